@@ -1,0 +1,123 @@
+"""Who may ask for what: access tokens, roles, and the local operator while there are no tokens."""
+
+import ipaddress
+from collections.abc import Awaitable, Callable
+from typing import Annotated
+from urllib.parse import urlsplit
+
+from fastapi import Depends, Security
+from fastapi.security import HTTPBearer
+from starlette.requests import HTTPConnection
+
+from app.api.problems import ProblemError
+from app.api.state import EdgeState, State
+from app.api.tokens import Principal, Role
+from app.settings import is_loopback
+
+LOCAL_OPERATOR = Principal("local operator", Role.ADMIN)
+
+# Only for the OpenAPI document: the header itself is read below, so that problems are answered our way.
+_bearer = HTTPBearer(
+    auto_error=False,
+    scheme_name="token",
+    description="A token made by `bathyfleet token create`. Needed as soon as one token exists.",
+)
+
+READERS = frozenset(Role)
+OPERATORS = frozenset({Role.OPERATOR, Role.ADMIN})
+VEHICLES = OPERATORS | {Role.VEHICLE}
+
+
+async def authenticate(connection: HTTPConnection, state: EdgeState, *, query_token: bool = False) -> Principal:
+    """Return who asks.
+
+    ``query_token`` also takes the token from ``?token=``, for browsers' sockets, which cannot send headers.
+    Raises ProblemError (unauthenticated, forbidden).
+    """
+    _check_origin(connection, state)
+    token = connection.query_params.get("token") if query_token else None
+    header = connection.headers.get("authorization")
+    if header is not None:
+        scheme, _, token = header.partition(" ")
+        if scheme.lower() != "bearer":
+            raise _unauthenticated(f"the Authorization header has the scheme {scheme[:20]!r}")
+    if token is not None:
+        principal = await state.tokens.principal(token.strip())
+        if principal is None:
+            raise _unauthenticated("the access token is unknown, revoked or has run out")
+        return principal
+    if await state.tokens.any():
+        raise _unauthenticated("the request carries no access token")
+    if state.settings.insecure or _is_local(connection):
+        return LOCAL_OPERATOR
+    raise ProblemError(
+        "forbidden",
+        "without access tokens only this machine may use the service",
+        remedy="Make one on the machine of the service: bathyfleet token create NAME --role operator",
+    )
+
+
+def _unauthenticated(detail: str) -> ProblemError:
+    return ProblemError(
+        "unauthenticated",
+        detail,
+        remedy="Send the header Authorization: Bearer TOKEN; bathyfleet token create makes a token",
+        headers={"WWW-Authenticate": 'Bearer realm="bathyfleet"'},
+    )
+
+
+def _is_local(connection: HTTPConnection) -> bool:
+    """Tell whether this machine asks, under one of its own names (else a foreign page could rebind its name to us)."""
+    if connection.client is None:
+        return True  # a Unix socket
+    try:
+        local = ipaddress.ip_address(connection.client.host).is_loopback
+    except ValueError:
+        local = False
+    return local and is_loopback(connection.url.hostname or "localhost")
+
+
+def _check_origin(connection: HTTPConnection, state: EdgeState) -> None:
+    """Refuse what a page of another site sends through an operator's browser."""
+    origin = connection.headers.get("origin")
+    if origin is None or origin in state.settings.allowed_origins:
+        return
+    if connection.scope["type"] == "http" and connection.scope["method"] in ("GET", "HEAD"):
+        return
+    if urlsplit(origin).netloc != connection.headers.get("host"):
+        raise ProblemError(
+            "forbidden",
+            "the request comes from a page of another site",
+            remedy="Add its origin to allowed_origins in the settings if that is meant",
+        )
+
+
+def _allow(roles: frozenset[Role], doing: str) -> Callable[..., Awaitable[Principal]]:
+    async def dependency(
+        connection: HTTPConnection, state: State, _: Annotated[object, Security(_bearer)]
+    ) -> Principal:
+        principal = await authenticate(connection, state)
+        if principal.role not in roles:
+            raise ProblemError(
+                "forbidden",
+                f"the token {principal.name!r} has role {principal.role}, which may not {doing}",
+                remedy="Use a token with one of the roles " + ", ".join(sorted(roles)),
+            )
+        return principal
+
+    return dependency
+
+
+Reader = Annotated[Principal, Depends(_allow(READERS, "look"))]
+VehicleOrOperator = Annotated[Principal, Depends(_allow(VEHICLES, "act as a vehicle"))]
+Operator = Annotated[Principal, Depends(_allow(OPERATORS, "command missions"))]
+
+
+def check_vehicle(principal: Principal, vehicle: str) -> None:
+    """Refuse a token that is bound to another vehicle."""
+    if principal.vehicle is not None and principal.vehicle != vehicle:
+        raise ProblemError(
+            "forbidden",
+            f"the token {principal.name!r} belongs to vehicle {principal.vehicle!r}, not to {vehicle!r}",
+            remedy="Use the token of that vehicle",
+        )

@@ -1,0 +1,175 @@
+"""What happens around every request: an id, one log line, counted time, a checked body, no leaked traceback."""
+
+import email.message
+import json
+import re
+import secrets
+import time
+from collections.abc import Iterator
+from typing import Any
+
+import structlog
+from starlette.datastructures import Headers
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from app.api.metrics import observe_request
+from app.api.problems import FieldProblem, instance_of, invalid, make_problem, problem_response
+
+log = structlog.get_logger("app.api")
+
+_REQUEST_ID = re.compile(r"^[A-Za-z0-9._-]{1,64}$")
+_SURROGATES = re.compile("[\ud800-\udfff]")
+
+
+class RequestMiddleware:
+    """Outermost layer: names, times, counts and logs each request; answers 500 without internals."""
+
+    def __init__(self, app: ASGIApp) -> None:
+        self.app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Serve one HTTP request; everything else passes."""
+        if scope["type"] != "http":
+            await self.app(scope, receive, send)
+            return
+        given = Headers(scope=scope).get("x-request-id", "")
+        request_id = given if _REQUEST_ID.match(given) else secrets.token_hex(8)
+        scope.setdefault("state", {})["request_id"] = request_id
+        status = 0
+
+        async def send_with_id(message: Message) -> None:
+            nonlocal status
+            if message["type"] == "http.response.start":
+                status = message["status"]
+                message["headers"] = [
+                    *message.get("headers", []),
+                    (b"x-request-id", request_id.encode()),
+                    (b"x-content-type-options", b"nosniff"),
+                ]
+            await send(message)
+
+        began = time.perf_counter()
+        with structlog.contextvars.bound_contextvars(request_id=request_id):
+            try:
+                await self.app(scope, receive, send_with_id)
+            except Exception:
+                log.exception("request failed", method=scope["method"], path=scope["path"])
+                if status:
+                    raise
+                problem = make_problem(
+                    "internal",
+                    "an unexpected error occurred; the log has it under the request's id",
+                    instance=instance_of(scope),
+                    remedy=f"Report it together with the request's id {request_id}",
+                )
+                await problem_response(problem)(scope, receive, send_with_id)
+            finally:
+                seconds = time.perf_counter() - began
+                route = getattr(scope.get("route"), "path", "") or "unmatched"
+                observe_request(scope["method"], route, status, seconds)
+                emit = log.debug if route.endswith(("/health/live", "/health/ready", "/metrics")) else log.info
+                emit(
+                    "request",
+                    method=scope["method"],
+                    path=scope["path"],
+                    status=status,
+                    ms=round(seconds * 1000, 1),
+                )
+
+
+class BodyMiddleware:
+    """Refuses bodies that are too large, of another type than JSON, or with text that no database can store."""
+
+    def __init__(self, app: ASGIApp, max_bytes: int) -> None:
+        self.app = app
+        self.max_bytes = max_bytes
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Read and check the body of requests that may change something; everything else passes."""
+        if scope["type"] != "http" or scope["method"] in ("GET", "HEAD", "OPTIONS"):
+            await self.app(scope, receive, send)
+            return
+        headers = Headers(scope=scope)
+        declared = headers.get("content-length", "")
+        body = b"" if declared.isdigit() and int(declared) > self.max_bytes else await self._read(receive)
+        if body is None:
+            return
+        problem = None
+        if (declared.isdigit() and int(declared) > self.max_bytes) or len(body) > self.max_bytes:
+            problem = make_problem(
+                "body-too-large",
+                f"the body has more than {self.max_bytes} bytes",
+                instance=instance_of(scope),
+                remedy="Send it in several requests; measurements are taken in batches of any size up to the limit",
+            )
+        elif body and not _is_json(headers.get("content-type", "")):
+            problem = make_problem(
+                "unsupported-media-type",
+                f"the body is declared as {headers.get('content-type') or 'nothing'}",
+                instance=instance_of(scope),
+                remedy="Send JSON with the header Content-Type: application/json",
+            )
+        elif b"\\u" in body:
+            found = [*_unstorable(body)]
+            problem = invalid(found, len(found), scope) if found else None
+        if problem is not None:
+            await problem_response(problem)(scope, receive, send)
+            return
+        replayed = False
+
+        async def replay() -> Message:
+            nonlocal replayed
+            if replayed:
+                return await receive()
+            replayed = True
+            return {"type": "http.request", "body": body, "more_body": False}
+
+        await self.app(scope, replay, send)
+
+    async def _read(self, receive: Receive) -> bytes | None:
+        """Return the body, cut off soon after the limit; None when the client went away."""
+        chunks: list[bytes] = []
+        size = 0
+        while size <= self.max_bytes:
+            message = await receive()
+            if message["type"] == "http.disconnect":
+                return None
+            chunk = message.get("body", b"")
+            chunks.append(chunk)
+            size += len(chunk)
+            if not message.get("more_body", False):
+                break
+        return b"".join(chunks)
+
+
+def _is_json(content_type: str) -> bool:
+    message = email.message.Message()
+    message["content-type"] = content_type
+    subtype = message.get_content_subtype()
+    return message.get_content_maintype() == "application" and (subtype == "json" or subtype.endswith("+json"))
+
+
+def _unstorable(body: bytes) -> Iterator[FieldProblem]:
+    """Yield a problem for the first text with a NUL or a lone surrogate; these arrive only as \\u escapes."""
+    try:
+        parsed = json.loads(body)
+    except (ValueError, RecursionError):
+        return  # the router answers malformed bodies
+    pending: list[tuple[tuple[str, ...], Any]] = [((), parsed)]
+    while pending:
+        path, value = pending.pop()
+        texts = [value] if isinstance(value, str) else list(value) if isinstance(value, dict) else []
+        for text in texts:
+            if "\0" in text or _SURROGATES.search(text):
+                yield FieldProblem(
+                    location="body",
+                    field=".".join(path) or "body",
+                    value=ascii(text)[:100],
+                    message="the text holds a NUL character or a lone surrogate",
+                    expected="valid Unicode text",
+                )
+                return
+        if isinstance(value, dict):
+            pending.extend(((*path, key), item) for key, item in value.items())
+        elif isinstance(value, list):
+            pending.extend(((*path, str(index)), item) for index, item in enumerate(value))

@@ -1,0 +1,165 @@
+"""Missions: describing, listing, moving through their states, and their vehicles."""
+
+from enum import StrEnum
+from typing import Annotated
+
+from fastapi import APIRouter, Body, Response
+
+from app.api.auth import Operator, Reader
+from app.api.problems import problems
+from app.api.schemas import API, ActionRequest, MissionId, VehicleName
+from app.api.state import Service
+from app.missions.spec import MissionSpec, VehicleSpec
+from app.missions.views import ActionView, MissionSummary, MissionView
+
+router = APIRouter(prefix=f"{API}/missions", tags=["missions"], responses=problems("unauthenticated", "forbidden"))
+
+EXAMPLE_SPEC = {
+    "name": "Leixoes quay",
+    "area": {
+        "type": "Polygon",
+        "coordinates": [[[-8.705, 41.185], [-8.7038, 41.185], [-8.7038, 41.1859], [-8.705, 41.1859], [-8.705, 41.185]]],
+    },
+    "vehicles": [
+        {"name": "lauv-xplore-1", "kind": "imc", "sensor": "dvl"},
+        {"name": "lauv-xplore-2", "kind": "imc", "sensor": "dvl"},
+    ],
+    "steps": 100,
+    "limits": {"max_step_m": 10, "min_depth_m": 2, "max_depth_m": 8},
+    "planner": {"name": "cao"},
+}
+
+
+class Action(StrEnum):
+    """What an operator does with a mission."""
+
+    START = "start"
+    PAUSE = "pause"
+    RESUME = "resume"
+    ABORT = "abort"
+    FINISH = "finish"
+
+
+@router.post(
+    "",
+    operation_id="createMission",
+    summary="Describe a new mission",
+    status_code=201,
+    responses=problems("malformed-body", "conflict", "body-too-large", "unsupported-media-type", "invalid-request")
+    | {201: {"headers": {"Location": {"description": "Path of the mission", "schema": {"type": "string"}}}}},
+)
+async def create_mission(
+    spec: Annotated[
+        MissionSpec, Body(openapi_examples={"quay": {"summary": "Two IMC vehicles at a quay", "value": EXAMPLE_SPEC}})
+    ],
+    service: Service,
+    operator: Operator,
+    response: Response,
+) -> MissionView:
+    """Store a mission. It is a draft until it has a vehicle, then ready to start; nothing moves yet."""
+    mission = await service.create(spec, actor=operator.name)
+    response.headers["Location"] = f"{router.prefix}/{mission.id}"
+    return mission
+
+
+@router.get("", operation_id="listMissions", summary="List the missions")
+async def list_missions(service: Service, reader: Reader) -> list[MissionSummary]:
+    """Return every mission, newest first, with its state and progress."""
+    return await service.missions()
+
+
+@router.get(
+    "/{mission_id}",
+    operation_id="getMission",
+    summary="See a mission",
+    responses=problems("mission-not-found", "invalid-request"),
+)
+async def get_mission(mission_id: MissionId, service: Service, reader: Reader) -> MissionView:
+    """Return a mission with its description, its vehicles as they are now and their newest waypoints."""
+    return await service.mission(mission_id)
+
+
+_ACTION_PROBLEMS = problems(
+    "malformed-body",
+    "mission-not-found",
+    "move-refused",
+    "conflict",
+    "body-too-large",
+    "unsupported-media-type",
+    "invalid-request",
+)
+
+_ACTION_TEXTS = {
+    Action.START: (
+        "Start a mission",
+        "Engage the vehicles and begin the first step. Every vehicle has to be ready; a refusal names what is missing.",
+    ),
+    Action.PAUSE: (
+        "Pause a mission",
+        "Stop the vehicles and the steps until resumed. The answer tells which vehicles acknowledged the stop.",
+    ),
+    Action.RESUME: ("Resume a paused mission", "Engage the vehicles again and go on with the next step."),
+    Action.ABORT: (
+        "Abort a mission",
+        "Stop every vehicle now and end the mission. The answer tells which vehicles acknowledged the stop.",
+    ),
+    Action.FINISH: (
+        "Finish a mission early",
+        "Stop the vehicles and end the mission as finished; its products stay available.",
+    ),
+}
+
+
+def _add_action(action: Action) -> None:
+    summary, description = _ACTION_TEXTS[action]
+
+    async def act(
+        mission_id: MissionId, service: Service, operator: Operator, body: ActionRequest | None = None
+    ) -> ActionView:
+        note = body.note if body is not None else ""
+        return await service.act(mission_id, action.value, actor=operator.name, note=note)
+
+    router.add_api_route(
+        f"/{{mission_id}}/{action}",
+        act,
+        methods=["POST"],
+        operation_id=f"{action}Mission",
+        summary=summary,
+        description=description,
+        responses=_ACTION_PROBLEMS,
+    )
+
+
+for _action in Action:
+    _add_action(_action)
+
+
+@router.post(
+    "/{mission_id}/vehicles",
+    operation_id="addVehicle",
+    summary="Add a vehicle to a mission",
+    responses=problems(
+        "malformed-body",
+        "mission-not-found",
+        "conflict",
+        "body-too-large",
+        "unsupported-media-type",
+        "invalid-request",
+    ),
+    tags=["vehicles"],
+)
+async def add_vehicle(mission_id: MissionId, vehicle: VehicleSpec, service: Service, operator: Operator) -> MissionView:
+    """Let a vehicle take part, also while the mission runs: it joins at the next step."""
+    return await service.add_vehicle(mission_id, vehicle, actor=operator.name)
+
+
+@router.delete(
+    "/{mission_id}/vehicles/{name}",
+    operation_id="removeVehicle",
+    summary="Take a vehicle out of a mission",
+    responses=problems("mission-not-found", "vehicle-not-found", "conflict", "invalid-request"),
+    tags=["vehicles"],
+)
+async def remove_vehicle(mission_id: MissionId, name: VehicleName, service: Service, operator: Operator) -> MissionView:
+    """Stop the vehicle and go on without it; what it measured stays."""
+    return await service.remove_vehicle(mission_id, name, actor=operator.name)

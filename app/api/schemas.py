@@ -1,0 +1,91 @@
+"""Bodies and parameters that only the HTTP edge knows; everything else is the missions' own models."""
+
+from typing import Annotated
+
+from fastapi import Path
+from pydantic import BaseModel, ConfigDict, Field, PlainValidator, ValidationError
+
+from app.api.problems import field_problem
+from app.missions.spec import Name
+from app.missions.views import Measurement
+
+API = "/api/v1"
+
+MAX_BATCH = 10_000
+
+MissionId = Annotated[
+    str,
+    Path(
+        min_length=1,
+        max_length=64,
+        pattern=r"^[A-Za-z0-9_-]+$",
+        description="The mission's id",
+        examples=["0197a3c8-6f2e-7c41-9d0f-5b2f6f0c1a2b"],
+    ),
+]
+VehicleName = Annotated[Name, Path(description="The vehicle's name", examples=["lauv-xplore-1"])]
+
+
+class ActionRequest(BaseModel):
+    """What an operator adds to an action."""
+
+    model_config = ConfigDict(extra="forbid", json_schema_extra={"examples": [{"note": "Ferry passes at 14:10"}]})
+
+    note: str = Field(default="", max_length=2000, description="Kept in the mission's log beside the action")
+
+
+def _item(value: object) -> Measurement | str:
+    """Return the measurement, or in words why ``value`` is none."""
+    try:
+        return Measurement.model_validate(value)
+    except ValidationError as error:
+        faults = [
+            field_problem(entry, location="body", path=entry["loc"], model=Measurement)
+            for entry in error.errors(include_url=False)
+        ]
+        return "; ".join(f"{f.field}: {f.message}; expected {f.expected}" for f in faults[:5])
+
+
+BatchItem = Annotated[Measurement | str, PlainValidator(_item, json_schema_input_type=Measurement)]
+
+
+class MeasurementBatch(BaseModel):
+    """Measurements in the order in which they were made. Each item has its own verdict."""
+
+    model_config = ConfigDict(
+        extra="forbid",
+        json_schema_extra={
+            "examples": [
+                {
+                    "items": [
+                        {
+                            "vehicle": "lauv-xplore-1",
+                            "time_s": 1795225140.5,
+                            "lat_deg": 41.1852,
+                            "lon_deg": -8.7046,
+                            "depth_m": 2.0,
+                            "range_m": 11.4,
+                        }
+                    ]
+                }
+            ]
+        },
+    )
+
+    items: list[BatchItem] = Field(min_length=1, max_length=MAX_BATCH)
+
+
+class ComponentHealth(BaseModel):
+    """Whether the service can do its work."""
+
+    status: str = Field(description="ok, or failing when a component is not ok", examples=["ok"])
+    version: str = Field(description="Version of bathyfleet")
+    components: dict[str, str] = Field(
+        description="Each component: ok, or what is wrong with it", examples=[{"database": "ok", "imc": "ok"}]
+    )
+
+
+class Liveness(BaseModel):
+    """The process answers."""
+
+    status: str = Field(default="ok", examples=["ok"])

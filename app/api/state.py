@@ -1,0 +1,69 @@
+"""What the routes share: the mission service, the tokens, the settings and the count of open streams."""
+
+import asyncio
+import secrets
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import Annotated
+
+from fastapi import Depends
+from starlette.requests import HTTPConnection
+
+from app.api.metrics import LIVE_VIEWERS
+from app.api.problems import ProblemError
+from app.api.tokens import TokenStore
+from app.missions.service import MissionService
+from app.settings import Settings
+
+
+@dataclass
+class EdgeState:
+    """Shared by every request; made once when the application starts.
+
+    Attributes
+    ----------
+    stopping
+        Set when the process was asked to end: streams and long polls finish then instead of holding it up.
+    run_id
+        Differs between runs of the process, whose map versions all begin at 1.
+    """
+
+    settings: Settings
+    service: MissionService
+    tokens: TokenStore
+    stopping: asyncio.Event = field(default_factory=asyncio.Event)
+    run_id: str = field(default_factory=lambda: secrets.token_hex(4))
+    streams: int = 0
+
+    @contextmanager
+    def stream(self, kind: str) -> Iterator[None]:
+        """Count a live view (``websocket``) or event stream (``sse``). Raises ProblemError above the limit."""
+        if self.streams >= self.settings.max_streams:
+            raise ProblemError(
+                "too-many-streams",
+                f"{self.streams} live views and event streams are open, as many as max_streams allows",
+                remedy="Close some, or raise max_streams in the settings",
+                headers={"Retry-After": "10"},
+            )
+        self.streams += 1
+        LIVE_VIEWERS.labels(kind).inc()
+        try:
+            yield
+        finally:
+            self.streams -= 1
+            LIVE_VIEWERS.labels(kind).dec()
+
+
+def edge_state(connection: HTTPConnection) -> EdgeState:
+    """The state of the application that serves this connection."""
+    state: EdgeState = connection.app.state.edge
+    return state
+
+
+def _service(connection: HTTPConnection) -> MissionService:
+    return edge_state(connection).service
+
+
+State = Annotated[EdgeState, Depends(edge_state)]
+Service = Annotated[MissionService, Depends(_service)]

@@ -1,0 +1,219 @@
+"""What a mission does, as it happens: the log as server-sent events, everything over a WebSocket."""
+
+import asyncio
+from collections.abc import AsyncIterator
+from typing import Annotated
+
+import anyio
+import structlog
+from fastapi import APIRouter, Header, Query, Request, Response, WebSocket, WebSocketDisconnect
+from pydantic import TypeAdapter
+from sse_starlette import EventSourceResponse, ServerSentEvent
+
+from app.api.auth import Reader, authenticate
+from app.api.problems import ProblemError, describe_mission_error, problems
+from app.api.racing import first_of
+from app.api.schemas import API, MissionId
+from app.api.state import EdgeState, Service, State, edge_state
+from app.missions.broadcast import WatcherTooSlowError
+from app.missions.errors import MissionError
+from app.missions.service import MissionService
+from app.missions.views import EventMessage, EventView, LiveMessage, SnapshotMessage
+
+router = APIRouter(prefix=f"{API}/missions/{{mission_id}}", tags=["live"])
+
+PAGE = 500
+KEEP_ALIVE_S = 15
+RECONNECT_MS = 2000
+
+CLOSE_UNAUTHENTICATED = 4401
+CLOSE_FORBIDDEN = 4403
+CLOSE_NOT_FOUND = 4404
+CLOSE_TOO_MANY = 4429
+CLOSE_TRY_AGAIN = 1013
+CLOSE_GOING_AWAY = 1001
+
+log = structlog.get_logger(__name__)
+
+_events = TypeAdapter(list[EventView])
+_message: TypeAdapter[LiveMessage] = TypeAdapter(LiveMessage)
+
+
+@router.get(
+    "/events",
+    operation_id="getEvents",
+    summary="Follow or read a mission's log",
+    responses=problems(
+        "unauthenticated", "forbidden", "mission-not-found", "not-acceptable", "invalid-request", "too-many-streams"
+    )
+    | {
+        200: {
+            "description": "The log: as a stream (`text/event-stream`, also when anything is accepted) that replays "
+            "what is newer than `Last-Event-ID` and then goes on, or as a list (`application/json`)",
+            "content": {
+                "application/json": {"schema": {"type": "array", "items": {"$ref": "#/components/schemas/EventView"}}},
+                "text/event-stream": {
+                    "schema": {
+                        "type": "string",
+                        "description": "Events whose id is the entry's id, whose name is its kind and whose data is an "
+                        "EventView as JSON",
+                    }
+                },
+            },
+        }
+    },
+    response_class=Response,
+)
+async def get_events(
+    mission_id: MissionId,
+    request: Request,
+    service: Service,
+    state: State,
+    reader: Reader,
+    last_event_id: Annotated[
+        int | None, Header(ge=0, lt=2**62, description="Id of the newest entry that the client has")
+    ] = None,
+    after: Annotated[
+        int, Query(ge=0, lt=2**62, description="Only entries with a larger id, like `Last-Event-ID`, which is stronger")
+    ] = 0,
+    limit: Annotated[int, Query(ge=1, le=1000, description="Most entries in a list")] = 1000,
+) -> Response:
+    """Return the mission's log, oldest entry first."""
+    start = after if last_event_id is None else last_event_id
+    if _wants_list(request.headers.get("accept", "*/*")):
+        entries = await service.events(mission_id, after=start, limit=limit)
+        return Response(_events.dump_json(entries), media_type="application/json")
+    await service.mission(mission_id)
+    if state.streams >= state.settings.max_streams:
+        with state.stream("sse"):
+            pass  # raises: the limit is reached
+    return EventSourceResponse(
+        _stream(service, state, mission_id, start),
+        ping=KEEP_ALIVE_S,
+        headers={"Cache-Control": "no-store", "X-Accel-Buffering": "no"},
+    )
+
+
+def _wants_list(accept: str) -> bool:
+    """Tell whether JSON is preferred over an event stream. Raises ProblemError when neither is accepted."""
+    weights = {"text/event-stream": -1.0, "application/json": -1.0}
+    specific = dict.fromkeys(weights, -1)
+    for part in accept.split(","):
+        media, *parameters = (piece.strip().lower() for piece in part.split(";"))
+        weight = 1.0
+        for parameter in parameters:
+            name, _, value = parameter.partition("=")
+            if name == "q":
+                try:
+                    weight = float(value)
+                except ValueError:
+                    weight = 0.0
+        for known in weights:
+            level = 2 if media == known else 1 if media == known.split("/")[0] + "/*" else 0 if media == "*/*" else -1
+            if level > specific[known]:
+                specific[known], weights[known] = level, weight
+    best = max(weights.values())
+    if best <= 0:
+        raise ProblemError(
+            "not-acceptable",
+            f"the header Accept is {accept[:100]!r}",
+            remedy="Accept text/event-stream or application/json",
+        )
+    # Clients that name JSON and also take anything (as HTTP libraries do) want JSON.
+    json, stream = "application/json", "text/event-stream"
+    return (weights[json], specific[json]) > (weights[stream], specific[stream])
+
+
+async def _stream(
+    service: MissionService, state: EdgeState, mission_id: str, start: int
+) -> AsyncIterator[ServerSentEvent]:
+    """Yield the log after ``start``, first what is stored, then what happens."""
+    with state.stream("sse"):
+        async with service.subscribe(mission_id) as messages:
+            snapshot = await anext(messages)
+            assert isinstance(snapshot, SnapshotMessage)  # noqa: S101 - the subscription's contract
+            sent = start
+            while sent < snapshot.last_event_id:
+                page = await service.events(mission_id, after=sent, limit=PAGE)
+                if not page:
+                    break
+                for event in page:
+                    yield _sse(event)
+                    sent = event.id
+            try:
+                async for message in _until_stopping(messages, state.stopping):
+                    if isinstance(message, EventMessage) and message.event.id > sent:
+                        yield _sse(message.event)
+                        sent = message.event.id
+            except WatcherTooSlowError:
+                return  # the client reconnects with its Last-Event-ID and misses nothing
+
+
+def _sse(event: EventView) -> ServerSentEvent:
+    return ServerSentEvent(event.model_dump_json(), id=str(event.id), event=event.kind, retry=RECONNECT_MS)
+
+
+async def _until_stopping(messages: AsyncIterator[LiveMessage], stopping: asyncio.Event) -> AsyncIterator[LiveMessage]:
+    """Yield messages until the process is asked to end."""
+    newest: LiveMessage | None = None
+
+    async def take() -> None:
+        nonlocal newest
+        newest = await anext(messages, None)
+
+    while await first_of(take(), stopping.wait()) == 0 and newest is not None:
+        yield newest
+
+
+@router.websocket("/live")
+async def live(websocket: WebSocket, mission_id: str) -> None:
+    """Send LiveMessage objects as JSON text: first a snapshot, then what changes.
+
+    Closes with 4401 (no valid token; send it in the Authorization header or as ``?token=``), 4403, 4404 (no such
+    mission), 4429 (too many viewers), 1013 (fell behind: reconnect) or 1001 (the service ends).
+    """
+    state = edge_state(websocket)
+    await websocket.accept()
+    try:
+        await authenticate(websocket, state, query_token=True)
+        with state.stream("websocket"):
+            await _serve(websocket, state, mission_id)
+    except ProblemError as error:
+        codes = {
+            "unauthenticated": CLOSE_UNAUTHENTICATED,
+            "forbidden": CLOSE_FORBIDDEN,
+            "too-many-streams": CLOSE_TOO_MANY,
+        }
+        await _close(websocket, codes[error.kind], error.detail)
+    except MissionError as error:
+        await _close(websocket, CLOSE_NOT_FOUND, describe_mission_error(error)[1])
+    except WatcherTooSlowError:
+        await _close(websocket, CLOSE_TRY_AGAIN, "messages were not taken in time: reconnect")
+    except WebSocketDisconnect:
+        pass
+
+
+async def _serve(websocket: WebSocket, state: EdgeState, mission_id: str) -> None:
+    async with state.service.subscribe(mission_id) as messages:
+        ended = await first_of(_send_all(websocket, messages), _until_left(websocket), state.stopping.wait())
+        if ended == 2:
+            await _close(websocket, CLOSE_GOING_AWAY, "the service ends")
+
+
+async def _send_all(websocket: WebSocket, messages: AsyncIterator[LiveMessage]) -> None:
+    async for message in messages:
+        await websocket.send_text(_message.dump_json(message).decode())
+
+
+async def _until_left(websocket: WebSocket) -> None:
+    """Return when the client leaves; what it sends is not read."""
+    while (await websocket.receive())["type"] != "websocket.disconnect":
+        pass
+
+
+async def _close(websocket: WebSocket, code: int, reason: str) -> None:
+    try:
+        # A close frame has room for 123 bytes of reason.
+        await websocket.close(code, reason.encode()[:120].decode(errors="ignore"))
+    except (RuntimeError, WebSocketDisconnect, anyio.ClosedResourceError):
+        log.debug("viewer was gone before it could be told", reason=reason)

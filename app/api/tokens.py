@@ -1,0 +1,96 @@
+"""Access tokens: made once, shown once, kept as a hash."""
+
+import hashlib
+import secrets
+import uuid
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from enum import StrEnum
+
+from app.storage import tokens
+from app.storage.database import Database
+from app.storage.models import TokenRow
+
+TOKEN_PREFIX = "bf_"  # noqa: S105 - makes leaked tokens easy to search for
+
+
+class Role(StrEnum):
+    """What the holder of a token may do."""
+
+    VIEWER = "viewer"
+    """Look at everything."""
+    VEHICLE = "vehicle"
+    """Look, post measurements and fetch waypoints."""
+    OPERATOR = "operator"
+    """Everything that concerns missions."""
+    ADMIN = "admin"
+    """Everything."""
+
+
+@dataclass(frozen=True)
+class Principal:
+    """Who asks. ``vehicle`` binds a token of role vehicle to one vehicle."""
+
+    name: str
+    role: Role
+    vehicle: str | None = None
+
+
+def token_hash(token: str) -> str:
+    """Return what is stored of a token. Its 256 random bits need no slow hash."""
+    return hashlib.sha256(token.encode()).hexdigest()
+
+
+class TokenStore:
+    """The tokens in the database."""
+
+    def __init__(self, database: Database) -> None:
+        self._database = database
+
+    async def create(
+        self, name: str, role: Role, *, vehicle: str | None = None, expires_at: datetime | None = None
+    ) -> tuple[str, str]:
+        """Store a new token; return its id and the token itself, which cannot be seen again."""
+        token = TOKEN_PREFIX + secrets.token_urlsafe(32)
+        row = TokenRow(
+            id=str(uuid.uuid4()),
+            name=name,
+            role=role.value,
+            vehicle=vehicle,
+            token_hash=token_hash(token),
+            created_at=datetime.now(UTC),
+            expires_at=expires_at,
+            revoked_at=None,
+        )
+        async with self._database.writing() as session:
+            session.add(row)
+        return row.id, token
+
+    async def all(self) -> list[TokenRow]:
+        """Return every token that was ever made, newest first."""
+        async with self._database.reading() as session:
+            return list(await tokens.all_tokens(session))
+
+    async def any(self) -> bool:
+        """Tell whether a token exists that was not revoked; then every request must carry one."""
+        async with self._database.reading() as session:
+            return await tokens.any_token(session)
+
+    async def revoke(self, token_id: str) -> bool:
+        """Revoke a token for good; False when no valid token has this id."""
+        async with self._database.writing() as session:
+            return await tokens.revoke(session, token_id, datetime.now(UTC))
+
+    async def principal(self, token: str) -> Principal | None:
+        """Return who holds ``token``; None when it is unknown, revoked or has run out."""
+        async with self._database.reading() as session:
+            row = await tokens.by_hash(session, token_hash(token))
+        if row is None or row.revoked_at is not None:
+            return None
+        if row.expires_at is not None and _aware(row.expires_at) <= datetime.now(UTC):
+            return None
+        return Principal(row.name, Role(row.role), row.vehicle)
+
+
+def _aware(moment: datetime) -> datetime:
+    return moment if moment.tzinfo else moment.replace(tzinfo=UTC)

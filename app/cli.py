@@ -1,0 +1,447 @@
+"""The command ``bathyfleet``. What a command needs is imported when it runs, so that ``--help`` answers at once."""
+
+import asyncio
+import json
+import sys
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from app import __version__
+
+if TYPE_CHECKING:
+    from app.settings import Settings
+    from imc_bridge.doctor import Diagnosis
+
+app = typer.Typer(
+    name="bathyfleet",
+    help="Maps an unknown sea floor with a fleet of AUVs.",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+token_app = typer.Typer(help="Make, list and revoke access tokens.", no_args_is_help=True)
+app.add_typer(token_app, name="token")
+
+
+class CommandError(Exception):
+    """A command failed for a reason that the user can do something about."""
+
+    def __init__(self, message: str, remedy: str = "") -> None:
+        super().__init__(message)
+        self.remedy = remedy
+
+
+DEMO_FOLDER = Path("bathyfleet-demo")
+
+FAILURE = 1
+USAGE = 2
+
+
+class LogLevel(StrEnum):
+    """How much is logged."""
+
+    DEBUG = "debug"
+    INFO = "info"
+    WARNING = "warning"
+    ERROR = "error"
+
+
+class LogFormat(StrEnum):
+    """How it is written."""
+
+    CONSOLE = "console"
+    JSON = "json"
+
+
+class TokenRole(StrEnum):
+    """What the holder of a token may do: the roles of ``app.api.tokens``."""
+
+    VIEWER = "viewer"
+    VEHICLE = "vehicle"
+    OPERATOR = "operator"
+    ADMIN = "admin"
+
+
+Database = Annotated[
+    str | None,
+    typer.Option(help="Database URL: sqlite+aiosqlite:///FILE or postgresql+asyncpg://USER:PASSWORD@HOST/NAME"),
+]
+
+
+@app.callback(invoke_without_command=True)
+def _root(
+    version: Annotated[bool, typer.Option("--version", help="Show the version and exit.")] = False,
+) -> None:
+    if version:
+        typer.echo(f"bathyfleet {__version__}")
+        raise typer.Exit
+
+
+@app.command()
+def serve(
+    host: Annotated[str | None, typer.Option(help="Address to listen on [default: 127.0.0.1]")] = None,
+    port: Annotated[
+        int | None, typer.Option(min=0, max=65535, help="TCP port; 0: any free one [default: 8080]")
+    ] = None,
+    database: Database = None,
+    insecure: Annotated[
+        bool, typer.Option("--insecure", help="Serve other machines without access tokens: anyone may command.")
+    ] = False,
+    time_scale: Annotated[
+        float | None, typer.Option(help="How much faster than wall time simulated vehicles live [default: 1]")
+    ] = None,
+    log_level: Annotated[LogLevel | None, typer.Option(help="How much is logged [default: info]")] = None,
+    log_format: Annotated[LogFormat | None, typer.Option(help="How it is written [default: console]")] = None,
+) -> None:
+    """Run the service. Further settings: environment BATHYFLEET_* or bathyfleet.toml."""
+    settings = _settings(
+        host=host,
+        port=port,
+        database_url=database,
+        insecure=insecure or None,
+        time_scale=time_scale,
+        log_level=log_level and log_level.value,
+        log_format=log_format and log_format.value,
+    )
+    from app.api import logs
+    from app.main import Server, serve
+
+    logs.configure(settings.log_level, settings.log_format)
+
+    def started(server: Server) -> None:
+        typer.echo(f"bathyfleet answers at {server.url} (API: {server.url}/api/docs). Ctrl-C stops it.", err=True)
+
+    asyncio.run(serve(settings, started=started))
+
+
+@app.command()
+def migrate(
+    database: Database = None,
+    down_to: Annotated[
+        str | None, typer.Option(help="Go back to this revision ('base': empty). What its tables held is lost.")
+    ] = None,
+) -> None:
+    """Bring the database's tables up to date."""
+    settings = _settings(database_url=database)
+    from alembic.util import CommandError as AlembicError
+    from sqlalchemy.exc import SQLAlchemyError
+
+    from app.storage import migrate as migrations
+
+    async def run() -> tuple[str | None, str | None]:
+        url = settings.database_url
+        before = await migrations.current(url)
+        if down_to is None:
+            await migrations.upgrade(url)
+        else:
+            await migrations.downgrade(url, down_to)
+        return before, await migrations.current(url)
+
+    try:
+        before, after = asyncio.run(run())
+    except (AlembicError, SQLAlchemyError, OSError) as error:
+        reason = str(getattr(error, "orig", None) or error).partition("\n")[0]
+        raise CommandError(f"the database cannot be migrated: {reason}") from None
+    if before == after:
+        typer.echo(f"the database is at revision {after or 'empty'} already")
+    else:
+        typer.echo(f"the database went from revision {before or 'empty'} to {after or 'empty'}")
+
+
+@token_app.command("create")
+def create_token(
+    name: Annotated[str, typer.Argument(help="Who will hold it, shown in logs.")],
+    role: Annotated[TokenRole, typer.Option(help="What the holder may do.")] = TokenRole.OPERATOR,
+    vehicle: Annotated[str | None, typer.Option(help="The one vehicle that a token of role vehicle is for.")] = None,
+    days: Annotated[float | None, typer.Option(min=0, help="Days it is valid; default: until revoked.")] = None,
+    database: Database = None,
+) -> None:
+    """Make an access token. It is printed once and cannot be seen again; from now on every request needs one."""
+    if vehicle is not None and role is not TokenRole.VEHICLE:
+        raise typer.BadParameter("only a token of role vehicle is for one vehicle", param_hint="--vehicle")
+    if not name.strip() or len(name) > 120:
+        raise typer.BadParameter("the name has 1 to 120 characters", param_hint="NAME")
+    from datetime import UTC, datetime, timedelta
+
+    from app.api.tokens import Role, TokenStore
+
+    expires_at = None if days is None else datetime.now(UTC) + timedelta(days=days)
+
+    async def run(store: TokenStore) -> tuple[str, str]:
+        return await store.create(name, Role(role.value), vehicle=vehicle, expires_at=expires_at)
+
+    token_id, token = _with_tokens(database, run)
+    typer.echo(f"token {token_id} of role {role} for {name}; it is shown only now:", err=True)
+    typer.echo(token)
+
+
+@token_app.command("list")
+def list_tokens(
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False, database: Database = None
+) -> None:
+    """List the access tokens, newest first."""
+    from app.api.tokens import TokenStore
+
+    async def run(store: TokenStore) -> list[dict[str, Any]]:
+        return [
+            {
+                "id": row.id,
+                "name": row.name,
+                "role": row.role,
+                "vehicle": row.vehicle,
+                "created_at": row.created_at.isoformat(timespec="seconds"),
+                "expires_at": row.expires_at and row.expires_at.isoformat(timespec="seconds"),
+                "revoked_at": row.revoked_at and row.revoked_at.isoformat(timespec="seconds"),
+            }
+            for row in await store.all()
+        ]
+
+    rows = _with_tokens(database, run)
+    if as_json:
+        typer.echo(json.dumps(rows, indent=2))
+        return
+    if not rows:
+        typer.echo("there are no tokens: only this machine may use the service")
+        return
+    from rich.console import Console
+    from rich.table import Column, Table
+
+    table = Table(Column("id", no_wrap=True), "name", "role", "vehicle", "made", "valid until", "revoked")
+    for row in rows:
+        table.add_row(*(str(value) if value is not None else "–" for value in row.values()))
+    Console().print(table)
+
+
+@token_app.command("revoke")
+def revoke_token(
+    token_id: Annotated[str, typer.Argument(metavar="ID", help="Its id, or the begin of it.")],
+    database: Database = None,
+) -> None:
+    """Revoke an access token for good."""
+    from app.api.tokens import TokenStore
+
+    async def run(store: TokenStore) -> list[str]:
+        valid = [row.id for row in await store.all() if row.revoked_at is None and row.id.startswith(token_id)]
+        if len(valid) == 1:
+            await store.revoke(valid[0])
+        return valid
+
+    found = _with_tokens(database, run)
+    if len(found) != 1:
+        meaning = "several tokens have ids that begin" if found else "no valid token has an id that begins"
+        raise typer.BadParameter(f"{meaning} with {token_id!r}; see bathyfleet token list", param_hint="ID")
+    typer.echo(f"token {found[0]} is revoked")
+
+
+@app.command()
+def export(
+    mission: Annotated[str, typer.Argument(metavar="MISSION", help="Its id, or the begin of it.")],
+    format: Annotated[  # noqa: A002 - the option's name
+        str, typer.Option("--format", "-f", help="tif, xyz, csv (soundings), geojson (contours and tracks) or png.")
+    ] = "tif",
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", help="File to write; '-' is stdout [default: in output_dir]")
+    ] = None,
+    database: Database = None,
+) -> None:
+    """Write a mission's map or soundings to a file, from the database; no service has to run."""
+    settings = _settings(database_url=database)
+    from app.missions.maps import FORMATS, Product
+    from app.missions.service import MissionService
+    from app.storage.database import Database as Store
+    from app.storage.prepare import prepare_database
+
+    if format not in FORMATS:
+        raise typer.BadParameter(f"{format!r} is not one of {', '.join(FORMATS)}", param_hint="--format")
+
+    async def run() -> Product:
+        await prepare_database(settings.database_url, may_upgrade=settings.migrates_itself)
+        store = Store(settings.database_url)
+        # Nothing is started: the links stay closed, whatever a service on this database is doing.
+        closed = settings.service().model_copy(update={"imc": settings.imc.model_copy(update={"enabled": False})})
+        service = MissionService(closed, store)
+        try:
+            every = await service.missions()
+            meant = [summary.id for summary in every if summary.id.startswith(mission)]
+            if len(meant) != 1:
+                ids = "; ".join(f"{summary.id} {summary.name}" for summary in every[:5]) or "none"
+                raise CommandError(f"{len(meant)} missions have ids that begin with {mission!r}", f"There are: {ids}")
+            return await service.export(meant[0], format)
+        finally:
+            await service.shutdown()
+            await store.close()
+
+    product = asyncio.run(run())
+    if out == Path("-"):
+        sys.stdout.buffer.write(product.content)
+        return
+    path = out or settings.output_dir / product.filename
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(product.content)
+    except OSError as error:
+        raise CommandError(f"{path} cannot be written: {error.strerror}") from None
+    typer.echo(f"{path}: {len(product.content)} bytes")
+
+
+@app.command()
+def doctor(
+    seconds: Annotated[float, typer.Option(min=0.1, max=3600, help="How long to listen.")] = 15.0,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+) -> None:
+    """Listen for IMC vehicles and say what is missing. Nothing is commanded. Exit code 1 when something is wrong."""
+    settings = _settings()
+    import dataclasses
+
+    from app.missions.links.imc import bridge_settings
+    from imc_bridge.doctor import Diagnosis, diagnose
+
+    async def run() -> Diagnosis:
+        return await diagnose(bridge_settings(settings.imc, settings.time_scale), seconds)
+
+    try:
+        if as_json:
+            diagnosis = asyncio.run(run())
+        else:
+            from rich.console import Console
+
+            with Console(stderr=True).status(f"Listening for {seconds:g} s …"):
+                diagnosis = asyncio.run(run())
+    except OSError as error:
+        raise CommandError(
+            f"cannot listen on UDP port {settings.imc.port}: {error.strerror or error}",
+            "Stop the service first, or ask it: GET /api/v1/vehicles",
+        ) from None
+    if as_json:
+        typer.echo(json.dumps(dataclasses.asdict(diagnosis) | {"healthy": diagnosis.healthy}, indent=2))
+    else:
+        _show_diagnosis(diagnosis)
+    raise typer.Exit(0 if diagnosis.healthy else FAILURE)
+
+
+def _show_diagnosis(diagnosis: "Diagnosis") -> None:
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    from imc_bridge.doctor import Severity
+
+    marks = {Severity.OK: ("ok", "green"), Severity.NOTE: ("note", "yellow"), Severity.PROBLEM: ("problem", "bold red")}
+    table = Table(
+        "", "", "finding", "what to do", title=f"IMC, listened for {diagnosis.seconds:g} s", title_style="bold"
+    )
+    groups = [("this service", diagnosis.own), *((f"{n.name} ({n.imc_id:#06x})", n.findings) for n in diagnosis.nodes)]
+    for name, findings in groups:
+        for index, finding in enumerate(findings):
+            words, style = marks[finding.severity]
+            table.add_row("" if index else Text(name), Text(words, style), Text(finding.text), Text(finding.remedy))
+        table.add_section()
+    Console().print(table)
+
+
+@app.command()
+def demo(
+    speed: Annotated[float, typer.Option(min=0.1, max=200, help="How much faster than real time.")] = 12.0,
+    terrain: Annotated[
+        Path | None,
+        typer.Option(
+            exists=True,
+            dir_okay=False,
+            readable=True,
+            help="Sea floor: .npz, .asc, GeoTIFF, .xyz or .csv [default: generated]",
+        ),
+    ] = None,
+    vehicles: Annotated[int, typer.Option(min=1, max=20, help="Number of simulated AUVs.")] = 2,
+    steps: Annotated[int, typer.Option(min=1, max=100_000, help="Steps of the mission.")] = 60,
+    keep_serving: Annotated[bool, typer.Option("--keep-serving", help="Go on serving after the mission.")] = False,
+    port: Annotated[int, typer.Option(min=0, max=65535, help="TCP port of the service; 0: any free one.")] = 8080,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the sea floor and every random decision.")] = 0,
+    output: Annotated[Path, typer.Option(file_okay=False, help="Folder for the files.")] = DEMO_FOLDER,
+) -> None:
+    """Try it without a vehicle: a whole mission with simulated AUVs that speak IMC, from start to map."""
+    from app.demo import DemoError, DemoOptions, run_demo
+
+    options = DemoOptions(
+        vehicles=vehicles,
+        steps=steps,
+        speed=speed,
+        terrain=terrain,
+        seed=seed,
+        port=port,
+        keep_serving=keep_serving,
+        output=output,
+    )
+    try:
+        code = run_demo(options)
+    except DemoError as error:
+        raise CommandError(str(error)) from None
+    raise typer.Exit(code)
+
+
+@app.command(
+    "evaluate",
+    context_settings={"allow_extra_args": True, "ignore_unknown_options": True, "allow_interspersed_args": False},
+    add_help_option=False,
+)
+def evaluate(context: typer.Context) -> None:
+    """Compare planners in closed loop, without a network. See bathyfleet evaluate --help."""
+    # Mounted by hand: its options are made from the planners, which take a second to load.
+    from app.evaluation.cli import evaluate_app
+
+    evaluate_app(args=context.args, prog_name="bathyfleet evaluate")
+
+
+def _with_tokens(database: str | None, run: Any) -> Any:
+    settings = _settings(database_url=database)
+    from app.api.tokens import TokenStore
+    from app.storage.database import Database as Store
+    from app.storage.prepare import prepare_database
+
+    async def use() -> Any:
+        await prepare_database(settings.database_url, may_upgrade=settings.migrates_itself)
+        store = Store(settings.database_url)
+        try:
+            return await run(TokenStore(store))
+        finally:
+            await store.close()
+
+    return asyncio.run(use())
+
+
+def _settings(**overrides: Any) -> "Settings":
+    from app.api import logs
+    from app.settings import load_settings
+
+    settings = load_settings(**overrides)
+    logs.configure("warning", settings.log_format)
+    return settings
+
+
+def main() -> None:
+    """Run the command line; expected errors are one line and an exit code: 2 for wrong usage, 1 for failure."""
+    try:
+        app()
+    except Exception as error:
+        code = _exit_code(error)
+        if code is None:
+            raise
+        lines = getattr(error, "problems", None) or [str(error)]
+        remedy = getattr(error, "remedy", "")
+        for line in lines:
+            typer.echo(f"error: {line}" + (f". {remedy}" if remedy else ""), err=True)
+        sys.exit(code)
+
+
+def _exit_code(error: Exception) -> int | None:
+    """Return the exit code of an error that is expected; None for a fault of the program."""
+    from app.missions.errors import MissionError
+    from app.settings import SettingsError, StartupError
+    from app.storage.prepare import DatabaseNotReadyError
+
+    if isinstance(error, SettingsError):
+        return USAGE
+    expected = isinstance(error, CommandError | StartupError | DatabaseNotReadyError | MissionError)
+    return FAILURE if expected else None

@@ -1,0 +1,79 @@
+"""Serves the built dashboard: one page and its hashed assets."""
+
+from pathlib import Path
+
+from fastapi import FastAPI
+from fastapi.responses import FileResponse, HTMLResponse
+from starlette.responses import Response
+from starlette.staticfiles import StaticFiles
+from starlette.types import Scope
+
+STATIC = Path(__file__).with_name("static")
+
+CONTENT_SECURITY_POLICY = "; ".join(
+    [
+        "default-src 'none'",
+        "script-src 'self'",
+        "style-src 'self'",
+        "img-src 'self' data: blob:",
+        "font-src 'self'",
+        "connect-src 'self'",
+        "worker-src 'self' blob:",
+        "base-uri 'none'",
+        "form-action 'none'",
+        "frame-ancestors 'none'",
+    ]
+)
+
+PAGE_HEADERS = {
+    "Content-Security-Policy": CONTENT_SECURITY_POLICY,
+    "Cache-Control": "no-cache",
+    "X-Content-Type-Options": "nosniff",
+    "Referrer-Policy": "no-referrer",
+}
+
+NOT_BUILT = """<!doctype html>
+<html lang="en"><meta charset="utf-8"><meta name="viewport" content="width=device-width">
+<title>bathyfleet: dashboard not built</title>
+<h1>The dashboard is not built</h1>
+<p>The service itself is running; its API is described at <a href="/api/docs">/api/docs</a>.</p>
+<p>To build the dashboard run <code>pip install .</code> in the project's folder (it fetches Node by itself where there
+is none), or, while working on it:</p>
+<pre>cd app/dashboard/web
+npm ci
+npm run build</pre>
+<p>Then load this page again; the service need not be restarted.</p>
+</html>
+"""
+
+
+class HashedFiles(StaticFiles):
+    """Files whose names change with their contents, so that browsers may keep them for good."""
+
+    async def get_response(self, path: str, scope: Scope) -> Response:
+        """Answer with the file and the permission to keep it."""
+        response = await super().get_response(path, scope)
+        if response.status_code == 200:
+            response.headers["Cache-Control"] = "public, max-age=31536000, immutable"
+            response.headers["X-Content-Type-Options"] = "nosniff"
+        return response
+
+
+def mount_dashboard(app: FastAPI, static: Path = STATIC) -> None:
+    """Serve the dashboard at ``/`` and its assets below ``/assets``.
+
+    Parameters
+    ----------
+    app
+        The application; its own routes are left alone.
+    static
+        Folder that the front end was built into. It may be missing: then the page says how to build it.
+    """
+    app.mount("/assets", HashedFiles(directory=static / "assets", check_dir=False), name="dashboard-assets")
+
+    @app.api_route("/", methods=["GET", "HEAD"], include_in_schema=False)
+    def dashboard() -> Response:
+        index = static / "index.html"
+        if not index.is_file():
+            return HTMLResponse(NOT_BUILT, status_code=503, headers=PAGE_HEADERS)
+        return FileResponse(index, headers=PAGE_HEADERS)

@@ -1,0 +1,108 @@
+import { kept } from "../kept";
+import type {
+  ActionView,
+  EventView,
+  FieldProblem,
+  MapView,
+  MissionAction,
+  MissionSummary,
+  MissionView,
+  NewMission,
+  PlannerView,
+  Problem,
+  VehicleView,
+} from "./types";
+
+const BASE = "/api/v1";
+const LOG_PAGE = 1000;
+
+/** The access token, kept on this device; empty where the service asks for none. */
+export const token = kept("token", "");
+
+/** The service refused a request, or could not be reached. Its message is meant for the operator. */
+export class ServiceError extends Error {
+  constructor(
+    message: string,
+    readonly status: number,
+    readonly remedy = "",
+    readonly faults: readonly FieldProblem[] = [],
+  ) {
+    super(message);
+  }
+}
+
+/** Turns an answer that is not a success into an error that says what the service said. */
+export async function toServiceError(response: Response): Promise<ServiceError> {
+  try {
+    const problem = (await response.json()) as Partial<Problem>;
+    return new ServiceError(
+      problem.detail || problem.title || `The service answered ${response.status}`,
+      response.status,
+      problem.remedy ?? "",
+      problem.errors ?? [],
+    );
+  } catch {
+    return new ServiceError(
+      `The service answered ${response.status} ${response.statusText}`,
+      response.status,
+    );
+  }
+}
+
+async function request<T>(path: string, init: RequestInit = {}): Promise<T> {
+  let response: Response;
+  try {
+    const headers = new Headers(init.headers);
+    headers.set("Accept", "application/json");
+    if (token.value) headers.set("Authorization", `Bearer ${token.value}`);
+    response = await fetch(`${BASE}${path}`, { ...init, headers });
+  } catch {
+    throw new ServiceError(
+      "The service does not answer",
+      0,
+      "Check that it is running and that this device reaches it.",
+    );
+  }
+  if (!response.ok) throw await toServiceError(response);
+  return (await response.json()) as T;
+}
+
+function post<T>(path: string, body?: unknown): Promise<T> {
+  return request<T>(path, {
+    method: "POST",
+    ...(body === undefined
+      ? {}
+      : { body: JSON.stringify(body), headers: { "Content-Type": "application/json" } }),
+  });
+}
+
+const missionPath = (id: string) => `/missions/${encodeURIComponent(id)}`;
+
+export const api = {
+  missions: () => request<MissionSummary[]>("/missions"),
+  vehicles: () => request<VehicleView[]>("/vehicles"),
+  planners: () => request<PlannerView[]>("/planners"),
+  create: (mission: NewMission) => post<MissionView>("/missions", mission),
+  act: (id: string, action: MissionAction) => post<ActionView>(`${missionPath(id)}/${action}`),
+  log: readLog,
+  map: (id: string) => request<MapView>(`${missionPath(id)}/map`),
+};
+
+/** The log between two of its lines, however long. */
+async function readLog(id: string, after: number, last: number): Promise<EventView[]> {
+  const lines: EventView[] = [];
+  while (after < last) {
+    const page = await request<EventView[]>(`${missionPath(id)}/events?after=${after}&limit=${LOG_PAGE}`);
+    lines.push(...page);
+    const end = page.at(-1);
+    if (!end) break;
+    after = end.id;
+  }
+  return lines;
+}
+
+/** Sockets of browsers cannot send headers, so the token goes into the address. */
+export function liveUrl(id: string, page: Location = window.location): string {
+  const query = token.value ? `?token=${encodeURIComponent(token.value)}` : "";
+  return `${page.protocol === "https:" ? "wss" : "ws"}://${page.host}${BASE}${missionPath(id)}/live${query}`;
+}

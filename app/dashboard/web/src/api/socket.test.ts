@@ -1,0 +1,102 @@
+import { afterEach, beforeEach, describe, expect, it, vi } from "vitest";
+import { backoffMs, LiveSocket, type SocketStatus } from "./socket";
+import type { LiveMessage } from "./types";
+
+/** Stands for the browser's socket, which vitest's Node does not connect anywhere; the flow tests use the real one. */
+class Line {
+  static opened: Line[] = [];
+  onopen: (() => void) | null = null;
+  onclose: (() => void) | null = null;
+  onmessage: ((raw: { data: string }) => void) | null = null;
+  closed = false;
+
+  constructor(readonly url: string) {
+    Line.opened.push(this);
+  }
+
+  close(): void {
+    this.closed = true;
+  }
+}
+
+const newest = () => Line.opened.at(-1) as Line;
+
+describe("the live socket", () => {
+  let statuses: SocketStatus["kind"][];
+  let messages: LiveMessage[];
+  let socket: LiveSocket;
+
+  beforeEach(() => {
+    vi.useFakeTimers();
+    Line.opened = [];
+    statuses = [];
+    messages = [];
+    vi.stubGlobal("WebSocket", Line);
+    vi.stubGlobal("window", new EventTarget());
+    socket = new LiveSocket(
+      "ws://service/live",
+      { onStatus: (s) => statuses.push(s.kind), onMessage: (m) => messages.push(m) },
+      5000,
+    );
+  });
+
+  afterEach(() => {
+    socket.close();
+    vi.unstubAllGlobals();
+    vi.useRealTimers();
+  });
+
+  it("connects again after the connection closed", () => {
+    newest().onopen?.();
+    newest().onclose?.();
+    vi.advanceTimersByTime(600);
+    expect(Line.opened).toHaveLength(2);
+    expect(statuses).toEqual(["connecting", "open", "waiting", "connecting"]);
+  });
+
+  it("drops a connection that fell silent", () => {
+    newest().onopen?.();
+    vi.advanceTimersByTime(4000);
+    newest().onmessage?.({ data: '{"type":"vehicles","time":"","vehicles":[]}' });
+    vi.advanceTimersByTime(4000);
+    expect(newest().closed).toBe(false);
+    vi.advanceTimersByTime(1500);
+    expect(Line.opened[0]?.closed).toBe(true);
+    expect(messages).toHaveLength(1);
+  });
+
+  it("does not wait when the network comes back", () => {
+    newest().onclose?.();
+    window.dispatchEvent(new Event("online"));
+    expect(Line.opened).toHaveLength(2);
+  });
+
+  it("ignores what an abandoned connection still says", () => {
+    const old = newest();
+    old.onclose?.();
+    vi.advanceTimersByTime(600);
+    old.onmessage?.({ data: '{"type":"vehicles","time":"","vehicles":[]}' });
+    old.onclose?.();
+    expect(messages).toHaveLength(0);
+    expect(Line.opened).toHaveLength(2);
+  });
+
+  it("stays closed once closed", () => {
+    socket.close();
+    newest().onclose?.();
+    vi.advanceTimersByTime(60_000);
+    expect(Line.opened).toHaveLength(1);
+  });
+});
+
+describe("the time between tries", () => {
+  it("doubles up to ten seconds", () => {
+    expect([1, 2, 3, 4].map((n) => backoffMs(n, 1))).toEqual([500, 1000, 2000, 4000]);
+    expect(backoffMs(30, 1)).toBe(10_000);
+  });
+
+  it("is spread at random over its second half", () => {
+    expect(backoffMs(3, 0)).toBe(1000);
+    expect(backoffMs(3, 0.5)).toBe(1500);
+  });
+});

@@ -1,0 +1,40 @@
+/** The shapes of the service's answers, from its OpenAPI document (schema.d.ts, made by `npm run schema`). */
+
+import type { components } from "./schema";
+
+type Schemas = components["schemas"];
+
+/** Answers carry every field, also those that a request may leave out. */
+type Complete<T> = T extends object ? { [K in keyof T]-?: Complete<T[K]> } : T;
+
+export type LngLat = [longitude: number, latitude: number];
+
+export type MissionState = Schemas["MissionState"];
+export type LinkState = Schemas["LinkState"];
+export type WaypointStatus = Schemas["WaypointStatus"];
+export type Level = Schemas["Level"];
+export type MissionAction = "start" | "pause" | "resume" | "abort" | "finish";
+
+export type PolygonGeometry = Schemas["PolygonGeometry"];
+export type VehicleView = Complete<Schemas["VehicleView"]>;
+export type WaypointView = Complete<Schemas["WaypointView"]>;
+export type MissionSummary = Complete<Schemas["MissionSummary"]>;
+export type MissionView = Complete<Schemas["MissionView"]>;
+export type EventView = Complete<Schemas["EventView"]>;
+export type MapView = Complete<Schemas["MapView"]>;
+export type PlannerView = Complete<Schemas["PlannerView"]>;
+export type ActionView = Complete<Schemas["ActionView"]>;
+export type StopView = Complete<Schemas["StopView"]>;
+export type LiveMessage = Complete<Schemas["LiveMessage"]>;
+export type Problem = Complete<Schemas["Problem"]>;
+export type FieldProblem = Complete<Schemas["FieldProblem"]>;
+
+/** What a request says of a vehicle; whatever is left out takes the service's default. */
+export type VehicleSpec = Pick<Schemas["VehicleSpec"], "name" | "kind" | "sensor">;
+
+/** What the form sends. */
+export type NewMission = Pick<Schemas["MissionSpec"], "name" | "area" | "steps" | "cell_m"> & {
+  vehicles: VehicleSpec[];
+  limits: Partial<Schemas["Limits"]>;
+  planner: Pick<Schemas["PlannerSpec"], "name">;
+};

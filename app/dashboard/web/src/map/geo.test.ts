@@ -1,0 +1,156 @@
+import { describe, expect, it } from "vitest";
+import type { LngLat, MapView } from "../api/types";
+import {
+  boundsOf,
+  contains,
+  graticule,
+  graticuleStep,
+  grown,
+  metresPerDegree,
+  pieces,
+  placeIn,
+  readCell,
+  rectangle,
+} from "./geo";
+
+const map: MapView = {
+  mission_id: "m",
+  version: 1,
+  step: 1,
+  west_m: 10,
+  south_m: 20,
+  cell_m: 2,
+  rows: 2,
+  cols: 3,
+  corners: [
+    [1, 3],
+    [4, 3],
+    [4, 1],
+    [1, 1],
+  ],
+  min_depth_m: 5,
+  max_depth_m: 9,
+  model: "gp",
+  depth_m: [
+    [5, 6, null],
+    [7, 8, 9],
+  ],
+  sd_m: [
+    [0.1, 0.2, null],
+    [0.3, 0.4, 0.5],
+  ],
+  count: [
+    [1, 0, 0],
+    [0, 4, 0],
+  ],
+  sounded: [
+    [true, false, false],
+    [false, true, false],
+  ],
+};
+
+describe("metres per degree", () => {
+  it.each([
+    [0, 110_574.3, 111_319.5],
+    [45, 111_131.8, 78_846.8],
+    [-60, 111_412.2, 55_800],
+  ])("at latitude %f agrees with the published lengths of a degree", (latitude, north, east) => {
+    const scale = metresPerDegree(latitude);
+    expect(scale.north).toBeCloseTo(north, 0);
+    expect(scale.east).toBeCloseTo(east, 0);
+  });
+});
+
+describe("a rectangle from a corner and a size", () => {
+  const ring = rectangle([-8.705, 41.185], 100, 50).coordinates[0] as LngLat[];
+
+  it("is a closed ring with the corner in its south-west", () => {
+    expect(ring).toHaveLength(5);
+    expect(ring[0]).toEqual(ring[4]);
+    expect(boundsOf(ring)?.slice(0, 2)).toEqual([-8.705, 41.185]);
+  });
+
+  it("has the size asked for", () => {
+    const scale = metresPerDegree(41.185);
+    const [west, south, east, north] = boundsOf(ring) as [number, number, number, number];
+    expect((east - west) * scale.east).toBeCloseTo(100, 2);
+    expect((north - south) * scale.north).toBeCloseTo(50, 2);
+  });
+});
+
+describe("reading the map at a place", () => {
+  it("finds the cell, row 0 in the south and column 0 in the west", () => {
+    expect(readCell(map, [1.5, 1.5])).toMatchObject({ depth_m: 5, sd_m: 0.1, count: 1, sounded: true });
+    expect(readCell(map, [3.9, 2.9])).toMatchObject({ depth_m: 9, sounded: false });
+  });
+
+  it("gives local coordinates", () => {
+    const cell = readCell(map, [2.5, 2]);
+    expect(cell?.east_m).toBeCloseTo(13);
+    expect(cell?.north_m).toBeCloseTo(22);
+  });
+
+  it("knows nothing of an unknown cell but its place", () => {
+    expect(readCell(map, [3.5, 1.5])?.depth_m).toBeNull();
+  });
+
+  it.each([[[0.9, 2]], [[4.1, 2]], [[2, 0.9]], [[2, 3.1]]] as [LngLat][])(
+    "is silent outside the grid, at %j",
+    (place) => {
+      expect(readCell(map, place)).toBeNull();
+    },
+  );
+
+  it("undoes placing a point by its share of the grid, also when the grid is turned", () => {
+    const turned: MapView = {
+      ...map,
+      corners: [
+        [0, 2],
+        [2, 3],
+        [3, 1],
+        [1, 0],
+      ],
+    };
+    const cell = readCell(turned, placeIn(turned.corners, 0.5, 0.25));
+    expect(cell?.east_m).toBeCloseTo(13);
+    expect(cell?.north_m).toBeCloseTo(21);
+  });
+});
+
+describe("the graticule", () => {
+  it.each([0.0001, 0.0123, 1, 50])(
+    "has a few lines across %f degrees, at whole multiples of its step",
+    (width) => {
+      const bounds = [10.00001, 50, 10.00001 + width, 50 + width / 2] as [number, number, number, number];
+      const step = graticuleStep(bounds);
+      const { meridians, decimals } = graticule(bounds, step);
+      expect(meridians.length).toBeGreaterThanOrEqual(2);
+      expect(meridians.length).toBeLessThanOrEqual(7);
+      for (const lng of meridians) expect(lng / step).toBeCloseTo(Math.round(lng / step), 5);
+      const labels = meridians.map((lng) => lng.toFixed(decimals));
+      expect(new Set(labels).size).toBe(labels.length);
+    },
+  );
+});
+
+it("grown bounds contain the old ones, not the other way round", () => {
+  const bounds = [1, 2, 3, 4] as [number, number, number, number];
+  expect(contains(grown(bounds, 0.5), bounds)).toBe(true);
+  expect(contains(bounds, grown(bounds, 0.5))).toBe(false);
+});
+
+describe("pieces of a line", () => {
+  const line = Array.from({ length: 25 }, (_, i): LngLat => [i, 0]);
+
+  it.each([2, 3, 7, 24, 25, 26])("of at most %i points touch and make up the whole", (most) => {
+    const parts = pieces(line, most);
+    expect(Math.max(...parts.map((part) => part.length))).toBeLessThanOrEqual(most);
+    for (let i = 1; i < parts.length; i++) expect(parts[i]?.[0]).toEqual(parts[i - 1]?.at(-1));
+    expect([...(parts[0] ?? []), ...parts.slice(1).flatMap((part) => part.slice(1))]).toEqual(line);
+  });
+
+  it("do not exist for fewer than two points", () => {
+    expect(pieces([])).toEqual([]);
+    expect(pieces([[1, 1]])).toEqual([]);
+  });
+});

@@ -1,0 +1,128 @@
+/** Geometry on the ellipsoid, small areas only. */
+
+import type { LngLat, MapView, PolygonGeometry } from "../api/types";
+import { niceStep } from "./palette";
+
+const WGS84_A = 6_378_137;
+const WGS84_E2 = 6.694_379_990_14e-3;
+const RAD = Math.PI / 180;
+
+/** Metres per degree of latitude and of longitude at a latitude (WGS84 radii of curvature). */
+export function metresPerDegree(latitude: number): { north: number; east: number } {
+  const w2 = 1 - WGS84_E2 * Math.sin(latitude * RAD) ** 2;
+  const meridian = (WGS84_A * (1 - WGS84_E2)) / w2 ** 1.5;
+  const vertical = WGS84_A / Math.sqrt(w2);
+  return { north: meridian * RAD, east: vertical * Math.cos(latitude * RAD) * RAD };
+}
+
+/** A rectangle by its south-western corner and its size in metres, as the service takes areas. */
+export function rectangle(southWest: LngLat, eastSize_m: number, northSize_m: number): PolygonGeometry {
+  const [west, south] = southWest;
+  const scale = metresPerDegree(south);
+  const east = west + eastSize_m / scale.east;
+  const north = south + northSize_m / scale.north;
+  const ring: LngLat[] = [
+    [west, south],
+    [east, south],
+    [east, north],
+    [west, north],
+    [west, south],
+  ];
+  return { type: "Polygon", coordinates: [ring.map(([lng, lat]) => [round9(lng), round9(lat)])] };
+}
+
+const round9 = (degrees: number) => Math.round(degrees * 1e9) / 1e9;
+
+export type Bounds = [west: number, south: number, east: number, north: number];
+
+export function boundsOf(points: readonly LngLat[]): Bounds | null {
+  if (points.length === 0) return null;
+  const lngs = points.map((p) => p[0]);
+  const lats = points.map((p) => p[1]);
+  return [Math.min(...lngs), Math.min(...lats), Math.max(...lngs), Math.max(...lats)];
+}
+
+export interface CellReading {
+  east_m: number;
+  north_m: number;
+  depth_m: number | null;
+  sd_m: number | null;
+  count: number;
+  sounded: boolean;
+}
+
+/** What the map says at a place; null outside its grid. The grid is taken as a parallelogram between its corners. */
+export function readCell(map: MapView, [lng, lat]: LngLat): CellReading | null {
+  const [northWest, , southEast, southWest] = map.corners;
+  if (!northWest || !southEast || !southWest) return null;
+  const eastward = [southEast[0] - southWest[0], southEast[1] - southWest[1]] as const;
+  const northward = [northWest[0] - southWest[0], northWest[1] - southWest[1]] as const;
+  const to = [lng - southWest[0], lat - southWest[1]] as const;
+  const determinant = eastward[0] * northward[1] - eastward[1] * northward[0];
+  const u = (to[0] * northward[1] - to[1] * northward[0]) / determinant;
+  const v = (eastward[0] * to[1] - eastward[1] * to[0]) / determinant;
+  if (!(u >= 0 && u < 1 && v >= 0 && v < 1)) return null;
+  const row = Math.floor(v * map.rows);
+  const col = Math.floor(u * map.cols);
+  return {
+    east_m: map.west_m + u * map.cols * map.cell_m,
+    north_m: map.south_m + v * map.rows * map.cell_m,
+    depth_m: map.depth_m[row]?.[col] ?? null,
+    sd_m: map.sd_m[row]?.[col] ?? null,
+    count: map.count[row]?.[col] ?? 0,
+    sounded: map.sounded[row]?.[col] ?? false,
+  };
+}
+
+/** A place inside a parallelogram given by a map's corners; u and v run from 0 (west, south) to 1 (east, north). */
+export function placeIn(corners: readonly LngLat[], u: number, v: number): LngLat {
+  const [northWest, , southEast, southWest] = corners as [LngLat, LngLat, LngLat, LngLat];
+  return [
+    southWest[0] + u * (southEast[0] - southWest[0]) + v * (northWest[0] - southWest[0]),
+    southWest[1] + u * (southEast[1] - southWest[1]) + v * (northWest[1] - southWest[1]),
+  ];
+}
+
+export interface Graticule {
+  meridians: number[];
+  parallels: number[];
+  decimals: number;
+}
+
+/** A pleasant distance between lines, degrees, so that about `lines` of them cross the wider side of the bounds. */
+export function graticuleStep([west, south, east, north]: Bounds, lines = 6): number {
+  const scale = metresPerDegree((south + north) / 2);
+  const widest = Math.max(east - west, ((north - south) * scale.north) / scale.east);
+  return Math.max(1e-6, niceStep(widest / lines));
+}
+
+/** The meridians and parallels at whole multiples of a step inside bounds, and the decimals that tell them apart. */
+export function graticule([west, south, east, north]: Bounds, step: number): Graticule {
+  const decimals = Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
+  return { meridians: multiples(west, east, step), parallels: multiples(south, north, step), decimals };
+}
+
+/** Bounds grown by a share of their size on every side. */
+export function grown([west, south, east, north]: Bounds, share: number): Bounds {
+  const x = (east - west) * share;
+  const y = (north - south) * share;
+  return [west - x, south - y, east + x, north + y];
+}
+
+export function contains(outer: Bounds, inner: Bounds): boolean {
+  return outer[0] <= inner[0] && outer[1] <= inner[1] && outer[2] >= inner[2] && outer[3] >= inner[3];
+}
+
+function multiples(low: number, high: number, step: number): number[] {
+  const first = Math.ceil(low / step);
+  const last = Math.floor(high / step);
+  return Array.from({ length: Math.max(0, last - first + 1) }, (_, i) => (first + i) * step);
+}
+
+/** A line as several shorter ones that touch: a line of too many points does not fit into one buffer of the map. */
+export function pieces(line: readonly LngLat[], most = 1000): (readonly LngLat[])[] {
+  const count = Math.ceil((line.length - 1) / (most - 1));
+  return Array.from({ length: Math.max(0, count) }, (_, i) =>
+    line.slice(i * (most - 1), (i + 1) * (most - 1) + 1),
+  );
+}

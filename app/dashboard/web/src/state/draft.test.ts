@@ -1,0 +1,76 @@
+import { describe, expect, it } from "vitest";
+import { boundsOf } from "../map/geo";
+import { areaOf, centred, emptyDraft, faultsOf, fieldOf, toMission } from "./draft";
+
+const draft = { ...emptyDraft([-8.705, 41.185]), name: "Quay" };
+
+it("an untouched draft only lacks a name", () => {
+  expect(Object.keys(faultsOf(emptyDraft([-8.7, 41.2])))).toEqual(["name"]);
+});
+
+describe("a wrong value is named with what would be right", () => {
+  it.each([
+    [{ latitude: "north" }, "latitude", "number"],
+    [{ latitude: "91" }, "latitude", "between"],
+    [{ east_m: "" }, "east_m", "number"],
+    [{ steps: "2.5" }, "steps", "whole"],
+    [{ steps: "0" }, "steps", "between"],
+    [{ min_depth_m: "40" }, "max_depth_m", "shallowest"],
+    [{ simulated: "0" }, "simulated", "at least one"],
+    [{ name: "  " }, "name", "name"],
+  ] as const)("%j", (change, field, words) => {
+    const faults = faultsOf({ ...draft, ...change });
+    expect(Object.keys(faults)).toEqual([field]);
+    expect(faults[field]).toContain(words);
+  });
+});
+
+describe("what is sent", () => {
+  it("has the numbers as numbers and a closed area", () => {
+    const mission = toMission({ ...draft, steps: " 40 ", east_m: "120" });
+    expect(mission.steps).toBe(40);
+    expect(mission.area).toEqual(areaOf({ ...draft, east_m: "120" }));
+    expect(mission.limits.max_step_m).toBe(10);
+  });
+
+  it("has real vehicles first and simulated ones under free names", () => {
+    const chosen = [{ name: "sim-1", kind: "imc", sensor: "dvl" }] as const;
+    const mission = toMission({ ...draft, chosen, simulated: "2" });
+    expect(mission.vehicles.map((v) => [v.name, v.kind])).toEqual([
+      ["sim-1", "imc"],
+      ["sim-2", "sim"],
+      ["sim-3", "sim"],
+    ]);
+  });
+});
+
+it("an area needs its four numbers only", () => {
+  expect(areaOf({ ...draft, name: "", steps: "x" })).not.toBeNull();
+  expect(areaOf({ ...draft, north_m: "-1" })).toBeNull();
+});
+
+it.each([
+  ["limits.max_step_m", "max_step_m"],
+  ["vehicles.0.name", "simulated"],
+  ["area.coordinates.0", "east_m"],
+  ["steps", "steps"],
+  ["tide.level_m", null],
+])("the service's field %s is shown at %s", (service, own) => {
+  expect(fieldOf(service)).toBe(own);
+});
+
+describe("placing an area in the middle", () => {
+  it.each([
+    [-8.705, 41.185],
+    [151.2, -33.9],
+  ])("puts its centre at %f, %f", (lng, lat) => {
+    const area = areaOf({ ...draft, east_m: "300", ...centred({ ...draft, east_m: "300" }, [lng, lat]) });
+    const [west, south, east, north] = boundsOf(area?.coordinates[0] ?? []) ?? [0, 0, 0, 0];
+    expect((west + east) / 2).toBeCloseTo(lng, 5);
+    expect((south + north) / 2).toBeCloseTo(lat, 5);
+  });
+
+  it("leaves a draft without a size alone", () => {
+    expect(centred({ ...draft, east_m: "wide" }, [0, 0])).toEqual({});
+  });
+});

@@ -1,0 +1,52 @@
+/** Numbers as an operator reads them. An en dash stands for "not known". */
+
+const UNKNOWN = "–";
+
+export function metres(value: number | null | undefined, digits = 1): string {
+  return value == null ? UNKNOWN : `${value.toFixed(digits)} m`;
+}
+
+export function percent(value: number | null | undefined, digits = 0): string {
+  return value == null ? UNKNOWN : `${value.toFixed(digits)} %`;
+}
+
+export function distance(value_m: number): string {
+  return value_m < 1000 ? `${value_m.toFixed(0)} m` : `${(value_m / 1000).toFixed(2)} km`;
+}
+
+export function count(value: number): string {
+  return value.toLocaleString("en", { useGrouping: true }).replaceAll(",", " ");
+}
+
+/** 7 s, 3 min 07 s, 2 h 05 min. */
+export function duration(seconds: number | null | undefined): string {
+  if (seconds == null) return UNKNOWN;
+  const s = Math.max(0, Math.round(seconds));
+  if (s < 60) return `${s} s`;
+  if (s < 3600) return `${Math.floor(s / 60)} min ${pad(s % 60)} s`;
+  return `${Math.floor(s / 3600)} h ${pad(Math.floor((s % 3600) / 60))} min`;
+}
+
+export function age(seconds: number | null): string {
+  if (seconds === null) return "never";
+  return seconds < 10 ? `${seconds.toFixed(1)} s` : duration(seconds);
+}
+
+/** Coordinates with as many decimals as a step of the given size needs. */
+export function latitude(degrees: number, decimals = 6): string {
+  return `${Math.abs(degrees).toFixed(decimals)}° ${degrees < 0 ? "S" : "N"}`;
+}
+
+export function longitude(degrees: number, decimals = 6): string {
+  return `${Math.abs(degrees).toFixed(decimals)}° ${degrees < 0 ? "W" : "E"}`;
+}
+
+export function clock(date: Date, zone: "utc" | "local"): string {
+  return zone === "utc"
+    ? date.toISOString().slice(11, 19)
+    : date.toLocaleTimeString("en-GB", { hour12: false });
+}
+
+function pad(value: number): string {
+  return String(value).padStart(2, "0");
+}

@@ -1,0 +1,162 @@
+import { describe, expect, it } from "vitest";
+import type { EventView, LiveMessage, MissionView, VehicleView, WaypointView } from "../api/types";
+import { ageSeconds, EMPTY_VIEW, reduce, withEvents } from "./live";
+
+const vehicle = (
+  name: string,
+  lon: number | null,
+  lat: number | null,
+  age_s: number | null = 0,
+): VehicleView => ({
+  name,
+  kind: "sim",
+  sensor: "dvl",
+  mission_id: "m",
+  active: true,
+  link: "engaged",
+  reason: "",
+  age_s,
+  address: null,
+  imc_id: null,
+  lat_deg: lat,
+  lon_deg: lon,
+  east_m: null,
+  north_m: null,
+  depth_m: 2,
+  altitude_m: null,
+  heading_deg: null,
+  speed_mps: null,
+  battery_pct: null,
+  position_sd_m: null,
+});
+
+const waypoint = (name: string, step: number, status: WaypointView["status"]): WaypointView => ({
+  vehicle: name,
+  step,
+  status,
+  reason: "",
+  lat_deg: 0,
+  lon_deg: 0,
+  east_m: 0,
+  north_m: 0,
+  depth_m: 2,
+  speed_mps: 1,
+  arrival_radius_m: 3,
+  min_altitude_m: 1,
+});
+
+const mission = (id: string): MissionView =>
+  ({
+    id,
+    name: id,
+    state: "running",
+    vehicles: [vehicle("a", 1, 1)],
+    waypoints: [waypoint("a", 3, "sent")],
+  }) as MissionView;
+
+const snapshot = (id: string): LiveMessage => ({
+  type: "snapshot",
+  mission: mission(id),
+  tracks: { a: [[1, 1]] },
+  map_version: 4,
+  last_event_id: 0,
+});
+
+const event = (id: number): EventView => ({
+  id,
+  mission_id: "m",
+  time: "2026-01-01T00:00:00Z",
+  level: "info",
+  kind: "step",
+  message: `line ${id}`,
+  data: {},
+});
+
+const started = reduce(EMPTY_VIEW, snapshot("m"), 1000);
+
+describe("live messages", () => {
+  it("mean nothing before the first snapshot", () => {
+    expect(reduce(EMPTY_VIEW, { type: "vehicles", time: "", vehicles: [vehicle("a", 1, 1)] }, 1)).toBe(
+      EMPTY_VIEW,
+    );
+  });
+
+  it("extend a track only when the vehicle has moved", () => {
+    const still = reduce(
+      started,
+      { type: "vehicles", time: "", vehicles: [vehicle("a", 1 + 1e-7, 1)] },
+      2000,
+    );
+    expect(still.tracks).toBe(started.tracks);
+    const moved = reduce(
+      still,
+      { type: "vehicles", time: "", vehicles: [vehicle("a", 1.1, 1), vehicle("b", null, null)] },
+      3000,
+    );
+    expect(moved.tracks).toEqual({
+      a: [
+        [1, 1],
+        [1.1, 1],
+      ],
+    });
+    expect(started.tracks).toEqual({ a: [[1, 1]] });
+  });
+
+  it("replace a waypoint by its next state and by later steps, never by earlier ones", () => {
+    let view = reduce(
+      started,
+      { type: "waypoints", waypoints: [waypoint("a", 3, "acknowledged"), waypoint("b", 3, "sent")] },
+      1,
+    );
+    view = reduce(view, { type: "waypoints", waypoints: [waypoint("a", 2, "missed")] }, 2);
+    expect(view.mission?.waypoints.map((w) => [w.vehicle, w.step, w.status])).toEqual([
+      ["a", 3, "acknowledged"],
+      ["b", 3, "sent"],
+    ]);
+  });
+
+  it("change the mission's state and keep its vehicles", () => {
+    const view = reduce(started, { type: "mission", mission: { ...mission("m"), state: "paused" } }, 5000);
+    expect(view.mission?.state).toBe("paused");
+    expect(view.mission?.vehicles).toHaveLength(1);
+    expect(view.progressAt).toBe(5000);
+  });
+
+  it("keep a long track within bounds and its newest point exact", () => {
+    let view = started;
+    for (let i = 1; i <= 9000; i++) {
+      view = reduce(view, { type: "vehicles", time: "", vehicles: [vehicle("a", 1 + i / 1000, 1)] }, i);
+    }
+    expect(view.tracks.a?.length).toBeLessThanOrEqual(8001);
+    expect(view.tracks.a?.at(-1)).toEqual([10, 1]);
+    expect(view.tracks.a?.[0]).toEqual([1, 1]);
+  });
+});
+
+describe("the log", () => {
+  it("has each line once, in order, whichever way it came", () => {
+    const view = withEvents(reduce(started, { type: "event", event: event(3) }, 1), [
+      event(1),
+      event(2),
+      event(3),
+    ]);
+    expect(view.events.map((e) => e.id)).toEqual([1, 2, 3]);
+  });
+
+  it("stays over a reconnection to the same mission and is dropped for another", () => {
+    const view = withEvents(started, [event(1)]);
+    expect(reduce(view, snapshot("m"), 2).events).toHaveLength(1);
+    expect(reduce(view, snapshot("other"), 2).events).toHaveLength(0);
+  });
+});
+
+describe("age", () => {
+  it("goes on counting from what the service said", () => {
+    expect(ageSeconds(vehicle("a", 1, 1, 0.5), 10_000, 12_000)).toBeCloseTo(2.5);
+  });
+
+  it("does not run backwards, and is unknown for a vehicle never heard", () => {
+    expect(ageSeconds(vehicle("a", 1, 1, 0.5), 10_000, 9000)).toBe(0.5);
+    expect(ageSeconds(vehicle("a", 1, 1, null), 0, 9000)).toBeNull();
+  });
+});

@@ -1,0 +1,109 @@
+/** What the page knows of one mission, and how each live message changes it. Pure: no socket, no page, no clock. */
+
+import type { EventView, LiveMessage, LngLat, MissionView, VehicleView, WaypointView } from "../api/types";
+
+export interface LiveView {
+  mission: MissionView | null;
+  tracks: Readonly<Record<string, readonly LngLat[]>>;
+  events: readonly EventView[];
+  mapVersion: number;
+  lastEventId: number;
+  /** When the vehicles' part was last heard of, page clock in milliseconds; ages grow from here. */
+  vehiclesAt: number;
+  /** The same for the mission's state and progress. */
+  progressAt: number;
+}
+
+export const EMPTY_VIEW: LiveView = {
+  mission: null,
+  tracks: {},
+  events: [],
+  mapVersion: 0,
+  lastEventId: 0,
+  vehiclesAt: 0,
+  progressAt: 0,
+};
+
+const MOST_TRACK_POINTS = 8000;
+const MOST_EVENTS = 2000;
+/** A vehicle that moved less than this adds nothing to its track; about 0.3 m, in degrees of latitude. */
+const LEAST_MOVE_DEG = 3e-6;
+
+export function reduce(view: LiveView, message: LiveMessage, at: number): LiveView {
+  switch (message.type) {
+    case "snapshot":
+      return {
+        mission: message.mission,
+        tracks: message.tracks,
+        events: view.mission?.id === message.mission.id ? view.events : [],
+        mapVersion: message.map_version,
+        lastEventId: message.last_event_id,
+        vehiclesAt: at,
+        progressAt: at,
+      };
+    case "vehicles":
+      if (!view.mission) return view;
+      return {
+        ...view,
+        mission: { ...view.mission, vehicles: message.vehicles },
+        tracks: extendTracks(view.tracks, message.vehicles),
+        vehiclesAt: at,
+      };
+    case "waypoints":
+      if (!view.mission) return view;
+      return {
+        ...view,
+        mission: { ...view.mission, waypoints: newest(view.mission.waypoints, message.waypoints) },
+      };
+    case "mission":
+      if (!view.mission) return view;
+      return { ...view, mission: { ...view.mission, ...message.mission }, progressAt: at };
+    case "map":
+      return { ...view, mapVersion: message.version };
+    case "event":
+      return withEvents(view, [message.event]);
+  }
+}
+
+/** Adds lines to the log: each once, in the order of their numbers, at most the newest 2000. */
+export function withEvents(view: LiveView, more: readonly EventView[]): LiveView {
+  const known = new Map(view.events.map((event) => [event.id, event]));
+  for (const event of more) known.set(event.id, event);
+  const events = [...known.values()].sort((a, b) => a.id - b.id).slice(-MOST_EVENTS);
+  return { ...view, events };
+}
+
+/** One waypoint per vehicle, the one of the highest step. */
+function newest(old: readonly WaypointView[], changed: readonly WaypointView[]): WaypointView[] {
+  const byVehicle = new Map(old.map((waypoint) => [waypoint.vehicle, waypoint]));
+  for (const waypoint of changed) {
+    const present = byVehicle.get(waypoint.vehicle);
+    if (!present || waypoint.step >= present.step) byVehicle.set(waypoint.vehicle, waypoint);
+  }
+  return [...byVehicle.values()];
+}
+
+function extendTracks(tracks: LiveView["tracks"], vehicles: readonly VehicleView[]): LiveView["tracks"] {
+  let changed: Record<string, readonly LngLat[]> | null = null;
+  for (const { name, lon_deg, lat_deg } of vehicles) {
+    if (lon_deg === null || lat_deg === null) continue;
+    const track = tracks[name] ?? [];
+    const last = track.at(-1);
+    if (last && Math.hypot(last[0] - lon_deg, last[1] - lat_deg) < LEAST_MOVE_DEG) continue;
+    changed ??= { ...tracks };
+    changed[name] = [...thinned(track), [lon_deg, lat_deg]];
+  }
+  return changed ?? tracks;
+}
+
+/** Drops every other point of the older half once a track is full, so that the shape of the recent part stays. */
+function thinned(track: readonly LngLat[]): readonly LngLat[] {
+  if (track.length < MOST_TRACK_POINTS) return track;
+  const half = track.length >> 1;
+  return [...track.slice(0, half).filter((_, i) => i % 2 === 0), ...track.slice(half)];
+}
+
+/** Seconds since a vehicle was last heard, counted on since the service said so; null: never. */
+export function ageSeconds(vehicle: VehicleView, vehiclesAt: number, now: number): number | null {
+  return vehicle.age_s === null ? null : vehicle.age_s + Math.max(0, now - vehiclesAt) / 1000;
+}

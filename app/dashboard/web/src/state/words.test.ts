@@ -1,0 +1,65 @@
+import { describe, expect, it } from "vitest";
+import type { VehicleView, WaypointView } from "../api/types";
+import { age, clock, count, distance, duration, latitude, longitude, metres } from "./format";
+import { hasEnded, isAllowed, vehicleState } from "./words";
+
+describe("numbers", () => {
+  it.each([
+    [0, "0 s"],
+    [59.6, "1 min 00 s"],
+    [187, "3 min 07 s"],
+    [7500, "2 h 05 min"],
+    [null, "–"],
+    [-3, "0 s"],
+  ])("%s seconds last %s", (seconds, words) => {
+    expect(duration(seconds)).toBe(words);
+  });
+
+  it("are written with their units", () => {
+    expect(metres(2.345, 2)).toBe("2.35 m");
+    expect(metres(undefined)).toBe("–");
+    expect(distance(980)).toBe("980 m");
+    expect(distance(1234)).toBe("1.23 km");
+    expect(count(1_234_567)).toBe("1 234 567");
+    expect(age(2.34)).toBe("2.3 s");
+    expect(age(null)).toBe("never");
+  });
+
+  it("name the hemisphere instead of a sign", () => {
+    expect(latitude(-33.5, 1)).toBe("33.5° S");
+    expect(longitude(8.70512, 4)).toBe("8.7051° E");
+  });
+
+  it("tell UTC", () => {
+    expect(clock(new Date("2026-03-01T05:06:07Z"), "utc")).toBe("05:06:07");
+  });
+});
+
+describe("a vehicle's state in words", () => {
+  const vehicle = (link: VehicleView["link"], active = true) => ({ link, active }) as VehicleView;
+  const waypoint = (status: WaypointView["status"]) => ({ step: 7, status }) as WaypointView;
+
+  it("is loud about unexpected silence and calm about silence by plan", () => {
+    expect(vehicleState(vehicle("lost"), undefined).tone).toBe("alarm");
+    expect(vehicleState(vehicle("expected_offline"), undefined).tone).toBe("calm");
+  });
+
+  it("does not claim a route before the vehicle acknowledged it", () => {
+    expect(vehicleState(vehicle("engaged"), waypoint("sent")).words).toContain("not acknowledged");
+    expect(vehicleState(vehicle("engaged"), waypoint("acknowledged")).words).toBe("To waypoint 7");
+    expect(vehicleState(vehicle("engaged"), waypoint("refused")).tone).toBe("alarm");
+  });
+
+  it("prefers the link's trouble to the waypoint's state", () => {
+    expect(vehicleState(vehicle("lost"), waypoint("acknowledged")).words).toBe("No contact");
+    expect(vehicleState(vehicle("lost", false), undefined).words).toBe("Left the mission");
+  });
+});
+
+describe("commands", () => {
+  it("can always abort until the mission is over", () => {
+    for (const state of ["draft", "ready", "running", "paused", "finished", "aborted", "failed"] as const) {
+      expect(isAllowed("abort", state)).toBe(!hasEnded(state));
+    }
+  });
+});

@@ -1,0 +1,97 @@
+/** States in the words an operator uses. */
+
+import type {
+  LinkState,
+  MissionAction,
+  MissionState,
+  VehicleView,
+  WaypointStatus,
+  WaypointView,
+} from "../api/types";
+
+export const MISSION_WORDS: Record<MissionState, string> = {
+  draft: "Draft, needs a vehicle",
+  ready: "Ready to start",
+  running: "Running",
+  paused: "Paused",
+  finished: "Finished",
+  aborted: "Aborted",
+  failed: "Failed",
+};
+
+/** A shape for each state, so that colour is never the only sign. */
+export const MISSION_SIGNS: Record<MissionState, string> = {
+  draft: "◌",
+  ready: "○",
+  running: "▶",
+  paused: "❚❚",
+  finished: "✓",
+  aborted: "■",
+  failed: "✕",
+};
+
+export const WAYPOINT_WORDS: Record<WaypointStatus, string> = {
+  planned: "planned, not sent yet",
+  sent: "sent, not acknowledged yet",
+  acknowledged: "acknowledged",
+  reached: "reached",
+  refused: "refused",
+  missed: "missed its deadline",
+};
+
+const LINK_WORDS: Record<LinkState, string> = {
+  unknown: "Never heard",
+  lost: "No contact",
+  expected_offline: "Offline by plan",
+  heard: "Heard, not ready",
+  ready: "Ready",
+  engaged: "Under way",
+};
+
+export type Tone = "calm" | "good" | "warning" | "alarm";
+
+const LINK_TONES: Record<LinkState, Tone> = {
+  unknown: "warning",
+  lost: "alarm",
+  expected_offline: "calm",
+  heard: "warning",
+  ready: "good",
+  engaged: "good",
+};
+
+/** A vehicle's state as one short line and how loud it is. */
+export function vehicleState(
+  vehicle: VehicleView,
+  waypoint: WaypointView | undefined,
+): { words: string; tone: Tone } {
+  if (!vehicle.active) return { words: "Left the mission", tone: "calm" };
+  const tone = LINK_TONES[vehicle.link];
+  if (vehicle.link !== "engaged" || !waypoint) return { words: LINK_WORDS[vehicle.link], tone };
+  switch (waypoint.status) {
+    case "acknowledged":
+      return { words: `To waypoint ${waypoint.step}`, tone };
+    case "reached":
+      return { words: `At waypoint ${waypoint.step}`, tone };
+    case "refused":
+      return { words: `Refused waypoint ${waypoint.step}`, tone: "alarm" };
+    case "missed":
+      return { words: `Missed waypoint ${waypoint.step}`, tone: "warning" };
+    default:
+      return { words: `Waypoint ${waypoint.step} not acknowledged`, tone: "calm" };
+  }
+}
+
+const ALLOWED: Record<MissionAction, readonly MissionState[]> = {
+  start: ["ready"],
+  pause: ["running"],
+  resume: ["paused"],
+  finish: ["running", "paused"],
+  abort: ["draft", "ready", "running", "paused"],
+};
+
+export function isAllowed(action: MissionAction, state: MissionState): boolean {
+  return ALLOWED[action].includes(state);
+}
+
+export const hasEnded = (state: MissionState): boolean =>
+  state === "finished" || state === "aborted" || state === "failed";

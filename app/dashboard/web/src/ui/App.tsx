@@ -1,0 +1,33 @@
+import { mission, panelOpen } from "../state/store";
+import { AbortDialog } from "./AbortDialog";
+import { BottomStrip } from "./BottomStrip";
+import { ChartPane } from "./ChartPane";
+import { Alarms } from "./EventLog";
+import { Legend } from "./Legend";
+import { MissionPanel } from "./MissionPanel";
+import { Notices } from "./Notices";
+import { Readout } from "./Readout";
+import { TopBar } from "./TopBar";
+import { VehicleCards } from "./VehicleCards";
+
+export function App() {
+  const classes = ["app", panelOpen.value ? "with-missions" : "", mission.value ? "with-mission" : ""];
+  return (
+    <div class={classes.join(" ")}>
+      <TopBar />
+      <main class="stage">
+        <ChartPane />
+        <Readout />
+        <Legend />
+        <div class="over-map">
+          <Alarms />
+          <Notices />
+        </div>
+      </main>
+      {panelOpen.value ? <MissionPanel /> : null}
+      <VehicleCards />
+      <BottomStrip />
+      <AbortDialog />
+    </div>
+  );
+}

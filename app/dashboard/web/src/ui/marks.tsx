@@ -1,0 +1,96 @@
+/** Vehicles and waypoints as shapes on the map. */
+
+import type { WaypointStatus, WaypointView } from "../api/types";
+import { age } from "../state/format";
+import type { Vehicle } from "../state/store";
+import { WAYPOINT_WORDS } from "../state/words";
+
+export function VehicleMark({ vehicle }: { vehicle: Vehicle }) {
+  const { name, heading_deg } = vehicle.view;
+  const silent = vehicle.view.link === "lost" || vehicle.view.link === "unknown";
+  const title = `${name}${vehicle.stale ? `, last heard ${age(vehicle.age_s)} ago` : ""}`;
+  return (
+    <div
+      class={`vehicle-mark${vehicle.stale ? " stale" : ""}`}
+      data-testid={`vehicle-mark-${name}`}
+      title={title}
+    >
+      <svg viewBox="-16 -16 32 32" width="34" height="34" aria-hidden="true">
+        {heading_deg === null ? (
+          <circle r="8" fill={vehicle.colour} class="outline" />
+        ) : (
+          <path
+            d="M0,-13 L8.5,10 L0,5.5 L-8.5,10 Z"
+            transform={`rotate(${heading_deg})`}
+            fill={vehicle.colour}
+            class="outline"
+          />
+        )}
+      </svg>
+      <span class="mark-label">
+        {name}
+        {silent || vehicle.stale ? <b> {age(vehicle.age_s)} old</b> : null}
+      </span>
+    </div>
+  );
+}
+
+/** Each stage of a waypoint's life has a shape of its own; the colour is the vehicle's. */
+export function WaypointShape({ status, colour }: { status: WaypointStatus; colour: string }) {
+  return (
+    <svg viewBox="-12 -12 24 24" width="24" height="24" aria-hidden="true" class="waypoint-shape">
+      {shape(status, colour)}
+    </svg>
+  );
+}
+
+function shape(status: WaypointStatus, colour: string) {
+  switch (status) {
+    case "planned":
+      return <circle r="6" class="halo" stroke={colour} stroke-width="2" stroke-dasharray="2 3" />;
+    case "sent":
+      return <circle r="6" class="halo" stroke={colour} stroke-width="2.5" />;
+    case "acknowledged":
+      return (
+        <>
+          <circle r="7" class="halo" stroke={colour} stroke-width="2.5" />
+          <circle r="3" fill={colour} />
+        </>
+      );
+    case "reached":
+      return (
+        <>
+          <circle r="7" fill={colour} class="outline" />
+          <path d="M-3.5,0 L-1,3 L4,-3" fill="none" stroke="#10181d" stroke-width="2" />
+        </>
+      );
+    case "refused":
+      return (
+        <>
+          <rect x="-7" y="-7" width="14" height="14" class="halo" stroke={colour} stroke-width="2.5" />
+          <path d="M-4,-4 L4,4 M-4,4 L4,-4" stroke="currentColor" stroke-width="2.5" />
+        </>
+      );
+    case "missed":
+      return (
+        <>
+          <circle r="7" class="halo" stroke={colour} stroke-width="2.5" />
+          <path d="M-6,6 L6,-6" stroke="currentColor" stroke-width="2.5" />
+        </>
+      );
+  }
+}
+
+export function WaypointMark({ waypoint, colour }: { waypoint: WaypointView; colour: string }) {
+  const words = `Waypoint ${waypoint.step} of ${waypoint.vehicle}: ${WAYPOINT_WORDS[waypoint.status]}`;
+  return (
+    <div
+      class="waypoint-mark"
+      data-testid={`waypoint-${waypoint.vehicle}`}
+      data-status={waypoint.status}
+      title={waypoint.reason ? `${words}. ${waypoint.reason}` : words}
+    >
+      <WaypointShape status={waypoint.status} colour={colour} />
+    </div>
+  );
+}

@@ -1,0 +1,14 @@
+"""What is known: sensor models and the landmark estimator. Pure: numpy in, numpy out."""
+
+from app.estimation.landmarks import LandmarkEstimator, Landmarks, LandmarkSets, landmark_sets
+from app.estimation.sensors import RangeSensor, Sensor, SingleBeam
+
+__all__ = [
+    "LandmarkEstimator",
+    "Landmarks",
+    "LandmarkSets",
+    "RangeSensor",
+    "Sensor",
+    "SingleBeam",
+    "landmark_sets",
+]

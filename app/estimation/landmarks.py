@@ -1,0 +1,184 @@
+"""Landmarks with fixed (x, y): weighted least squares of their depth, and the sets A, B, V, B_hat (AURO15 sec. 3.4)."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.estimation.sensors import RangeSensor
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+IntArray = NDArray[np.int64]
+
+ITERATIONS = 3
+
+
+@dataclass(frozen=True)
+class Landmarks:
+    """What is known of the landmarks; every update returns a new object.
+
+    Attributes
+    ----------
+    xy_m : (n, 2)
+        Fixed positions.
+    depth_m : (n,)
+        Estimates; NaN where never seen.
+    variance_m2 : (n,)
+        The confidence ``c_L``: posterior variance of the depth; inf where never seen.
+    looks : (n,)
+        How often each landmark was measured.
+    accurate : (n,)
+        The set ``A``; only grows.
+    credited : (n,)
+        Which vehicle brought the landmark into ``A`` (``A_j``); -1 where none did.
+    """
+
+    xy_m: FloatArray
+    depth_m: FloatArray
+    variance_m2: FloatArray
+    looks: IntArray
+    accurate: BoolArray
+    credited: IntArray
+
+    @classmethod
+    def unknown(cls, xy_m: FloatArray) -> "Landmarks":
+        """Return landmarks at ``xy_m`` (n, 2) that nobody has seen."""
+        n = len(xy_m)
+        return cls(
+            np.asarray(xy_m, dtype=np.float64),
+            np.full(n, np.nan),
+            np.full(n, np.inf),
+            np.zeros(n, dtype=np.int64),
+            np.zeros(n, dtype=np.bool_),
+            np.full(n, -1, dtype=np.int64),
+        )
+
+    @property
+    def seen(self) -> BoolArray:
+        """Which landmarks were ever measured."""
+        return np.asarray(self.looks > 0, dtype=np.bool_)
+
+
+@dataclass(frozen=True)
+class LandmarkEstimator:
+    """Weighted least squares for the depths of landmarks whose (x, y) are known, from noisy ranges.
+
+    The measurement is ``y = r (1 + noise xi)`` with ``r^2 = h^2 + (z - z_vehicle)^2``, ``h`` the horizontal distance.
+    The weight of a range is ``1 / (noise r)^2``; normal equations are kept per landmark and every new range is
+    linearised at the current estimate (Gauss-Newton). Landmarks lie below the vehicles.
+
+    Attributes
+    ----------
+    sensor : RangeSensor
+        Gives the noise.
+    accuracy_sd_m : float
+        A landmark whose standard deviation falls below this belongs to ``A``, for ever.
+    visit_cap : int
+        A landmark measured more often than this counts as accurate too (AURO15 footnote 3).
+    """
+
+    sensor: RangeSensor = RangeSensor()  # noqa: RUF009 - frozen
+    accuracy_sd_m: float = 0.02
+    visit_cap: int = 200
+
+    def update(
+        self, landmarks: Landmarks, vehicle: int, position: FloatArray, index: IntArray, ranges: FloatArray
+    ) -> Landmarks:
+        """Take in the ranges that one vehicle measured.
+
+        Parameters
+        ----------
+        vehicle : int
+            Row of the vehicle, to be credited with the landmarks it completes.
+        position : (3,)
+            Where it measured.
+        index : (k,)
+            Which landmarks it measured, each at most once.
+        ranges : (k,)
+            The noisy ranges.
+        """
+        prior, prior_variance = landmarks.depth_m[index], landmarks.variance_m2[index]
+        information = np.where(np.isfinite(prior_variance), 1.0 / prior_variance, 0.0)
+        h2 = ((landmarks.xy_m[index] - position[:2]) ** 2).sum(axis=1)
+        # A range shorter than the horizontal distance is noise: the floor keeps the first estimate below the vehicle.
+        below = np.sqrt(np.maximum(ranges**2 - h2, (0.05 * ranges) ** 2))
+        depth = np.where(information > 0.0, prior, position[2] + below)
+        anchor = np.where(information > 0.0, prior, 0.0)
+        gained = np.zeros_like(depth)
+        for _ in range(ITERATIONS):
+            drop = np.maximum(depth - position[2], 0.05 * ranges)
+            r = np.sqrt(h2 + drop**2)
+            slope = drop / r
+            gained = (slope / (self.sensor.relative_noise * r)) ** 2
+            pseudo = depth + (ranges - r) / slope
+            depth = (information * anchor + gained * pseudo) / (information + gained)
+            depth = np.maximum(depth, position[2] + 0.05 * ranges)
+        variance = 1.0 / (information + gained)
+
+        depth_m, variance_m2 = landmarks.depth_m.copy(), landmarks.variance_m2.copy()
+        looks, accurate, credited = (
+            landmarks.looks.copy(),
+            landmarks.accurate.copy(),
+            landmarks.credited.copy(),
+        )
+        depth_m[index], variance_m2[index] = depth, variance
+        looks[index] += 1
+        done = (variance < self.accuracy_sd_m**2) | (looks[index] > self.visit_cap)
+        fresh = index[done & ~accurate[index]]
+        accurate[fresh] = True
+        credited[fresh] = vehicle
+        return replace(
+            landmarks,
+            depth_m=depth_m,
+            variance_m2=variance_m2,
+            looks=looks,
+            accurate=accurate,
+            credited=credited,
+        )
+
+
+@dataclass(frozen=True)
+class LandmarkSets:
+    """The sets of AURO15 definitions 1-3 at one time, as masks.
+
+    Attributes
+    ----------
+    accurate : (n,)
+        ``A``.
+    accurate_count_by : (n_vehicles,)
+        ``|A_j|``.
+    visible_by : (n_vehicles, n)
+        ``V_j``.
+    pending : (n,)
+        ``B_hat``: seen in the past, not visible now, not accurate; when there is none, every landmark that is neither
+        visible nor accurate.
+    """
+
+    accurate: BoolArray
+    accurate_count_by: IntArray
+    visible_by: BoolArray
+    pending: BoolArray
+
+    @property
+    def visible(self) -> BoolArray:
+        """``V``."""
+        return np.asarray(self.visible_by.any(axis=0), dtype=np.bool_)
+
+    @property
+    def unfinished_by(self) -> BoolArray:
+        """``B_j``: visible to vehicle j, not accurate."""
+        return np.asarray(self.visible_by & ~self.accurate, dtype=np.bool_)
+
+    @property
+    def unfinished(self) -> BoolArray:
+        """``B``: visible to anyone, not accurate."""
+        return np.asarray(self.visible & ~self.accurate, dtype=np.bool_)
+
+
+def landmark_sets(landmarks: Landmarks, visible_by: BoolArray) -> LandmarkSets:
+    """Return the sets for the visibility ``visible_by`` (n_vehicles, n)."""
+    hidden = ~visible_by.any(axis=0) & ~landmarks.accurate
+    seen_before = hidden & landmarks.seen
+    count = np.array([(landmarks.credited == j).sum() for j in range(len(visible_by))], dtype=np.int64)
+    return LandmarkSets(landmarks.accurate, count, visible_by, seen_before if seen_before.any() else hidden)

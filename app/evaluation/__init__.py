@@ -1,0 +1,1 @@
+"""Closed-loop runs without a network: comparisons of planners and maps."""

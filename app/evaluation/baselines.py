@@ -1,0 +1,96 @@
+"""What a user would do instead: lawnmowers, reconstructed with the same default map as ours."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.estimation import SingleBeam
+from app.evaluation.survey_world import SOUNDING_RATE_HZ, SPEED_MPS, Log, default_map, fly_routes, rmse_m
+from app.exploration.constraints import Constraints
+from app.exploration.planners.lawnmower import lawnmower_routes
+from app.mapping.types import Grid
+from simulator.terrain import Terrain
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Baseline:
+    """A lawnmower that was flown, and how far its map is from the truth."""
+
+    rmse_m: float
+    l2_norm: float
+    samples: int
+    distance_m: float
+
+
+@dataclass(frozen=True)
+class Baselines:
+    """The two lawnmowers that a survey is compared with."""
+
+    same_distance: Baseline
+    same_soundings: Baseline
+
+
+def lawnmower_baseline(
+    terrain: Terrain,
+    constraints: Constraints,
+    starts_m: FloatArray,
+    distance_m: float,
+    grid: Grid,
+    *,
+    spacing_m: float = SPEED_MPS / SOUNDING_RATE_HZ,
+    relative_noise: float = 0.01,
+    seed: int = 0,
+) -> Baseline:
+    """Fly even lines along the area's longer axis, an equal share of the area per vehicle, and map the soundings.
+
+    Parameters
+    ----------
+    constraints : Constraints
+        Give the area and its keep-out zones.
+    starts_m : (n_vehicles, 3)
+        Where the vehicles start; they keep that depth.
+    distance_m : float
+        Distance that each vehicle travels at most; as many lines as it pays for.
+    grid : Grid
+        Where the map is judged.
+    spacing_m : float
+        Distance between soundings along the lines.
+    """
+    log = Log(SingleBeam(relative_noise), terrain, np.random.default_rng([seed, 2]))
+    routes = lawnmower_routes(constraints, starts_m[:, :2], distance_m)
+    flown = fly_routes(log, starts_m, routes, distance_m, spacing_m)
+    rmse, l2 = rmse_m(default_map(log.soundings, grid), terrain)
+    return Baseline(rmse, l2, len(log.soundings), float(flown.sum()))
+
+
+def lawnmower_baselines(
+    terrain: Terrain,
+    constraints: Constraints,
+    starts_m: FloatArray,
+    distance_m: float,
+    soundings: int,
+    grid: Grid,
+    *,
+    relative_noise: float = 0.01,
+    seed: int = 0,
+) -> Baselines:
+    """Return the lawnmower of the same travelled distance, and the one of the same number of soundings.
+
+    Parameters
+    ----------
+    distance_m : float
+        What each vehicle travelled, on average.
+    soundings : int
+        What the whole team sounded; the second lawnmower travels as far as so many soundings at 5 Hz and 1.3 m/s take.
+    """
+    spacing = SPEED_MPS / SOUNDING_RATE_HZ
+    by_distance, by_soundings = (
+        lawnmower_baseline(
+            terrain, constraints, starts_m, metres, grid, spacing_m=spacing, relative_noise=relative_noise, seed=seed
+        )
+        for metres in (distance_m, soundings * spacing / len(starts_m))
+    )
+    return Baselines(by_distance, by_soundings)

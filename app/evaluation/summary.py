@@ -1,0 +1,45 @@
+"""Means and their spread over runs."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from scipy.stats import t as student
+
+
+@dataclass(frozen=True)
+class Spread:
+    """Mean, half width of its 95 % confidence interval, least and greatest value."""
+
+    mean: float
+    ci95: float
+    min: float
+    max: float
+
+
+def spread(values: Sequence[float]) -> Spread:
+    """Return the spread of at least one value; a single one has no interval (0)."""
+    x = np.asarray(values, dtype=np.float64)
+    half = 0.0
+    if len(x) > 1:
+        half = float(student.ppf(0.975, len(x) - 1) * x.std(ddof=1) / np.sqrt(len(x)))
+    return Spread(float(x.mean()), half, float(x.min()), float(x.max()))
+
+
+def summarise(runs: Sequence[Mapping[str, Any]]) -> dict[str, dict[str, dict[str, float]]]:
+    """Return planner -> metric -> spread, for every metric that is a number in at least one run of the planner."""
+    result: dict[str, dict[str, dict[str, float]]] = {}
+    for planner in dict.fromkeys(str(run["planner"]) for run in runs):
+        mine = [run for run in runs if run["planner"] == planner]
+        metrics: dict[str, dict[str, float]] = {}
+        for key in mine[0]:
+            numbers = [run[key] for run in mine if _is_number(run[key])]
+            if numbers and key != "seed":
+                metrics[key] = asdict(spread(numbers))
+        result[planner] = metrics
+    return result
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)

@@ -1,0 +1,170 @@
+"""The papers' field experiment on any terrain: a planner beside the usual practice, even coverage and an oracle."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from app.estimation import SingleBeam
+from app.evaluation.survey_world import (
+    SOUNDING_RATE_HZ,
+    SPEED_MPS,
+    Log,
+    SurveyScenario,
+    belief_of,
+    default_map,
+    fly_planner,
+    fly_routes,
+    rmse_m,
+    unknown_belief,
+)
+from app.exploration.options import PlannerOptions
+from app.exploration.planners.lawnmower import lawnmower_routes
+from app.exploration.problem import Belief
+from app.exploration.survey_backbone import Nodes, backbone
+from app.mapping.types import FloatArray, Soundings
+
+TVU_A_M, TVU_B = 0.25, 0.0075
+"""IHO S-44 special order: total vertical uncertainty at 95 % is sqrt(a^2 + (b depth)^2)."""
+
+
+@dataclass(frozen=True)
+class SurveyResult:
+    """How good the default map of some soundings is; ``coverage_pct``: cells known to S-44 special order."""
+
+    rmse_m: float
+    l2_norm: float
+    samples: int
+    distance_m: float
+    time_s: float
+    coverage_pct: float
+
+
+@dataclass(frozen=True)
+class RecordedTrack:
+    """The map from a track that was really flown, where the terrain file has one."""
+
+    samples: int
+    rmse_m: float
+
+
+@dataclass(frozen=True)
+class SurveyRun:
+    """One run; names as in the command's JSON. ``ratio``: RMSE over that of the better of the two patterns."""
+
+    planner: str
+    terrain: str
+    seed: int
+    vehicles: int
+    steps: int
+    max_step_m: float
+    sampling: str
+    rmse_m: float
+    l2_norm: float
+    samples: int
+    distance_m: float
+    time_s: float
+    coverage_pct: float
+    plan_ms_median: float
+    plan_ms_p99: float
+    usual_practice: SurveyResult
+    coverage: SurveyResult
+    oracle: SurveyResult
+    ratio: float
+    recorded_track: RecordedTrack | None = None
+    ratio_recorded: float | None = None
+
+
+def run_survey(
+    scenario: SurveyScenario,
+    planner: str,
+    options: PlannerOptions,
+    progress: Callable[[int], None] = lambda step: None,
+    recorded: Soundings | None = None,
+) -> SurveyRun:
+    """Fly the planner and everything that it is compared with.
+
+    The patterns travel as far as the planner did, on average over the vehicles. ``recorded`` are the soundings of a
+    track that was really flown over this terrain.
+    """
+    track = fly_planner(scenario, planner, options, progress)
+    ours = judge(scenario, track.soundings, track.distance_m)
+    limit = float(track.distance_m.mean())
+    usual = _pattern(scenario, lawnmower_routes(scenario.constraints, scenario.starts_m[:, :2], limit), limit)
+    even = _pattern(scenario, even_coverage(scenario, limit), limit)
+    knowing = fly_planner(scenario, "cao", PlannerOptions(), known=true_belief(scenario))
+    beside = None
+    if recorded is not None:
+        beside = RecordedTrack(len(recorded), rmse_m(default_map(recorded, scenario.grid), scenario.terrain)[0])
+    return SurveyRun(
+        planner=planner,
+        terrain=scenario.terrain.name,
+        seed=scenario.seed,
+        vehicles=scenario.vehicles,
+        steps=scenario.steps,
+        max_step_m=scenario.max_step_m,
+        sampling=scenario.sampling,
+        rmse_m=ours.rmse_m,
+        l2_norm=ours.l2_norm,
+        samples=ours.samples,
+        distance_m=ours.distance_m,
+        time_s=ours.time_s,
+        coverage_pct=ours.coverage_pct,
+        plan_ms_median=1e3 * float(np.median(track.plan_s)),
+        plan_ms_p99=1e3 * float(np.quantile(track.plan_s, 0.99)),
+        usual_practice=usual,
+        coverage=even,
+        oracle=judge(scenario, knowing.soundings, knowing.distance_m),
+        ratio=ours.rmse_m / min(usual.rmse_m, even.rmse_m),
+        recorded_track=beside,
+        ratio_recorded=None if beside is None else ours.rmse_m / beside.rmse_m,
+    )
+
+
+def judge(scenario: SurveyScenario, soundings: Soundings, distance_m: FloatArray) -> SurveyResult:
+    """Map the soundings and compare with the truth; ``distance_m`` (vehicles,) is what each travelled."""
+    estimate = default_map(soundings, scenario.grid)
+    rmse, l2 = rmse_m(estimate, scenario.terrain)
+    allowed = np.hypot(TVU_A_M, TVU_B * estimate.depth_m) / 1.96
+    return SurveyResult(
+        rmse,
+        l2,
+        len(soundings),
+        float(np.sum(distance_m)),
+        float(np.max(distance_m)) / SPEED_MPS,
+        100.0 * float(np.mean(estimate.sd_m <= allowed)),
+    )
+
+
+def even_coverage(scenario: SurveyScenario, distance_m: float) -> list[FloatArray]:
+    """Return routes of equal area per vehicle, in the direction and order that come closest to every place."""
+    belief = unknown_belief(scenario.belief_grid)
+    steps = max(1, int(distance_m / scenario.max_step_m))
+    nodes = Nodes(belief.xy_m, belief.weight)
+    spacing = scenario.terrain.width_m * scenario.terrain.height_m / (scenario.vehicles * distance_m)
+    shares = backbone(
+        scenario.constraints,
+        np.ascontiguousarray(scenario.starts_m[:, :2]),
+        steps,
+        nodes,
+        max(belief.correlation_length_m, spacing),
+        2.0,
+    )
+    return [share.stops for share in shares]
+
+
+def true_belief(scenario: SurveyScenario) -> Belief:
+    """Return the belief of one who has sounded every node of the planner's grid without noise."""
+    grid = scenario.belief_grid
+    centres = grid.centres_m
+    depth = scenario.terrain.depth_at(centres[:, 0], centres[:, 1])
+    known = np.isfinite(depth)
+    soundings = Soundings(centres[known, 0], centres[known, 1], depth[known], np.full(int(known.sum()), 1e-2))
+    return belief_of(default_map(soundings, grid))
+
+
+def _pattern(scenario: SurveyScenario, routes: list[FloatArray], distance_m: float) -> SurveyResult:
+    log = Log(SingleBeam(scenario.relative_noise), scenario.terrain, np.random.default_rng([scenario.seed, 2]))
+    spacing = SPEED_MPS / SOUNDING_RATE_HZ if scenario.sampling == "continuous" else distance_m / scenario.steps
+    flown = fly_routes(log, scenario.starts_m, routes, distance_m, spacing)
+    return judge(scenario, log.soundings, flown)

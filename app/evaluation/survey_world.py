@@ -1,0 +1,259 @@
+"""The field experiment without a network: vehicles on straight legs over a known terrain, sounding as they go."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.estimation import SingleBeam
+from app.exploration.constraints import Constraints
+from app.exploration.options import PlannerOptions
+from app.exploration.planners import create_planner
+from app.exploration.problem import Belief, Situation
+from app.mapping.gp import GaussianProcessMap
+from app.mapping.types import BathymetricMap, Grid, Soundings
+from simulator.terrain import Terrain
+
+FloatArray = NDArray[np.float64]
+Sampling = Literal["step", "continuous"]
+
+SPEED_MPS = 1.3
+SOUNDING_RATE_HZ = 5.0
+FIRST_DEPTH_M = 2.0
+MIN_ALTITUDE_M = 0.5
+BELIEF_NODES_PER_SIDE = 50
+LEARN_AT = (0.05, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8)
+"""Parts of the mission after which the map's hyperparameters are learned anew; between them they are kept."""
+
+
+@dataclass(frozen=True)
+class SurveyScenario:
+    """A survey of a whole terrain.
+
+    Attributes
+    ----------
+    terrain : Terrain
+        The true sea floor; the area is its rectangle.
+    vehicles : int
+        Size of the team, starting in the south-west corner, 5 m apart.
+    steps : int
+        Steps of the mission.
+    max_step_m : float
+        Largest leg.
+    sampling : "step" or "continuous"
+        One sounding at the end of every leg, or 5 Hz at 1.3 m/s along it.
+    relative_noise : float
+        Of a sounding's range to the bottom.
+    seed : int
+        Of everything random.
+    """
+
+    terrain: Terrain
+    vehicles: int = 2
+    steps: int = 100
+    max_step_m: float = 10.0
+    sampling: Sampling = "continuous"
+    relative_noise: float = 0.01
+    seed: int = 0
+
+    @property
+    def area_m(self) -> FloatArray:
+        """The terrain's rectangle, (4, 2)."""
+        w, h = self.terrain.width_m, self.terrain.height_m
+        return np.array([[0.0, 0.0], [w, 0.0], [w, h], [0.0, h]])
+
+    @property
+    def constraints(self) -> Constraints:
+        """The limits of the mission."""
+        return Constraints(
+            self.area_m, max_step_m=self.max_step_m, max_depth_m=50.0, min_altitude_m=MIN_ALTITUDE_M, min_depth_m=0.0
+        )
+
+    @property
+    def starts_m(self) -> FloatArray:
+        """Where the vehicles start, (vehicles, 3): 2 m from the corner, 5 m apart, each 1 m deeper than the last."""
+        k = np.arange(self.vehicles)
+        gap = min(5.0, (self.terrain.width_m - 4.0) / max(1, self.vehicles))
+        depth = np.minimum(FIRST_DEPTH_M + k, max(0.2, self.terrain.min_depth_m - MIN_ALTITUDE_M))
+        return np.column_stack([2.0 + gap * k, np.full(self.vehicles, 2.0), depth])
+
+    @property
+    def grid(self) -> Grid:
+        """The grid of the map that is judged: about 1 m."""
+        t = self.terrain
+        cell = max(1.0, max(t.width_m, t.height_m) / 200.0)
+        return Grid(0.0, 0.0, cell, max(1, int(t.height_m / cell)), max(1, int(t.width_m / cell)))
+
+    @property
+    def belief_grid(self) -> Grid:
+        """The coarser grid whose nodes are the planner's landmarks."""
+        t = self.terrain
+        cell = max(t.width_m, t.height_m) / BELIEF_NODES_PER_SIDE
+        return Grid(0.0, 0.0, cell, max(1, int(np.ceil(t.height_m / cell))), max(1, int(np.ceil(t.width_m / cell))))
+
+
+@dataclass
+class Log:
+    """Soundings taken and where the vehicles went, growing."""
+
+    sensor: SingleBeam
+    terrain: Terrain
+    rng: np.random.Generator
+    east_m: list[FloatArray] = field(default_factory=list)
+    north_m: list[FloatArray] = field(default_factory=list)
+    depth_m: list[FloatArray] = field(default_factory=list)
+    sd_m: list[FloatArray] = field(default_factory=list)
+
+    def sound(self, points: FloatArray) -> None:
+        """Sound from vehicle positions (n, 3); nothing is heard where the terrain is unknown."""
+        bottom = self.terrain.depth_at(points[:, 0], points[:, 1])
+        heard = np.isfinite(bottom)
+        points, bottom = points[heard], bottom[heard]
+        depth = self.sensor.measure(points[:, 2], bottom, self.rng)
+        self.east_m.append(points[:, 0])
+        self.north_m.append(points[:, 1])
+        self.depth_m.append(depth)
+        self.sd_m.append(self.sensor.sd_m(points[:, 2], depth))
+
+    @property
+    def soundings(self) -> Soundings:
+        """All of them."""
+        return Soundings(*(np.concatenate(x) for x in (self.east_m, self.north_m, self.depth_m, self.sd_m)))
+
+
+def along(start: FloatArray, end: FloatArray, sampling: Sampling) -> FloatArray:
+    """Return the positions (n, 3) at which a vehicle sounds on the leg, its start left out."""
+    if sampling == "step":
+        return end[None]
+    gap = SPEED_MPS / SOUNDING_RATE_HZ
+    n = max(1, int(np.linalg.norm(end - start) / gap))
+    return start + np.linspace(0.0, 1.0, n + 1)[1:, None] * (end - start)
+
+
+def default_map(soundings: Soundings, grid: Grid) -> BathymetricMap:
+    """Return the map that the service makes by default."""
+    return GaussianProcessMap().fit(soundings).predict(grid)
+
+
+def rmse_m(estimate: BathymetricMap, terrain: Terrain) -> tuple[float, float]:
+    """Return the root mean square and the L2 norm of the error over all cells whose true depth is known."""
+    centres = estimate.grid.centres_m
+    difference = estimate.depth_m.ravel() - terrain.depth_at(centres[:, 0], centres[:, 1])
+    difference = difference[np.isfinite(difference)]
+    return float(np.sqrt(np.mean(difference**2))), float(np.linalg.norm(difference))
+
+
+@dataclass(frozen=True)
+class Track:
+    """A survey that was flown: positions after every step (steps + 1, vehicles, 3), soundings and planning times."""
+
+    positions_m: FloatArray
+    soundings: Soundings
+    plan_s: FloatArray
+
+    @property
+    def distance_m(self) -> FloatArray:
+        """Travelled by each vehicle, (vehicles,)."""
+        return np.asarray(np.linalg.norm(np.diff(self.positions_m, axis=0), axis=2).sum(axis=0))
+
+
+def fly_planner(
+    scenario: SurveyScenario,
+    planner: str,
+    options: PlannerOptions,
+    progress: Callable[[int], None] = lambda step: None,
+    known: Belief | None = None,
+) -> Track:
+    """Run the closed loop: belief from the default map, planner, legs, soundings.
+
+    ``progress`` is told every step. An oracle is given ``known`` instead of what it has sounded.
+    """
+    sensor = SingleBeam(scenario.relative_noise)
+    chooser = create_planner(planner, options, sensor)
+    rng, world = (np.random.default_rng([scenario.seed, k]) for k in (0, 1))
+    log = Log(sensor, scenario.terrain, world)
+    positions = scenario.starts_m
+    log.sound(positions)
+    grid, gp = scenario.belief_grid, GaussianProcessMap()
+    learn_at = {max(2, round(part * scenario.steps)) for part in LEARN_AT}
+    names = tuple(f"auv-{k + 1}" for k in range(scenario.vehicles))
+    headings = np.full(scenario.vehicles, np.nan)
+    history, times = [positions], []
+    belief = unknown_belief(grid) if known is None else known
+    every = max(1, scenario.steps // 100)
+    for step in range(1, scenario.steps + 1):
+        if known is None and ((step > 2 and step % every == 0) or step in learn_at):
+            estimate = gp.fit(log.soundings, learn=step in learn_at).predict(grid)
+            belief = belief_of(estimate)
+        soundings = log.soundings
+        situation = Situation(
+            step,
+            scenario.steps,
+            names,
+            positions,
+            headings,
+            belief,
+            np.column_stack([soundings.east_m, soundings.north_m]),
+            scenario.constraints,
+        )
+        begun = time.perf_counter()
+        proposal = chooser.propose(situation, rng)
+        times.append(time.perf_counter() - begun)
+        for start, end in zip(positions, proposal.positions, strict=True):
+            log.sound(along(start, end, scenario.sampling))
+        leg = proposal.positions - positions
+        moved = np.hypot(leg[:, 0], leg[:, 1]) > 1e-6
+        headings = np.where(moved, np.arctan2(leg[:, 0], leg[:, 1]), headings)
+        positions = proposal.positions
+        history.append(positions)
+        progress(step)
+    return Track(np.array(history), log.soundings, np.array(times))
+
+
+def fly_routes(
+    log: Log, starts_m: FloatArray, routes: list[FloatArray], distance_m: float, spacing_m: float
+) -> FloatArray:
+    """Fly given routes from ``starts_m`` (n, 3) for at most ``distance_m`` each; return the distances flown (n,).
+
+    Soundings are taken every ``spacing_m`` and go to ``log``.
+    """
+    flown = np.zeros(len(routes))
+    for i, (start, route) in enumerate(zip(starts_m, routes, strict=True)):
+        corners = np.vstack([start[:2], route])
+        at = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(corners, axis=0).T))])
+        flown[i] = min(distance_m, float(at[-1]))
+        stops = np.arange(0.0, flown[i] + 1e-9, spacing_m)
+        points = np.column_stack([np.interp(stops, at, corners[:, k]) for k in (0, 1)])
+        log.sound(np.column_stack([points, np.full(len(points), start[2])]))
+    return flown
+
+
+def unknown_belief(grid: Grid) -> Belief:
+    """Return what is known before the first sounding: nothing."""
+    xy = grid.centres_m
+    n = len(xy)
+    extent = float(np.ptp(xy, axis=0).max())
+    return Belief(
+        xy,
+        np.full(n, np.nan),
+        np.full(n, np.inf),
+        np.zeros(n, dtype=np.bool_),
+        np.ones(n),
+        correlation_length_m=0.2 * extent,
+    )
+
+
+def belief_of(estimate: BathymetricMap) -> Belief:
+    """Return the planner's view of a map: its nodes are the landmarks, roughness their weight."""
+    n = estimate.depth_m.size
+    return Belief(
+        estimate.grid.centres_m,
+        estimate.depth_m.ravel(),
+        estimate.sd_m.ravel(),
+        np.zeros(n, dtype=np.bool_),
+        np.where(np.isfinite(estimate.roughness), estimate.roughness, 1.0).ravel(),
+        estimate.correlation_length_m,
+    )

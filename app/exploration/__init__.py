@@ -1,0 +1,1 @@
+"""Where to go: objectives, constraints and planners. Pure: numpy in, numpy out."""

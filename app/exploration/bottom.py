@@ -1,0 +1,70 @@
+"""The sea floor as planners and the safety check see it: depth estimates on a raster that answers in constant time."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+FloatArray = NDArray[np.float64]
+
+MAX_CELLS_PER_SIDE = 128
+
+
+@dataclass(frozen=True)
+class Bottom:
+    """Estimated depth of the sea floor on square cells; row 0 is south, column 0 is west.
+
+    Attributes
+    ----------
+    west_m, south_m : float
+        Outer corner of the south-western cell.
+    cell_m : float
+        Side of a cell.
+    depth_m : (rows, cols)
+        Depth, positive down; NaN where unknown. Outside the raster nothing is known.
+    """
+
+    west_m: float
+    south_m: float
+    cell_m: float
+    depth_m: FloatArray
+
+    @classmethod
+    def unknown(cls) -> "Bottom":
+        """Return a sea floor of which nothing is known."""
+        return cls(0.0, 0.0, 1.0, np.full((1, 1), np.nan))
+
+    @classmethod
+    def from_landmarks(cls, xy_m: FloatArray, depth_m: FloatArray) -> "Bottom":
+        """Give every cell the depth of the known landmark closest to it, within two landmark spacings.
+
+        Parameters
+        ----------
+        xy_m : (n, 2)
+            Landmark positions.
+        depth_m : (n,)
+            Depth estimates; NaN ones are left out.
+        """
+        known = np.isfinite(depth_m)
+        if not known.any():
+            return cls.unknown()
+        low, high = xy_m.min(axis=0), xy_m.max(axis=0)
+        extent = max(float((high - low).max()), 1e-9)
+        spacing = max(float(np.sqrt(max(np.prod(high - low), 1e-18) / len(xy_m))), extent / MAX_CELLS_PER_SIDE)
+        cols, rows = (int(k) for k in np.ceil((high - low) / spacing + 1e-9).astype(int) + 1)
+        west, south = low - spacing / 2
+        east, north = np.meshgrid(west + (np.arange(cols) + 0.5) * spacing, south + (np.arange(rows) + 0.5) * spacing)
+        distance, nearest = cKDTree(xy_m[known]).query(np.column_stack([east.ravel(), north.ravel()]))
+        depth = np.where(distance <= 2 * spacing, depth_m[known][nearest], np.nan)
+        return cls(float(west), float(south), spacing, depth.reshape(rows, cols))
+
+    def at(self, en_m: FloatArray) -> FloatArray:
+        """Return depths at positions (..., 2); NaN where unknown."""
+        col = np.floor((en_m[..., 0] - self.west_m) / self.cell_m)
+        row = np.floor((en_m[..., 1] - self.south_m) / self.cell_m)
+        rows, cols = self.depth_m.shape
+        known = (col >= 0) & (col < cols) & (row >= 0) & (row < rows)
+        safe_row = np.where(known, row, 0).astype(int)
+        safe_col = np.where(known, col, 0).astype(int)
+        return np.where(known, self.depth_m[safe_row, safe_col], np.nan)

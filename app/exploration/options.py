@@ -1,0 +1,35 @@
+"""What can be set about a planner; declared once, shown by the command line, REST and the dashboard."""
+
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+
+class PlannerOptions(BaseModel):
+    """Settings of the planners. Every planner reads those that concern it."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    regressors: Literal["map", "polynomial"] = Field(
+        "map",
+        description="What CAO's estimator is linear in: predictions from the current map, or powers of raw positions.",
+    )
+    candidates: int = Field(48, ge=4, le=10_000, description="Candidates per vehicle that CAO weighs in a step (N).")
+    window: int = Field(30, ge=2, le=1000, description="Past steps to which CAO fits its estimator (L + T_h).")
+    alpha: float = Field(1.0, gt=0, le=10, description="First size of random moves, as a fraction of the largest step.")
+    alpha_decay: float = Field(
+        0.6,
+        gt=0.5,
+        le=1.0,
+        description="Exponent of the decay of alpha; above 0.5 the squares have a finite sum.",
+    )
+    alpha_floor: float = Field(0.2, ge=0, le=1, description="Least alpha, so that random moves never die out.")
+    search: int = Field(1500, ge=0, le=100_000, description="Most changes to the survey plan tried in a step.")
+    turn_radius_m: float = Field(6.0, ge=0, description="Tightest turn the vehicles fly; sharper ones are penalised.")
+    cruise_depth_m: float | None = Field(
+        None, ge=0, description="Depth at which vehicles survey; by default the depth at which each joined."
+    )
+    tries: int = Field(0, ge=0, le=10_000, description="Real tries per step of OSARSES (only in simulation).")
+    accuracy_sd_m: float = Field(
+        0.02, gt=0, description="Standard deviation below which a landmark counts as accurately estimated."
+    )

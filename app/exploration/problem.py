@@ -1,0 +1,108 @@
+"""What a planner is asked and what it answers.
+
+All positions are metres in one local Cartesian frame: columns ``east_m, north_m, depth_m`` (depth positive down).
+Arrays are never modified by the receiver.
+"""
+
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.exploration.constraints import Constraints
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Belief:
+    """What is known of the sea floor, at fixed landmarks (the nodes of the map's grid in a bathymeter mission).
+
+    Attributes
+    ----------
+    xy_m : (n_landmarks, 2)
+        Fixed horizontal positions, east and north.
+    depth_m : (n_landmarks,)
+        Current depth estimates; NaN where nothing is known at all.
+    sd_m : (n_landmarks,)
+        Their standard deviations (the confidence ``c_L`` is the square); inf where nothing is known.
+    accurate : (n_landmarks,)
+        The set ``A``: landmarks whose estimate once passed the accuracy threshold.
+    weight : (n_landmarks,)
+        How much each landmark matters: local roughness of the sea floor relative to the area's mean, mean about 1.
+    correlation_length_m : float
+        Distance over which a sounding informs its surroundings.
+    """
+
+    xy_m: FloatArray
+    depth_m: FloatArray
+    sd_m: FloatArray
+    accurate: BoolArray
+    weight: FloatArray
+    correlation_length_m: float
+
+
+@dataclass(frozen=True)
+class Situation:
+    """Everything a planner may know when it decides one step.
+
+    Attributes
+    ----------
+    step : int
+        Number of the step being decided, from 1.
+    steps_total : int
+        Steps of the whole mission, this one included in the count.
+    vehicles : tuple of str
+        Names, in the order of the rows of ``positions``; may change from step to step.
+    positions : (n_vehicles, 3)
+        The team configuration ``X_R``: where the vehicles are when the step begins.
+    headings_rad : (n_vehicles,)
+        Clockwise from north; NaN where unknown.
+    belief : Belief
+        What is known of the sea floor.
+    soundings_en_m : (n_soundings, 2)
+        Where soundings were taken so far.
+    constraints : Constraints
+        What every proposed configuration must obey.
+    """
+
+    step: int
+    steps_total: int
+    vehicles: tuple[str, ...]
+    positions: FloatArray
+    headings_rad: FloatArray
+    belief: Belief
+    soundings_en_m: FloatArray
+    constraints: Constraints
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """A planner's answer: the next team configuration, (n_vehicles, 3), and figures for the operator."""
+
+    positions: FloatArray
+    objective: float
+    terms: dict[str, float] = field(default_factory=dict)
+
+
+class Planner(Protocol):
+    """Decides where every vehicle goes next.
+
+    The same situation, memory and generator state give the same answer. ``snapshot`` returns everything the planner
+    remembers from step to step as bytes; ``restore`` on a new object of the same class continues as if nothing had
+    happened.
+    """
+
+    def propose(self, situation: Situation, rng: np.random.Generator) -> Proposal:
+        """Return a configuration that obeys ``situation.constraints``."""
+        ...
+
+    def snapshot(self) -> bytes:
+        """Return the planner's memory."""
+        ...
+
+    def restore(self, memory: bytes) -> None:
+        """Take up a memory made by ``snapshot``. Raises ValueError when it is not one."""
+        ...

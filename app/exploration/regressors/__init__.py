@@ -1,0 +1,1 @@
+"""What CAO's estimator can be linear in."""

@@ -1,0 +1,152 @@
+"""Predictions for sensors that see landmarks from afar, from the current estimates (method of AURO15, map regressors).
+
+phi = (expected progress of landmarks in sight towards accuracy, expected newly accurate ones, minus the sum over the
+vehicles of the distance to the closest open landmark, in steps). Unseen landmarks are taken to be as deep as the
+closest seen one. While nothing is gained the whole team heads for one common landmark: vehicles that pull towards
+different ones under a communication limit would hold each other back for ever.
+"""
+
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from app.estimation import RangeSensor, Sensor
+from app.exploration.bottom import Bottom
+from app.exploration.measured import MeasuredObjective
+from app.exploration.options import PlannerOptions
+from app.exploration.planners.base import vehicle_rng
+from app.exploration.problem import Situation
+
+FloatArray = NDArray[np.float64]
+
+PATIENCE = 3
+"""Steps without a new accurate landmark after which the team heads for one common landmark."""
+
+
+class LandmarkRegressors:
+    """See the module's text."""
+
+    def __init__(self, options: PlannerOptions, sensor: Sensor) -> None:
+        if not isinstance(sensor, RangeSensor):
+            raise ValueError(f"sensor: landmark regressors need a RangeSensor, not {type(sensor).__name__}")
+        self._options = options
+        self._sensor = sensor
+        self._measured = MeasuredObjective(sensor)
+        self._accurate = 0
+        self._idle = 0
+
+    def begin(self, team: Situation, bottom: Bottom, seed: int) -> float:
+        """See :class:`app.exploration.planners.cao.Regressors`."""
+        self._team, self._seed = team, seed
+        belief = team.belief
+        open_ = ~belief.accurate
+        depth = belief.depth_m.copy()
+        known = np.isfinite(depth)
+        if known.any() and not known.all():
+            _, nearest = cKDTree(belief.xy_m[known]).query(belief.xy_m[~known])
+            depth[~known] = depth[known][nearest]
+        elif not known.any():
+            depth[:] = team.positions[:, 2].max() + self._sensor.visibility_m / 2
+        self._points = np.ascontiguousarray(np.column_stack([belief.xy_m, depth])[open_])
+        sd = belief.sd_m[open_]
+        have = np.where(np.isfinite(sd), 1.0 / np.maximum(sd, 1e-9) ** 2, 0.0)
+        self._needed = np.maximum(1e-9, 1.0 / self._options.accuracy_sd_m**2 - have)
+        J = self._measured.update(team)
+        gained = int(belief.accurate.sum()) > self._accurate
+        self._accurate = int(belief.accurate.sum())
+        self._idle = 0 if gained else self._idle + 1
+        self._goals = self._points
+        if self._idle >= PATIENCE and len(self._points):
+            squared = ((self._points[None, :, :2] - team.positions[:, None, :2]) ** 2).sum(axis=2)
+            self._goals = self._points[[int(squared.min(axis=0).argmin())]]
+        return J
+
+    def prior(self, team: Situation) -> tuple[FloatArray, float]:
+        """Progress and completed landmarks count alike; the pull of far ones is gentle."""
+        return np.array([1.0, 1.0, 1.0]), 20.0
+
+    def trusted(self, theta: FloatArray) -> FloatArray:
+        """No prediction counts against what it predicts, and none is switched off altogether."""
+        return np.maximum(theta, 0.2)
+
+    def candidates(self, alpha: float) -> FloatArray:
+        """Whole steps, the team's common heading mixed with each vehicle's own, and random moves of size alpha."""
+        team, step = self._team, self._team.constraints.max_step_m * (1 - 1e-9)
+        n = self._options.candidates * len(team.vehicles)
+        own = [vehicle_rng(self._seed, name).standard_normal((n, 3)) for name in team.vehicles]
+        common = np.random.default_rng([self._seed, 2]).standard_normal((n, 1, 3))
+        mix = np.linspace(0.0, 1.0, n)[:, None, None]
+        zeta = mix * common + (1.0 - mix) * np.stack(own, axis=1)
+        length = np.maximum(np.linalg.norm(zeta, axis=2, keepdims=True), 1e-12)
+        whole = (np.arange(n) % 4 != 3)[:, None, None]
+        moves = np.where(whole, step * zeta / length, alpha * step * zeta)
+        moves *= np.minimum(1.0, step / np.maximum(np.linalg.norm(moves, axis=2, keepdims=True), 1e-12))
+        return team.positions + moves
+
+    def regressors(self, candidates: FloatArray) -> FloatArray:
+        """See the module's text."""
+        if len(self._points) == 0:
+            return np.zeros((len(candidates), 3))
+        return _predict(
+            np.ascontiguousarray(candidates),
+            self._points,
+            self._needed,
+            self._goals,
+            self._sensor.visibility_m,
+            self._sensor.relative_noise,
+            self._team.constraints.max_step_m,
+        )
+
+    def chosen(self, positions: FloatArray) -> None:
+        """Nothing to keep."""
+
+    def remember(self) -> dict[str, Any]:
+        """Return the memory."""
+        return {"measured": self._measured.remember(), "accurate": self._accurate, "idle": self._idle}
+
+    def recall(self, state: dict[str, Any]) -> None:
+        """Take up what :meth:`remember` returned."""
+        self._measured.recall(state["measured"])
+        self._accurate, self._idle = int(state["accurate"]), int(state["idle"])
+
+
+@njit(cache=True, nogil=True)
+def _predict(
+    candidates: FloatArray,
+    points: FloatArray,
+    needed: FloatArray,
+    goals: FloatArray,
+    visibility: float,
+    noise: float,
+    step: float,
+) -> FloatArray:
+    c, n, _ = candidates.shape
+    v2 = visibility * visibility
+    common = len(goals) == 1
+    out = np.zeros((c, 3))
+    closest = np.empty(n)
+    for k in range(c):
+        closest[:] = np.inf
+        for m in range(len(points)):
+            information = 0.0
+            for i in range(n):
+                dx = candidates[k, i, 0] - points[m, 0]
+                dy = candidates[k, i, 1] - points[m, 1]
+                dz = points[m, 2] - candidates[k, i, 2]
+                r2 = dx * dx + dy * dy + dz * dz
+                if r2 < v2:
+                    information += dz * dz / (noise * noise * r2 * r2 + 1e-12)
+                closest[i] = min(closest[i], r2)
+            if information > 0.0:
+                progress = min(1.0, information / needed[m])
+                out[k, 0] += progress
+                if progress >= 1.0:
+                    out[k, 1] += 1.0
+        for i in range(n):
+            if common:
+                closest[i] = ((candidates[k, i] - goals[0]) ** 2).sum()
+            out[k, 2] -= np.sqrt(closest[i]) / step
+    return out

@@ -1,0 +1,315 @@
+"""Predictions for bathymeter missions, from the current map: what a leg gains, and how good the final map becomes.
+
+The team holds two plans for all remaining steps: the coverage backbone, and a freer plan that is improved step by step
+(:mod:`app.exploration.survey_search`) towards where the map is rough and little sounded. It follows the backbone until
+the freer plan promises a clearly better final map. Candidates are the next legs of both, turns that a vehicle can fly,
+legs to places of high gain, and random ones; each is judged by the final map when the plan goes on from its end.
+
+phi = (improvement of the predicted final map over the plan kept so far, uncertainty removed by the legs alone); the
+objective measured after a step is the improvement of the predicted final map that really came about.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from app.exploration.bottom import Bottom
+from app.exploration.constraints import inside_area
+from app.exploration.options import PlannerOptions
+from app.exploration.planners.base import vehicle_rng
+from app.exploration.planners.handover import hand_over
+from app.exploration.problem import Belief, Situation
+from app.exploration.routes import next_waypoint
+from app.exploration.survey_backbone import MARGIN_M, Nodes, backbone
+from app.exploration.survey_search import DRAWS, improve
+from app.exploration.survey_value import plan_value, values_after_first_leg
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+AtCruise = Callable[[Situation, Bottom, FloatArray], FloatArray]
+
+MAX_NODES = 900
+SEARCH_VIAS = 60
+"""Plans with more via points than this get proportionally fewer tries, so that a step takes no longer."""
+POWER = 2.0
+SLOPE_SHARE = 0.5
+STEEPEST = 10.0
+LEAVE_BACKBONE = 0.93
+"""The freer plan must promise at most this part of the squared error that the backbone promises."""
+LEAVE_PLAN = 0.02
+"""A leg off the plan must promise a squared error smaller by this part: predictions are noisy, and a choice among many
+takes the luckiest."""
+TURN_PENALTY = 0.002
+"""Relative worsening of the final map that a reversal counts for."""
+TURNS_RAD = np.deg2rad([-120.0, -90.0, -60.0, -30.0, 0.0, 30.0, 60.0, 90.0, 120.0])
+
+
+class SurveyRegressors:
+    """See the module's text."""
+
+    def __init__(self, options: PlannerOptions, at_cruise: AtCruise) -> None:
+        """Vehicles move at their cruise depths by ``at_cruise``."""
+        self._options = options
+        self._at_cruise = at_cruise
+        self._backbone: dict[str, FloatArray] = {}
+        self._coarse: dict[str, int] = {}
+        self._plan: dict[str, FloatArray] = {}
+        self._expected: float | None = None
+
+    def begin(self, team: Situation, bottom: Bottom, seed: int) -> float:
+        """See :class:`app.exploration.planners.cao.Regressors`."""
+        self._team, self._bottom, self._seed = team, bottom, seed
+        constraints = team.constraints
+        self._en = np.ascontiguousarray(team.positions[:, :2])
+        self._steps = max(1, team.steps_total - team.step + 1)
+        self._step_m = constraints.max_step_m * (1 - 1e-9)
+        self._nodes = thin_nodes(team, expected_variability(team.belief, bottom))
+        self._px, self._py = (np.ascontiguousarray(self._nodes.en_m[:, k]) for k in (0, 1))
+        area = float(len(self._nodes.en_m)) * _cell(self._nodes.en_m) ** 2
+        self._spacing = area / max(1.0, len(self._en) * self._steps * constraints.max_step_m)
+        self._scale = max(team.belief.correlation_length_m, self._spacing)
+        soundings = np.vstack([team.soundings_en_m, self._en])
+        distance, _ = cKDTree(soundings).query(self._nodes.en_m)
+        self._d2 = np.asarray(distance**2)
+        self._reference = max(1e-12, float(self._nodes.weight.sum()))
+        self._adopt()
+        plan, lattice = self._packed(self._plan), self._packed(self._backbone)
+        expected = min(self._value(*plan), self._value(*lattice)) / self._reference
+        before, self._expected = self._expected, expected
+        self._choose_plan(plan, lattice)
+        return np.nan if before is None else before - expected
+
+    def prior(self, team: Situation) -> tuple[FloatArray, float]:
+        """The final map counts fully, what is gained at once a little."""
+        return np.array([1.0, 0.02]), 10.0
+
+    def trusted(self, theta: FloatArray) -> FloatArray:
+        """Gain at once may bend the plan, never replace it."""
+        final = max(float(theta[0]), 0.1)
+        return np.array([final, float(np.clip(theta[1], 0.0, 0.1 * final))])
+
+    def candidates(self, alpha: float) -> FloatArray:
+        """Per vehicle: the legs described above, the others following the plan; and both plans for the whole team."""
+        team, n = self._team, len(self._en)
+        along = self._first_legs(self._followed)
+        legs = [self._legs_of(i, alpha) for i in range(n)]
+        targets = [along, self._first_legs(self._other)]
+        for i, name in enumerate(team.vehicles):
+            if self._coarse[name] > 0:
+                continue  # before the first pass is over too little is known to be worth a detour
+            for leg in legs[i]:
+                target = along.copy()
+                target[i] = leg
+                targets.append(target)
+        return self._at_cruise(team, self._bottom, np.array(targets))
+
+    def regressors(self, candidates: FloatArray) -> FloatArray:
+        """See the module's text."""
+        values = self._after_legs(candidates)
+        now = self._uncertainty_now()
+        kept = self._expected_value
+        along = [
+            np.hypot(*np.moveaxis(candidates[..., :2] - self._first_legs(p), 2, 0)) < 1e-3
+            for p in (self._followed, self._other)
+        ]
+        off_plan = ~(along[0].all(axis=1) | along[1].all(axis=1))
+        final = values[:, 1] + LEAVE_PLAN * kept * off_plan
+        return np.column_stack([(kept - final) / self._reference, (now - values[:, 0]) / self._reference])
+
+    def chosen(self, positions: FloatArray) -> None:
+        """Drop the via points that the legs reach."""
+        for i, name in enumerate(self._team.vehicles):
+            x, y = self._en[i]
+            for routes in (self._plan, self._backbone):
+                route = routes[name]
+                tx, ty, first = next_waypoint(x, y, route, 0, len(route), self._step_m)
+                if np.hypot(tx - positions[i, 0], ty - positions[i, 1]) < 1e-3:
+                    routes[name] = route[first:]
+                    if routes is self._plan:
+                        self._coarse[name] = max(0, self._coarse[name] - first)
+
+    def remember(self) -> dict[str, Any]:
+        """Return the memory."""
+        return {
+            "backbone": self._backbone,
+            "coarse": self._coarse,
+            "plan": self._plan,
+            "expected": self._expected,
+        }
+
+    def recall(self, state: dict[str, Any]) -> None:
+        """Take up what :meth:`remember` returned."""
+        self._backbone, self._plan = (
+            {str(k): np.array(v, dtype=np.float64).reshape(-1, 2) for k, v in state[key].items()}
+            for key in ("backbone", "plan")
+        )
+        self._coarse = {str(k): int(v) for k, v in state["coarse"].items()}
+        self._expected = state["expected"]
+
+    def _adopt(self) -> None:
+        """Give every vehicle of the team both plans."""
+        team = self._team
+        if not self._plan.keys() & set(team.vehicles):
+            shares = backbone(team.constraints, self._en, self._steps, self._nodes, self._scale, POWER)
+            self._backbone = {name: share.stops for name, share in zip(team.vehicles, shares, strict=True)}
+            self._coarse = {name: share.coarse for name, share in zip(team.vehicles, shares, strict=True)}
+            self._plan = dict(self._backbone)
+        elif self._plan.keys() != set(team.vehicles):
+            self._backbone = hand_over(self._backbone, team.vehicles, self._en)
+            self._plan = hand_over(self._plan, team.vehicles, self._en)
+            self._coarse = dict.fromkeys(team.vehicles, 0)
+
+    def _choose_plan(self, plan: tuple[FloatArray, IntArray], lattice: tuple[FloatArray, IntArray]) -> None:
+        """Improve the freer plan, then decide which of the two to follow."""
+        team = self._team
+        if self._value(*lattice) < self._value(*plan):
+            plan = lattice
+        locked = np.array(
+            [min(self._coarse[v], k) for v, k in zip(team.vehicles, plan[1], strict=True)], dtype=np.int64
+        )
+        vias, counts, value = self._improved(plan[0], plan[1], locked)
+        self._plan = {v: vias[i, : counts[i]].copy() for i, v in enumerate(team.vehicles)}
+        lattice_value = self._value(*lattice)
+        free = value < LEAVE_BACKBONE * lattice_value
+        self._followed, self._other = ((vias, counts), lattice) if free else (lattice, (vias, counts))
+        self._expected_value = value if free else lattice_value
+
+    def _improved(self, vias: FloatArray, counts: IntArray, locked: IntArray) -> tuple[FloatArray, IntArray, float]:
+        constraints = self._team.constraints
+        rng = np.random.default_rng([self._seed, 1])
+        tries = int(self._options.search * min(1.0, SEARCH_VIAS / max(1, int(counts.sum()))))
+        roomy = np.zeros((len(vias), vias.shape[1] + 32, 2))
+        roomy[:, : vias.shape[1]] = vias
+        zones = [np.ascontiguousarray(z, dtype=np.float64) for z in constraints.keep_out]
+        starts = np.concatenate([[0], np.cumsum([len(z) for z in zones])]).astype(np.int64)
+        flat = np.vstack(zones) if zones else np.zeros((0, 2))
+        area = np.ascontiguousarray(constraints.area, dtype=np.float64)
+        return improve(
+            self._d2, self._px, self._py, self._nodes.weight, self._en, self._headings, roomy, counts, locked,
+            self._step_m, self._steps, self._scale, POWER, TURN_PENALTY, self._spacing, area, flat, starts,
+            _convex(area), MARGIN_M, rng.random((tries, DRAWS)),
+        )  # fmt: skip
+
+    @property
+    def _headings(self) -> FloatArray:
+        return np.ascontiguousarray(self._team.headings_rad)
+
+    def _value(self, vias: FloatArray, counts: IntArray) -> float:
+        return plan_value(
+            self._d2, self._px, self._py, self._nodes.weight, self._en, self._headings, vias, counts,
+            self._step_m, self._steps, self._scale, POWER, TURN_PENALTY,
+        )  # fmt: skip
+
+    def _uncertainty_now(self) -> float:
+        nothing = np.zeros(len(self._en), dtype=np.int64)
+        return self._value(np.zeros((len(self._en), 1, 2)), nothing)
+
+    def _packed(self, routes: dict[str, FloatArray]) -> tuple[FloatArray, IntArray]:
+        names = self._team.vehicles
+        counts = np.array([len(routes[v]) for v in names], dtype=np.int64)
+        vias = np.zeros((len(names), max(1, int(counts.max())), 2))
+        for i, v in enumerate(names):
+            vias[i, : counts[i]] = routes[v]
+        return vias, counts
+
+    def _first_legs(self, plan: tuple[FloatArray, IntArray]) -> FloatArray:
+        vias, counts = plan
+        legs = [
+            next_waypoint(self._en[i, 0], self._en[i, 1], vias[i], 0, int(counts[i]), self._step_m)[:2]
+            for i in range(len(self._en))
+        ]
+        return np.array(legs)
+
+    def _legs_of(self, i: int, alpha: float) -> FloatArray:
+        """Return the free candidates (k, 2) of one vehicle."""
+        rng = vehicle_rng(self._seed, self._team.vehicles[i])
+        here, step = self._en[i], self._step_m
+        heading = self._team.headings_rad[i]
+        course = np.pi / 2 - (heading if np.isfinite(heading) else rng.uniform(0, 2 * np.pi))
+        turns = here + step * np.column_stack([np.cos(course + TURNS_RAD), np.sin(course + TURNS_RAD)])
+        away = np.hypot(*(self._nodes.en_m - here).T)
+        gain = (
+            self._nodes.weight * np.minimum(1.0, self._d2 / self._scale**2) * (away <= 2 * step) * (away > 0.3 * step)
+        )
+        best = np.argsort(-gain, kind="stable")[:: max(1, len(gain) // 400)][:8]
+        way = self._nodes.en_m[best] - here
+        towards = here + way * np.minimum(1.0, step / np.maximum(away[best], 1e-9))[:, None]
+        n = max(0, self._options.candidates - len(turns) - len(towards))
+        random = alpha * step * rng.standard_normal((n, 2))
+        random *= np.minimum(1.0, step / np.maximum(np.hypot(*random.T), 1e-12))[:, None]
+        return np.vstack([turns, towards, here + random])
+
+    def _after_legs(self, candidates: FloatArray) -> FloatArray:
+        """Return U after the first legs and at the end, when the team goes on with the plan it follows, (c, 2).
+
+        Only the candidate that is the first leg of the other plan for the whole team goes on with that one.
+        """
+        c, n = candidates.shape[:2]
+        width = max(self._followed[0].shape[1], self._other[0].shape[1])
+        vias, counts = np.zeros((c, n, width, 2)), np.zeros((c, n), dtype=np.int64)
+        for plan in (self._followed, self._other):
+            on_plan = np.hypot(*np.moveaxis(candidates[..., :2] - self._first_legs(plan), 2, 0)) < 1e-3
+            takes = np.ones(c, dtype=np.bool_) if plan is self._followed else on_plan.all(axis=1)
+            for i in range(n):
+                route = plan[0][i, : plan[1][i]]
+                *_, passed = next_waypoint(self._en[i, 0], self._en[i, 1], route, 0, len(route), self._step_m)
+                for which, rest in ((takes & on_plan[:, i], route[passed:]), (takes & ~on_plan[:, i], route)):
+                    vias[which, i, : len(rest)] = rest
+                    counts[which, i] = len(rest)
+        return values_after_first_leg(
+            self._d2, self._px, self._py, self._nodes.weight, self._en, self._headings,
+            np.ascontiguousarray(candidates[..., :2]), vias, counts, self._step_m, self._steps, self._scale,
+            POWER, TURN_PENALTY,
+        )  # fmt: skip
+
+
+def expected_variability(belief: Belief, bottom: Bottom) -> FloatArray:
+    """Return how large squared errors between soundings are expected to be at the landmarks, (n,), mean about 1.
+
+    Half of it is the map's roughness, half the slope's squared deviation from its mean: an edge that runs along between
+    two survey lines shows in no sounding as roughness, only as a steep interpolation between the lines.
+    """
+    roughness = np.where(np.isfinite(belief.weight), belief.weight, 1.0)
+    roughness = roughness / max(1e-12, float(roughness.mean()))
+    depth = bottom.depth_m
+    if min(depth.shape) < 3 or not np.isfinite(depth).any():
+        return roughness
+    filled = np.where(np.isfinite(depth), depth, np.nanmean(depth))
+    squared = sum((g - g.mean()) ** 2 for g in np.gradient(filled, bottom.cell_m))
+    steepness = replace(bottom, depth_m=np.asarray(squared, dtype=np.float64)).at(belief.xy_m)
+    mean = float(np.nanmean(steepness))
+    if not mean > 0.0:
+        return roughness
+    relative = np.clip(np.nan_to_num(steepness / mean, nan=1.0), 0.0, STEEPEST)
+    return np.asarray((1.0 - SLOPE_SHARE) * roughness + SLOPE_SHARE * relative)
+
+
+def thin_nodes(team: Situation, variability: FloatArray) -> Nodes:
+    """Return at most about ``MAX_NODES`` nodes of the area; nodes of one square are merged, their weights averaged."""
+    belief: Belief = team.belief
+    inside = inside_area(team.constraints, belief.xy_m)
+    xy, weight = belief.xy_m[inside], variability[inside]
+    if len(xy) <= MAX_NODES:
+        return Nodes(xy, np.ascontiguousarray(weight))
+    low, size = xy.min(axis=0), np.ptp(xy, axis=0)
+    side = float(np.sqrt(max(size[0], 1e-9) * max(size[1], 1e-9) / MAX_NODES))
+    bins = np.floor((xy - low) / side + 1e-9).astype(np.int64)
+    _, which = np.unique(bins[:, 0] * 1_000_003 + bins[:, 1], return_inverse=True)
+    count = np.bincount(which)
+    centre = np.column_stack([np.bincount(which, xy[:, k]) / count for k in (0, 1)])
+    return Nodes(centre, np.bincount(which, weight) / count)
+
+
+def _cell(xy: FloatArray) -> float:
+    size = np.ptp(xy, axis=0)
+    return float(np.sqrt(max(size[0], 1e-9) * max(size[1], 1e-9) / len(xy)))
+
+
+def _convex(polygon: FloatArray) -> bool:
+    edges = np.roll(polygon, -1, axis=0) - polygon
+    after = np.roll(edges, -1, axis=0)
+    return bool((edges[:, 0] * after[:, 1] - edges[:, 1] * after[:, 0] >= -1e-9).all())

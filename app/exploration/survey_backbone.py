@@ -1,0 +1,132 @@
+"""The coverage backbone of a survey: even lines, equal areas, every other line first, the rest coming back."""
+
+import itertools
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.exploration.constraints import Constraints
+from app.exploration.lattice import Sweep, even_lines, longer_axis_rad, most_lines
+from app.exploration.routes import FreeSpace, fly
+from app.exploration.survey_value import plan_value
+
+FloatArray = NDArray[np.float64]
+
+MARGIN_M = 0.5
+TRANSIT_PENALTY = 0.5
+"""How much worse a share counts whose first line would only be reached with the whole budget."""
+
+
+@dataclass(frozen=True)
+class Share:
+    """One vehicle's part of the backbone: stops (k, 2), the first ``coarse`` of which are the first pass."""
+
+    stops: FloatArray
+    coarse: int
+
+
+@dataclass(frozen=True)
+class Nodes:
+    """Where uncertainty is summed up: positions (m, 2) and roughness (m,)."""
+
+    en_m: FloatArray
+    weight: FloatArray
+
+
+def backbone(
+    constraints: Constraints, starts: FloatArray, steps: int, nodes: Nodes, scale_m: float, power: float
+) -> list[Share]:
+    """Return every vehicle's share of the backbone that promises the best map for the steps available.
+
+    Lines along either axis of the area, strips in either order, every corner to begin at; as many lines as the steps
+    pay for. ``starts`` is (n_vehicles, 2).
+    """
+    free = FreeSpace(constraints, MARGIN_M)
+    axis = longer_axis_rad(constraints.area)
+    best: tuple[float, list[Share]] | None = None
+    for direction in (axis, axis + np.pi / 2):
+        sweep = Sweep(constraints, free, float(direction))
+        cuts = sweep.shares(len(starts))
+        for order in _orders(sweep.to_uv(starts)[:, 0]):
+            shares, value = [], 0.0
+            for i, strip in enumerate(order):
+                share, left = _best_share(
+                    sweep,
+                    starts[i],
+                    float(cuts[strip]),
+                    float(cuts[strip + 1]),
+                    constraints.max_step_m,
+                    steps,
+                    nodes,
+                    scale_m,
+                    power,
+                )
+                shares.append(share)
+                value += left
+            if best is None or value < best[0] * (1 - 1e-9):
+                best = value, shares
+    assert best is not None  # noqa: S101 - two directions, at least one order
+    return best[1]
+
+
+def _orders(u: FloatArray) -> list[tuple[int, ...]]:
+    """Return which strip each vehicle takes: every way for a few vehicles, otherwise as they stand across the lines."""
+    n = len(u)
+    if n <= 3:
+        return list(itertools.permutations(range(n)))
+    rank = np.argsort(np.argsort(u, kind="stable"))
+    return [tuple(int(k) for k in rank), tuple(int(n - 1 - k) for k in rank)]
+
+
+def _best_share(
+    sweep: Sweep,
+    start: FloatArray,
+    low_u: float,
+    high_u: float,
+    step_m: float,
+    steps: int,
+    nodes: Nodes,
+    scale_m: float,
+    power: float,
+) -> tuple[Share, float]:
+    u = sweep.to_uv(nodes.en_m)[:, 0]
+    mine = (u >= low_u) & (u <= high_u)
+    px, py = (np.ascontiguousarray(nodes.en_m[mine, k]) for k in (0, 1))
+    weight = np.ascontiguousarray(nodes.weight[mine])
+    unknown = np.full(len(px), np.inf)
+    affordable = most_lines(lambda n: _steps(sweep, start, low_u, high_u, n, step_m) <= steps)
+    best: tuple[float, Share] | None = None
+    for n in {max(1, affordable - 1), affordable, affordable + 1}:
+        for forward, upwards in itertools.product((True, False), repeat=2):
+            share = _there_and_back(sweep, start, low_u, high_u, n, forward=forward, upwards=upwards)
+            route = share.stops
+            left = plan_value(
+                unknown, px, py, weight, start[None], np.array([np.nan]), route[None], np.array([len(route)]),
+                step_m, steps, scale_m, power, 0.0,
+            )  # fmt: skip
+            left *= 1.0 + TRANSIT_PENALTY * float(np.hypot(*(route[0] - start))) / (step_m * steps)
+            if best is None or left < best[0] * (1 - 1e-9):
+                best = left, share
+    assert best is not None  # noqa: S101 - at least one number of lines was tried
+    return best[1], best[0]
+
+
+def _steps(sweep: Sweep, start: FloatArray, low_u: float, high_u: float, n: int, step_m: float) -> int:
+    route = _there_and_back(sweep, start, low_u, high_u, n, forward=True, upwards=True).stops
+    most = 100_000
+    _, used = fly(start[0], start[1], route, len(route), step_m, most, np.empty((2 * len(route) + 4, 2)))
+    return used
+
+
+def _there_and_back(
+    sweep: Sweep, start: FloatArray, low_u: float, high_u: float, n: int, *, forward: bool, upwards: bool
+) -> Share:
+    lines = even_lines(low_u, high_u, n)
+    lines = lines if forward else lines[::-1]
+    out, back = lines[::2], lines[1::2][::-1]
+    first = sweep.free.connect(start, sweep.stops(out, upwards=upwards))
+    rest_upwards = upwards if len(out) % 2 == 0 else not upwards
+    here = first[-1] if len(first) else start
+    second = sweep.free.connect(here, sweep.stops(back, upwards=rest_upwards))
+    return Share(np.vstack([first, second]), len(first))

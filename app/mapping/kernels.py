@@ -1,0 +1,109 @@
+"""Correlation functions and the small dense linear algebra that local kriging needs, compiled."""
+
+import math
+from typing import Literal
+
+import numpy as np
+from numba import njit
+
+from app.mapping.types import FloatArray
+
+KernelName = Literal["matern32", "matern52", "exponential", "gaussian"]
+
+MATERN32, MATERN52, EXPONENTIAL, GAUSSIAN = 0, 1, 2, 3
+KERNEL_CODES: dict[str, int] = {
+    "matern32": MATERN32,
+    "matern52": MATERN52,
+    "exponential": EXPONENTIAL,
+    "gaussian": GAUSSIAN,
+}
+
+SQRT3 = math.sqrt(3.0)
+SQRT5 = math.sqrt(5.0)
+
+_FAST = {"reassoc", "contract", "arcp", "nsz"}
+
+
+@njit(cache=True, nogil=True, inline="always")
+def correlation(kind: int, r: float) -> float:
+    """Correlation at the scaled distance ``r = d / length``."""
+    if kind == MATERN32:
+        t = SQRT3 * r
+        return (1.0 + t) * math.exp(-t)
+    if kind == MATERN52:
+        t = SQRT5 * r
+        return (1.0 + t + t * t / 3.0) * math.exp(-t)
+    if kind == EXPONENTIAL:
+        return math.exp(-r)
+    return math.exp(-0.5 * r * r)
+
+
+@njit(cache=True, nogil=True)
+def correlation_matrices(kind: int, r: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Correlation and its derivative with respect to ln(length), elementwise; ``r`` is symmetric, (n, n)."""
+    n = r.shape[0]
+    value = np.empty((n, n))
+    slope = np.empty((n, n))
+    for i in range(n):
+        for j in range(i + 1):
+            x = r[i, j]
+            if kind == MATERN32:
+                t = SQRT3 * x
+                e = math.exp(-t)
+                v, s = (1.0 + t) * e, t * t * e
+            elif kind == MATERN52:
+                t = SQRT5 * x
+                e = math.exp(-t)
+                v, s = (1.0 + t + t * t / 3.0) * e, t * t * (1.0 + t) * e / 3.0
+            elif kind == EXPONENTIAL:
+                e = math.exp(-x)
+                v, s = e, x * e
+            else:
+                e = math.exp(-0.5 * x * x)
+                v, s = e, x * x * e
+            value[i, j] = value[j, i] = v
+            slope[i, j] = slope[j, i] = s
+    return value, slope
+
+
+@njit(cache=True, nogil=True, inline="always")
+def paciorek(kind: int, dx: float, dy: float, a: FloatArray, b: FloatArray) -> float:
+    """Nonstationary correlation in the plane (Paciorek and Schervish 2006).
+
+    ``|A|^(1/4) |B|^(1/4) |M|^(-1/2) rho(sqrt(d' M^-1 d))``, ``M = (A + B) / 2``, with the squared-length
+    matrices A and B of the two places, each given as ``(xx, xy, yy, |.|^(1/4))``.
+    """
+    xx = 0.5 * (a[0] + b[0])
+    xy = 0.5 * (a[1] + b[1])
+    yy = 0.5 * (a[2] + b[2])
+    det = xx * yy - xy * xy
+    d2 = (yy * dx * dx - 2.0 * xy * dx * dy + xx * dy * dy) / det
+    value: float = a[3] * b[3] / math.sqrt(det) * correlation(kind, math.sqrt(d2))
+    return value
+
+
+@njit(cache=True, nogil=True, fastmath=_FAST)
+def cholesky_in_place(a: FloatArray, n: int) -> bool:
+    """Replace the lower triangle of the leading ``n`` rows by its Cholesky factor; False if impossible."""
+    for i in range(n):
+        for j in range(i + 1):
+            s = a[i, j]
+            for k in range(j):
+                s -= a[i, k] * a[j, k]
+            if i == j:
+                if s <= 0.0:
+                    return False
+                a[i, i] = math.sqrt(s)
+            else:
+                a[i, j] = s / a[j, j]
+    return True
+
+
+@njit(cache=True, nogil=True, fastmath=_FAST)
+def solve_lower_in_place(a: FloatArray, n: int, b: FloatArray) -> None:
+    """Replace ``b`` by ``L^-1 b`` for the factor in the lower triangle of ``a``."""
+    for i in range(n):
+        s = b[i]
+        for k in range(i):
+            s -= a[i, k] * b[k]
+        b[i] = s / a[i, i]

@@ -1,0 +1,53 @@
+"""Map as a bare picture to lay over a web map."""
+
+import io
+from typing import Literal
+
+import numpy as np
+from PIL import Image
+
+from app.mapping.georeference import LocalFrame
+from app.mapping.products.colours import DEPTH_COLOURS, UNCERTAINTY_COLOURS, scaled
+from app.mapping.types import BathymetricMap, Grid
+
+INTERPOLATED_ALPHA = 0.72
+"""Opacity of cells that were not sounded, so that sounded tracks show."""
+
+
+def overlay_png(
+    bathymetry: BathymetricMap,
+    range_m: tuple[float, float],
+    *,
+    layer: Literal["depth", "uncertainty"] = "depth",
+) -> bytes:
+    """Return an RGBA PNG, one pixel per cell, north up, no axes; cells without depth are transparent.
+
+    Parameters
+    ----------
+    range_m
+        Values of the first and the last colour. Fixed by the caller: a range that follows the data would make
+        successive pictures of a mission incomparable.
+    """
+    values, colours = (
+        (bathymetry.depth_m, DEPTH_COLOURS) if layer == "depth" else (bathymetry.sd_m, UNCERTAINTY_COLOURS)
+    )
+    alpha = np.where(bathymetry.sounded, 1.0, INTERPOLATED_ALPHA)
+    fractions = scaled(values, range_m)
+    pixels = colours(np.nan_to_num(fractions), bytes=True)
+    pixels[..., 3] = np.where(np.isfinite(fractions), np.round(255 * alpha), 0)
+    stream = io.BytesIO()
+    Image.fromarray(np.ascontiguousarray(pixels[::-1])).save(stream, "PNG", compress_level=6)
+    return stream.getvalue()
+
+
+def overlay_corners(grid: Grid, frame: LocalFrame) -> list[tuple[float, float]]:
+    """Where the overlay's corners lie: (lon, lat) of north-west, north-east, south-east and south-west.
+
+    The order is that of MapLibre's image source.
+    """
+    east = grid.west_m + grid.cols * grid.cell_m
+    north = grid.south_m + grid.rows * grid.cell_m
+    lat, lon = frame.to_geographic(
+        np.array([grid.west_m, east, east, grid.west_m]), np.array([north, north, grid.south_m, grid.south_m])
+    )
+    return [(float(x), float(y)) for x, y in zip(lon, lat, strict=True)]

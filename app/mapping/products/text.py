@@ -1,0 +1,85 @@
+"""Map and soundings as plain text."""
+
+import io
+
+import numpy as np
+
+from app.mapping.georeference import LocalFrame
+from app.mapping.types import BathymetricMap, FloatArray, Soundings
+
+
+def map_xyz(
+    bathymetry: BathymetricMap,
+    frame: LocalFrame,
+    *,
+    vertical_datum: str,
+    geographic: bool = False,
+    sounded_only: bool = False,
+) -> bytes:
+    """Return the cells as XYZ text, south-west to north-east; cells without depth are left out.
+
+    Columns after a comment header: position, depth (positive down), standard deviation, count, sounded (1 or
+    0). Positions are cell centres: east and north of the local frame, or longitude and latitude when
+    ``geographic``.
+    """
+    keep = np.isfinite(bathymetry.depth_m)
+    if sounded_only:
+        keep &= bathymetry.sounded
+    east, north = bathymetry.grid.centres_m[keep.ravel()].T
+    x, y, names, digits = _positions(east, north, frame, geographic)
+    header = (
+        f"{names} depth_m sd_m count sounded\n"
+        f"depth positive down, vertical datum: {vertical_datum}\n{_frame_line(frame, geographic)}"
+    )
+    rows = np.column_stack(
+        [
+            x,
+            y,
+            bathymetry.depth_m[keep],
+            bathymetry.sd_m[keep],
+            bathymetry.count[keep],
+            bathymetry.sounded[keep],
+        ]
+    )
+    return _text(rows, header, [digits, digits, "%.3f", "%.3f", "%d", "%d"], " ")
+
+
+def soundings_xyz(soundings: Soundings, frame: LocalFrame, *, vertical_datum: str, geographic: bool = False) -> bytes:
+    """Return the soundings as XYZ text: position, depth (positive down) and standard deviation per line."""
+    x, y, names, digits = _positions(soundings.east_m, soundings.north_m, frame, geographic)
+    header = (
+        f"{names} depth_m sd_m\ndepth positive down, vertical datum: {vertical_datum}\n{_frame_line(frame, geographic)}"
+    )
+    rows = np.column_stack([x, y, soundings.depth_m, soundings.sd_m])
+    return _text(rows, header, [digits, digits, "%.3f", "%.3f"], " ")
+
+
+def soundings_csv(soundings: Soundings, frame: LocalFrame) -> bytes:
+    """Return the soundings as CSV with one header line; positions both local and geographic."""
+    lat, lon = frame.to_geographic(soundings.east_m, soundings.north_m)
+    rows = np.column_stack([soundings.east_m, soundings.north_m, soundings.depth_m, soundings.sd_m, lat, lon])
+    stream = io.StringIO()
+    stream.write("east_m,north_m,depth_m,sd_m,lat_deg,lon_deg\n")
+    np.savetxt(stream, rows, fmt=["%.3f", "%.3f", "%.3f", "%.3f", "%.8f", "%.8f"], delimiter=",")
+    return stream.getvalue().encode()
+
+
+def _positions(
+    east: FloatArray, north: FloatArray, frame: LocalFrame, geographic: bool
+) -> tuple[FloatArray, FloatArray, str, str]:
+    if geographic:
+        lat, lon = frame.to_geographic(east, north)
+        return lon, lat, "lon_deg lat_deg", "%.8f"
+    return east, north, "east_m north_m", "%.3f"
+
+
+def _frame_line(frame: LocalFrame, geographic: bool) -> str:
+    if geographic:
+        return "positions: WGS 84 (EPSG:4326)"
+    return f"positions: transverse Mercator k=1, lat {frame.origin_lat_deg!r} lon {frame.origin_lon_deg!r}"
+
+
+def _text(rows: FloatArray, header: str, formats: list[str], delimiter: str) -> bytes:
+    stream = io.StringIO()
+    np.savetxt(stream, rows, fmt=formats, delimiter=delimiter, header=header, comments="# ")
+    return stream.getvalue().encode()

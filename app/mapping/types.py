@@ -1,0 +1,100 @@
+"""Grids, soundings and maps: the data that passes between mapping and its users."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Square cells over a rectangle of the local frame; row 0 is south, column 0 is west.
+
+    ``west_m`` and ``south_m`` are the outer corner of the south-western cell; values sit at cell centres.
+    """
+
+    west_m: float
+    south_m: float
+    cell_m: float
+    rows: int
+    cols: int
+
+    @property
+    def east_m(self) -> FloatArray:
+        """Centres of the columns, shape (cols,)."""
+        return self.west_m + (np.arange(self.cols, dtype=np.float64) + 0.5) * self.cell_m
+
+    @property
+    def north_m(self) -> FloatArray:
+        """Centres of the rows, shape (rows,)."""
+        return self.south_m + (np.arange(self.rows, dtype=np.float64) + 0.5) * self.cell_m
+
+    @property
+    def centres_m(self) -> FloatArray:
+        """All cell centres, shape (rows * cols, 2), in row-major order."""
+        east, north = np.meshgrid(self.east_m, self.north_m)
+        return np.column_stack([east.ravel(), north.ravel()])
+
+
+@dataclass(frozen=True)
+class Soundings:
+    """Accepted soundings, corrected, local frame. All arrays have shape (n,); depth is positive down."""
+
+    east_m: FloatArray
+    north_m: FloatArray
+    depth_m: FloatArray
+    sd_m: FloatArray
+
+    def __len__(self) -> int:
+        return len(self.depth_m)
+
+    def take(self, rows: IntArray | BoolArray) -> "Soundings":
+        """Return the soundings with the given numbers, or where a boolean array is True."""
+        return Soundings(self.east_m[rows], self.north_m[rows], self.depth_m[rows], self.sd_m[rows])
+
+    def check(self) -> None:
+        """Raise ValueError unless all is finite, of one length, and every sd positive."""
+        for name in ("east_m", "north_m", "depth_m", "sd_m"):
+            values = getattr(self, name)
+            if values.shape != (len(self),):
+                raise ValueError(f"soundings.{name} has shape {values.shape}; depth_m has {len(self)} values")
+            finite = np.isfinite(values)
+            if not finite.all():
+                i = int(np.argmin(finite))
+                raise ValueError(f"soundings.{name}[{i}] is {values[i]}; it must be finite")
+        positive = self.sd_m > 0.0
+        if not positive.all():
+            i = int(np.argmin(positive))
+            raise ValueError(f"soundings.sd_m[{i}] is {self.sd_m[i]}; it must be positive")
+
+
+@dataclass(frozen=True)
+class BathymetricMap:
+    """A map on a grid; every layer has shape (rows, cols), NaN outside the area.
+
+    Attributes
+    ----------
+    depth_m, sd_m
+        Estimate and posterior standard deviation of the sea floor's depth (not of a new sounding).
+    count
+        Soundings in the cell.
+    sounded
+        True where the cell was sounded, False where it is interpolated.
+    roughness
+        Relative local variability of the sea floor, mean about 1.
+    correlation_length_m
+        Fitted length scale.
+    """
+
+    grid: Grid
+    depth_m: FloatArray
+    sd_m: FloatArray
+    count: IntArray
+    sounded: BoolArray
+    roughness: FloatArray
+    correlation_length_m: float
+    model: str

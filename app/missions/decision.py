@@ -1,0 +1,161 @@
+"""One step's decision, from the situation to waypoints that may be sent. Pure apart from the planner's memory."""
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+from shapely.geometry import Polygon
+
+from app.exploration.bottom import Bottom
+from app.exploration.constraints import Constraints
+from app.exploration.problem import Belief, Planner, Situation
+from app.missions import safety
+from app.missions.spec import MissionSpec
+
+FloatArray = NDArray[np.float64]
+
+NEARBY_OUTSIDE_M = 10.0
+"""A vehicle that drifted or overshot this little is planned for as if it were at the border."""
+
+RESERVE = 0.06
+"""Share of the remaining steps that a planner is not told of: vehicles turn in circles and pass waypoints at the side,
+so a plan that needs every step would end with its last line half flown. What is not used is released bit by bit."""
+
+INSET_M = 1.0
+"""Vehicles that come from outside are sent to a point this far inside the border."""
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where one vehicle is when a step begins, and the depth it should travel at."""
+
+    vehicle: str
+    en_m: FloatArray
+    heading_rad: float
+    cruise_depth_m: float
+
+
+@dataclass(frozen=True)
+class Leg:
+    """Where one vehicle is sent, or why it is not sent anywhere."""
+
+    vehicle: str
+    target_m: FloatArray
+    refusal: str = ""
+
+
+@dataclass(frozen=True)
+class Decision:
+    """A step's waypoints, the planner's figures, and what the operator has to know."""
+
+    legs: list[Leg]
+    objective: float | None
+    terms: dict[str, float]
+    memory: bytes
+    notes: list[str] = field(default_factory=list)
+
+
+def make_constraints(spec: MissionSpec) -> Constraints:
+    """Return a mission's limits in its local frame."""
+    limits = spec.limits
+    return Constraints(
+        area=spec.local_area(),
+        keep_out=tuple(spec.to_local(zone) for zone in spec.keep_out),
+        max_step_m=limits.max_step_m,
+        # Depths are chosen here and may be shallower than asked where the water is; see safety.travel_depth_m.
+        min_depth_m=0.0,
+        max_depth_m=limits.max_depth_m,
+        min_altitude_m=limits.min_altitude_m,
+        com_range_m=limits.com_range_m if limits.com_range_m is not None else np.inf,
+        min_separation_m=limits.min_separation_m,
+        min_vertical_separation_m=limits.min_vertical_separation_m,
+    )
+
+
+def decide(
+    step: int,
+    spec: MissionSpec,
+    constraints: Constraints,
+    planner: Planner,
+    places: list[Place],
+    belief: Belief,
+    soundings_en_m: FloatArray,
+) -> Decision:
+    """Decide one step for the vehicles at ``places``; vehicles far outside the area are sent to its border."""
+    polygon = Polygon(constraints.area)
+    notes: list[str] = []
+    team: list[Place] = []
+    legs: list[Leg] = []
+    for place in places:
+        outside_m = safety.distance_outside_m(polygon, place.en_m)
+        if outside_m > NEARBY_OUTSIDE_M:
+            others = [p.en_m for p in places if p is not place] + [other.target_m[:2] for other in legs]
+            leg = _come_in(place, constraints, others)
+            what = leg.refusal or "it is sent to the border"
+            notes.append(f"{place.vehicle} is {outside_m:.0f} m outside the area: {what}")
+            legs.append(leg)
+        elif outside_m > 0:
+            border = safety.nearest_inside(polygon, place.en_m)
+            team.append(Place(place.vehicle, border, place.heading_rad, place.cruise_depth_m))
+        else:
+            team.append(place)
+    if not team:
+        return Decision(legs, None, {}, planner.snapshot(), notes)
+
+    names = tuple(place.vehicle for place in team)
+    bottom = Bottom.from_landmarks(belief.xy_m, belief.depth_m)
+    cautious = Bottom.from_landmarks(
+        belief.xy_m,
+        np.where(np.isfinite(belief.sd_m), belief.depth_m - safety.UNCERTAINTY_FACTOR * belief.sd_m, np.nan),
+    )
+    origin = np.array(
+        [
+            [*p.en_m, safety.travel_depth_m(p.en_m, p.en_m, p.cruise_depth_m, cautious, constraints.min_altitude_m)]
+            for p in team
+        ]
+    )
+    situation = Situation(
+        step=step,
+        steps_total=step - 1 + math.ceil((1 - RESERVE) * (spec.steps - step + 1)),
+        vehicles=names,
+        positions=origin,
+        headings_rad=np.array([p.heading_rad for p in team]),
+        belief=belief,
+        soundings_en_m=soundings_en_m,
+        constraints=constraints,
+    )
+    proposal = planner.propose(situation, np.random.default_rng([spec.seed, step]))
+    proposed = np.array(proposal.positions, dtype=float)
+    for i, place in enumerate(team):
+        if not np.isfinite(proposed[i]).all():
+            continue  # the check makes the vehicle hold
+        proposed[i, 2] = safety.travel_depth_m(
+            place.en_m, proposed[i, :2], place.cruise_depth_m, cautious, constraints.min_altitude_m
+        )
+        proposed[i] = _within_step(origin[i], proposed[i], constraints.max_step_m)
+    checked = safety.check_step(names, origin, proposed, constraints, bottom)
+    notes += [f"{name}: {reason}" for name, reason in (checked.corrections | checked.refusals).items()]
+    for i, place in enumerate(team):
+        refusal = checked.refusals.get(place.vehicle, "")
+        legs.append(Leg(place.vehicle, checked.positions[i], refusal))
+    return Decision(legs, proposal.objective, dict(proposal.terms), planner.snapshot(), notes)
+
+
+def _come_in(place: Place, constraints: Constraints, taken: list[FloatArray]) -> Leg:
+    """Send a vehicle that is far outside to the area's border, clear of keep-out zones and of others (n of (2,))."""
+    goal = safety.way_in(constraints, place.en_m, INSET_M, taken)
+    if goal is None:
+        return Leg(place.vehicle, np.append(place.en_m, 0.0), "a keep-out zone or a vehicle bars every straight way in")
+    # The bottom on the way is unknown: it comes at the surface.
+    return Leg(place.vehicle, np.append(goal, 0.0))
+
+
+def _within_step(origin: FloatArray, target: FloatArray, max_step_m: float) -> FloatArray:
+    """Shorten a leg horizontally when the change of depth made it longer than a step may be."""
+    rise = abs(target[2] - origin[2])
+    run = float(np.linalg.norm(target[:2] - origin[:2]))
+    if np.hypot(run, rise) <= max_step_m or run == 0.0:
+        return target
+    factor = np.sqrt(max(max_step_m**2 - rise**2, 0.0)) / run * (1 - 1e-9)
+    return np.append(origin[:2] + factor * (target[:2] - origin[:2]), target[2])

@@ -1,0 +1,35 @@
+"""What the mission service refuses, each with the reason and what to do about it."""
+
+
+class MissionError(Exception):
+    """Base. ``str()`` says what is wrong, ``remedy`` what would be right."""
+
+    remedy: str = ""
+
+    def __init__(self, message: str, remedy: str = "") -> None:
+        super().__init__(message)
+        self.remedy = remedy
+
+
+class MissionNotFoundError(MissionError):
+    """There is no such mission."""
+
+
+class VehicleNotFoundError(MissionError):
+    """There is no such vehicle, or it takes no part in the mission."""
+
+
+class ConflictError(MissionError):
+    """The request contradicts the present state of things."""
+
+
+class InvalidRequestError(MissionError):
+    """A field's value cannot be taken; ``field`` names it as a path, for example ``planner.options.window``."""
+
+    def __init__(self, field: str, message: str, remedy: str = "") -> None:
+        super().__init__(message, remedy)
+        self.field = field
+
+
+class MapNotReadyError(MissionError):
+    """No sounding was accepted yet, so there is no map."""

@@ -1,0 +1,202 @@
+"""The one interface through which the mission loop sees vehicles.
+
+Everything here is geographic (WGS84 degrees, depth in metres, positive down) because a vehicle exists before any
+mission gives it a local frame. Links report by calling an :data:`EventSink` from the event loop's thread; they never
+block and never raise through it.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Protocol
+
+
+class LinkState(StrEnum):
+    """How well a vehicle can be reached, worst to best."""
+
+    UNKNOWN = "unknown"
+    """Never heard of."""
+    LOST = "lost"
+    """Was heard, is silent for longer than it should be."""
+    EXPECTED_OFFLINE = "expected_offline"
+    """Silent by plan, for example submerged without acoustics."""
+    HEARD = "heard"
+    """Something arrives, but the vehicle cannot take commands yet; the reason says what is missing."""
+    READY = "ready"
+    """Takes commands; executes nothing of ours."""
+    ENGAGED = "engaged"
+    """Follows our waypoints."""
+
+
+class WaypointStatus(StrEnum):
+    """The life of one waypoint. A vehicle's route is drawn from ``ACKNOWLEDGED`` on, not before."""
+
+    PLANNED = "planned"
+    SENT = "sent"
+    ACKNOWLEDGED = "acknowledged"
+    REACHED = "reached"
+    REFUSED = "refused"
+    MISSED = "missed"
+    """The step's deadline passed before the vehicle arrived."""
+
+
+@dataclass(frozen=True, slots=True)
+class Position:
+    """A place: WGS84 degrees and metres below the surface, positive down."""
+
+    lat_deg: float
+    lon_deg: float
+    depth_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class VehicleReport:
+    """One state report of a vehicle. ``time_s`` is the vehicle's own clock (Unix seconds)."""
+
+    vehicle: str
+    time_s: float
+    position: Position
+    heading_rad: float | None = None
+    speed_mps: float | None = None
+    altitude_m: float | None = None
+    battery_pct: float | None = None
+    position_sd_m: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class SoundingReport:
+    """One measurement of the sea floor, already placed at its footprint.
+
+    ``footprint`` is where the beam met the bottom (its ``depth_m`` is the bottom's depth below the instantaneous water
+    surface, no tide applied); ``vehicle_depth_m`` and ``range_m`` are the raw values it was made of.
+    """
+
+    vehicle: str
+    time_s: float
+    footprint: Position
+    vehicle_depth_m: float
+    range_m: float
+    source: str
+    beam: int = 0
+    depth_sd_m: float | None = None
+    position_sd_m: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class WaypointOrder:
+    """One waypoint for one vehicle, checked by the safety gate before it reaches a link.
+
+    ``lead`` lies on the leg's line beyond the waypoint, as far as the area and the keep-out zones allow. Vehicles that
+    leave off flying straight well before their target (DUNE circles from 15 m on) are sent there to pass the waypoint
+    itself; the waypoint stays the place where they arrive.
+    """
+
+    mission_id: str
+    step: int
+    vehicle: str
+    position: Position
+    speed_mps: float
+    arrival_radius_m: float
+    min_altitude_m: float
+    lead: Position | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class WaypointReport:
+    """What became of a waypoint; ``reason`` is filled for every status that is not progress."""
+
+    vehicle: str
+    mission_id: str
+    step: int
+    status: WaypointStatus
+    reason: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class LinkReport:
+    """A change of a vehicle's link, with a reason an operator can act on."""
+
+    vehicle: str
+    state: LinkState
+    reason: str = ""
+
+
+FleetEvent = VehicleReport | SoundingReport | WaypointReport | LinkReport
+EventSink = Callable[[FleetEvent], None]
+
+
+@dataclass(frozen=True, slots=True)
+class VehicleInfo:
+    """What a link knows of a vehicle now. ``age_s`` is the time since it was last heard, None when never."""
+
+    name: str
+    kind: str
+    state: LinkState
+    reason: str = ""
+    age_s: float | None = None
+    address: str | None = None
+    imc_id: int | None = None
+    report: VehicleReport | None = None
+    details: dict[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class StopReceipt:
+    """Whether a vehicle acknowledged a stop, and in which words."""
+
+    vehicle: str
+    acknowledged: bool
+    detail: str = ""
+
+
+class VehicleRefusedError(Exception):
+    """A vehicle cannot do what was asked. ``reason`` says why, ``remedy`` what to do about it."""
+
+    def __init__(self, vehicle: str, reason: str, remedy: str) -> None:
+        super().__init__(f"{vehicle}: {reason}. {remedy}")
+        self.vehicle = vehicle
+        self.reason = reason
+        self.remedy = remedy
+
+
+class FleetLink(Protocol):
+    """One way of reaching vehicles. Names of vehicles are unique within a link.
+
+    Contract, tested for every implementation by ``tests/missions/test_fleet_links.py``:
+
+    * ``order`` replaces the vehicle's current waypoint, returns without waiting for the vehicle, and is followed by
+      ``WaypointReport`` events (sent, acknowledged, reached) or by one with status ``refused`` and a reason.
+      Repeating an order (same mission and step) is harmless.
+    * ``stop`` makes the vehicle stop following, whatever it was doing, and is safe to repeat; it waits at most
+      ``timeout_s`` (wall clock) for the vehicle's acknowledgement and never raises for a silent vehicle.
+    * ``close`` stops every engaged vehicle first.
+    """
+
+    @property
+    def kind(self) -> str:
+        """``imc``, ``rest`` or ``sim``."""
+        ...
+
+    async def start(self, sink: EventSink) -> None:
+        """Begin to listen; every event from now on goes to ``sink``."""
+        ...
+
+    async def close(self) -> None:
+        """Stop every engaged vehicle, then release sockets and tasks."""
+        ...
+
+    def vehicles(self) -> Sequence[VehicleInfo]:
+        """Every vehicle known to this link, in a stable order."""
+        ...
+
+    async def engage(self, vehicle: str) -> None:
+        """Make the vehicle ready to follow waypoints of ours. Raises VehicleRefusedError."""
+        ...
+
+    async def order(self, order: WaypointOrder) -> None:
+        """Send a waypoint; see the class's contract. Raises VehicleRefusedError when the vehicle is not engaged."""
+        ...
+
+    async def stop(self, vehicle: str, *, timeout_s: float = 3.0) -> StopReceipt:
+        """Stop the vehicle; see the class's contract."""
+        ...

@@ -1,0 +1,268 @@
+"""What a mission writes down as it goes: soundings, tracks, waypoint states and its log.
+
+Everything that arrives from vehicles is buffered for a moment and written in one transaction; a sounding counts as
+accepted only when that transaction has committed.
+"""
+
+import asyncio
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import structlog
+from sqlalchemy.ext.asyncio import AsyncSession
+
+from app.missions import metrics
+from app.missions.broadcast import Broadcaster
+from app.missions.clock import now
+from app.missions.fleet import SoundingReport, VehicleReport, WaypointReport
+from app.missions.gate import Gate, GatedSounding
+from app.missions.views import EventMessage, EventView, ItemVerdict, Level, Verdict
+from app.storage import missions as mission_queries
+from app.storage import soundings as sounding_queries
+from app.storage.database import Database
+from app.storage.models import EventRow
+from app.storage.shielding import to_the_end
+
+FLUSH_PERIOD_S = 0.1
+TRACK_SPACING_M = 1.0
+METRES_PER_DEGREE = 111_320.0
+
+log = structlog.get_logger(__name__)
+
+
+@dataclass(frozen=True, slots=True)
+class Counts:
+    """Soundings of a mission so far."""
+
+    accepted: int = 0
+    rejected: int = 0
+
+
+class Journal:
+    """Writes one mission's records.
+
+    Parameters
+    ----------
+    on_accepted
+        Called with every committed batch of accepted soundings, shape (n, 4): east, north, depth, sd.
+    """
+
+    def __init__(
+        self,
+        database: Database,
+        mission_id: str,
+        gate: Gate,
+        counts: Counts,
+        broadcaster: Broadcaster,
+        on_accepted: Callable[[np.ndarray[Any, np.dtype[np.float64]]], None],
+    ) -> None:
+        self._database = database
+        self._mission_id = mission_id
+        self._gate = gate
+        self._broadcaster = broadcaster
+        self._on_accepted = on_accepted
+        self.counts = counts
+        self.travelled_m = 0.0
+        self.step = 0
+        self._soundings: list[SoundingReport] = []
+        self._positions: list[dict[str, Any]] = []
+        self._statuses: list[WaypointReport] = []
+        self._track_ends: dict[str, tuple[float, float]] = {}
+        self._writing = asyncio.Lock()
+        self._pump: asyncio.Task[None] | None = None
+
+    def sounding(self, report: SoundingReport) -> None:
+        """Note a sounding; it is written within a moment."""
+        self._soundings.append(report)
+        self._start_pump()
+
+    def position(self, report: VehicleReport) -> None:
+        """Note a point of a track, unless it is close to the last one."""
+        place = report.position
+        end = (place.lon_deg, place.lat_deg)
+        last = self._track_ends.get(report.vehicle)
+        if last is not None:
+            leg_m = track_length_m([last, end])
+            if leg_m < TRACK_SPACING_M:
+                return
+            self.travelled_m += leg_m
+        self._track_ends[report.vehicle] = end
+        self._positions.append(
+            {
+                "mission_id": self._mission_id,
+                "vehicle": report.vehicle,
+                "time_s": report.time_s,
+                "lat_deg": place.lat_deg,
+                "lon_deg": place.lon_deg,
+                "depth_m": place.depth_m,
+            }
+        )
+        self._start_pump()
+
+    def waypoint(self, report: WaypointReport) -> None:
+        """Note what became of a waypoint."""
+        self._statuses.append(report)
+        self._start_pump()
+
+    async def flush(self) -> None:
+        """Write everything noted so far. What could not be written stays noted."""
+        await to_the_end(self._flush())
+
+    async def _flush(self) -> None:
+        async with self._writing:
+            soundings, self._soundings = self._soundings, []
+            positions, self._positions = self._positions, []
+            statuses, self._statuses = self._statuses, []
+            if not (soundings or positions or statuses):
+                return
+            try:
+                async with self._database.writing() as session:
+                    gated, new = await self._store(session, soundings)
+                    await mission_queries.add_positions(session, positions)
+                    for report in statuses:
+                        await mission_queries.set_waypoint_status(
+                            session, self._mission_id, report.step, report.vehicle, report.status, report.reason, now()
+                        )
+            except BaseException:
+                self._soundings[:0] = soundings
+                self._positions[:0] = positions
+                self._statuses[:0] = statuses
+                raise
+            self._count(gated, new)
+
+    async def take(
+        self, reports: Sequence[SoundingReport], session: AsyncSession
+    ) -> tuple[list[ItemVerdict], Callable[[], None]]:
+        """Store soundings in the caller's transaction.
+
+        Returns
+        -------
+        The verdicts in the order of the reports, and what to call once the transaction has committed.
+        """
+        gated, new = await self._store(session, reports)
+        left = set(new)
+        verdicts = []
+        for index, item in enumerate(gated):
+            identity = _identity(item.report)
+            if _storable(item) and identity not in left:
+                verdicts.append(ItemVerdict(index=index, verdict=Verdict.DUPLICATE, reason="already stored"))
+                continue
+            if _storable(item):
+                left.discard(identity)
+            verdict = Verdict.ACCEPTED if item.accepted else Verdict.REJECTED
+            verdicts.append(ItemVerdict(index=index, verdict=verdict, reason=item.reason))
+        return verdicts, lambda: self._count(gated, new)
+
+    async def log(self, level: Level, kind: str, message: str, **data: Any) -> None:
+        """Write a line of the mission's log and show it to everyone who watches."""
+        row = EventRow(mission_id=self._mission_id, time=now(), level=level, kind=kind, message=message, data=data)
+        await to_the_end(self._add(row))
+        metrics.EVENTS.labels(level).inc()
+        log.info("mission event", mission=self._mission_id, level=str(level), kind=kind, message=message, **data)
+        self._broadcaster.publish(EventMessage(event=event_view(row)))
+
+    async def _add(self, row: EventRow) -> None:
+        async with self._database.writing() as session:
+            session.add(row)
+
+    async def close(self) -> None:
+        """Write what is left and stop."""
+        if self._pump is not None:
+            self._pump.cancel()
+            await asyncio.gather(self._pump, return_exceptions=True)
+        await self.flush()
+
+    def _start_pump(self) -> None:
+        if self._pump is None or self._pump.done():
+            self._pump = asyncio.create_task(self._flush_soon())
+
+    async def _flush_soon(self) -> None:
+        while self._soundings or self._positions or self._statuses:
+            await asyncio.sleep(FLUSH_PERIOD_S)
+            try:
+                await self.flush()
+            except Exception:
+                # A locked or full database: everything stays noted and is tried again.
+                log.exception("could not write to the database, trying again", mission=self._mission_id)
+
+    async def _store(
+        self, session: AsyncSession, reports: Sequence[SoundingReport]
+    ) -> tuple[list[GatedSounding], set[sounding_queries.Identity]]:
+        gated = self._gate.check(reports)
+        received = now()
+        rows = [_row(self._mission_id, self.step, received, item) for item in gated if _storable(item)]
+        return gated, await sounding_queries.insert_new(session, rows)
+
+    def _count(self, gated: Sequence[GatedSounding], new: set[sounding_queries.Identity]) -> None:
+        first = {_identity(item.report): item for item in reversed(gated) if _storable(item)}
+        fresh = [item for identity, item in first.items() if identity in new]
+        accepted = [item for item in reversed(fresh) if item.accepted]
+        rejected = len(fresh) - len(accepted)
+        self.counts = Counts(self.counts.accepted + len(accepted), self.counts.rejected + rejected)
+        metrics.SOUNDINGS.labels(Verdict.ACCEPTED).inc(len(accepted))
+        metrics.SOUNDINGS.labels(Verdict.REJECTED).inc(rejected)
+        metrics.SOUNDINGS.labels(Verdict.DUPLICATE).inc(len(gated) - len(fresh))
+        if accepted:
+            self._on_accepted(np.array([(s.east_m, s.north_m, s.depth_m, s.sd_m) for s in accepted]))
+
+
+def track_length_m(track: Sequence[tuple[float, float]]) -> float:
+    """Return the length of a line through (longitude, latitude) points a short way apart; good to 0.5 %."""
+    return sum(
+        METRES_PER_DEGREE * math.hypot((lon2 - lon1) * math.cos(math.radians(lat1)), lat2 - lat1)
+        for (lon1, lat1), (lon2, lat2) in pairwise(track)
+    )
+
+
+def event_view(row: EventRow) -> EventView:
+    """Return a log line as it is shown."""
+    return EventView(
+        id=row.id,
+        mission_id=row.mission_id,
+        time=row.time,
+        level=Level(row.level),
+        kind=row.kind,
+        message=row.message,
+        data=row.data,
+    )
+
+
+def _identity(report: SoundingReport) -> sounding_queries.Identity:
+    return report.vehicle, report.time_s, report.beam
+
+
+def _storable(item: GatedSounding) -> bool:
+    # NaN and infinity have no place in a database column that is summed later; the verdict still goes out.
+    report = item.report
+    place = report.footprint
+    values = (report.time_s, report.range_m, report.vehicle_depth_m, place.lat_deg, place.lon_deg, place.depth_m)
+    return all(math.isfinite(v) for v in values)
+
+
+def _row(mission_id: str, step: int, received: Any, item: GatedSounding) -> dict[str, Any]:
+    report = item.report
+    return {
+        "mission_id": mission_id,
+        "vehicle": report.vehicle,
+        "time_s": report.time_s,
+        "beam": report.beam,
+        "received_at": received,
+        "step": step,
+        "source": report.source,
+        "lat_deg": report.footprint.lat_deg,
+        "lon_deg": report.footprint.lon_deg,
+        "east_m": item.east_m,
+        "north_m": item.north_m,
+        "vehicle_depth_m": report.vehicle_depth_m,
+        "range_m": report.range_m,
+        "raw_depth_m": report.footprint.depth_m,
+        "depth_m": item.depth_m,
+        "sd_m": item.sd_m,
+        "position_sd_m": report.position_sd_m,
+        "verdict": Verdict.ACCEPTED if item.accepted else Verdict.REJECTED,
+        "reason": item.reason,
+    }

@@ -1,0 +1,211 @@
+"""Vehicles on the IMC network (DUNE on board), through :class:`imc_bridge.Bridge`."""
+
+from collections.abc import Sequence
+
+from app.missions.fleet import (
+    EventSink,
+    FleetEvent,
+    LinkReport,
+    LinkState,
+    Position,
+    SoundingReport,
+    StopReceipt,
+    VehicleInfo,
+    VehicleRefusedError,
+    VehicleReport,
+    WaypointOrder,
+    WaypointReport,
+    WaypointStatus,
+)
+from app.missions.settings import ImcSettings
+from imc_bridge import (
+    Bridge,
+    BridgeEvent,
+    BridgeSettings,
+    LinkChange,
+    NodeState,
+    NodeView,
+    RefusedError,
+    Sounding,
+    StateReport,
+    Waypoint,
+    WaypointChange,
+)
+
+_UNENGAGED = {
+    NodeState.HEARD: LinkState.HEARD,
+    NodeState.ANNOUNCED: LinkState.HEARD,
+    NodeState.ACTIVE: LinkState.HEARD,
+    NodeState.IN_PLAN: LinkState.HEARD,
+    NodeState.READY: LinkState.READY,
+    NodeState.LOST: LinkState.LOST,
+    NodeState.EXPECTED_OFFLINE: LinkState.EXPECTED_OFFLINE,
+}
+_SILENT = frozenset({NodeState.LOST, NodeState.EXPECTED_OFFLINE})
+
+
+def make_imc_link(settings: ImcSettings, time_scale: float) -> "ImcFleetLink":
+    """The link as the service's settings describe it."""
+    return ImcFleetLink(bridge_settings(settings, time_scale))
+
+
+def bridge_settings(settings: ImcSettings, time_scale: float) -> BridgeSettings:
+    """The bridge's settings as the service's describe them. Raises ValueError, naming the field."""
+    return BridgeSettings(
+        imc_id=settings.id,
+        name=settings.name,
+        port=settings.port,
+        loopback_only=settings.loopback_only,
+        announce_ports=settings.announce_ports,
+        altimeter=settings.altimeter,
+        time_scale=time_scale,
+    )
+
+
+class ImcFleetLink:
+    """The fleet interface over IMC/UDP; see :class:`app.missions.fleet.FleetLink` for its contract."""
+
+    def __init__(self, settings: BridgeSettings) -> None:
+        self._bridge = Bridge(settings)
+        self._sink: EventSink = lambda _event: None
+
+    @property
+    def kind(self) -> str:
+        """``imc``."""
+        return "imc"
+
+    async def start(self, sink: EventSink) -> None:
+        """Bind the ports and listen. Raises ``imc_bridge.PortInUseError`` when a port is taken."""
+        self._sink = sink
+        await self._bridge.start(self._forward)
+
+    async def close(self) -> None:
+        """Stop every engaged vehicle, then release sockets and tasks."""
+        await self._bridge.close()
+
+    def vehicles(self) -> Sequence[VehicleInfo]:
+        """Every vehicle heard of, by IMC id."""
+        wanted = self._bridge.settings.vehicles
+        return [_info(node) for node in self._bridge.nodes() if node.is_vehicle and (not wanted or node.name in wanted)]
+
+    async def engage(self, vehicle: str) -> None:
+        """Start the FollowReference plan; raises VehicleRefusedError.
+
+        A vehicle that someone else aborted or took over is left alone until it was stopped from here, which pausing a
+        mission does: only an operator may decide that it goes on.
+        """
+        intervention = self._bridge.intervention(vehicle)
+        if intervention:
+            remedy = "It is left alone; when it may go on, pause and resume the mission"
+            raise VehicleRefusedError(vehicle, intervention, remedy)
+        try:
+            await self._bridge.engage(vehicle)
+        except RefusedError as error:
+            raise VehicleRefusedError(vehicle, error.reason, error.remedy) from error
+
+    async def order(self, order: WaypointOrder) -> None:
+        """Send a waypoint; raises VehicleRefusedError when the vehicle is not engaged."""
+        waypoint = Waypoint(
+            mission_id=order.mission_id,
+            step=order.step,
+            lat_deg=order.position.lat_deg,
+            lon_deg=order.position.lon_deg,
+            depth_m=order.position.depth_m,
+            speed_mps=order.speed_mps,
+            arrival_radius_m=order.arrival_radius_m,
+            min_altitude_m=order.min_altitude_m,
+            lead_lat_deg=order.lead.lat_deg if order.lead else None,
+            lead_lon_deg=order.lead.lon_deg if order.lead else None,
+        )
+        try:
+            self._bridge.goto(order.vehicle, waypoint)
+        except RefusedError as error:
+            raise VehicleRefusedError(order.vehicle, error.reason, error.remedy) from error
+
+    async def stop(self, vehicle: str, *, timeout_s: float = 3.0) -> StopReceipt:
+        """Stop the vehicle; a plan of another console is left alone."""
+        result = await self._bridge.stop(vehicle, timeout_s=timeout_s)
+        return StopReceipt(result.vehicle, result.acknowledged, result.detail)
+
+    def _forward(self, event: BridgeEvent) -> None:
+        translated = _translate(event)
+        if translated is not None:
+            self._sink(translated)
+
+
+def _translate(event: BridgeEvent) -> FleetEvent | None:
+    match event:
+        case StateReport():
+            return _report(event)
+        case Sounding():
+            return SoundingReport(
+                vehicle=event.vehicle,
+                time_s=event.time_s,
+                footprint=Position(event.lat_deg, event.lon_deg, event.bottom_depth_m),
+                vehicle_depth_m=event.vehicle_depth_m,
+                range_m=event.range_m,
+                source=event.source,
+                beam=event.beam,
+                position_sd_m=event.position_sd_m,
+            )
+        case WaypointChange():
+            return WaypointReport(
+                vehicle=event.vehicle,
+                mission_id=event.waypoint.mission_id,
+                step=event.waypoint.step,
+                status=WaypointStatus(event.status.value),
+                reason=event.reason,
+            )
+        case LinkChange():
+            return LinkReport(event.vehicle, _link_state(event.state, event.engaged, event.ours), event.reason)
+        case _:
+            # A refused Distance is counted in the vehicle's details.
+            return None
+
+
+def _link_state(state: NodeState, engaged: bool, ours: bool) -> LinkState:
+    """``ours``: it executes our plan. One of an earlier run is replaced when the vehicle is engaged."""
+    if engaged and state not in _SILENT:
+        return LinkState.ENGAGED
+    if state is NodeState.IN_PLAN and ours:
+        return LinkState.READY
+    return _UNENGAGED[state]
+
+
+def _report(state: StateReport) -> VehicleReport:
+    return VehicleReport(
+        vehicle=state.vehicle,
+        time_s=state.time_s,
+        position=Position(state.lat_deg, state.lon_deg, state.depth_m),
+        heading_rad=state.heading_rad,
+        speed_mps=state.speed_mps,
+        altitude_m=state.altitude_m,
+        battery_pct=state.battery_pct,
+        position_sd_m=state.position_sd_m,
+    )
+
+
+def _info(node: NodeView) -> VehicleInfo:
+    details = {
+        "operation mode": node.operation_mode,
+        "plan": node.plan_id,
+        "plan control": node.plan_state,
+        "IMC version": node.imc_version,
+        "clock ahead of ours": None if node.clock_offset_s is None else f"{node.clock_offset_s:.1f} s",
+        "bottom sensors": ", ".join(node.bottom_sensors) or None,
+        "soundings": str(node.soundings),
+        "soundings refused": "; ".join(f"{reason}: {count}" for reason, count in node.refused.items()) or None,
+        "rate limiters": node.rate_limiters,
+        "conflict": node.conflict,
+    }
+    return VehicleInfo(
+        name=node.name,
+        kind="imc",
+        state=_link_state(node.state, node.engaged, node.ours),
+        reason=node.reason,
+        age_s=node.age_s,
+        address=node.address,
+        imc_id=node.imc_id,
+        report=None if node.report is None else _report(node.report),
+        details={key: value for key, value in details.items() if value is not None},
+    )

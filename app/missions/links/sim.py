@@ -1,0 +1,272 @@
+"""Vehicles simulated inside the service, over a sea floor laid under each mission's area."""
+
+import asyncio
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from app.missions.clock import now
+from app.missions.fleet import (
+    EventSink,
+    FleetEvent,
+    LinkReport,
+    LinkState,
+    Position,
+    SoundingReport,
+    StopReceipt,
+    VehicleInfo,
+    VehicleRefusedError,
+    VehicleReport,
+    WaypointOrder,
+    WaypointReport,
+    WaypointStatus,
+)
+from app.missions.settings import SimulationSettings
+from app.missions.spec import Sensor
+from simulator.seafloors import generate
+from simulator.sensors import SensorKind, SonarNoise
+from simulator.terrain import Terrain
+from simulator.terrain_files import load_terrain
+from simulator.world import Measurement, Place, SimulatedVehicle
+
+TICK_S = 0.05
+REPORT_PERIOD_S = 0.5
+"""Time between position reports on the vehicle's clock, as often as DUNE sends EstimatedState."""
+
+LAUNCH_MARGIN_M = 2.0
+SENSORS = {
+    Sensor.SINGLE_BEAM: SensorKind.SINGLE,
+    Sensor.DVL: SensorKind.DVL,
+    Sensor.MULTIBEAM: SensorKind.MULTIBEAM,
+}
+
+
+@dataclass(frozen=True)
+class Launch:
+    """Where and how a simulated vehicle comes into the world.
+
+    Attributes
+    ----------
+    vehicle, sensor
+        Its name and its sonar.
+    south_west
+        Latitude and longitude of the sea floor's corner.
+    width_m, height_m
+        Extent of a generated sea floor.
+    start
+        Latitude and longitude; None: in the south-western corner, beside those already there.
+    noise
+        Standard deviation of a range as a fraction of it.
+    """
+
+    vehicle: str
+    sensor: Sensor
+    south_west: tuple[float, float]
+    width_m: float
+    height_m: float
+    start: tuple[float, float] | None
+    noise: float
+
+
+class _Swimmer:
+    def __init__(self, body: SimulatedVehicle, terrain: Terrain) -> None:
+        self.body = body
+        self.terrain = terrain
+        self.state = LinkState.READY
+        self.order: WaypointOrder | None = None
+        self.reached = False
+        self.raised = False
+        self.reported_s = -math.inf
+        self.report: VehicleReport | None = None
+
+    def position(self, place: Place) -> Position:
+        lat, lon = self.terrain.frame.to_geodetic(place.east_m, place.north_m)
+        return Position(lat, lon, place.depth_m)
+
+    def make_report(self) -> VehicleReport:
+        state = self.body.state
+        self.reported_s = state.time_s
+        self.report = VehicleReport(
+            vehicle=self.body.name,
+            time_s=state.time_s,
+            position=self.position(state.position),
+            heading_rad=state.heading_rad,
+            speed_mps=state.speed_mps,
+            altitude_m=state.altitude_m if math.isfinite(state.altitude_m) else None,
+            battery_pct=None,
+            position_sd_m=math.sqrt(state.position_variance_m2),
+        )
+        return self.report
+
+    def head_for(self, order: WaypointOrder, depth_m: float) -> None:
+        east, north = self.terrain.frame.to_local(order.position.lat_deg, order.position.lon_deg)
+        self.body.go_to(east, north, depth_m, order.speed_mps, arrival_radius_m=order.arrival_radius_m)
+
+
+class SimFleetLink:
+    """The fleet interface for vehicles simulated in this process.
+
+    Parameters
+    ----------
+    time_scale
+        How much faster than the wall clock they live.
+    """
+
+    kind = "sim"
+
+    def __init__(self, settings: SimulationSettings, time_scale: float) -> None:
+        self._settings = settings
+        self._time_scale = time_scale
+        self._swimmers: dict[str, _Swimmer] = {}
+        self._sink: EventSink = lambda _event: None
+        self._task: asyncio.Task[None] | None = None
+
+    async def start(self, sink: EventSink) -> None:
+        """Let time pass from now on."""
+        self._sink = sink
+        self._task = asyncio.create_task(self._live())
+
+    async def close(self) -> None:
+        """Stop every vehicle and let time stand still."""
+        for name in self._swimmers:
+            await self.stop(name)
+        if self._task is not None:
+            self._task.cancel()
+            await asyncio.gather(self._task, return_exceptions=True)
+
+    def launch(self, launch: Launch) -> None:
+        """Bring a vehicle into the world; nothing happens when it is there already.
+
+        Raises
+        ------
+        ValueError
+            When the start lies outside of the sea floor.
+        """
+        if launch.vehicle in self._swimmers:
+            return
+        terrain = self._terrain(launch)
+        seed = [self._settings.seed, *launch.vehicle.encode()]
+        body = SimulatedVehicle(
+            launch.vehicle,
+            terrain,
+            SENSORS[launch.sensor],
+            (*self._start(launch, terrain), 0.0),
+            np.random.default_rng(seed),
+            noise=SonarNoise(relative_sd=launch.noise),
+            start_time_s=now().timestamp(),
+        )
+        swimmer = _Swimmer(body, terrain)
+        swimmer.make_report()
+        self._swimmers[launch.vehicle] = swimmer
+
+    def _terrain(self, launch: Launch) -> Terrain:
+        settings = self._settings
+        if settings.terrain is not None:
+            terrain = load_terrain(settings.terrain)
+            return terrain if terrain.origin_lat_deg is not None else terrain.placed_at(*launch.south_west)
+        # Whole cells that cover the area to its border and a little more.
+        return generate(
+            settings.family,
+            settings.seed,
+            width_m=math.ceil(launch.width_m + 1e-3),
+            height_m=math.ceil(launch.height_m + 1e-3),
+            origin=launch.south_west,
+        )
+
+    def _start(self, launch: Launch, terrain: Terrain) -> tuple[float, float]:
+        if launch.start is not None:
+            return terrain.frame.to_local(*launch.start)
+        there = sum(1 for s in self._swimmers.values() if s.terrain.frame.definition == terrain.frame.definition)
+        spacing = min(5.0, terrain.width_m / 4)
+        return LAUNCH_MARGIN_M + (there * spacing) % (terrain.width_m - LAUNCH_MARGIN_M), LAUNCH_MARGIN_M
+
+    def vehicles(self) -> Sequence[VehicleInfo]:
+        """Every vehicle that was launched."""
+        return [
+            VehicleInfo(name=name, kind=self.kind, state=s.state, age_s=0.0, report=s.report)
+            for name, s in self._swimmers.items()
+        ]
+
+    async def engage(self, vehicle: str) -> None:
+        """Let a vehicle follow. Raises VehicleRefusedError when it was not launched."""
+        swimmer = self._swimmers.get(vehicle)
+        if swimmer is None:
+            raise VehicleRefusedError(vehicle, "is not in the water", "add it to a mission as a vehicle of kind sim")
+        if swimmer.state is not LinkState.ENGAGED:
+            swimmer.state = LinkState.ENGAGED
+            self._sink(LinkReport(vehicle, LinkState.ENGAGED))
+
+    async def order(self, order: WaypointOrder) -> None:
+        """Send a vehicle to a waypoint."""
+        swimmer = self._swimmers.get(order.vehicle)
+        if swimmer is None or swimmer.state is not LinkState.ENGAGED:
+            raise VehicleRefusedError(order.vehicle, "does not follow this service", "engage it first")
+        swimmer.head_for(order, order.position.depth_m)
+        swimmer.order = order
+        swimmer.reached = False
+        swimmer.raised = False
+        for status in (WaypointStatus.SENT, WaypointStatus.ACKNOWLEDGED):
+            self._sink(WaypointReport(order.vehicle, order.mission_id, order.step, status))
+
+    async def stop(self, vehicle: str, *, timeout_s: float = 3.0) -> StopReceipt:
+        """Switch a vehicle's motor off."""
+        swimmer = self._swimmers.get(vehicle)
+        if swimmer is None or swimmer.state is not LinkState.ENGAGED:
+            return StopReceipt(vehicle, acknowledged=True, detail="was not following")
+        swimmer.body.stop()
+        swimmer.order = None
+        swimmer.state = LinkState.READY
+        self._sink(LinkReport(vehicle, LinkState.READY))
+        return StopReceipt(vehicle, acknowledged=True, detail="motor off")
+
+    async def _live(self) -> None:
+        loop = asyncio.get_running_loop()
+        then_s = loop.time()
+        while True:
+            await asyncio.sleep(TICK_S)
+            now_s = loop.time()
+            passed_s = (now_s - then_s) * self._time_scale
+            then_s = now_s
+            for swimmer in list(self._swimmers.values()):
+                for event in self._advance(swimmer, passed_s):
+                    self._sink(event)
+
+    def _advance(self, swimmer: _Swimmer, passed_s: float) -> list[FleetEvent]:
+        events: list[FleetEvent] = []
+        measurements = swimmer.body.advance(passed_s)
+        order = swimmer.order
+        if order is not None:
+            events += [_sounding(swimmer, m) for m in measurements if m.valid]
+            self._keep_clear_of_bottom(swimmer, order)
+        if swimmer.body.time_s - swimmer.reported_s >= REPORT_PERIOD_S:
+            events.append(swimmer.make_report())
+        if order is not None and not swimmer.reached and swimmer.body.arrived:
+            swimmer.reached = True
+            # The loop plans from the last report: it must be the place of arrival.
+            events.append(swimmer.make_report())
+            events.append(WaypointReport(order.vehicle, order.mission_id, order.step, WaypointStatus.REACHED))
+        return events
+
+    def _keep_clear_of_bottom(self, swimmer: _Swimmer, order: WaypointOrder) -> None:
+        state = swimmer.body.state
+        too_low = state.altitude_m < order.min_altitude_m
+        if too_low and not swimmer.raised and not swimmer.body.arrived:
+            swimmer.raised = True
+            swimmer.head_for(order, max(0.0, swimmer.body.bottom_m - order.min_altitude_m))
+
+
+def _sounding(swimmer: _Swimmer, measurement: Measurement) -> SoundingReport:
+    if measurement.footprint is None:
+        raise ValueError("a measurement without a return has no footprint")
+    return SoundingReport(
+        vehicle=measurement.vehicle,
+        time_s=measurement.time_s,
+        footprint=swimmer.position(measurement.footprint),
+        vehicle_depth_m=measurement.position.depth_m,
+        range_m=measurement.range_m,
+        source=measurement.source,
+        beam=measurement.beam,
+        position_sd_m=math.sqrt(swimmer.body.state.position_variance_m2),
+    )

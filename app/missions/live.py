@@ -1,0 +1,340 @@
+"""The side of a mission that lives in memory: its map, its journal, its vehicles' reports and its watchers."""
+
+import asyncio
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+import structlog
+from shapely.geometry import Polygon
+
+from app.mapping.georeference import LocalFrame
+from app.missions.broadcast import Broadcaster
+from app.missions.clock import now
+from app.missions.fleet import (
+    FleetEvent,
+    LinkReport,
+    LinkState,
+    Position,
+    SoundingReport,
+    VehicleReport,
+    WaypointReport,
+)
+from app.missions.gate import Gate
+from app.missions.hub import FleetHub
+from app.missions.journal import Counts, Journal, track_length_m
+from app.missions.map_builder import BuiltMap, MapBuilder
+from app.missions.members import Member, Team
+from app.missions.spec import MissionSpec, VehicleSpec
+from app.missions.states import MissionState
+from app.missions.views import (
+    MapMessage,
+    MissionSummary,
+    Progress,
+    StateMessage,
+    VehiclesMessage,
+    VehicleView,
+    WaypointsMessage,
+    WaypointView,
+)
+from app.storage import missions as mission_queries
+from app.storage import soundings as sounding_queries
+from app.storage.database import Database
+from app.storage.models import MissionRow, PositionRow, WaypointRow
+
+LIVE_PERIOD_S = 0.25
+
+log = structlog.get_logger(__name__)
+
+
+@dataclass
+class Header:
+    """A mission's state as last committed."""
+
+    state: MissionState
+    reason: str
+    created_at: Any
+    updated_at: Any
+    elapsed_s: float
+    step: int = 0
+    objective: float | None = None
+    terms: dict[str, float] | None = None
+
+
+class LiveMission:
+    """One mission in memory. Made by ``load``; the step loop, the service and the watchers share it."""
+
+    def __init__(
+        self,
+        database: Database,
+        hub: FleetHub,
+        executor: Executor,
+        row: MissionRow,
+        spec: MissionSpec,
+        counts: Counts,
+    ) -> None:
+        self.id = row.id
+        self.spec = spec
+        self.header = Header(MissionState(row.state), row.reason, row.created_at, row.updated_at, row.elapsed_s)
+        self.frame: LocalFrame = spec.frame()
+        self.area = spec.local_area()
+        self.team = Team()
+        self.broadcaster = Broadcaster()
+        self.builder = MapBuilder(self.area, spec.cell_m, spec.accuracy_m)
+        gate = Gate(
+            self.frame,
+            Polygon(self.area),
+            margin_m=2 * spec.limits.max_step_m,
+            noise=spec.sounding_noise,
+            tide_level_m=spec.tide.level_m,
+        )
+        self.journal = Journal(database, row.id, gate, counts, self.broadcaster, self.builder.add)
+        self.changed = asyncio.Event()
+        """Set whenever a vehicle reported something that the step loop may be waiting for."""
+        self.halted = False
+        """Set while vehicles are being stopped: the step loop must not send them off again as it ends."""
+        self.seconds_per_step: float | None = None
+        self.running_since_s: float | None = None
+        self._database = database
+        self._hub = hub
+        self._executor = executor
+        self._waypoints: dict[str, WaypointView] = {}
+        self._ticker: asyncio.Task[None] | None = None
+
+    @classmethod
+    async def load(cls, database: Database, hub: FleetHub, executor: Executor, row: MissionRow) -> "LiveMission":
+        """Take a mission up from the database, as it was last committed."""
+        async with database.reading() as session:
+            counted = await sounding_queries.counts(session, row.id)
+            soundings = await sounding_queries.accepted_arrays(session, row.id)
+            vehicles = await mission_queries.vehicles_of(session, row.id)
+            waypoints = await mission_queries.newest_waypoints(session, row.id)
+            step = await mission_queries.last_step(session, row.id)
+            tracks = await mission_queries.tracks(session, row.id)
+            positions = await mission_queries.last_positions(session, row.id)
+        # Building the spec checks geometry, which takes milliseconds: not on the event loop.
+        spec = await asyncio.get_running_loop().run_in_executor(executor, MissionSpec.model_validate, row.spec)
+        counts = Counts(counted.get("accepted", 0), counted.get("rejected", 0))
+        live = cls(database, hub, executor, row, spec, counts)
+        live.builder.add(soundings)
+        live.journal.travelled_m = sum(track_length_m(track) for track in tracks.values())
+        if step is not None:
+            live.set_step(step.number, step.objective, step.terms)
+        for vehicle in vehicles:
+            if vehicle.left_at is None:
+                member = live.team.join(VehicleSpec.model_validate(vehicle.spec), vehicle.slot)
+                member.report = _last_report(positions.get(member.name))
+        live.show_waypoints([live.waypoint_view(waypoint) for waypoint in waypoints])
+        return live
+
+    def halt(self) -> None:
+        """Keep the step loop from sending anything more, and wake everyone who waits for a waypoint."""
+        self.halted = True
+        self.changed.set()
+        self.publish_summary()
+
+    def set_step(self, number: int, objective: float | None, terms: dict[str, float]) -> None:
+        """Note the last committed step."""
+        self.header.step = number
+        self.header.objective = objective
+        self.header.terms = terms
+        self.journal.step = number
+
+    def receive(self, event: FleetEvent) -> None:
+        """Take an event from one of this mission's vehicles; called from the event loop, never blocks."""
+        member = self.team.get(event.vehicle)
+        if member is None:
+            return
+        match event:
+            case VehicleReport():
+                if self.local_place(event.position) is None:
+                    log.warning("position is not near the mission, ignored", vehicle=event.vehicle)
+                    return
+                member.report = event
+                self.journal.position(event)
+            case SoundingReport():
+                self.journal.sounding(event)
+                return
+            case LinkReport():
+                member.link = event.state
+                if event.state in (LinkState.HEARD, LinkState.READY):
+                    # It can be reached but follows nothing of ours (any more): the loop engages it again.
+                    member.engaged = False
+            case WaypointReport():
+                self._receive_waypoint(member, event)
+        self.changed.set()
+
+    def _receive_waypoint(self, member: Member, event: WaypointReport) -> None:
+        if event.mission_id != self.id or member.order is None or event.step != member.order.step:
+            return
+        member.status = event.status
+        member.reason = event.reason
+        self.journal.waypoint(event)
+        shown = self._waypoints.get(member.name)
+        if shown is not None and shown.step == event.step:
+            update = {"status": event.status, "reason": event.reason}
+            self.show_waypoints([shown.model_copy(update=update)])
+
+    def show_waypoints(self, waypoints: list[WaypointView]) -> None:
+        """Make these the vehicles' newest waypoints and tell everyone who watches."""
+        if waypoints:
+            self._waypoints |= {waypoint.vehicle: waypoint for waypoint in waypoints}
+            self.broadcaster.publish(WaypointsMessage(waypoints=waypoints))
+
+    @property
+    def waypoints(self) -> list[WaypointView]:
+        """The newest waypoint of each vehicle."""
+        return list(self._waypoints.values())
+
+    def waypoint_of(self, vehicle: str) -> WaypointView | None:
+        """Return a vehicle's newest waypoint."""
+        return self._waypoints.get(vehicle)
+
+    def waypoint_view(self, row: WaypointRow) -> WaypointView:
+        """Return a stored waypoint as it is shown."""
+        return WaypointView.model_validate(
+            {
+                "vehicle": row.vehicle,
+                "step": row.step,
+                "lat_deg": row.lat_deg,
+                "lon_deg": row.lon_deg,
+                "east_m": row.east_m,
+                "north_m": row.north_m,
+                "depth_m": row.depth_m,
+                "speed_mps": self.spec.speed_mps,
+                "arrival_radius_m": self.spec.arrival_radius_m,
+                "min_altitude_m": self.spec.limits.min_altitude_m,
+                "status": row.status,
+                "reason": row.reason,
+            }
+        )
+
+    async def build_map(self) -> BuiltMap | None:
+        """Make the map of everything accepted so far as thoroughly as for a product, in a worker thread."""
+        before = self.builder.newest
+        build = partial(self.builder.build, thorough=True)
+        built = await asyncio.get_running_loop().run_in_executor(self._executor, build)
+        if built is not None and built is not before:
+            self.publish_map(built)
+        return built
+
+    def publish_map(self, built: BuiltMap) -> None:
+        """Tell everyone who watches that there is a new map."""
+        depth = built.map.depth_m[np.isfinite(built.map.depth_m)]
+        self.broadcaster.publish(
+            MapMessage(
+                version=built.version,
+                step=self.header.step,
+                min_depth_m=float(depth.min()) if depth.size else None,
+                max_depth_m=float(depth.max()) if depth.size else None,
+            )
+        )
+
+    def progress(self) -> Progress:
+        """Return how far the mission has come."""
+        built = self.builder.newest
+        header = self.header
+        left = self.spec.steps - header.step
+        loop_time = asyncio.get_running_loop().time()
+        running_s = loop_time - self.running_since_s if self.running_since_s is not None else 0.0
+        return Progress(
+            step=header.step,
+            steps=self.spec.steps,
+            soundings=self.journal.counts.accepted,
+            rejected=self.journal.counts.rejected,
+            distance_m=self.journal.travelled_m,
+            coverage_pct=self.builder.coverage_pct(),
+            mean_sd_m=float(np.nanmean(built.map.sd_m)) if built is not None else None,
+            objective=header.objective,
+            terms=header.terms or {},
+            elapsed_s=header.elapsed_s + running_s,
+            eta_s=left * self.seconds_per_step if self.seconds_per_step is not None else None,
+        )
+
+    def summary(self) -> MissionSummary:
+        """Return the mission as it stands in a list."""
+        header = self.header
+        return MissionSummary(
+            id=self.id,
+            name=self.spec.name,
+            state=header.state,
+            reason=header.reason,
+            created_at=header.created_at,
+            updated_at=header.updated_at,
+            progress=self.progress(),
+        )
+
+    def publish_summary(self) -> None:
+        """Tell everyone who watches about state and progress."""
+        self.broadcaster.publish(StateMessage(mission=self.summary()))
+
+    def vehicle_views(self) -> list[VehicleView]:
+        """Return the vehicles that take part."""
+        return [self._vehicle_view(member) for member in self.team]
+
+    def _vehicle_view(self, member: Member) -> VehicleView:
+        info = self._hub.info(member.key)
+        report = member.report or info.report
+        view = VehicleView(
+            name=member.name,
+            kind=member.spec.kind,
+            sensor=member.spec.sensor,
+            mission_id=self.id,
+            link=info.state,
+            reason=member.refusal or info.reason,
+            age_s=info.age_s,
+            address=info.address,
+            imc_id=info.imc_id,
+        )
+        if report is None:
+            return view
+        position = report.position
+        place = self.local_place(position)
+        return view.model_copy(
+            update={
+                "lat_deg": position.lat_deg,
+                "lon_deg": position.lon_deg,
+                "east_m": place and round(place[0], 3),
+                "north_m": place and round(place[1], 3),
+                "depth_m": position.depth_m,
+                "altitude_m": report.altitude_m,
+                "heading_deg": None if report.heading_rad is None else float(np.degrees(report.heading_rad) % 360),
+                "speed_mps": report.speed_mps,
+                "battery_pct": report.battery_pct,
+                "position_sd_m": report.position_sd_m,
+            }
+        )
+
+    def local_place(self, position: Position) -> tuple[float, float] | None:
+        """Return east and north of a position; None when it is not near enough to be on the mission's frame."""
+        try:
+            east, north = self.frame.to_local(position.lat_deg, position.lon_deg)
+        except ValueError:
+            return None
+        return float(east), float(north)
+
+    def start_ticker(self) -> None:
+        """Send the vehicles' positions at a steady rate while anyone watches."""
+        if self._ticker is None or self._ticker.done():
+            self._ticker = asyncio.create_task(self._tick())
+
+    async def _tick(self) -> None:
+        while self.broadcaster.watched:
+            self.broadcaster.publish(VehiclesMessage(time=now(), vehicles=self.vehicle_views()))
+            await asyncio.sleep(LIVE_PERIOD_S)
+
+    async def close(self) -> None:
+        """Write what is left."""
+        if self._ticker is not None:
+            self._ticker.cancel()
+            await asyncio.gather(self._ticker, return_exceptions=True)
+        await self.journal.close()
+
+
+def _last_report(row: PositionRow | None) -> VehicleReport | None:
+    """Return where a vehicle was last: one that holds there and only polls has nothing new to tell."""
+    if row is None:
+        return None
+    return VehicleReport(row.vehicle, row.time_s, Position(row.lat_deg, row.lon_deg, row.depth_m))

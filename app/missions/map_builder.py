@@ -1,0 +1,173 @@
+"""From accepted soundings to the mission's map and to the belief a planner works on."""
+
+import copy
+import hashlib
+import threading
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely.geometry import Polygon
+
+from app.exploration.problem import Belief
+from app.mapping.gp import GaussianProcessMap
+from app.mapping.outliers import flag_outliers
+from app.mapping.types import BathymetricMap, BoolArray, FloatArray, Grid, Soundings
+
+MAX_LANDMARKS = 4000
+"""More landmarks make planning slower, not better: neighbouring cells are almost the same question."""
+
+RELEARN_GROWTH = 1.15
+"""Hyperparameters are learned again when the soundings grew by this factor."""
+
+
+@dataclass(frozen=True)
+class BuiltMap:
+    """A map and what was known when it was made. ``version`` grows with each."""
+
+    version: int
+    soundings: int
+    map: BathymetricMap
+    digest: str
+
+
+def make_grid(area: FloatArray, cell_m: float) -> tuple[Grid, BoolArray]:
+    """Return the grid over a polygon (n, 2), and which of its cells (rows, cols) have their centre in it."""
+    low, high = area.min(axis=0), area.max(axis=0)
+    # A side that is a whole number of cells up to rounding is not given one cell more.
+    cols, rows = (max(1, int(np.ceil(side / cell_m - 1e-3))) for side in high - low)
+    grid = Grid(float(low[0]), float(low[1]), cell_m, rows, cols)
+    centres = grid.centres_m
+    inside = shapely.contains_xy(Polygon(area), centres[:, 0], centres[:, 1])
+    return grid, inside.reshape(rows, cols)
+
+
+class MapBuilder:
+    """Collects soundings and makes maps of them.
+
+    ``add`` may be called from the event loop at any time; ``build`` and ``learn`` belong in worker threads.
+    """
+
+    def __init__(self, area: FloatArray, cell_m: float, accuracy_m: float) -> None:
+        self.grid, self.mask = make_grid(area, cell_m)
+        self._accuracy_m = accuracy_m
+        stride = int(np.ceil(np.sqrt(max(self.mask.sum(), 1) / MAX_LANDMARKS)))
+        self._nodes = np.zeros_like(self.mask)
+        self._nodes[stride // 2 :: stride, stride // 2 :: stride] = True
+        self._nodes &= self.mask
+        if not self._nodes.any():
+            self._nodes = self.mask.copy()
+        self._nodes_xy = self.grid.centres_m[self._nodes.ravel()]
+        self._accurate = np.zeros(len(self._nodes_xy), dtype=bool)
+        self._pending: deque[NDArray[np.float64]] = deque()
+        self._soundings = np.zeros((0, 4))
+        # The model with its hyperparameters, and for the soundings it was learned on which are outliers.
+        self._learned = (GaussianProcessMap(reject_outliers=False), np.zeros(0, dtype=bool))
+        self._building = threading.Lock()
+        self._learning = threading.Lock()
+        self._newest: BuiltMap | None = None
+
+    def add(self, soundings: NDArray[np.float64]) -> None:
+        """Take in soundings, shape (n, 4): east, north, depth, standard deviation in metres."""
+        if len(soundings):
+            self._pending.append(soundings)
+
+    @property
+    def newest(self) -> BuiltMap | None:
+        """The newest map; None before the first sounding was built in."""
+        return self._newest
+
+    @property
+    def stale(self) -> bool:
+        """Whether there are soundings that the newest map does not hold."""
+        return bool(self._pending)
+
+    def build(self, *, thorough: bool = False) -> BuiltMap | None:
+        """Make a map of everything added so far; None without soundings.
+
+        Gross outliers are judged by ``learn``; a sounding that came since is trusted until then. A thorough map judges
+        every sounding and learns the model first, as a product should.
+        """
+        with self._building:
+            arrived = []
+            while self._pending:
+                arrived.append(self._pending.popleft())
+            if arrived:
+                self._soundings = np.concatenate([self._soundings, *arrived])
+            if thorough:
+                self.learn(always=True)
+            if arrived or (self._newest is not None and thorough):
+                self._newest = self._build()
+            return self._newest
+
+    def _build(self) -> BuiltMap:
+        model, rejected = self._learned
+        trusted = np.ones(len(self._soundings), dtype=bool)
+        trusted[: len(rejected)] = ~rejected
+        model = copy.copy(model)
+        bathymetry = model.fit(_as_soundings(self._soundings[trusted]), learn=False).predict(self.grid, self.mask)
+        if not rejected.size:
+            # The first fit had to learn; keep what it found.
+            self._learned = (model, rejected)
+        digest = hashlib.sha256(bathymetry.depth_m.tobytes()).hexdigest()
+        version = self._newest.version + 1 if self._newest else 1
+        return BuiltMap(version, len(self._soundings), bathymetry, digest)
+
+    def learn(self, *, always: bool = False) -> None:
+        """Judge outliers and learn the model's hyperparameters anew when there are enough more soundings.
+
+        Slower than a build, so it is done while the vehicles travel. The next ``build`` uses what was found.
+        """
+        known = self._soundings
+        with self._learning:
+            model, rejected = self._learned
+            if not len(known) or (len(known) < RELEARN_GROWTH * len(rejected) and not always):
+                return
+            soundings = _as_soundings(known)
+            verdict = flag_outliers(soundings, hyperparameters=getattr(model, "stationary_hyperparameters_", None))
+            trusted = ~verdict.rejected
+            self._learned = (copy.copy(model).fit(soundings.take(trusted), learn=True), verdict.rejected)
+
+    def coverage_pct(self) -> float:
+        """Return the share of the area's cells that are known to the asked accuracy."""
+        if self._newest is None:
+            return 0.0
+        sd = self._newest.map.sd_m[self.mask]
+        return float(100.0 * np.mean(sd <= self._accuracy_m))
+
+    def belief(self) -> Belief:
+        """Return what is known at the landmarks (a lattice of the grid's cells)."""
+        n = len(self._nodes_xy)
+        if self._newest is None:
+            extent = float(np.ptp(self.grid.centres_m, axis=0).max())
+            return Belief(
+                xy_m=self._nodes_xy,
+                depth_m=np.full(n, np.nan),
+                sd_m=np.full(n, np.inf),
+                accurate=np.zeros(n, dtype=bool),
+                weight=np.ones(n),
+                correlation_length_m=extent / 5,
+            )
+        bathymetry = self._newest.map
+        sd = bathymetry.sd_m[self._nodes]
+        # AURO15: what was once accurately estimated stays so.
+        self._accurate |= sd <= self._accuracy_m
+        return Belief(
+            xy_m=self._nodes_xy,
+            depth_m=bathymetry.depth_m[self._nodes],
+            sd_m=sd,
+            accurate=self._accurate.copy(),
+            weight=bathymetry.roughness[self._nodes],
+            correlation_length_m=bathymetry.correlation_length_m,
+        )
+
+    def sounded_at_m(self) -> FloatArray:
+        """Return where the soundings of the newest map were taken, shape (n, 2)."""
+        return self._soundings[:, :2].copy()
+
+
+def _as_soundings(rows: NDArray[np.float64]) -> Soundings:
+    east, north, depth, sd = rows.T.copy()
+    return Soundings(east, north, depth, sd)

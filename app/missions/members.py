@@ -1,0 +1,100 @@
+"""The vehicles of one mission as its step loop sees them."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.mapping.georeference import LocalFrame
+from app.missions.fleet import (
+    LinkState,
+    VehicleReport,
+    WaypointOrder,
+    WaypointStatus,
+)
+from app.missions.hub import VehicleKey
+from app.missions.spec import Limits, VehicleSpec
+
+SETTLED = frozenset({WaypointStatus.REACHED, WaypointStatus.REFUSED, WaypointStatus.MISSED})
+OUT_OF_REACH = frozenset({LinkState.UNKNOWN, LinkState.LOST})
+
+
+@dataclass
+class Member:
+    """A vehicle that takes part. ``slot`` is its place in the depth stack."""
+
+    spec: VehicleSpec
+    slot: int
+    report: VehicleReport | None = None
+    link: LinkState = LinkState.UNKNOWN
+    engaged: bool = False
+    followed: bool = False
+    """Whether it ever followed in this run: one that then refuses is an alarm."""
+    refusal: str = ""
+    order: WaypointOrder | None = None
+    status: WaypointStatus | None = None
+    reason: str = ""
+
+    @property
+    def name(self) -> str:
+        """The vehicle's name."""
+        return self.spec.name
+
+    @property
+    def key(self) -> VehicleKey:
+        """What the hub knows the vehicle by."""
+        return self.spec.kind, self.spec.name
+
+    @property
+    def present(self) -> bool:
+        """Whether it can be planned for: it follows us and we know where it is."""
+        return self.engaged and self.report is not None and self.link not in OUT_OF_REACH
+
+    @property
+    def busy(self) -> bool:
+        """Whether it is on its way to a waypoint."""
+        return self.order is not None and self.status not in SETTLED and self.link not in OUT_OF_REACH
+
+    def cruise_depth_m(self, limits: Limits) -> float:
+        """Return the depth it travels at where the bottom leaves room: as asked for, or its place in the stack."""
+        if self.spec.depth_m is not None:
+            return self.spec.depth_m
+        return min(limits.min_depth_m + self.slot * limits.min_vertical_separation_m, limits.max_depth_m)
+
+    def place_m(self, frame: LocalFrame) -> NDArray[np.float64]:
+        """Return its last reported place, (2,): east and north in the mission's frame."""
+        if self.report is None:
+            raise ValueError(f"{self.name} has not reported a position yet")
+        position = self.report.position
+        east, north = frame.to_local(np.array(position.lat_deg), np.array(position.lon_deg))
+        return np.array([float(east), float(north)])
+
+
+@dataclass
+class Team:
+    """All vehicles of a mission, by name, in the order of their slots."""
+
+    members: dict[str, Member] = field(default_factory=dict)
+
+    def join(self, spec: VehicleSpec, slot: int) -> Member:
+        """Add a vehicle."""
+        member = Member(spec, slot)
+        self.members[spec.name] = member
+        return member
+
+    def leave(self, name: str) -> None:
+        """Take a vehicle out."""
+        self.members.pop(name, None)
+
+    def __iter__(self) -> Iterator[Member]:
+        return iter(list(self.members.values()))
+
+    def get(self, name: str) -> Member | None:
+        """Return the vehicle of this name, if it takes part."""
+        return self.members.get(name)
+
+    @property
+    def present(self) -> list[Member]:
+        """Those that can be planned for."""
+        return [m for m in self.members.values() if m.present]

@@ -1,0 +1,13 @@
+"""Figures about missions for GET /metrics."""
+
+from prometheus_client import Counter, Gauge, Histogram
+
+STEPS = Counter("bathyfleet_steps_total", "Committed mission steps")
+SOUNDINGS = Counter("bathyfleet_soundings_total", "Soundings by verdict", ["verdict"])
+PLANNING_SECONDS = Histogram(
+    "bathyfleet_planning_seconds",
+    "Time to make the map and decide one step",
+    buckets=(0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1, 2.5, 5, 10, 30),
+)
+RUNNING = Gauge("bathyfleet_missions_running", "Missions whose step loop runs in this process")
+EVENTS = Counter("bathyfleet_mission_events_total", "Lines written to mission logs by level", ["level"])

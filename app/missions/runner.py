@@ -1,0 +1,428 @@
+"""The step loop of one running mission.
+
+Every start is a recovery: the loop takes the mission up from its last committed step, whether it was just started,
+paused, or killed in the middle. A step's decision, waypoints and planner memory are one transaction; waypoints are sent
+after it. So a crash between any two moments loses nothing and repeats nothing but the sending, which is harmless.
+"""
+
+import asyncio
+import math
+from collections.abc import Callable
+from concurrent.futures import Executor, Future
+
+import numpy as np
+import structlog
+from numpy.typing import NDArray
+
+from app.exploration.planners import create_planner
+from app.exploration.problem import Planner
+from app.missions import metrics, safety
+from app.missions.clock import now
+from app.missions.decision import Decision, Place, decide, make_constraints
+from app.missions.fleet import (
+    Position,
+    VehicleRefusedError,
+    WaypointOrder,
+    WaypointReport,
+    WaypointStatus,
+)
+from app.missions.hub import FleetHub
+from app.missions.live import LiveMission
+from app.missions.members import SETTLED, Member
+from app.missions.views import Level
+from app.storage import missions as mission_queries
+from app.storage.database import Database
+from app.storage.models import StepRow, WaypointRow
+from app.storage.shielding import to_the_end
+
+ENGAGE_PERIOD_S = 2.0
+"""A vehicle that refused to follow is asked again after this time (of the vehicles' clock)."""
+
+ELAPSED_PERIOD_S = 5.0
+PACE_MEMORY = 0.9
+"""Weight of the past in the running mean of a step's duration."""
+
+EXPECTED_DECISION_S = 0.3
+"""How long a decision is taken to last before the first was made."""
+
+LEAD_M = 25.0
+"""How far beyond a waypoint a vehicle may be sent to pass it straight; more than the 15 m from which DUNE circles."""
+
+REPORT_DELAY_S = 0.1
+"""How old a vehicle's last report is at most, on the wall clock."""
+
+FloatArray = NDArray[np.float64]
+
+log = structlog.get_logger(__name__)
+
+
+class Runner:
+    """Runs one mission from its last committed step to its last one; cancel ``run`` to stop it.
+
+    Parameters
+    ----------
+    time_scale
+        How much faster than the wall clock the vehicles live.
+    """
+
+    def __init__(
+        self, live: LiveMission, database: Database, hub: FleetHub, executor: Executor, time_scale: float
+    ) -> None:
+        self._live = live
+        self._database = database
+        self._hub = hub
+        self._executor = executor
+        self._time_scale = time_scale
+        self._spec = live.spec
+        self._constraints = make_constraints(live.spec)
+        self._decision_s = EXPECTED_DECISION_S
+
+    async def run(self) -> None:
+        """Fly all remaining steps. Returns when the last one is done; raises whatever went wrong."""
+        live = self._live
+        live.running_since_s = asyncio.get_running_loop().time()
+        metrics.RUNNING.inc()
+        keepers = [
+            asyncio.create_task(self._keep_engaged()),
+            asyncio.create_task(self._keep_time()),
+        ]
+        try:
+            planner = await self._recover()
+            decision: Decision | None = None
+            while live.header.step < self._spec.steps:
+                started_s = asyncio.get_running_loop().time()
+                if decision is None:
+                    await self._gather_team(patient=live.header.step == 0)
+                    decision = await self._decide(planner, self._places())
+                await self._commit(decision)
+                await self._send()
+                # The map's model is refined while the vehicles travel; nobody waits for it.
+                self._executor.submit(live.builder.learn).add_done_callback(_log_failure)
+                decision = await self._travel(planner)
+                self._keep_pace(asyncio.get_running_loop().time() - started_s)
+        finally:
+            metrics.RUNNING.dec()
+            for keeper in keepers:
+                keeper.cancel()
+            await asyncio.gather(*keepers, return_exceptions=True)
+            await to_the_end(self._save_elapsed())
+            live.running_since_s = None
+
+    async def _recover(self) -> Planner:
+        """Take up the last committed step: the planner's memory, and the waypoints that were not settled."""
+        planner = create_planner(self._spec.planner.name, self._spec.planner.options)
+        async with self._database.reading() as session:
+            step = await mission_queries.last_step(session, self._live.id)
+            if step is None:
+                return planner
+            rows = await mission_queries.waypoints_of_step(session, self._live.id, step.number)
+        planner.restore(step.memory)
+        self._live.set_step(step.number, step.objective, step.terms)
+        again = []
+        for row in rows:
+            member = self._live.team.get(row.vehicle)
+            if member is not None and WaypointStatus(row.status) not in SETTLED:
+                member.order = self._order(row, member)
+                member.status = WaypointStatus.PLANNED
+                again.append(self._live.waypoint_view(row).model_copy(update={"status": WaypointStatus.PLANNED}))
+        self._live.show_waypoints(again)
+        await self._live.journal.log(
+            Level.INFO, "resumed", f"going on after step {step.number} of {self._spec.steps}", step=step.number
+        )
+        if again or step.number < self._spec.steps:
+            await self._gather_team(patient=True)
+            await self._send()
+            await self._arrive(self._deadline_s())
+        return planner
+
+    async def _keep_engaged(self) -> None:
+        """Ask every vehicle that does not follow us to do so, again and again; each new reason is told once."""
+        while True:
+            for member in self._live.team:
+                info = self._hub.info(member.key)
+                member.link = info.state
+                if member.report is None:
+                    member.report = info.report
+            waiting = [member for member in self._live.team if not member.engaged]
+            results = await asyncio.gather(*(self._engage(member) for member in waiting), return_exceptions=True)
+            for member, error in zip(waiting, results, strict=True):
+                if error is not None:
+                    log.error("a vehicle could not be engaged, trying again", vehicle=member.name, exc_info=error)
+            await asyncio.sleep(ENGAGE_PERIOD_S / self._time_scale)
+
+    async def _engage(self, member: Member) -> None:
+        if self._live.halted:
+            return
+        try:
+            await self._hub.engage(member.key)
+        except VehicleRefusedError as error:
+            if str(error) != member.refusal:
+                member.refusal = str(error)
+                level = Level.ALARM if member.followed else Level.WARNING
+                await self._live.journal.log(level, "vehicle", str(error), vehicle=member.name)
+            return
+        member.engaged = True
+        member.followed = True
+        member.refusal = ""
+        member.link = self._hub.info(member.key).state
+        member.report = self._hub.info(member.key).report or member.report
+        await self._live.journal.log(Level.INFO, "vehicle", f"{member.name} follows", vehicle=member.name)
+        self._live.changed.set()
+        if member.busy and member.order is not None:
+            await self._send_to(member)
+
+    async def _gather_team(self, *, patient: bool) -> None:
+        """Wait until a vehicle can be planned for; patient: until all of them can, or the step's time is over."""
+        team = self._live.team
+        if patient and await self._wait(
+            lambda: bool(team.present) and all(m.present for m in team), self._deadline_s()
+        ):
+            return
+        if team.present:
+            return
+        absent = [member.name for member in team]
+        message = (
+            "no vehicle can be sent anywhere; waiting for one" if absent else "every vehicle left; add one to go on"
+        )
+        await self._live.journal.log(Level.ALARM, "waiting", message, vehicles=absent)
+        await self._wait(lambda: bool(team.present), None)
+
+    async def _travel(self, planner: Planner) -> Decision | None:
+        """Wait until the vehicles arrived; returns the next step's decision when it could be made on the way.
+
+        Deciding takes a moment in which vehicles would wait. So it begins when all of them are about to arrive, for the
+        places where they will be. Whether they really came there decides whether the decision counts.
+        """
+        deadline_s = self._deadline_s()
+        close = await self._wait(lambda: all(self._about_to_arrive(m) for m in self._live.team if m.busy), deadline_s)
+        last = self._live.header.step >= self._spec.steps
+        if not close or last or not self._live.team.present:
+            await self._arrive(deadline_s)
+            return None
+        memory = planner.snapshot()
+        expected = self._places(ahead=True)
+        deciding = asyncio.create_task(self._decide(planner, expected))
+        try:
+            await self._arrive(deadline_s)
+            decision = await deciding
+        finally:
+            deciding.cancel()
+        if self._came_true(expected):
+            return decision
+        planner.restore(memory)
+        return None
+
+    def _about_to_arrive(self, member: Member) -> bool:
+        """Tell whether a vehicle will be at its waypoint by the time a decision takes."""
+        if member.order is None or member.report is None:
+            return False
+        left_m = float(np.linalg.norm(self._target_m(member.order) - member.place_m(self._live.frame)))
+        ahead_s = (self._decision_s + REPORT_DELAY_S) * self._time_scale
+        return left_m <= self._spec.arrival_radius_m + self._spec.speed_mps * ahead_s
+
+    def _target_m(self, order: WaypointOrder) -> FloatArray:
+        east, north = self._live.frame.to_local(np.array(order.position.lat_deg), np.array(order.position.lon_deg))
+        return np.array([float(east), float(north)])
+
+    def _places(self, *, ahead: bool = False) -> list[Place]:
+        """Return where the vehicles are that can be planned for; ``ahead``: or will be, where they are under way."""
+        return [
+            Place(
+                member.name,
+                self._target_m(member.order)
+                if ahead and member.busy and member.order
+                else member.place_m(self._live.frame),
+                member.report.heading_rad if member.report and member.report.heading_rad is not None else math.nan,
+                member.cruise_depth_m(self._spec.limits),
+            )
+            for member in self._live.team.present
+        ]
+
+    def _came_true(self, expected: list[Place]) -> bool:
+        """Tell whether the vehicles are the expected ones at the expected places."""
+        there = {place.vehicle: place.en_m for place in self._places()}
+        tolerance_m = 2 * self._spec.arrival_radius_m
+        return there.keys() == {place.vehicle for place in expected} and all(
+            np.linalg.norm(there[place.vehicle] - place.en_m) <= tolerance_m for place in expected
+        )
+
+    async def _decide(self, planner: Planner, places: list[Place]) -> Decision:
+        """Make the map, then the decision, in a worker thread."""
+        live = self._live
+        started_s = asyncio.get_running_loop().time()
+        await live.journal.flush()
+        before = live.builder.newest
+
+        def work() -> Decision:
+            live.builder.build()
+            return decide(
+                live.header.step + 1,
+                self._spec,
+                self._constraints,
+                planner,
+                places,
+                live.builder.belief(),
+                live.builder.sounded_at_m(),
+            )
+
+        with metrics.PLANNING_SECONDS.time():
+            decision = await asyncio.get_running_loop().run_in_executor(self._executor, work)
+        built = live.builder.newest
+        if built is not None and built is not before:
+            live.publish_map(built)
+        took_s = asyncio.get_running_loop().time() - started_s
+        self._decision_s = PACE_MEMORY * self._decision_s + (1 - PACE_MEMORY) * took_s
+        return decision
+
+    async def _commit(self, decision: Decision) -> None:
+        """Make the step durable: decision, waypoints and memory together."""
+        live = self._live
+        number = live.header.step + 1
+        built = live.builder.newest
+        rows = [self._waypoint_row(number, leg.vehicle, leg.target_m, leg.refusal) for leg in decision.legs]
+        step = StepRow(
+            mission_id=live.id,
+            number=number,
+            committed_at=now(),
+            objective=decision.objective,
+            terms=dict(decision.terms),
+            soundings=built.soundings if built else 0,
+            map_digest=built.digest if built else "",
+            memory=decision.memory,
+        )
+        await to_the_end(self._store(step, rows))
+        metrics.STEPS.inc()
+        live.set_step(number, decision.objective, decision.terms)
+        for member in live.team:
+            member.order = None
+            member.status = None
+        for row in rows:
+            member_of_row = live.team.get(row.vehicle)
+            if member_of_row is not None and row.status != WaypointStatus.REFUSED:
+                member_of_row.order = self._order(row, member_of_row)
+                member_of_row.status = WaypointStatus.PLANNED
+        live.show_waypoints([live.waypoint_view(row) for row in rows])
+        live.publish_summary()
+        for note in decision.notes:
+            await live.journal.log(Level.WARNING, "safety", note, step=number)
+
+    async def _store(self, step: StepRow, waypoints: list[WaypointRow]) -> None:
+        async with self._database.writing() as session:
+            session.add(step)
+            await session.flush()
+            session.add_all(waypoints)
+
+    def _waypoint_row(
+        self,
+        step: int,
+        vehicle: str,
+        target_m: np.ndarray,
+        refusal: str,
+    ) -> WaypointRow:
+        lat, lon = self._live.frame.to_geographic(np.array(target_m[0]), np.array(target_m[1]))
+        return WaypointRow(
+            mission_id=self._live.id,
+            step=step,
+            vehicle=vehicle,
+            lat_deg=float(lat),
+            lon_deg=float(lon),
+            east_m=float(target_m[0]),
+            north_m=float(target_m[1]),
+            depth_m=float(target_m[2]),
+            status=WaypointStatus.REFUSED if refusal else WaypointStatus.PLANNED,
+            reason=refusal,
+            changed_at=now(),
+        )
+
+    def _order(self, row: WaypointRow, member: Member) -> WaypointOrder:
+        lead = None
+        if member.report is not None:
+            start, target = member.place_m(self._live.frame), np.array([row.east_m, row.north_m])
+            east, north = safety.lead_point(self._constraints, start, target, LEAD_M)
+            lat, lon = self._live.frame.to_geographic(np.array(east), np.array(north))
+            lead = Position(float(lat), float(lon), row.depth_m)
+        return WaypointOrder(
+            mission_id=self._live.id,
+            step=row.step,
+            vehicle=row.vehicle,
+            position=Position(row.lat_deg, row.lon_deg, row.depth_m),
+            speed_mps=self._spec.speed_mps,
+            arrival_radius_m=self._spec.arrival_radius_m,
+            min_altitude_m=self._spec.limits.min_altitude_m,
+            lead=lead,
+        )
+
+    async def _send(self) -> None:
+        await asyncio.gather(*(self._send_to(member) for member in self._live.team if member.engaged and member.busy))
+
+    async def _send_to(self, member: Member) -> None:
+        if member.order is None or self._live.halted:
+            return
+        try:
+            await self._hub.order(member.key, member.order)
+        except VehicleRefusedError as error:
+            member.engaged = False
+            self._settle(member, WaypointStatus.REFUSED, str(error))
+            await self._live.journal.log(Level.WARNING, "vehicle", str(error), vehicle=member.name)
+
+    def _settle(self, member: Member, status: WaypointStatus, reason: str) -> None:
+        if member.order is not None:
+            report = WaypointReport(member.name, member.order.mission_id, member.order.step, status, reason)
+            self._live.receive(report)
+
+    async def _arrive(self, deadline_s: float) -> None:
+        """Wait until every vehicle under way arrived or refused; at the deadline go on without the others."""
+        if await self._wait(lambda: not any(member.busy for member in self._live.team), deadline_s):
+            return
+        late = [member for member in self._live.team if member.busy]
+        for member in late:
+            self._settle(member, WaypointStatus.MISSED, f"not reached within {self._spec.step_deadline_s:g} s")
+        await self._live.journal.log(
+            Level.WARNING,
+            "straggler",
+            f"step {self._live.header.step} goes on without {', '.join(m.name for m in late)}",
+            step=self._live.header.step,
+            vehicles=[m.name for m in late],
+        )
+
+    def _deadline_s(self) -> float:
+        """Return the event loop's time at which a step that begins now goes on without stragglers."""
+        return asyncio.get_running_loop().time() + self._spec.step_deadline_s / self._time_scale
+
+    async def _wait(self, condition: Callable[[], bool], deadline_s: float | None) -> bool:
+        """Wait until ``condition`` holds; False when the deadline passed first."""
+        changed = self._live.changed
+        try:
+            async with asyncio.timeout_at(deadline_s):
+                while not condition():
+                    changed.clear()
+                    await changed.wait()
+        except TimeoutError:
+            return condition()
+        return True
+
+    def _keep_pace(self, seconds: float) -> None:
+        before = self._live.seconds_per_step
+        self._live.seconds_per_step = seconds if before is None else PACE_MEMORY * before + (1 - PACE_MEMORY) * seconds
+
+    async def _keep_time(self) -> None:
+        while True:
+            await asyncio.sleep(ELAPSED_PERIOD_S)
+            await to_the_end(self._save_elapsed())
+
+    async def _save_elapsed(self) -> None:
+        live = self._live
+        loop_time = asyncio.get_running_loop().time()
+        if live.running_since_s is None:
+            return
+        seconds = loop_time - live.running_since_s
+        live.running_since_s = loop_time
+        live.header.elapsed_s += seconds
+        async with self._database.writing() as session:
+            await mission_queries.add_elapsed(session, live.id, seconds, now())
+
+
+def _log_failure(done: Future[None]) -> None:
+    error = None if done.cancelled() else done.exception()
+    if error is not None:
+        log.error("learning the map's model failed; the last one stays in use", exc_info=error)

@@ -1,0 +1,173 @@
+"""The last check before anything is sent to a vehicle: depth of travel, and every limit of the mission."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely.geometry import LineString, Point, Polygon
+from shapely.geometry.base import BaseGeometry
+from shapely.ops import nearest_points
+
+from app.exploration.bottom import Bottom
+from app.exploration.constraints import Constraints
+
+FloatArray = NDArray[np.float64]
+
+LEG_SAMPLES = 9
+LEAST_LEG_M = 0.5
+ENTRY_POINTS = 400
+LEAD_CLEARANCE_M = 0.5
+UNCERTAINTY_FACTOR = 2.0
+"""The bottom is taken to be this many standard deviations shallower than estimated."""
+
+
+@dataclass(frozen=True)
+class CheckedStep:
+    """What may be sent.
+
+    Attributes
+    ----------
+    positions : (n_vehicles, 3)
+        Allowed waypoints; rows of vehicles with a refusal mean nothing.
+    refusals : dict
+        Vehicles that get no waypoint, with the reason.
+    corrections : dict
+        Vehicles whose waypoint was changed, with the reason.
+    """
+
+    positions: FloatArray
+    refusals: dict[str, str]
+    corrections: dict[str, str]
+
+
+def travel_depth_m(
+    origin: FloatArray, target: FloatArray, wanted_m: float, bottom: Bottom, min_altitude_m: float
+) -> float:
+    """Return the depth for a leg: as wanted, or shallower where the bottom leaves less room; 0 is the surface.
+
+    Parameters
+    ----------
+    origin, target : (2,)
+        Ends of the leg, east and north.
+    bottom : Bottom
+        Pessimistic sea floor: estimate minus its uncertainty. NaN where nothing is known.
+    """
+    along = np.linspace(0.0, 1.0, LEG_SAMPLES)[:, None]
+    depths = bottom.at(origin + along * (target - origin))
+    known = depths[np.isfinite(depths)]
+    if len(known) == 0:
+        return wanted_m
+    return float(min(wanted_m, max(known.min() - min_altitude_m, 0.0)))
+
+
+def check_step(
+    vehicles: tuple[str, ...],
+    origin: FloatArray,
+    proposed: FloatArray,
+    constraints: Constraints,
+    bottom: Bottom,
+) -> CheckedStep:
+    """Return the part of a proposal that breaks no limit.
+
+    A vehicle whose waypoint breaks one holds its place instead; one that cannot even hold gets no waypoint at all.
+
+    Parameters
+    ----------
+    vehicles
+        Names, in the order of the rows.
+    origin, proposed : (n_vehicles, 3)
+        Where the vehicles are and where the planner wants them.
+    bottom : Bottom
+        The sea floor as estimated now.
+    """
+    positions = np.array(proposed, dtype=float)
+    corrections: dict[str, str] = {}
+    refusals: dict[str, str] = {}
+    for i, name in enumerate(vehicles):
+        if not np.isfinite(positions[i]).all():
+            corrections[name] = f"the planner proposed {positions[i].tolist()}, which is no place; the vehicle holds"
+            positions[i] = origin[i]
+    # Holding one vehicle can bring it too close to another's waypoint: repeat until nothing changes.
+    for _ in range(len(vehicles) + 1):
+        broken = {v.vehicle: v.reason for v in constraints.violations(vehicles, origin, positions, bottom)}
+        fresh = [name for name in broken if name not in corrections]
+        for name in fresh:
+            corrections[name] = f"{broken[name]}; the vehicle holds instead"
+            positions[vehicles.index(name)] = origin[vehicles.index(name)]
+        if not fresh:
+            refusals = broken
+            break
+    return CheckedStep(positions, refusals, {n: r for n, r in corrections.items() if n not in refusals})
+
+
+def lead_point(constraints: Constraints, start: FloatArray, target: FloatArray, lead_m: float) -> FloatArray:
+    """Return how far a leg may be followed beyond its target, at most ``lead_m``: inside the area, clear of keep-outs.
+
+    Parameters
+    ----------
+    start, target : (2,)
+        Ends of the leg. The target itself is returned when the leg has no direction.
+    """
+    along = target - start
+    length = float(np.linalg.norm(along))
+    if length < LEAST_LEG_M:
+        return target
+    ray = LineString([target, target + along / length * lead_m])
+    free: BaseGeometry = Polygon(constraints.area)
+    for zone in constraints.keep_out:
+        free = free.difference(Polygon(zone).buffer(LEAD_CLEARANCE_M))
+    part = ray.intersection(free.buffer(-LEAD_CLEARANCE_M))
+    pieces = [piece for piece in getattr(part, "geoms", [part]) if isinstance(piece, LineString) and not piece.is_empty]
+    first = next((piece for piece in pieces if piece.distance(Point(target)) < LEAD_CLEARANCE_M), None)
+    if first is None:
+        return target
+    ends = np.array(first.coords)
+    return np.asarray(ends[np.argmax(np.linalg.norm(ends - target, axis=1))])
+
+
+def nearest_inside(area: Polygon, place: FloatArray) -> FloatArray:
+    """Return the point of the area that is nearest to ``place`` (2,)."""
+    goal, _ = nearest_points(area, Point(place))
+    return np.array([goal.x, goal.y])
+
+
+def way_in(
+    constraints: Constraints, place: FloatArray, inset_m: float, taken: Sequence[FloatArray]
+) -> FloatArray | None:
+    """Return the nearest point of the area that a vehicle outside of it may go straight to; None when there is none.
+
+    Parameters
+    ----------
+    place : (2,)
+        Where the vehicle is.
+    inset_m
+        How far inside the border the point should lie.
+    taken : sequence of (2,)
+        Places of other vehicles, from which the point keeps the least separation.
+    """
+    zones = [Polygon(zone) for zone in constraints.keep_out]
+    ahead = [zone for zone in zones if not zone.contains(Point(place))]
+    free: BaseGeometry = Polygon(constraints.area).buffer(-inset_m)
+    if free.is_empty:
+        free = Polygon(constraints.area)
+    for zone in zones:
+        free = free.difference(zone.buffer(LEAD_CLEARANCE_M))
+    if free.is_empty:
+        return None
+    border = free.boundary
+    spacing = max(border.length / ENTRY_POINTS, inset_m)
+    along = np.arange(0.0, border.length, spacing)
+    points = [nearest_points(free, Point(place))[0], *(border.interpolate(distance) for distance in along)]
+    for goal in sorted(points, key=Point(place).distance):
+        leg = LineString(np.array([place, (goal.x, goal.y)]))
+        apart = all(goal.distance(Point(other)) >= constraints.min_separation_m for other in taken)
+        if apart and not any(zone.intersects(leg) for zone in ahead):
+            return np.array([goal.x, goal.y])
+    return None
+
+
+def distance_outside_m(area: Polygon, place: FloatArray) -> float:
+    """Return how far a place (2,) lies outside the area; 0 inside."""
+    return float(shapely.distance(area, Point(place)))

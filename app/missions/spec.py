@@ -1,0 +1,240 @@
+"""What an operator asks for: the description of a mission, declared once.
+
+The REST schema, the command line's help and the dashboard's forms are all made from these models.
+"""
+
+from enum import StrEnum
+from typing import Annotated, Any, Literal, Self
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+from shapely.geometry import Polygon
+from shapely.validation import explain_validity
+
+from app.exploration.options import PlannerOptions
+from app.mapping.georeference import LocalFrame
+
+Latitude = Annotated[float, Field(ge=-90, le=90, description="Latitude, WGS84 degrees")]
+Longitude = Annotated[float, Field(ge=-180, le=180, description="Longitude, WGS84 degrees")]
+Name = Annotated[str, Field(min_length=1, max_length=64, pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$")]
+
+MAX_GRID_CELLS = 4_000_000
+
+
+class Model(BaseModel):
+    """Base: unknown fields are refused, so that a misspelt limit is an error and not a default."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class PolygonGeometry(Model):
+    """A GeoJSON polygon: one closed outer ring of [longitude, latitude] positions, no holes."""
+
+    type: Literal["Polygon"] = "Polygon"
+    coordinates: list[list[tuple[Longitude, Latitude]]] = Field(
+        min_length=1,
+        max_length=1,
+        description="One ring of [longitude, latitude]; the last position repeats the first",
+        examples=[[[[-8.705, 41.185], [-8.7038, 41.185], [-8.7038, 41.1859], [-8.705, 41.1859], [-8.705, 41.185]]]],
+    )
+
+    @field_validator("coordinates")
+    @classmethod
+    def _is_a_simple_ring(cls, rings: list[list[tuple[float, float]]]) -> list[list[tuple[float, float]]]:
+        ring = rings[0]
+        if len(ring) < 4 or ring[0] != ring[-1]:
+            raise ValueError(
+                "the ring needs at least 4 positions and must end where it began: repeat the first position as the last"
+            )
+        if len(ring) > 1000:
+            raise ValueError(f"the ring has {len(ring)} positions, at most 1000 are taken: simplify it")
+        polygon = Polygon(ring)
+        if not polygon.is_valid:
+            raise ValueError(f"the ring crosses or touches itself ({explain_validity(polygon)}): draw a simple polygon")
+        return rings
+
+    @property
+    def ring(self) -> list[tuple[float, float]]:
+        """The outer ring without its closing position, as (longitude, latitude)."""
+        return self.coordinates[0][:-1]
+
+
+class Sensor(StrEnum):
+    """How a vehicle sounds the bottom."""
+
+    SINGLE_BEAM = "single_beam"
+    DVL = "dvl"
+    MULTIBEAM = "multibeam"
+
+
+class VehicleKind(StrEnum):
+    """Which link reaches a vehicle."""
+
+    IMC = "imc"
+    REST = "rest"
+    SIM = "sim"
+
+
+class VehicleSpec(Model):
+    """A vehicle that takes part in a mission."""
+
+    name: Name = Field(description="Its name; for IMC the name it announces", examples=["lauv-xplore-1"])
+    kind: VehicleKind = Field(
+        default=VehicleKind.IMC,
+        description="imc: DUNE over UDP; rest: polls and posts by itself; sim: simulated inside the service",
+    )
+    sensor: Sensor = Sensor.SINGLE_BEAM
+    depth_m: float | None = Field(
+        default=None,
+        ge=0,
+        le=6000,
+        description="Depth it travels at where the bottom leaves room; null: the first vehicle of a mission at "
+        "limits.min_depth_m, each further one limits.min_vertical_separation_m deeper",
+    )
+    start: tuple[Longitude, Latitude] | None = Field(
+        default=None,
+        description="Where a simulated vehicle starts, [longitude, latitude]; default: a corner of the area",
+    )
+
+
+class Limits(Model):
+    """What no waypoint may break. Checked before anything is sent to a vehicle."""
+
+    max_step_m: float = Field(default=10.0, gt=0, le=2000, description="Largest distance a vehicle moves in one step")
+    min_depth_m: float = Field(default=2.0, ge=0, le=6000, description="Shallowest depth of travel under water")
+    max_depth_m: float = Field(default=30.0, gt=0, le=6000, description="Deepest depth of travel")
+    min_altitude_m: float = Field(default=1.0, ge=0, le=1000, description="Least clearance above the sea floor")
+    com_range_m: float | None = Field(
+        default=None, gt=0, description="Every vehicle keeps another one within this range; null: unlimited"
+    )
+    min_separation_m: float = Field(
+        default=5.0,
+        ge=0,
+        le=10_000,
+        description="Least horizontal distance between vehicles at similar depth",
+    )
+    min_vertical_separation_m: float = Field(
+        default=1.0,
+        gt=0,
+        le=1000,
+        description="Difference in depth that makes horizontal separation unnecessary",
+    )
+
+    @model_validator(mode="after")
+    def _depth_band_is_not_empty(self) -> Self:
+        if self.max_depth_m < self.min_depth_m:
+            raise ValueError(
+                f"max_depth_m is {self.max_depth_m} but min_depth_m is {self.min_depth_m}: "
+                "max_depth_m must be at least min_depth_m"
+            )
+        return self
+
+
+class PlannerSpec(Model):
+    """Which planner decides, and its options."""
+
+    name: str = Field(default="cao", description="One of the planners of GET /api/v1/planners")
+    options: PlannerOptions = Field(default_factory=PlannerOptions, description="Its settings")
+
+
+class Tide(Model):
+    """Water level correction: chart depth = sounded depth - level."""
+
+    level_m: float = Field(default=0.0, ge=-20, le=20, description="Water level above chart datum, metres")
+    source: str = Field(
+        default="none applied",
+        max_length=200,
+        description="Where the level comes from, kept with the product",
+    )
+
+
+class MissionSpec(Model):
+    """A mission as an operator describes it."""
+
+    name: str = Field(
+        min_length=1,
+        max_length=120,
+        description="Shown to people; need not be unique",
+        examples=["Leixoes quay"],
+    )
+    area: PolygonGeometry = Field(description="The area to map")
+    keep_out: list[PolygonGeometry] = Field(
+        default_factory=list, max_length=100, description="Zones no vehicle may enter"
+    )
+    vehicles: list[VehicleSpec] = Field(default_factory=list, max_length=100)
+    steps: int = Field(default=100, ge=1, le=100_000, description="Steps after which the mission is finished")
+    cell_m: float = Field(default=1.0, gt=0, le=1000, description="Cell of the map's grid")
+    limits: Limits = Field(default_factory=Limits)
+    planner: PlannerSpec = Field(default_factory=PlannerSpec)
+    speed_mps: float = Field(default=1.3, gt=0, le=5, description="Speed asked of the vehicles")
+    arrival_radius_m: float = Field(
+        default=3.0, gt=0, le=100, description="Horizontal distance at which a waypoint counts as reached"
+    )
+    step_deadline_s: float = Field(
+        default=60.0,
+        gt=0,
+        le=86_400,
+        description="After this many seconds of vehicle time a step goes on without stragglers",
+    )
+    accuracy_m: float = Field(
+        default=0.25,
+        gt=0,
+        le=100,
+        description="Standard deviation below which a cell counts as accurately known",
+    )
+    sounding_noise: float = Field(
+        default=0.01,
+        ge=0,
+        le=1,
+        description="Standard deviation of a range as a fraction of it, where the vehicle states none",
+    )
+    tide: Tide = Field(default_factory=Tide)
+    seed: int = Field(default=0, ge=0, lt=2**63, description="Seed of every random decision")
+
+    @field_validator("vehicles")
+    @classmethod
+    def _names_are_unique(cls, vehicles: list[VehicleSpec]) -> list[VehicleSpec]:
+        names = [v.name for v in vehicles]
+        twice = sorted({n for n in names if names.count(n) > 1})
+        if twice:
+            raise ValueError(f"vehicle {twice[0]!r} is listed twice: every vehicle takes part once")
+        return vehicles
+
+    @model_validator(mode="after")
+    def _area_is_of_a_sensible_size(self) -> Self:
+        area = self.local_area()
+        size = area.max(axis=0) - area.min(axis=0)
+        cells = float(np.prod(np.ceil(size / self.cell_m)))
+        if min(size) < 2 * self.cell_m:
+            raise ValueError(
+                f"the area is {size[0]:.1f} m x {size[1]:.1f} m, less than two cells of {self.cell_m} m: "
+                "enlarge it or make cell_m smaller"
+            )
+        # A disc of this radius holds the centre of a cell wherever it lies.
+        if Polygon(area).buffer(-self.cell_m * np.sqrt(0.5)).is_empty:
+            raise ValueError(
+                f"the area is nowhere wide enough for cells of {self.cell_m} m: enlarge it or make cell_m smaller"
+            )
+        if cells > MAX_GRID_CELLS:
+            raise ValueError(
+                f"the area of {size[0]:.0f} m x {size[1]:.0f} m has {cells:.0f} cells of {self.cell_m} m, "
+                f"at most {MAX_GRID_CELLS} are taken: make cell_m larger or the area smaller"
+            )
+        return self
+
+    def frame(self) -> LocalFrame:
+        """The mission's local frame; its origin is the south-western corner of the area's bounding box."""
+        lons, lats = zip(*self.area.ring, strict=True)
+        return LocalFrame(min(lats), min(lons))
+
+    def local_area(self) -> np.ndarray[Any, np.dtype[np.float64]]:
+        """The area's vertices in the local frame, shape (n, 2): east, north in metres."""
+        return self.to_local(self.area)
+
+    def to_local(self, polygon: PolygonGeometry) -> np.ndarray[Any, np.dtype[np.float64]]:
+        """Vertices of a polygon in the local frame, counter-clockwise, shape (n, 2)."""
+        lons, lats = zip(*polygon.ring, strict=True)
+        east, north = self.frame().to_local(np.array(lats), np.array(lons))
+        vertices = np.column_stack([east, north])
+        ring_area = Polygon(vertices).exterior.is_ccw
+        return vertices if ring_area else vertices[::-1]

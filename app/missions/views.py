@@ -1,0 +1,268 @@
+"""What the mission service answers: the shapes that the REST API, the live view and the dashboard share."""
+
+from datetime import datetime
+from enum import StrEnum
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from app.missions.fleet import LinkState, WaypointStatus
+from app.missions.spec import Latitude, Longitude, MissionSpec, Name, Sensor, VehicleKind
+from app.missions.states import MissionState
+
+
+class View(BaseModel):
+    """Base of everything that is sent out."""
+
+    # Every field is always sent; generated clients need not ask whether it is there.
+    model_config = ConfigDict(frozen=True, json_schema_serialization_defaults_required=True)
+
+
+class VehicleView(View):
+    """A vehicle as an operator sees it now."""
+
+    name: str
+    kind: VehicleKind
+    sensor: Sensor | None = None
+    mission_id: str | None = Field(default=None, description="The mission it takes part in, if any")
+    active: bool = Field(default=True, description="False once it left its mission")
+    link: LinkState
+    reason: str = Field(default="", description="What is missing or wrong, and what to do; empty when all is well")
+    age_s: float | None = Field(default=None, description="Seconds since last heard; null: never")
+    address: str | None = None
+    imc_id: int | None = None
+    lat_deg: float | None = None
+    lon_deg: float | None = None
+    east_m: float | None = None
+    north_m: float | None = None
+    depth_m: float | None = None
+    altitude_m: float | None = None
+    heading_deg: float | None = None
+    speed_mps: float | None = None
+    battery_pct: float | None = None
+    position_sd_m: float | None = None
+
+
+class WaypointView(View):
+    """One waypoint of one vehicle."""
+
+    vehicle: str
+    step: int
+    lat_deg: float
+    lon_deg: float
+    east_m: float
+    north_m: float
+    depth_m: float
+    speed_mps: float
+    arrival_radius_m: float
+    min_altitude_m: float
+    status: WaypointStatus
+    reason: str = ""
+
+
+class Progress(View):
+    """How far a mission has come."""
+
+    step: int = Field(description="Last committed step; 0 before the first")
+    steps: int
+    soundings: int = Field(description="Accepted soundings")
+    rejected: int = Field(description="Soundings kept but not used")
+    distance_m: float = Field(description="Distance travelled by all vehicles, along their tracks")
+    coverage_pct: float = Field(description="Share of the area's cells known to accuracy_m")
+    mean_sd_m: float | None = Field(default=None, description="Mean standard deviation of the map")
+    objective: float | None = Field(default=None, description="The planner's objective at the last step")
+    terms: dict[str, float] = Field(default_factory=dict)
+    elapsed_s: float = Field(default=0.0, description="Wall-clock seconds in state running")
+    eta_s: float | None = Field(default=None, description="Estimated wall-clock seconds until the last step")
+
+
+class MissionSummary(View):
+    """A mission in a list."""
+
+    id: str
+    name: str
+    state: MissionState
+    reason: str = Field(default="", description="Why it is in this state")
+    created_at: datetime
+    updated_at: datetime
+    progress: Progress
+
+
+class MissionView(MissionSummary):
+    """A mission with everything an operator sees of it."""
+
+    spec: MissionSpec
+    origin: tuple[Longitude, Latitude] = Field(description="Origin of the local frame, [longitude, latitude]")
+    vehicles: list[VehicleView]
+    waypoints: list[WaypointView] = Field(description="The newest waypoint of each vehicle")
+
+
+class Verdict(StrEnum):
+    """What happened to one measurement."""
+
+    ACCEPTED = "accepted"
+    REJECTED = "rejected"
+    """Stored with the reason, not used for the map."""
+    DUPLICATE = "duplicate"
+    """Already there; nothing stored."""
+
+
+class Measurement(BaseModel):
+    """One measurement posted by a vehicle: a sounding, a position report, or both."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+    vehicle: Name
+    time_s: float = Field(description="The vehicle's clock, Unix seconds", ge=0, lt=1e11, examples=[1795225140.5])
+    lat_deg: float = Field(description="Latitude of the vehicle, WGS84 degrees")
+    lon_deg: float = Field(description="Longitude of the vehicle, WGS84 degrees")
+    depth_m: float = Field(description="Depth of the vehicle below the surface, metres")
+    range_m: float | None = Field(
+        default=None, description="Vertical range from the vehicle to the bottom; null: position report only"
+    )
+    beam: int = Field(default=0, ge=0, lt=4096)
+    range_sd_m: float | None = Field(default=None, gt=0)
+    position_sd_m: float | None = Field(default=None, ge=0)
+    heading_deg: float | None = None
+    speed_mps: float | None = Field(default=None, ge=0)
+    battery_pct: float | None = Field(default=None, ge=0, le=100)
+
+
+class ItemVerdict(View):
+    """The verdict on one item of a batch."""
+
+    index: int
+    verdict: Verdict
+    reason: str = ""
+
+
+class BatchVerdict(View):
+    """The verdicts on a batch, in its order. Whatever is counted accepted is stored for good."""
+
+    accepted: int
+    rejected: int
+    duplicate: int
+    items: list[ItemVerdict]
+    replayed: bool = Field(
+        default=False, description="True: this idempotency key was seen before, this is the first answer"
+    )
+
+
+class Level(StrEnum):
+    """How much an event matters."""
+
+    INFO = "info"
+    WARNING = "warning"
+    ALARM = "alarm"
+
+
+class EventView(View):
+    """One line of a mission's log."""
+
+    id: int
+    mission_id: str
+    time: datetime
+    level: Level
+    kind: str = Field(description="Machine-readable kind, for example step, state, vehicle, sounding, safety")
+    message: str
+    data: dict[str, Any] = Field(default_factory=dict)
+
+
+class MapView(View):
+    """The map as JSON: row 0 is south, column 0 is west, null outside the area or where unknown."""
+
+    mission_id: str
+    version: int = Field(description="Grows with every new map; 0: no sounding yet")
+    step: int
+    west_m: float
+    south_m: float
+    cell_m: float
+    rows: int
+    cols: int
+    corners: list[tuple[Longitude, Latitude]] = Field(
+        description="[longitude, latitude] of the grid's corners: north-west, north-east, south-east, south-west"
+    )
+    min_depth_m: float | None
+    max_depth_m: float | None
+    model: str
+    depth_m: list[list[float | None]]
+    sd_m: list[list[float | None]]
+    count: list[list[int]]
+    sounded: list[list[bool]]
+
+
+class SnapshotMessage(View):
+    """First message on the live socket: everything needed to draw the picture."""
+
+    type: Literal["snapshot"] = "snapshot"
+    mission: MissionView
+    tracks: dict[str, list[tuple[float, float]]] = Field(
+        description="Per vehicle its track so far, thinned, [longitude, latitude]"
+    )
+    map_version: int
+    last_event_id: int
+
+
+class VehiclesMessage(View):
+    """Positions and links, a few times per second."""
+
+    type: Literal["vehicles"] = "vehicles"
+    time: datetime
+    vehicles: list[VehicleView]
+
+
+class WaypointsMessage(View):
+    """Waypoints whose state changed."""
+
+    type: Literal["waypoints"] = "waypoints"
+    waypoints: list[WaypointView]
+
+
+class StateMessage(View):
+    """The mission's state or progress changed."""
+
+    type: Literal["mission"] = "mission"
+    mission: MissionSummary
+
+
+class MapMessage(View):
+    """A new map can be fetched: ``GET /missions/{id}/map`` or its picture."""
+
+    type: Literal["map"] = "map"
+    version: int
+    step: int
+    min_depth_m: float | None
+    max_depth_m: float | None
+
+
+class EventMessage(View):
+    """A new line of the log."""
+
+    type: Literal["event"] = "event"
+    event: EventView
+
+
+LiveMessage = SnapshotMessage | VehiclesMessage | WaypointsMessage | StateMessage | MapMessage | EventMessage
+
+
+class StopView(View):
+    """A vehicle's answer to a stop."""
+
+    vehicle: str
+    acknowledged: bool
+    detail: str
+
+
+class ActionView(View):
+    """What an action led to, with each vehicle's answer where vehicles were stopped."""
+
+    mission: MissionSummary
+    stops: list[StopView] = Field(default_factory=list)
+
+
+class PlannerView(View):
+    """A planner that a mission may name."""
+
+    name: str
+    summary: str
+    options: dict[str, Any] = Field(description="JSON schema of its options")

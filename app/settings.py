@@ -1,0 +1,226 @@
+"""The service's settings: declared once, read from the environment and from ``bathyfleet.toml``."""
+
+import difflib
+import ipaddress
+import os
+import tomllib
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import BaseModel, Field, ValidationError, field_validator
+from pydantic_settings import (
+    BaseSettings,
+    PydanticBaseSettingsSource,
+    SettingsConfigDict,
+    TomlConfigSettingsSource,
+)
+
+from app.missions.settings import ImcSettings, ServiceSettings, SimulationSettings
+
+PREFIX = "BATHYFLEET_"
+CONFIG_VARIABLE = "BATHYFLEET_CONFIG"
+DEFAULT_CONFIG = Path("bathyfleet.toml")
+
+# Carry the prefix without being settings: the file's place, where the tests find real sea floors, the build's switch.
+_OTHER_VARIABLES = {CONFIG_VARIABLE, "BATHYFLEET_TERRAINS", "BATHYFLEET_SKIP_DASHBOARD"}
+
+_DRIVERS = {"sqlite": "sqlite+aiosqlite", "postgresql": "postgresql+asyncpg", "postgres": "postgresql+asyncpg"}
+
+
+class SettingsError(Exception):
+    """The settings cannot be used; ``problems`` has one line for each thing that is wrong."""
+
+    def __init__(self, problems: Iterable[str]) -> None:
+        self.problems = list(problems)
+        super().__init__("; ".join(self.problems))
+
+
+class StartupError(Exception):
+    """The service cannot start as it is set up; ``str()`` says why and what to do."""
+
+
+class Settings(BaseSettings):
+    """Everything that can be set. Sources, strongest first: command line, environment, ``bathyfleet.toml``.
+
+    The environment uses the prefix ``BATHYFLEET_`` and two underscores between levels:
+    ``BATHYFLEET_PORT=9000``, ``BATHYFLEET_IMC__PORT=6102``. The file is ``bathyfleet.toml`` in the working
+    directory, or the one that ``BATHYFLEET_CONFIG`` names. Use :func:`load_settings` for helpful errors.
+    """
+
+    model_config = SettingsConfigDict(
+        env_prefix=PREFIX, env_nested_delimiter="__", extra="forbid", frozen=True, validate_default=True
+    )
+
+    host: str = Field(
+        default="127.0.0.1",
+        description="Address to listen on; others than loopback need an access token or --insecure",
+    )
+    port: int = Field(default=8080, ge=0, le=65535, description="TCP port to listen on; 0: any free one")
+    insecure: bool = Field(
+        default=False, description="Serve without access tokens even to other machines: anyone may command"
+    )
+    allowed_origins: tuple[str, ...] = Field(
+        default=(),
+        description="Origins of other web pages that may use the API, for example https://console.example",
+    )
+    database_url: str = Field(
+        default="sqlite+aiosqlite:///bathyfleet.db",
+        description="SQLAlchemy URL: sqlite+aiosqlite:///FILE or postgresql+asyncpg://USER:PASSWORD@HOST/NAME",
+    )
+    auto_migrate: bool | None = Field(
+        default=None,
+        description="Bring the database's tables up to date at the start; without a value: only for SQLite",
+    )
+    log_level: Literal["debug", "info", "warning", "error"] = Field(default="info", description="How much is logged")
+    log_format: Literal["console", "json"] = Field(
+        default="console", description="Lines for people, or one JSON object per line for log collectors"
+    )
+    output_dir: Path = Field(default=Path("output"), description="Folder for exported files")
+    max_body_bytes: int = Field(default=8 * 2**20, ge=1024, le=2**30, description="Largest request body that is taken")
+    max_streams: int = Field(
+        default=200, ge=1, le=100_000, description="Most live views and event streams at the same time"
+    )
+    time_scale: float = Field(
+        default=1.0, gt=0, le=1000, description="How much faster than wall time simulated vehicles live"
+    )
+    imc: ImcSettings = Field(default=ImcSettings(), description="The link to IMC vehicles")
+    simulation: SimulationSettings = Field(
+        default=SimulationSettings(), description="The world of vehicles of kind sim"
+    )
+
+    @field_validator("log_level", "log_format", mode="before")
+    @classmethod
+    def _lower_case(cls, value: object) -> object:
+        return value.lower() if isinstance(value, str) else value
+
+    @field_validator("database_url")
+    @classmethod
+    def _names_a_supported_driver(cls, url: str) -> str:
+        scheme, separator, rest = url.partition("://")
+        scheme = _DRIVERS.get(scheme, scheme)
+        if not separator or scheme not in _DRIVERS.values():
+            raise ValueError("use sqlite+aiosqlite:///FILE or postgresql+asyncpg://USER:PASSWORD@HOST/NAME")
+        return f"{scheme}://{rest}"
+
+    @classmethod
+    def settings_customise_sources(
+        cls,
+        settings_cls: type[BaseSettings],
+        init_settings: PydanticBaseSettingsSource,
+        env_settings: PydanticBaseSettingsSource,
+        dotenv_settings: PydanticBaseSettingsSource,
+        file_secret_settings: PydanticBaseSettingsSource,
+    ) -> tuple[PydanticBaseSettingsSource, ...]:
+        """Arguments, then the environment, then the file."""
+        return init_settings, env_settings, TomlConfigSettingsSource(settings_cls, toml_file=config_file())
+
+    @property
+    def loopback(self) -> bool:
+        """Whether only this machine can connect."""
+        return is_loopback(self.host)
+
+    @property
+    def migrates_itself(self) -> bool:
+        """Whether the service brings the database's tables up to date when it starts."""
+        if self.auto_migrate is not None:
+            return self.auto_migrate
+        return self.database_url.startswith("sqlite")
+
+    def service(self) -> ServiceSettings:
+        """The part that the mission service needs."""
+        return ServiceSettings(
+            database_url=self.database_url,
+            time_scale=self.time_scale,
+            imc=self.imc,
+            simulation=self.simulation,
+        )
+
+
+def is_loopback(host: str) -> bool:
+    """Tell whether a host name or address means this machine only."""
+    if host == "localhost":
+        return True
+    try:
+        return ipaddress.ip_address(host.split("%")[0]).is_loopback
+    except ValueError:
+        return False
+
+
+def config_file() -> Path:
+    """The settings file: what ``BATHYFLEET_CONFIG`` names, else ``bathyfleet.toml`` here (it need not exist)."""
+    return Path(os.environ.get(CONFIG_VARIABLE) or DEFAULT_CONFIG)
+
+
+def load_settings(**overrides: Any) -> Settings:
+    """Read the settings; arguments that are None are left to the other sources.
+
+    Raises
+    ------
+    SettingsError
+        With one line per wrong value, unknown name or unreadable file, each naming its source.
+    """
+    file = config_file()
+    if os.environ.get(CONFIG_VARIABLE) and not file.is_file():
+        raise SettingsError([f"{CONFIG_VARIABLE} names {str(file)!r}, which is not a file"])
+    unknown = [
+        _unknown(f"environment variable {name}", name, _variable_names(Settings, PREFIX))
+        for name in sorted(os.environ)
+        if name.startswith(PREFIX) and name not in _OTHER_VARIABLES and name not in _variable_names(Settings, PREFIX)
+    ]
+    if unknown:
+        raise SettingsError(unknown)
+    try:
+        return Settings(**{name: value for name, value in overrides.items() if value is not None})
+    except ValidationError as error:
+        raise SettingsError(_describe(error, overrides)) from None
+    except tomllib.TOMLDecodeError as error:
+        raise SettingsError([f"{file} is not TOML: {error}"]) from None
+    except OSError as error:
+        raise SettingsError([f"{file} cannot be read: {error.strerror}"]) from None
+    except Exception as error:
+        # pydantic-settings wraps what it cannot parse in an exception of its own that names the field only.
+        if type(error).__name__ == "SettingsError":
+            raise SettingsError([f"{error}; lists and tables are written as JSON in the environment"]) from None
+        raise
+
+
+def _variable_names(model: type[BaseModel], prefix: str) -> set[str]:
+    names: set[str] = set()
+    for name, field in model.model_fields.items():
+        variable = prefix + name.upper()
+        names.add(variable)
+        if isinstance(field.annotation, type) and issubclass(field.annotation, BaseModel):
+            names |= _variable_names(field.annotation, variable + "__")
+    return names
+
+
+def _unknown(what: str, name: str, known: Iterable[str]) -> str:
+    close = difflib.get_close_matches(name, known, n=1)
+    hint = f"did you mean {close[0]}?" if close else "known are " + ", ".join(sorted(known))
+    return f"{what} is not a setting: {hint}"
+
+
+def _describe(error: ValidationError, overrides: dict[str, Any]) -> Iterable[str]:
+    for entry in error.errors(include_url=False):
+        path = [str(part) for part in entry["loc"]]
+        name = ".".join(path)
+        variable = PREFIX + "__".join(path).upper()
+        if overrides.get(path[0]) is not None:
+            source = "the command line"
+        elif variable in os.environ:
+            source = variable
+        else:
+            source = str(config_file())
+        if entry["type"] == "extra_forbidden":
+            model: type[BaseModel] = Settings
+            for part in path[:-1]:
+                annotation = model.model_fields[part].annotation
+                if not (isinstance(annotation, type) and issubclass(annotation, BaseModel)):
+                    break
+                model = annotation
+            yield _unknown(f"{name} (from {source})", path[-1], model.model_fields)
+        else:
+            message = entry["msg"].removeprefix("Value error, ")
+            shown = "" if path[0] == "database_url" else f" is {entry['input']!r}"
+            yield f"{name}{shown} (from {source}): {message[0].lower()}{message[1:]}"

@@ -1,0 +1,97 @@
+"""The database behind the service: connections, transactions, SQLite's settings."""
+
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from typing import Any
+
+from sqlalchemy import Connection, event, make_url, text
+from sqlalchemy.ext.asyncio import AsyncConnection, AsyncEngine, AsyncSession, create_async_engine
+
+from app.storage.shielding import to_the_end
+
+
+def make_engine(url: str) -> AsyncEngine:
+    """Return an engine for ``url``; SQLite is put into WAL mode with foreign keys and durable commits.
+
+    Raises
+    ------
+    ValueError
+        When the URL names a database or driver that is not supported.
+    """
+    parsed = make_url(url)
+    if parsed.drivername not in ("sqlite+aiosqlite", "postgresql+asyncpg"):
+        raise ValueError(
+            f"database_url names {parsed.drivername!r}: use sqlite+aiosqlite:///FILE or postgresql+asyncpg://USER@HOST/NAME"
+        )
+    if parsed.get_backend_name() != "sqlite":
+        return create_async_engine(url, pool_pre_ping=True)
+    engine = create_async_engine(url)
+
+    @event.listens_for(engine.sync_engine, "connect")
+    def _configure(connection: Any, _record: Any) -> None:
+        # The driver's own implicit transactions would begin too late for BEGIN IMMEDIATE.
+        connection.isolation_level = None
+        cursor = connection.cursor()
+        for pragma in ("journal_mode=WAL", "synchronous=FULL", "foreign_keys=ON", "busy_timeout=10000"):
+            cursor.execute(f"PRAGMA {pragma}")
+        cursor.close()
+
+    @event.listens_for(engine.sync_engine, "begin")
+    def _begin(connection: Connection) -> None:
+        # A reader that becomes a writer half-way fails when another writer was faster: writers say so at once.
+        writes = connection.get_execution_options().get("bathyfleet_writes", False)
+        connection.exec_driver_sql("BEGIN IMMEDIATE" if writes else "BEGIN")
+
+    return engine
+
+
+class Database:
+    """Hands out sessions: ``reading`` for queries, ``writing`` for transactions that commit at the end."""
+
+    def __init__(self, url: str) -> None:
+        self.url = url
+        self._engine = make_engine(url)
+
+    @asynccontextmanager
+    async def reading(self) -> AsyncIterator[AsyncSession]:
+        """Yield a session for queries."""
+        async with self._connected() as connection, _session_on(connection) as session:
+            yield session
+
+    @asynccontextmanager
+    async def writing(self) -> AsyncIterator[AsyncSession]:
+        """Yield a session whose changes are committed together, or not at all when the block raises."""
+        async with self._connected() as connection:
+            await connection.execution_options(bathyfleet_writes=True)
+            async with connection.begin(), _session_on(connection) as session:
+                yield session
+                await session.flush()
+
+    async def ping(self) -> None:
+        """Raise when the database cannot be reached."""
+        async with self._connected() as connection:
+            await connection.execute(text("SELECT 1"))
+
+    @asynccontextmanager
+    async def _connected(self) -> AsyncIterator[AsyncConnection]:
+        # The library's own context managers forget a connection whose opening or closing is cancelled.
+        connection = self._engine.connect()
+        try:
+            await to_the_end(connection.start())
+            yield connection
+        finally:
+            if connection.sync_connection is not None:
+                await to_the_end(connection.close())
+
+    async def close(self) -> None:
+        """Close every connection."""
+        await self._engine.dispose()
+
+
+@asynccontextmanager
+async def _session_on(connection: AsyncConnection) -> AsyncIterator[AsyncSession]:
+    session = AsyncSession(connection, expire_on_commit=False)
+    try:
+        yield session
+    finally:
+        await to_the_end(session.close())

@@ -1,0 +1,67 @@
+"""Running the migrations from code, on whatever database a URL names."""
+
+import asyncio
+from collections.abc import Callable
+from pathlib import Path
+
+from alembic import command
+from alembic.config import Config
+from alembic.runtime.migration import MigrationContext
+from alembic.script import ScriptDirectory
+from sqlalchemy import Connection
+
+from app.storage.database import make_engine
+
+# The migrations lie beside the package in a checkout as in an installation.
+MIGRATIONS = Path(__file__).resolve().parents[2] / "migrations"
+
+
+def _config(connection: Connection | None = None) -> Config:
+    config = Config()
+    config.set_main_option("script_location", str(MIGRATIONS).replace("%", "%%"))
+    config.attributes["connection"] = connection
+    return config
+
+
+def head() -> str:
+    """Return the newest revision known to this version of the program."""
+    revision = ScriptDirectory.from_config(_config()).get_current_head()
+    if revision is None:
+        raise RuntimeError(f"no migrations in {MIGRATIONS}: the installation is incomplete")
+    return revision
+
+
+async def current(url: str) -> str | None:
+    """Return the revision that a database is at; None when it is empty."""
+    engine = make_engine(url)
+    try:
+        async with engine.connect() as connection:
+            return await connection.run_sync(lambda sync: MigrationContext.configure(sync).get_current_revision())
+    finally:
+        await engine.dispose()
+
+
+async def upgrade(url: str, revision: str = "head") -> None:
+    """Bring a database up to ``revision``. Waits for another process that is doing the same."""
+    await _run(url, lambda config: command.upgrade(config, revision))
+
+
+async def downgrade(url: str, revision: str) -> None:
+    """Take a database back to ``revision`` (``base``: empty)."""
+    await _run(url, lambda config: command.downgrade(config, revision))
+
+
+async def _run(url: str, action: Callable[[Config], None]) -> None:
+    engine = make_engine(url)
+    try:
+        async with engine.connect() as connection:
+            await connection.execution_options(bathyfleet_writes=True)
+            async with connection.begin():
+                await connection.run_sync(lambda sync: action(_config(sync)))
+    finally:
+        await engine.dispose()
+
+
+def upgrade_now(url: str) -> None:
+    """Bring a database up to date from code that has no event loop."""
+    asyncio.run(upgrade(url))

@@ -1,0 +1,109 @@
+"""Queries on missions, their vehicles, steps and waypoints."""
+
+from collections.abc import Sequence
+from datetime import datetime
+from typing import Any
+
+from sqlalchemy import func, select, update
+from sqlalchemy.ext.asyncio import AsyncSession
+
+from app.storage.models import MissionRow, MissionVehicleRow, PositionRow, StepRow, WaypointRow
+
+
+async def all_missions(session: AsyncSession) -> Sequence[MissionRow]:
+    """Return every mission, newest first."""
+    return (await session.scalars(select(MissionRow).order_by(MissionRow.created_at.desc(), MissionRow.id))).all()
+
+
+async def missions_in(session: AsyncSession, states: Sequence[str]) -> Sequence[MissionRow]:
+    """Return the missions in any of ``states``, oldest first."""
+    query = select(MissionRow).where(MissionRow.state.in_(states)).order_by(MissionRow.created_at)
+    return (await session.scalars(query)).all()
+
+
+async def set_state(session: AsyncSession, mission_id: str, state: str, reason: str, now: datetime) -> None:
+    """Record a mission's new state."""
+    await session.execute(
+        update(MissionRow).where(MissionRow.id == mission_id).values(state=state, reason=reason, updated_at=now)
+    )
+
+
+async def add_elapsed(session: AsyncSession, mission_id: str, seconds: float, now: datetime) -> None:
+    """Add running time to a mission."""
+    await session.execute(
+        update(MissionRow)
+        .where(MissionRow.id == mission_id)
+        .values(elapsed_s=MissionRow.elapsed_s + seconds, updated_at=now)
+    )
+
+
+async def vehicles_of(session: AsyncSession, mission_id: str) -> Sequence[MissionVehicleRow]:
+    """Return every vehicle that ever took part, by slot."""
+    query = select(MissionVehicleRow).where(MissionVehicleRow.mission_id == mission_id).order_by(MissionVehicleRow.slot)
+    return (await session.scalars(query)).all()
+
+
+async def last_step(session: AsyncSession, mission_id: str) -> StepRow | None:
+    """Return the newest committed step."""
+    query = select(StepRow).where(StepRow.mission_id == mission_id).order_by(StepRow.number.desc()).limit(1)
+    return (await session.scalars(query)).first()
+
+
+async def waypoints_of_step(session: AsyncSession, mission_id: str, step: int) -> Sequence[WaypointRow]:
+    """Return the waypoints of one step."""
+    query = select(WaypointRow).where(WaypointRow.mission_id == mission_id, WaypointRow.step == step)
+    return (await session.scalars(query.order_by(WaypointRow.vehicle))).all()
+
+
+async def newest_waypoints(session: AsyncSession, mission_id: str) -> Sequence[WaypointRow]:
+    """Return the newest waypoint of each vehicle."""
+    newest = (
+        select(WaypointRow.vehicle, func.max(WaypointRow.step).label("step"))
+        .where(WaypointRow.mission_id == mission_id)
+        .group_by(WaypointRow.vehicle)
+        .subquery()
+    )
+    query = (
+        select(WaypointRow)
+        .join(newest, (WaypointRow.vehicle == newest.c.vehicle) & (WaypointRow.step == newest.c.step))
+        .where(WaypointRow.mission_id == mission_id)
+        .order_by(WaypointRow.vehicle)
+    )
+    return (await session.scalars(query)).all()
+
+
+async def set_waypoint_status(
+    session: AsyncSession, mission_id: str, step: int, vehicle: str, status: str, reason: str, now: datetime
+) -> None:
+    """Record what became of a waypoint."""
+    await session.execute(
+        update(WaypointRow)
+        .where(WaypointRow.mission_id == mission_id, WaypointRow.step == step, WaypointRow.vehicle == vehicle)
+        .values(status=status, reason=reason, changed_at=now)
+    )
+
+
+async def add_positions(session: AsyncSession, rows: Sequence[dict[str, Any]]) -> None:
+    """Append points to the tracks."""
+    if rows:
+        await session.execute(PositionRow.__table__.insert(), list(rows))  # type: ignore[attr-defined]
+
+
+async def tracks(session: AsyncSession, mission_id: str) -> dict[str, list[tuple[float, float]]]:
+    """Return each vehicle's track as (longitude, latitude), in the order it was heard."""
+    query = (
+        select(PositionRow.vehicle, PositionRow.lon_deg, PositionRow.lat_deg)
+        .where(PositionRow.mission_id == mission_id)
+        .order_by(PositionRow.vehicle, PositionRow.id)
+    )
+    result: dict[str, list[tuple[float, float]]] = {}
+    for vehicle, lon, lat in await session.execute(query):
+        result.setdefault(vehicle, []).append((lon, lat))
+    return result
+
+
+async def last_positions(session: AsyncSession, mission_id: str) -> dict[str, PositionRow]:
+    """Return the last recorded position of each vehicle."""
+    newest = select(func.max(PositionRow.id)).where(PositionRow.mission_id == mission_id).group_by(PositionRow.vehicle)
+    rows = await session.scalars(select(PositionRow).where(PositionRow.id.in_(newest)))
+    return {row.vehicle: row for row in rows}

@@ -1,0 +1,217 @@
+"""The tables. Every change here needs a migration; a test compares the two."""
+
+from datetime import UTC, datetime
+from typing import Any, ClassVar
+
+from sqlalchemy import (
+    JSON,
+    BigInteger,
+    DateTime,
+    Dialect,
+    Double,
+    ForeignKey,
+    ForeignKeyConstraint,
+    Index,
+    Integer,
+    LargeBinary,
+    MetaData,
+    String,
+    Text,
+    TypeDecorator,
+    UniqueConstraint,
+)
+from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
+
+
+class UtcDateTime(TypeDecorator[datetime]):
+    """Aware datetimes, stored as UTC; SQLite has no time zones of its own."""
+
+    impl = DateTime(timezone=True)
+    cache_ok = True
+
+    def process_bind_param(self, value: datetime | None, dialect: Dialect) -> datetime | None:
+        """Refuse naive values and convert to UTC."""
+        if value is None:
+            return None
+        if value.tzinfo is None:
+            raise ValueError(f"naive datetime {value}: give it a time zone")
+        value = value.astimezone(UTC)
+        return value.replace(tzinfo=None) if dialect.name == "sqlite" else value
+
+    def process_result_value(self, value: datetime | None, dialect: Dialect) -> datetime | None:
+        """Return an aware value."""
+        return value.replace(tzinfo=UTC) if value is not None and value.tzinfo is None else value
+
+
+_BigId = BigInteger().with_variant(Integer, "sqlite")
+
+
+class Base(DeclarativeBase):
+    """Base of all tables; constraint names are fixed so that migrations can find them."""
+
+    metadata = MetaData(
+        naming_convention={
+            "ix": "ix_%(column_0_label)s",
+            "uq": "uq_%(table_name)s_%(column_0_name)s",
+            "ck": "ck_%(table_name)s_%(constraint_name)s",
+            "fk": "fk_%(table_name)s_%(column_0_name)s_%(referred_table_name)s",
+            "pk": "pk_%(table_name)s",
+        }
+    )
+    type_annotation_map: ClassVar = {
+        datetime: UtcDateTime(),
+        float: Double(),
+        dict[str, Any]: JSON(),
+    }
+
+
+class MissionRow(Base):
+    """A mission: what was asked for and where it is in its life."""
+
+    __tablename__ = "missions"
+
+    id: Mapped[str] = mapped_column(String(36), primary_key=True)
+    name: Mapped[str] = mapped_column(String(120))
+    state: Mapped[str] = mapped_column(String(16), index=True)
+    reason: Mapped[str] = mapped_column(Text, default="")
+    spec: Mapped[dict[str, Any]]
+    created_at: Mapped[datetime]
+    updated_at: Mapped[datetime]
+    elapsed_s: Mapped[float] = mapped_column(default=0.0)
+
+
+class MissionVehicleRow(Base):
+    """A vehicle's part in a mission. ``slot`` fixes its place in the depth stack; it is never reused."""
+
+    __tablename__ = "mission_vehicles"
+
+    mission_id: Mapped[str] = mapped_column(ForeignKey("missions.id", ondelete="CASCADE"), primary_key=True)
+    name: Mapped[str] = mapped_column(String(64), primary_key=True)
+    slot: Mapped[int]
+    spec: Mapped[dict[str, Any]]
+    joined_at: Mapped[datetime]
+    left_at: Mapped[datetime | None]
+
+
+class StepRow(Base):
+    """A committed step: the decision, and the planner's memory after it."""
+
+    __tablename__ = "steps"
+
+    mission_id: Mapped[str] = mapped_column(ForeignKey("missions.id", ondelete="CASCADE"), primary_key=True)
+    number: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
+    committed_at: Mapped[datetime]
+    objective: Mapped[float | None]
+    terms: Mapped[dict[str, Any]]
+    soundings: Mapped[int]
+    map_digest: Mapped[str] = mapped_column(String(64))
+    memory: Mapped[bytes] = mapped_column(LargeBinary)
+
+
+class WaypointRow(Base):
+    """Where a step sends a vehicle, and what became of it."""
+
+    __tablename__ = "waypoints"
+    __table_args__ = (
+        ForeignKeyConstraint(["mission_id", "step"], ["steps.mission_id", "steps.number"], ondelete="CASCADE"),
+    )
+
+    mission_id: Mapped[str] = mapped_column(String(36), primary_key=True)
+    step: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
+    vehicle: Mapped[str] = mapped_column(String(64), primary_key=True)
+    lat_deg: Mapped[float]
+    lon_deg: Mapped[float]
+    east_m: Mapped[float]
+    north_m: Mapped[float]
+    depth_m: Mapped[float]
+    status: Mapped[str] = mapped_column(String(16))
+    reason: Mapped[str] = mapped_column(Text, default="")
+    changed_at: Mapped[datetime]
+
+
+class SoundingRow(Base):
+    """A measurement of the sea floor: raw values as they came, the corrected depth beside them."""
+
+    __tablename__ = "soundings"
+    __table_args__ = (
+        UniqueConstraint("mission_id", "vehicle", "time_s", "beam", name="uq_soundings_identity"),
+        Index("ix_soundings_mission", "mission_id", "id"),
+    )
+
+    id: Mapped[int] = mapped_column(_BigId, primary_key=True, autoincrement=True)
+    mission_id: Mapped[str] = mapped_column(ForeignKey("missions.id", ondelete="CASCADE"))
+    vehicle: Mapped[str] = mapped_column(String(64))
+    time_s: Mapped[float]
+    beam: Mapped[int]
+    received_at: Mapped[datetime]
+    step: Mapped[int]
+    source: Mapped[str] = mapped_column(String(64))
+    lat_deg: Mapped[float]
+    lon_deg: Mapped[float]
+    east_m: Mapped[float]
+    north_m: Mapped[float]
+    vehicle_depth_m: Mapped[float]
+    range_m: Mapped[float]
+    raw_depth_m: Mapped[float]
+    depth_m: Mapped[float]
+    sd_m: Mapped[float]
+    position_sd_m: Mapped[float | None]
+    verdict: Mapped[str] = mapped_column(String(16))
+    reason: Mapped[str] = mapped_column(Text, default="")
+
+
+class PositionRow(Base):
+    """A point of a vehicle's track, thinned."""
+
+    __tablename__ = "positions"
+    __table_args__ = (Index("ix_positions_track", "mission_id", "vehicle", "id"),)
+
+    id: Mapped[int] = mapped_column(_BigId, primary_key=True, autoincrement=True)
+    mission_id: Mapped[str] = mapped_column(ForeignKey("missions.id", ondelete="CASCADE"))
+    vehicle: Mapped[str] = mapped_column(String(64))
+    time_s: Mapped[float]
+    lat_deg: Mapped[float]
+    lon_deg: Mapped[float]
+    depth_m: Mapped[float]
+
+
+class BatchRow(Base):
+    """The answer once given to an idempotency key."""
+
+    __tablename__ = "batches"
+
+    mission_id: Mapped[str] = mapped_column(ForeignKey("missions.id", ondelete="CASCADE"), primary_key=True)
+    key: Mapped[str] = mapped_column(String(200), primary_key=True)
+    digest: Mapped[str] = mapped_column(String(64))
+    answer: Mapped[dict[str, Any]]
+    created_at: Mapped[datetime]
+
+
+class EventRow(Base):
+    """A line of a mission's log."""
+
+    __tablename__ = "events"
+    __table_args__ = (Index("ix_events_mission", "mission_id", "id"),)
+
+    id: Mapped[int] = mapped_column(_BigId, primary_key=True, autoincrement=True)
+    mission_id: Mapped[str] = mapped_column(ForeignKey("missions.id", ondelete="CASCADE"))
+    time: Mapped[datetime]
+    level: Mapped[str] = mapped_column(String(16))
+    kind: Mapped[str] = mapped_column(String(32))
+    message: Mapped[str] = mapped_column(Text)
+    data: Mapped[dict[str, Any]]
+
+
+class TokenRow(Base):
+    """An access token; only its hash is kept."""
+
+    __tablename__ = "tokens"
+
+    id: Mapped[str] = mapped_column(String(36), primary_key=True)
+    name: Mapped[str] = mapped_column(String(120))
+    role: Mapped[str] = mapped_column(String(16))
+    vehicle: Mapped[str | None] = mapped_column(String(64))
+    token_hash: Mapped[str] = mapped_column(String(64), unique=True)
+    created_at: Mapped[datetime]
+    expires_at: Mapped[datetime | None]
+    revoked_at: Mapped[datetime | None]

@@ -1,0 +1,62 @@
+"""Queries on soundings and on the answers given to batches of them."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from sqlalchemy import func, select
+from sqlalchemy.dialects import postgresql, sqlite
+from sqlalchemy.ext.asyncio import AsyncSession
+
+from app.storage.models import BatchRow, MissionRow, SoundingRow
+
+Identity = tuple[str, float, int]
+"""What makes a sounding the same sounding within a mission: vehicle, vehicle's time, beam."""
+
+
+async def insert_new(session: AsyncSession, rows: Sequence[dict[str, Any]]) -> set[Identity]:
+    """Store soundings; those already there are left alone. Returns the identities that were new."""
+    if not rows:
+        return set()
+    insert = sqlite.insert if session.get_bind().dialect.name == "sqlite" else postgresql.insert
+    statement = (
+        insert(SoundingRow)
+        .on_conflict_do_nothing(index_elements=["mission_id", "vehicle", "time_s", "beam"])
+        .returning(SoundingRow.vehicle, SoundingRow.time_s, SoundingRow.beam)
+    )
+    result = await session.execute(statement, list(rows))
+    return {(vehicle, time_s, beam) for vehicle, time_s, beam in result}
+
+
+async def accepted_arrays(session: AsyncSession, mission_id: str) -> NDArray[np.float64]:
+    """Return the accepted soundings in the order they came, shape (n, 4): east, north, depth, deviation (metres)."""
+    query = (
+        select(SoundingRow.east_m, SoundingRow.north_m, SoundingRow.depth_m, SoundingRow.sd_m)
+        .where(SoundingRow.mission_id == mission_id, SoundingRow.verdict == "accepted")
+        .order_by(SoundingRow.id)
+    )
+    rows = (await session.execute(query)).all()
+    return np.array([tuple(row) for row in rows], dtype=float).reshape(-1, 4)
+
+
+async def counts(session: AsyncSession, mission_id: str) -> dict[str, int]:
+    """Return the number of soundings by verdict."""
+    query = (
+        select(SoundingRow.verdict, func.count().label("n"))
+        .where(SoundingRow.mission_id == mission_id)
+        .group_by(SoundingRow.verdict)
+    )
+    return {row.verdict: row.n for row in await session.execute(query)}
+
+
+async def all_soundings(session: AsyncSession, mission_id: str) -> Sequence[SoundingRow]:
+    """Return every sounding, rejected ones included, in the order they came."""
+    query = select(SoundingRow).where(SoundingRow.mission_id == mission_id).order_by(SoundingRow.id)
+    return (await session.scalars(query)).all()
+
+
+async def answer_to(session: AsyncSession, mission_id: str, key: str) -> BatchRow | None:
+    """Return the answer once given to an idempotency key; waits for a transaction that is about to answer."""
+    await session.execute(select(MissionRow.id).where(MissionRow.id == mission_id).with_for_update(key_share=True))
+    return await session.get(BatchRow, (mission_id, key))

@@ -1,0 +1,36 @@
+"""Queries on access tokens."""
+
+from collections.abc import Sequence
+from datetime import datetime
+
+from sqlalchemy import func, select, update
+from sqlalchemy.ext.asyncio import AsyncSession
+
+from app.storage.models import TokenRow
+
+
+async def by_hash(session: AsyncSession, token_hash: str) -> TokenRow | None:
+    """Return the token with this hash, revoked or not."""
+    return (await session.scalars(select(TokenRow).where(TokenRow.token_hash == token_hash))).first()
+
+
+async def any_token(session: AsyncSession) -> bool:
+    """Tell whether a token that was not revoked exists; then requests must carry one."""
+    query = select(func.count()).select_from(TokenRow).where(TokenRow.revoked_at.is_(None))
+    return bool(await session.scalar(query))
+
+
+async def all_tokens(session: AsyncSession) -> Sequence[TokenRow]:
+    """Return every token, newest first."""
+    return (await session.scalars(select(TokenRow).order_by(TokenRow.created_at.desc()))).all()
+
+
+async def revoke(session: AsyncSession, token_id: str, now: datetime) -> bool:
+    """Revoke a token; False when there is none to revoke."""
+    found = await session.scalars(
+        update(TokenRow)
+        .where(TokenRow.id == token_id, TokenRow.revoked_at.is_(None))
+        .values(revoked_at=now)
+        .returning(TokenRow.id)
+    )
+    return found.first() is not None

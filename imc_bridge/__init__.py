@@ -1,0 +1,37 @@
+"""The IMC side: transport, discovery, vehicle links and FollowReference control."""
+
+from imc_bridge.bridge import Bridge
+from imc_bridge.events import (
+    BridgeEvent,
+    LinkChange,
+    NodeState,
+    NodeView,
+    RefusedError,
+    Sounding,
+    SoundingRefused,
+    StateReport,
+    StopResult,
+    Waypoint,
+    WaypointChange,
+    WaypointStatus,
+)
+from imc_bridge.settings import BridgeSettings
+from imc_bridge.transport import PortInUseError
+
+__all__ = [
+    "Bridge",
+    "BridgeEvent",
+    "BridgeSettings",
+    "LinkChange",
+    "NodeState",
+    "NodeView",
+    "PortInUseError",
+    "RefusedError",
+    "Sounding",
+    "SoundingRefused",
+    "StateReport",
+    "StopResult",
+    "Waypoint",
+    "WaypointChange",
+    "WaypointStatus",
+]

@@ -1,0 +1,594 @@
+"""The console: sockets, nodes and followers put together behind one small class."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import itertools
+import logging
+import time
+from collections import Counter
+from collections.abc import Callable
+
+import imcpy
+
+from imc_bridge.codec import BROADCAST_ID, Decoder, Message, encode
+from imc_bridge.discovery import Announcement, own_announce, reachable_first, read_announce
+from imc_bridge.events import (
+    BridgeEvent,
+    EventCallback,
+    LinkChange,
+    NodeState,
+    NodeView,
+    RefusedError,
+    Sounding,
+    StopResult,
+    Waypoint,
+)
+from imc_bridge.follow import Follower, Phase
+from imc_bridge.nodes import Node
+from imc_bridge.rates import RateRequest
+from imc_bridge.settings import BridgeSettings
+from imc_bridge.transport import Address, UdpTransport
+
+log = logging.getLogger(__name__)
+
+WANTED = (
+    "Abort",
+    "Distance",
+    "EntityList",
+    "EntityParameters",
+    "EstimatedState",
+    "FollowRefState",
+    "FuelLevel",
+    "Heartbeat",
+    "NavigationUncertainty",
+    "PlanControl",
+    "PlanControlState",
+    "VehicleMedium",
+    "VehicleState",
+)
+TICK_S = 0.2
+MIN_TICK_WALL_S = 0.02
+ENTITY_QUERY_S = 2.0
+ANNOUNCE_AGAIN_S = 1.0
+STOP_ESCALATION = 0.5
+"""Share of a stop's patience after which Abort is sent too."""
+CLOSE_TIMEOUT_WALL_S = 3.0
+MAX_NODES = 256
+"""Nodes beyond this many are not taken up: no amount of forged packets may fill the memory."""
+MAX_PLAUSIBLE_VEHICLE_TIME_S = 4e9
+
+
+class Bridge:
+    """A console on the IMC network that can make vehicles follow waypoints.
+
+    Parameters
+    ----------
+    settings
+    commanding
+        False for a listener that announces itself and sends heartbeats but never commands a vehicle.
+    clock
+        Seconds of the wall clock that never step back; a replay gives the recording's.
+
+    Examples
+    --------
+    >>> bridge = Bridge(BridgeSettings(loopback_only=True))          # doctest: +SKIP
+    >>> await bridge.start(print)                                    # doctest: +SKIP
+    >>> await bridge.engage("lauv-xplore-1")                         # doctest: +SKIP
+    >>> bridge.goto("lauv-xplore-1", Waypoint("m1", 0, 41.1852, -8.7062, 3.0))   # doctest: +SKIP
+    """
+
+    def __init__(
+        self,
+        settings: BridgeSettings,
+        *,
+        commanding: bool = True,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self.settings = settings
+        self.decoder = Decoder(WANTED)
+        self.announces = Decoder(("Announce",))
+        self.transport = UdpTransport(settings, self.on_packet, self.on_announce)
+        self.handler_errors: Counter[str] = Counter()
+        self._commanding = commanding
+        self._clock = clock
+        self._on_event: EventCallback = lambda _event: None
+        self._nodes: dict[int, Node] = {}
+        self._followers: dict[int, Follower] = {}
+        self._rates: dict[int, RateRequest] = {}
+        self._by_address: dict[Address, Node] = {}
+        self._links: dict[int, LinkChange] = {}
+        self._state_reported: dict[int, float] = {}
+        self._entities_asked: dict[int, float] = {}
+        self._task: asyncio.Task[None] | None = None
+        self._turn = asyncio.Event()
+        self._announce_due = 0.0
+        self._announced_at = float("-inf")
+        self._heartbeat_due = 0.0
+        self._tick_wall_s = max(TICK_S / settings.time_scale, MIN_TICK_WALL_S)
+        # Replies to an earlier run's requests must not be taken for replies to ours.
+        self._request_ids = itertools.count(int(time.time() * 10.0))
+
+    # Life
+
+    def listen(self, on_event: EventCallback) -> None:
+        """Send events to ``on_event`` without opening sockets, as a replay does."""
+        self._on_event = on_event
+
+    async def start(self, on_event: EventCallback) -> None:
+        """Bind the ports, announce and listen; events go to ``on_event`` from the event loop's thread.
+
+        Raises
+        ------
+        imc_bridge.transport.PortInUseError
+            When a port belongs to another program.
+        ValueError
+            When a configured interface is absent.
+        """
+        if self._task is not None:
+            raise RuntimeError("this bridge has been started already")
+        self._on_event = on_event
+        self.transport.open()
+        self._task = asyncio.create_task(self._run(), name="imc-bridge")
+
+    async def close(self) -> None:
+        """Stop every engaged vehicle, restore rates, release the ports; safe to repeat."""
+        if self._task is None:
+            return
+        busy = [
+            node.name for node, follower in self._controlled() if follower.engaged or follower.phase is Phase.STOPPING
+        ]
+        await asyncio.gather(*(self.stop(name, timeout_s=CLOSE_TIMEOUT_WALL_S) for name in busy))
+        for rates in self._rates.values():
+            rates.restore()
+        self._task.cancel()
+        with contextlib.suppress(asyncio.CancelledError):
+            await self._task
+        self._task = None
+        self.transport.close()
+
+    async def __aenter__(self) -> Bridge:
+        await self.start(self._on_event)
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        await self.close()
+
+    # What the user asks
+
+    def nodes(self) -> tuple[NodeView, ...]:
+        """Every node heard of, by id."""
+        now = self._now()
+        return tuple(self._view(self._nodes[imc_id], now) for imc_id in sorted(self._nodes))
+
+    async def engage(self, vehicle: str) -> None:
+        """Start our plan on the vehicle and wait until it follows; it then holds its place at the surface.
+
+        Raises
+        ------
+        RefusedError
+            When the vehicle is unknown, silent, busy with another console's plan, or refuses.
+        """
+        if not self._commanding:
+            raise RefusedError(vehicle, "this bridge only listens", "Use one that may command")
+        node = self._node_named(vehicle)
+        if node is None:
+            known = ", ".join(n.name for n in self._nodes.values() if n.is_vehicle) or "none"
+            raise RefusedError(vehicle, f"never heard of (known: {known})", "Switch it on; see `bathyfleet doctor`")
+        follower = self._follower(node)
+        if not follower.engaged and follower.engage(self._now()):
+            self._rate_request(node).begin()
+        while follower.engaged and follower.phase is not Phase.FOLLOWING:
+            await self._turn.wait()
+        if not follower.engaged:
+            refusal = follower.refusal
+            reason = refusal.reason if refusal else "stopped while it was being engaged"
+            raise RefusedError(vehicle, reason, refusal.remedy if refusal else "Engage it again")
+
+    def intervention(self, vehicle: str) -> str:
+        """Return why a vehicle left us of its own or another console's will, until :meth:`stop` is called; else ''."""
+        node = self._node_named(vehicle)
+        return self._follower(node).intervention if node is not None and self._commanding else ""
+
+    def goto(self, vehicle: str, waypoint: Waypoint) -> None:
+        """Replace the vehicle's waypoint; what becomes of it is told by events.
+
+        Raises
+        ------
+        RefusedError
+            When the vehicle is not engaged.
+        """
+        node = self._node_named(vehicle)
+        follower = self._followers.get(node.imc_id) if node is not None else None
+        if follower is None or not follower.engaged:
+            refusal = follower.refusal if follower is not None else None
+            raise RefusedError(
+                vehicle,
+                f"not engaged: {refusal.reason}" if refusal else "not engaged",
+                refusal.remedy if refusal else "Engage it first",
+            )
+        follower.order(waypoint, self._now())
+
+    async def stop(self, vehicle: str, *, timeout_s: float = 3.0) -> StopResult:
+        """Make the vehicle stop following; wait at most ``timeout_s`` (wall clock) for its acknowledgement.
+
+        A plan of another console is left alone. Half-way through the patience Abort is sent as well. When nothing is
+        acknowledged the references have ceased all the same, which ends the plan on board within seconds, and STOP
+        goes on being sent whenever the vehicle shows up in our plan.
+        """
+        node = self._node_named(vehicle)
+        if node is None:
+            return StopResult(vehicle, False, "never heard of")
+        if not self._commanding:
+            return StopResult(vehicle, False, "this bridge only listens")
+        follower = self._follower(node)
+        follower.begin_stop(self._now())
+        begun = self._clock()
+        while follower.phase is Phase.STOPPING:
+            waited = self._clock() - begun
+            if waited >= timeout_s:
+                follower.give_up_stop(self._now())
+                reason = node.status(self._now()).reason
+                return StopResult(
+                    vehicle,
+                    False,
+                    f"no acknowledgement within {timeout_s:g} s{f' ({reason})' if reason else ''}; "
+                    "references have ceased, so its plan ends by itself",
+                )
+            if waited >= STOP_ESCALATION * timeout_s:
+                follower.escalate_stop()
+            with contextlib.suppress(TimeoutError):
+                await asyncio.wait_for(self._turn.wait(), timeout_s - waited)
+        if follower.engaged:
+            return StopResult(vehicle, False, "engaged again while it was being stopped")
+        self._rate_request(node).restore()
+        self._check_link(node, self._now())
+        return StopResult(vehicle, True, follower.stop_detail or "stopped")
+
+    # Time
+
+    def _now(self) -> float:
+        """Seconds of the vehicles' clock rate: every period and timeout is measured in these."""
+        return self._clock() * self.settings.time_scale
+
+    async def _run(self) -> None:
+        while True:
+            now = self._now()
+            try:
+                self._tick(now)
+            except Exception as error:
+                self._note_error(error)
+            turn, self._turn = self._turn, asyncio.Event()
+            turn.set()
+            await asyncio.sleep(self._tick_wall_s)
+
+    def _tick(self, now: float) -> None:
+        if now >= self._announce_due:
+            self._announce(now)
+        if now >= self._heartbeat_due:
+            self._heartbeat_due = now + self.settings.heartbeat_period_s
+            for node in self._nodes.values():
+                if self._talks_to(node):
+                    self._send(node, imcpy.Heartbeat())
+        for node in list(self._nodes.values()):
+            if node.is_vehicle and self._talks_to(node):
+                self._tick_vehicle(node, now)
+        self.review()
+
+    def review(self) -> None:
+        """Judge every link by the time that has passed; runs by itself in a started bridge."""
+        now = self._now()
+        for node in list(self._nodes.values()):
+            self._check_link(node, now)
+
+    def _tick_vehicle(self, node: Node, now: float) -> None:
+        if node.entities is None and node.heard_at is not None:
+            asked = self._entities_asked.get(node.imc_id, float("-inf"))
+            if now - asked >= ENTITY_QUERY_S:
+                self._entities_asked[node.imc_id] = now
+                query = imcpy.EntityList()
+                query.op = imcpy.EntityList.OperationEnum.QUERY
+                self._send(node, query)
+        follower = self._followers.get(node.imc_id)
+        if follower is not None:
+            follower.tick(now)
+        rates = self._rates.get(node.imc_id)
+        if rates is not None and rates.pending and follower is not None and follower.engaged:
+            rates.observed(node.rates.rates_hz(now).get("EstimatedState", 0.0))
+            rates.tick(now)
+
+    def _announce(self, now: float) -> None:
+        self._announce_due = now + self.settings.announce_period_s
+        self._announced_at = now
+        self.transport.announce(
+            lambda addresses: encode(
+                own_announce(self.settings, addresses), src=self.settings.imc_id, dst=0, time_s=time.time()
+            )
+        )
+
+    # Packets
+
+    def on_announce(self, packet: bytes, address: Address) -> None:
+        """Take a packet of the announce socket; also the way to replay a recording."""
+        try:
+            self._take_announce(packet, address)
+        except Exception as error:
+            self._note_error(error)
+
+    def _take_announce(self, packet: bytes, address: Address) -> None:
+        header = self.announces.header(packet)
+        if header is None or not self.announces.wants(header) or header.src == self.settings.imc_id:
+            return
+        message = self.announces.message(packet)
+        if message is None:
+            return
+        announcement = read_announce(message)
+        now = self._now()
+        node = self._node_of(announcement.imc_id, announcement.name, now)
+        if node is None:
+            return
+        known = node.announcement
+        if known is not None:
+            node.conflict = self._conflict(node, known, announcement, now) or node.conflict
+        first = known is None
+        if first:
+            self._name(node, announcement.name)
+            if announcement.is_vehicle:
+                # Its guard learns the bottom from the first sounding on.
+                self._follower(node)
+        rebooted = node.announced(announcement, reachable_first(announcement, address[0]), now)
+        for reachable in announcement.addresses:
+            self._by_address[reachable] = node
+        if rebooted:
+            self._reboot(node, now)
+        if (first or rebooted) and now - self._announced_at > ANNOUNCE_AGAIN_S:
+            # So that a newcomer need not wait for our next announce.
+            self._announce(now)
+        self._check_link(node, now)
+
+    def _conflict(self, node: Node, known: Announcement, new: Announcement, now: float) -> str | None:
+        """Why two announces under one id cannot come from one node, None when they can."""
+        if known.name != new.name:
+            return f"id 0x{node.imc_id:04X} is announced by {known.name!r} and by {new.name!r}: give one another id"
+        quick = node.announced_at is not None and now - node.announced_at < 0.5 * self.settings.announce_period_s
+        if quick and known.uid != new.uid and set(known.addresses) != set(new.addresses):
+            return f"two nodes named {known.name!r} announce id 0x{node.imc_id:04X}: stop one of them"
+        return None
+
+    def _reboot(self, node: Node, now: float) -> None:
+        self._entities_asked.pop(node.imc_id, None)
+        follower = self._followers.get(node.imc_id)
+        if follower is not None:
+            follower.rebooted(now)
+            if follower.engaged:
+                self._rate_request(node).begin()
+
+    def on_packet(self, packet: bytes, address: Address) -> None:
+        """Take a packet of the traffic socket; also the way to replay a recording."""
+        try:
+            self._take_packet(packet, address)
+        except Exception as error:
+            self._note_error(error)
+
+    def _take_packet(self, packet: bytes, address: Address) -> None:
+        header = self.decoder.header(packet)
+        if header is None:
+            return
+        now = self._now()
+        sender = self._by_address.get(address)
+        if sender is None:
+            self._from_unknown_address(header.src, now)
+            self.decoder.wants(header)
+            return
+        if header.src == self.settings.imc_id:
+            sender.echoes += 1
+            return
+        if header.src != sender.imc_id:
+            sender.relayed[header.src] += 1
+            if header.dst in (sender.imc_id, BROADCAST_ID) and self.decoder.wants(header):
+                self._relayed(sender, packet, now)
+            return
+        sender.heard(now, address)
+        if not self.decoder.wants(header):
+            return
+        message = self.decoder.message(packet)
+        if message is not None and 0.0 < message.timestamp < MAX_PLAUSIBLE_VEHICLE_TIME_S:
+            self._take_message(sender, message, now)
+
+    def _from_unknown_address(self, imc_id: int, now: float) -> None:
+        if imc_id in (self.settings.imc_id, 0, BROADCAST_ID):
+            return
+        node = self._node_of(imc_id, f"0x{imc_id:04X}", now)
+        if node is not None:
+            node.foreign_address += 1
+            if node.announcement is None:
+                node.heard_at = now
+
+    def _relayed(self, via: Node, packet: bytes, now: float) -> None:
+        follower = self._followers.get(via.imc_id)
+        message = self.decoder.message(packet)
+        if follower is None or message is None:
+            return
+        if isinstance(message, imcpy.Abort):
+            follower.foreign_abort(int(message.src), now)
+        elif isinstance(message, imcpy.PlanControl) and message.type == imcpy.PlanControl.TypeEnum.REQUEST:
+            follower.foreign_plan_control(int(message.src), int(message.op))
+
+    def _take_message(self, node: Node, message: Message, now: float) -> None:
+        name = type(message).__name__
+        follower = self._followers.get(node.imc_id)
+        node.telemetry_at = now
+        node.rates.count(name, now)
+        if node.follow_clock(message.timestamp, time.time()) and follower is not None:
+            follower.guard.clear()
+        match name:
+            case "EstimatedState":
+                self._take_state(node, follower, message, now)
+            case "Distance":
+                self._take_distance(node, message)
+            case "NavigationUncertainty":
+                node.take_uncertainty(message)
+            case "PlanControlState" if node.in_order(name, message.timestamp):
+                node.take_plan_state(message, now)
+                if follower is not None:
+                    follower.plan_state_changed(now)
+            case "VehicleState" if node.in_order(name, message.timestamp):
+                node.take_vehicle_state(message, now)
+                if follower is not None:
+                    follower.vehicle_state_changed(now)
+            case "FollowRefState" if follower is not None:
+                follower.follow_state(message, now)
+            case "PlanControl" if follower is not None and int(message.dst) == self.settings.imc_id:
+                follower.plan_control_reply(message, now)
+            case "VehicleMedium":
+                node.medium = int(message.medium)
+            case "FuelLevel":
+                node.battery_pct = float(message.value)
+            case "EntityList" if message.op == imcpy.EntityList.OperationEnum.REPORT:
+                node.take_entities(message)
+            case "EntityParameters" if node.imc_id in self._rates:
+                self._rates[node.imc_id].answered(message, now)
+
+    def _take_state(self, node: Node, follower: Follower | None, message: Message, now: float) -> None:
+        report = node.take_state(message)
+        if report is not None:
+            if follower is not None:
+                follower.moved(report, now)
+            wall = self._clock()
+            if wall - self._state_reported.get(node.imc_id, float("-inf")) >= 1.0 / self.settings.state_events_per_s:
+                self._state_reported[node.imc_id] = wall
+                self._tell(report)
+        for result in node.gate.resolve(node.history, node.position_sd_m()):
+            if follower is not None and isinstance(result, Sounding):
+                follower.guard.add(result.time_s, result.lat_deg, result.lon_deg, result.bottom_depth_m)
+            self._tell(result)
+
+    def _take_distance(self, node: Node, message: Message) -> None:
+        lever_arm = (0.0, 0.0, 0.0)
+        for device in message.location:
+            lever_arm = (float(device.x), float(device.y), float(device.z))
+            break
+        valid = message.validity == imcpy.Distance.ValidityEnum.VALID
+        refused = node.gate.offer(
+            message.timestamp, node.entity_name(int(message.src_ent)), valid, float(message.value), lever_arm
+        )
+        if refused is not None:
+            self._tell(refused)
+
+    # Nodes
+
+    def _node_of(self, imc_id: int, name: str, now: float) -> Node | None:
+        node = self._nodes.get(imc_id)
+        if node is None and len(self._nodes) < MAX_NODES:
+            node = self._nodes[imc_id] = Node(imc_id, name, self.settings, now)
+            self._name(node, name)
+        return node
+
+    def _name(self, node: Node, name: str) -> None:
+        """Give a node its announced name, made unique."""
+        taken = {other.name for other in self._nodes.values() if other is not node}
+        node.name = name if name and name not in taken else f"{name} (0x{node.imc_id:04X})".strip()
+        node.gate.vehicle = node.name
+
+    def _node_named(self, name: str) -> Node | None:
+        return next((node for node in self._nodes.values() if node.name == name), None)
+
+    def _talks_to(self, node: Node) -> bool:
+        wanted = self.settings.vehicles
+        if node.address is None or node.announcement is None:
+            return False
+        # A console announces, too, but has nothing to tell us.
+        return node.name in wanted if wanted else node.announcement.system_type != int(imcpy.SystemType.CCU)
+
+    def _controlled(self) -> list[tuple[Node, Follower]]:
+        return [(self._nodes[imc_id], follower) for imc_id, follower in self._followers.items()]
+
+    def _follower(self, node: Node) -> Follower:
+        follower = self._followers.get(node.imc_id)
+        if follower is None:
+            follower = self._followers[node.imc_id] = Follower(
+                node, self.settings, lambda message: self._send(node, message), self._tell, self._request_ids
+            )
+        return follower
+
+    def _rate_request(self, node: Node) -> RateRequest:
+        request = self._rates.get(node.imc_id)
+        if request is None:
+            request = self._rates[node.imc_id] = RateRequest(
+                self.settings.rate_limiters, lambda message: self._send(node, message)
+            )
+        return request
+
+    def _send(self, node: Node, message: Message) -> None:
+        if node.address is not None:
+            packet = encode(message, src=self.settings.imc_id, dst=node.imc_id, time_s=time.time())
+            self.transport.send(packet, node.address)
+
+    # Telling the user
+
+    def _note_error(self, error: Exception) -> None:
+        self.handler_errors[type(error).__name__] += 1
+        log.error("An event of the IMC bridge failed", exc_info=error)
+
+    def _check_link(self, node: Node, now: float) -> None:
+        status = node.status(now)
+        follower = self._followers.get(node.imc_id)
+        engaged = follower is not None and follower.engaged
+        known = self._links.get(node.imc_id)
+        reason = status.reason
+        if follower is not None and not engaged and follower.refusal is not None and not reason:
+            reason = f"not ours: {follower.refusal.reason}"
+        same = known is not None and (known.state, known.engaged) == (status.state, engaged)
+        # The seconds in the reason for a silence are no news.
+        silent = status.state in (NodeState.LOST, NodeState.EXPECTED_OFFLINE)
+        if same and (silent or (known is not None and known.reason == reason)):
+            return
+        change = self._links[node.imc_id] = LinkChange(
+            node.name, status.state, engaged, reason, node.executing(self.settings.plan_id)
+        )
+        self._tell(change)
+
+    def _tell(self, event: BridgeEvent) -> None:
+        try:
+            self._on_event(event)
+        except Exception as error:
+            self._note_error(error)
+
+    def _view(self, node: Node, now: float) -> NodeView:
+        status = node.status(now)
+        follower = self._followers.get(node.imc_id)
+        rates = self._rates.get(node.imc_id)
+        scale = self.settings.time_scale
+
+        def age(at: float | None) -> float | None:
+            return None if at is None else (now - at) / scale
+
+        return NodeView(
+            name=node.name,
+            imc_id=node.imc_id,
+            is_vehicle=node.is_vehicle,
+            state=status.state,
+            engaged=follower is not None and follower.engaged,
+            reason=status.reason,
+            ours=node.executing(self.settings.plan_id),
+            age_s=age(node.heard_at),
+            announce_age_s=age(node.announced_at),
+            address=f"{node.address[0]}:{node.address[1]}" if node.address else None,
+            imc_version=node.announcement.imc_version if node.announcement else None,
+            operation_mode=node.operation_mode_name,
+            plan_id=node.plan_id or None,
+            plan_state=node.plan_state_name,
+            report=node.report,
+            clock_offset_s=node.clock_offset_s,
+            entities=None if node.entities is None else len(node.entities),
+            bottom_sensors=tuple(sorted(node.gate.heard)),
+            rates_hz=node.rates.rates_hz(now),
+            soundings=node.gate.accepted,
+            refused=dict(node.gate.refused),
+            echoes=node.echoes,
+            relayed=sum(node.relayed.values()),
+            foreign_address=node.foreign_address,
+            conflict=node.conflict,
+            rate_limiters=rates.text if rates is not None else "as the vehicle has them",
+        )

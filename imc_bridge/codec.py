@@ -1,0 +1,150 @@
+"""IMC packets to messages and back: imcpy does the coding, this module decides what is worth decoding.
+
+A vehicle sends some 400 packets per second, most of which nobody here needs. Their header is read first, so that
+an unwanted packet costs no decoding. Nothing that arrives can raise out of :class:`Decoder`.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+from collections import Counter
+from collections.abc import Iterable
+from enum import StrEnum
+from functools import cache
+from typing import Any, NamedTuple
+
+import imcpy
+
+Message = Any
+"""An imcpy message object; the package has no usable type information."""
+
+SYNC = 0xFE54
+HEADER_SIZE = 20
+FOOTER_SIZE = 2
+MAX_PACKET_SIZE = 65535
+BROADCAST_ID = 0xFFFF
+ANY_ENTITY = 0xFF
+
+_LITTLE = struct.Struct("<HHHdHBHB")
+_BIG = struct.Struct(">HHHdHBHB")
+_SYNC_LITTLE = struct.pack("<H", SYNC)
+_SYNC_BIG = struct.pack(">H", SYNC)
+
+
+class PacketFault(StrEnum):
+    """Why a packet did not become a message."""
+
+    SYNC = "no IMC packet (synchronisation word)"
+    LENGTH = "truncated or over-long packet"
+    CHECKSUM = "wrong checksum or malformed payload"
+    UNKNOWN = "message id unknown to this IMC version"
+
+
+class Header(NamedTuple):
+    """The 20 bytes before every payload."""
+
+    msg_id: int
+    size: int
+    timestamp: float
+    src: int
+    src_ent: int
+    dst: int
+    dst_ent: int
+
+
+def peek(packet: bytes) -> Header | PacketFault:
+    """Read a packet's header in its sender's byte order, without verifying the payload."""
+    if len(packet) < HEADER_SIZE + FOOTER_SIZE:
+        return PacketFault.LENGTH
+    sync = packet[:2]
+    if sync == _SYNC_LITTLE:
+        header = Header._make(_LITTLE.unpack_from(packet)[1:])
+    elif sync == _SYNC_BIG:
+        header = Header._make(_BIG.unpack_from(packet)[1:])
+    else:
+        return PacketFault.SYNC
+    if len(packet) != HEADER_SIZE + header.size + FOOTER_SIZE:
+        return PacketFault.LENGTH
+    return header
+
+
+@cache
+def message_name(msg_id: int) -> str | None:
+    """Abbreviated name of a message id, None when this IMC version does not have it."""
+    try:
+        return str(imcpy.Factory.abbrev_from_id(msg_id))
+    except RuntimeError:
+        return None
+
+
+def message_ids(names: Iterable[str]) -> frozenset[int]:
+    """Ids of messages by abbreviated name."""
+    return frozenset(int(imcpy.Factory.id_from_abbrev(name)) for name in names)
+
+
+class Decoder:
+    """Decodes the wanted messages and counts everything else.
+
+    Parameters
+    ----------
+    wanted
+        Abbreviated names of the messages worth decoding.
+
+    Attributes
+    ----------
+    decoded, unwanted : Counter[str]
+        Packets by message name.
+    faults : Counter[PacketFault]
+    unknown_ids : Counter[int]
+    """
+
+    def __init__(self, wanted: Iterable[str]) -> None:
+        self.wanted = message_ids(wanted)
+        self.decoded: Counter[str] = Counter()
+        self.unwanted: Counter[str] = Counter()
+        self.faults: Counter[PacketFault] = Counter()
+        self.unknown_ids: Counter[int] = Counter()
+
+    def header(self, packet: bytes) -> Header | None:
+        """The header of a sound packet, None (and a count) otherwise."""
+        header = peek(packet)
+        if isinstance(header, Header):
+            return header
+        self.faults[header] += 1
+        return None
+
+    def wants(self, header: Header) -> bool:
+        """Whether the packet is worth decoding; when not, it is counted here."""
+        if header.msg_id in self.wanted:
+            return True
+        name = message_name(header.msg_id)
+        if name is None:
+            self.faults[PacketFault.UNKNOWN] += 1
+            self.unknown_ids[header.msg_id] += 1
+        else:
+            self.unwanted[name] += 1
+        return False
+
+    def message(self, packet: bytes) -> Message | None:
+        """Decode a packet whose header was taken; None (and a count) when its contents are wrong."""
+        try:
+            message = imcpy.Packet.deserialize(packet)
+        except (RuntimeError, UnicodeDecodeError, ValueError):
+            self.faults[PacketFault.CHECKSUM] += 1
+            return None
+        if not math.isfinite(message.timestamp):
+            self.faults[PacketFault.CHECKSUM] += 1
+            return None
+        self.decoded[type(message).__name__] += 1
+        return message
+
+
+def encode(message: Message, *, src: int, dst: int, time_s: float) -> bytes:
+    """Serialise a message as sent by ``src`` to ``dst`` at ``time_s`` (Unix seconds)."""
+    message.src = src
+    message.src_ent = 0
+    message.dst = dst
+    message.dst_ent = ANY_ENTITY
+    message.timestamp = time_s
+    return bytes(imcpy.Packet.serialize(message))

@@ -1,0 +1,79 @@
+"""Announces: who is there, where it can be reached, and how we say the same of ourselves."""
+
+from __future__ import annotations
+
+import ipaddress
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import imcpy
+
+from imc_bridge.codec import Message
+from imc_bridge.settings import BridgeSettings
+from imc_bridge.transport import Address
+
+_UDP_SERVICE = re.compile(r"imc\+udp://([0-9.]+):(\d{1,5})/?")
+_VERSION_SERVICE = re.compile(r"imc\+info://[^/]*/version/([^/;]+)")
+_UID_SERVICE = re.compile(r"dune://[^/]*/uid/(\d+)")
+
+SYSTEM_CCU = 0
+VEHICLE_TYPES = frozenset({2, 3})
+"""UUV and USV."""
+
+
+@dataclass(frozen=True, slots=True)
+class Announcement:
+    """An Announce, understood."""
+
+    imc_id: int
+    name: str
+    system_type: int
+    addresses: tuple[Address, ...]
+    imc_version: str | None = None
+    uid: str | None = None
+    """Changes whenever DUNE restarts."""
+
+    @property
+    def is_vehicle(self) -> bool:
+        """Whether it moves by itself in or on water."""
+        return self.system_type in VEHICLE_TYPES
+
+
+def read_announce(message: Message) -> Announcement:
+    """Take an Announce apart; addresses that cannot be are left out."""
+    services = str(message.services)
+    addresses = []
+    for host, port_text in _UDP_SERVICE.findall(services):
+        try:
+            ip = ipaddress.IPv4Address(host)
+        except ValueError:
+            continue
+        port = int(port_text)
+        if 0 < port <= 65535 and not ip.is_unspecified and (host, port) not in addresses:
+            addresses.append((host, port))
+    version = _VERSION_SERVICE.search(services)
+    uid = _UID_SERVICE.search(services)
+    return Announcement(
+        imc_id=int(message.src),
+        name=str(message.sys_name),
+        system_type=int(message.sys_type),
+        addresses=tuple(addresses),
+        imc_version=version.group(1) if version else None,
+        uid=uid.group(1) if uid else None,
+    )
+
+
+def reachable_first(announcement: Announcement, source_host: str) -> tuple[Address, ...]:
+    """The announced addresses, the one on the host that the announce came from first."""
+    return tuple(sorted(announcement.addresses, key=lambda address: address[0] != source_host))
+
+
+def own_announce(settings: BridgeSettings, addresses: Sequence[str]) -> Message:
+    """Our own Announce: a console reachable by UDP at each of ``addresses``."""
+    message = imcpy.Announce()
+    message.sys_name = settings.name
+    message.sys_type = imcpy.SystemType.CCU
+    message.owner = 0xFFFF
+    message.services = ";".join(f"imc+udp://{address}:{settings.port}/" for address in addresses)
+    return message

@@ -1,0 +1,176 @@
+"""What the bridge tells its user, as plain values: WGS84 degrees, metres, depth positive down."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+
+class NodeState(StrEnum):
+    """How far the acquaintance with a node has come."""
+
+    HEARD = "heard"
+    """Packets arrive, but it never announced where it can be reached."""
+    ANNOUNCED = "announced"
+    """It said where it can be reached; no telemetry yet."""
+    ACTIVE = "active"
+    """Telemetry arrives, but it cannot take a plan now."""
+    READY = "ready"
+    """In service, without a plan."""
+    IN_PLAN = "in_plan"
+    """Executes a plan, ours or another console's."""
+    LOST = "lost"
+    EXPECTED_OFFLINE = "expected_offline"
+    """Silent under water in a plan that needs no contact."""
+
+
+class WaypointStatus(StrEnum):
+    """The life of one waypoint on its vehicle."""
+
+    SENT = "sent"
+    ACKNOWLEDGED = "acknowledged"
+    REACHED = "reached"
+    REFUSED = "refused"
+
+
+@dataclass(frozen=True, slots=True)
+class Waypoint:
+    """Where a vehicle shall go. Equal ``mission_id`` and ``step`` make two waypoints the same order.
+
+    ``lead_lat_deg``, ``lead_lon_deg``: a point on the leg's line beyond the waypoint, where it may be sent in order
+    to pass the waypoint straight. DUNE flies straight to a reference only until some 7 m before it, and circles
+    at once around one that is closer than 15 m.
+    """
+
+    mission_id: str
+    step: int
+    lat_deg: float
+    lon_deg: float
+    depth_m: float
+    speed_mps: float = 1.2
+    arrival_radius_m: float = 5.0
+    min_altitude_m: float = 3.0
+    lead_lat_deg: float | None = None
+    lead_lon_deg: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class StateReport:
+    """One EstimatedState of a vehicle; ``time_s`` is the vehicle's clock, Unix seconds."""
+
+    vehicle: str
+    time_s: float
+    lat_deg: float
+    lon_deg: float
+    depth_m: float
+    heading_rad: float
+    speed_mps: float
+    altitude_m: float | None = None
+    battery_pct: float | None = None
+    position_sd_m: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Sounding:
+    """One measurement of the bottom at its footprint; ``bottom_depth_m`` is below the instantaneous surface."""
+
+    vehicle: str
+    time_s: float
+    lat_deg: float
+    lon_deg: float
+    bottom_depth_m: float
+    vehicle_depth_m: float
+    range_m: float
+    source: str
+    beam: int = 0
+    position_sd_m: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class SoundingRefused:
+    """A Distance that did not become a sounding, and why."""
+
+    vehicle: str
+    time_s: float
+    source: str
+    range_m: float
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class WaypointChange:
+    """What became of a waypoint; ``reason`` explains whatever is not plain progress."""
+
+    vehicle: str
+    waypoint: Waypoint
+    status: WaypointStatus
+    reason: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class LinkChange:
+    """A node's link has changed."""
+
+    vehicle: str
+    state: NodeState
+    engaged: bool
+    reason: str = ""
+    ours: bool = False
+    """Executes a plan of ours, perhaps of an earlier run."""
+
+
+BridgeEvent = StateReport | Sounding | SoundingRefused | WaypointChange | LinkChange
+EventCallback = Callable[[BridgeEvent], None]
+
+
+@dataclass(frozen=True, slots=True)
+class StopResult:
+    """Whether a vehicle acknowledged a stop, and in which words."""
+
+    vehicle: str
+    acknowledged: bool
+    detail: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class NodeView:
+    """All that is known of one node at one moment. Ages are seconds of the wall clock."""
+
+    name: str
+    imc_id: int
+    is_vehicle: bool
+    state: NodeState
+    engaged: bool
+    reason: str = ""
+    ours: bool = False
+    """Executes a plan of ours, perhaps of an earlier run."""
+    age_s: float | None = None
+    announce_age_s: float | None = None
+    address: str | None = None
+    imc_version: str | None = None
+    operation_mode: str | None = None
+    plan_id: str | None = None
+    plan_state: str | None = None
+    report: StateReport | None = None
+    clock_offset_s: float | None = None
+    entities: int | None = None
+    bottom_sensors: tuple[str, ...] = ()
+    rates_hz: Mapping[str, float] = field(default_factory=dict)
+    soundings: int = 0
+    refused: Mapping[str, int] = field(default_factory=dict)
+    echoes: int = 0
+    relayed: int = 0
+    foreign_address: int = 0
+    conflict: str | None = None
+    rate_limiters: str = ""
+
+
+class RefusedError(Exception):
+    """A vehicle cannot do what was asked: ``reason`` says why, ``remedy`` what to do about it."""
+
+    def __init__(self, vehicle: str, reason: str, remedy: str) -> None:
+        super().__init__(f"{vehicle}: {reason}. {remedy}")
+        self.vehicle = vehicle
+        self.reason = reason
+        self.remedy = remedy

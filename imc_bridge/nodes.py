@@ -1,0 +1,389 @@
+"""What is known of one node: who it is, how it is heard, what it does, where it is.
+
+A :class:`Node` is fed messages and the time they arrived and keeps no clock of its own. Arrival times are in
+seconds of the bridge's clock, which runs ``time_scale`` times faster than the wall clock; the vehicle's own
+timestamps order its messages.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter, deque
+from dataclasses import dataclass
+from enum import IntEnum
+
+from imcpy.coordinates import toWGS84
+
+from imc_bridge.codec import Message
+from imc_bridge.discovery import Announcement
+from imc_bridge.events import NodeState, StateReport
+from imc_bridge.settings import BridgeSettings
+from imc_bridge.soundings import SoundingGate, StateHistory, StateSample, beam_table
+from imc_bridge.transport import Address
+
+LATE_S = 5.0
+"""A timestamp further back than this is no late packet but a clock that was set back, once it repeats."""
+CLOCK_JUMP_CONFIRMATIONS = 3
+UNCERTAINTY_VALID_S = 10.0
+SUBMERGED_DEPTH_M = 0.3
+"""Radio is gone that far below; the depth sensor's noise at the surface is about 0.1 m."""
+ANNOUNCES_MISSED = 3
+RATE_WINDOW_S = 10.0
+STATE_MESSAGES_FRESH_S = 3.0
+
+
+class OperationMode(IntEnum):
+    """VehicleState.op_mode."""
+
+    SERVICE = 0
+    CALIBRATION = 1
+    ERROR = 2
+    MANEUVER = 3
+    EXTERNAL = 4
+    BOOT = 5
+
+
+class PlanState(IntEnum):
+    """PlanControlState.state."""
+
+    BLOCKED = 0
+    READY = 1
+    INITIALIZING = 2
+    EXECUTING = 3
+
+
+MEDIUM_UNDERWATER = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Status:
+    """A link state with the reason an operator can act on."""
+
+    state: NodeState
+    reason: str = ""
+
+
+class RateMeter:
+    """Messages per second over the last window, by name."""
+
+    def __init__(self) -> None:
+        self._arrivals: dict[str, deque[float]] = {}
+
+    def count(self, name: str, now: float) -> None:
+        """Note one message."""
+        arrivals = self._arrivals.get(name)
+        if arrivals is None:
+            arrivals = self._arrivals[name] = deque(maxlen=256)
+        arrivals.append(now)
+
+    def rates_hz(self, now: float) -> dict[str, float]:
+        """Rate of every message seen within the window."""
+        rates = {}
+        for name, arrivals in self._arrivals.items():
+            while arrivals and now - arrivals[0] > RATE_WINDOW_S:
+                arrivals.popleft()
+            if len(arrivals) > 1:
+                rates[name] = (len(arrivals) - 1) / max(now - arrivals[0], 1e-3)
+            elif arrivals:
+                rates[name] = 1.0 / RATE_WINDOW_S
+        return rates
+
+
+class Node:
+    """One node of the IMC network.
+
+    Parameters
+    ----------
+    imc_id
+    name
+        As announced, or the hexadecimal id of a node that never announced.
+    settings
+    now
+        Time of the first packet.
+    """
+
+    def __init__(self, imc_id: int, name: str, settings: BridgeSettings, now: float) -> None:
+        self.imc_id = imc_id
+        self.name = name
+        self.first_heard = now
+        self.announcement: Announcement | None = None
+        self.announced_at: float | None = None
+        self.first_announced_at: float | None = None
+        self.addresses: tuple[Address, ...] = ()
+        self.address: Address | None = None
+        self.conflict: str | None = None
+        self.boots = 0
+
+        self.packets = 0
+        self.heard_at: float | None = None
+        self.telemetry_at: float | None = None
+        self.echoes = 0
+        self.relayed: Counter[int] = Counter()
+        self.foreign_address = 0
+        self.rates = RateMeter()
+
+        self.clock_offset_s: float | None = None
+        self.clock_jumps = 0
+        self._time_s: float | None = None
+        self._backward: int = 0
+
+        self.entities: dict[int, str] | None = None
+        self.operation_mode: int | None = None
+        self.operation_mode_at: float | None = None
+        self.error_text = ""
+        self.plan_state: int | None = None
+        self.plan_state_at: float | None = None
+        self.plan_id = ""
+        self.medium: int | None = None
+        self.battery_pct: float | None = None
+        self.history = StateHistory()
+        self.report: StateReport | None = None
+        self.gate = SoundingGate(name, beam_table(settings.altimeter), settings.max_range_m)
+        self._uncertainty: tuple[float, float] | None = None
+        self._settings = settings
+        self._latest: dict[str, float] = {}
+
+    @property
+    def is_vehicle(self) -> bool:
+        """Whether it announced itself as a vehicle, or has not said what it is."""
+        return self.announcement is None or self.announcement.is_vehicle
+
+    @property
+    def time_s(self) -> float | None:
+        """The newest timestamp of the vehicle's own clock."""
+        return self._time_s
+
+    # Discovery
+
+    def announced(self, announcement: Announcement, addresses: tuple[Address, ...], now: float) -> bool:
+        """Take an announce in; True when the node has restarted since the last one."""
+        previous = self.announcement
+        self.announcement = announcement
+        self.announced_at = now
+        if self.first_announced_at is None:
+            self.first_announced_at = now
+        self.addresses = addresses
+        if self.address not in addresses:
+            self.address = addresses[0] if addresses else None
+        rebooted = (
+            previous is not None
+            and previous.uid is not None
+            and announcement.uid is not None
+            and previous.uid != announcement.uid
+        )
+        if rebooted:
+            self.boots += 1
+            self._forget_plan()
+        return rebooted
+
+    def _forget_plan(self) -> None:
+        self.entities = None
+        self.operation_mode = self.plan_state = None
+        self.operation_mode_at = self.plan_state_at = None
+        self.telemetry_at = None
+        self.plan_id = ""
+        self._latest.clear()
+
+    # Packets and the vehicle's clock
+
+    def heard(self, now: float, address: Address) -> None:
+        """Note that a packet of its own arrived from one of its addresses."""
+        self.packets += 1
+        self.heard_at = now
+        self.address = address
+
+    def in_order(self, name: str, timestamp: float) -> bool:
+        """Whether a message is newer, by the vehicle's clock, than the last of its kind."""
+        if timestamp <= self._latest.get(name, -math.inf):
+            return False
+        self._latest[name] = timestamp
+        return True
+
+    def follow_clock(self, timestamp: float, wall_time_s: float) -> bool:
+        """Keep up with the vehicle's clock; True when it was set back and all history was dropped."""
+        if self._time_s is None or timestamp >= self._time_s:
+            self._time_s = timestamp
+            self._backward = 0
+        elif timestamp < self._time_s - LATE_S:
+            self._backward += 1
+            if self._backward >= CLOCK_JUMP_CONFIRMATIONS:
+                self.clock_jumps += 1
+                self._backward = 0
+                self._time_s = timestamp
+                self._latest.clear()
+                self.history.clear()
+                self.gate.clear()
+                self._uncertainty = None
+                self.clock_offset_s = timestamp - wall_time_s
+                return True
+        self.clock_offset_s = timestamp - wall_time_s
+        return False
+
+    # Telemetry
+
+    def take_state(self, message: Message) -> StateReport | None:
+        """EstimatedState: None when it is out of order, repeated or not finite."""
+        lat, lon, _height = toWGS84(message)
+        values = (lat, lon, message.depth, message.phi, message.theta, message.psi)
+        if not all(map(math.isfinite, values)) or abs(lat) > math.pi / 2:
+            return None
+        time_s = message.timestamp
+        sample = StateSample(
+            time_s, lat, lon, message.depth, message.phi, message.theta, math.remainder(message.psi, math.tau)
+        )
+        if not self.history.add(sample) or not self.in_order("EstimatedState", time_s):
+            return None
+        speed = math.hypot(message.vx, message.vy)
+        altitude = float(message.alt)
+        self.report = StateReport(
+            vehicle=self.name,
+            time_s=time_s,
+            lat_deg=math.degrees(lat),
+            lon_deg=math.degrees(lon),
+            depth_m=sample.depth_m,
+            heading_rad=sample.yaw_rad,
+            speed_mps=speed if math.isfinite(speed) else 0.0,
+            altitude_m=altitude if math.isfinite(altitude) and altitude >= 0.0 else None,
+            battery_pct=self.battery_pct,
+            position_sd_m=self.position_sd_m(),
+        )
+        return self.report
+
+    def take_uncertainty(self, message: Message) -> None:
+        """NavigationUncertainty: x and y are variances of the position."""
+        variance = 0.5 * (message.x + message.y)
+        if math.isfinite(variance) and variance >= 0.0:
+            self._uncertainty = (message.timestamp, math.sqrt(variance))
+
+    def position_sd_m(self) -> float | None:
+        """Standard deviation of the position per axis, None when the vehicle has not told it lately."""
+        if self._uncertainty is None or self._time_s is None:
+            return None
+        at_s, sd = self._uncertainty
+        return sd if self._time_s - at_s <= UNCERTAINTY_VALID_S else None
+
+    def take_vehicle_state(self, message: Message, now: float) -> None:
+        """VehicleState: the operation mode and the errors that explain it."""
+        self.operation_mode = int(message.op_mode)
+        self.operation_mode_at = now
+        self.error_text = ", ".join(filter(None, (str(message.error_ents), str(message.last_error))))
+
+    def take_plan_state(self, message: Message, now: float) -> None:
+        """PlanControlState."""
+        self.plan_state = int(message.state)
+        self.plan_state_at = now
+        self.plan_id = str(message.plan_id)
+
+    def take_entities(self, message: Message) -> None:
+        """EntityList report: ``Name=id;…``."""
+        entities = {}
+        for item in str(message.list).split(";"):
+            name, separator, number = item.rpartition("=")
+            if separator and number.isdigit():
+                entities[int(number)] = name
+        if entities:
+            self.entities = entities
+
+    def entity_name(self, entity: int) -> str | None:
+        """Name of an entity, None while names are unknown; an id the list lacks has the name ``entity N``."""
+        return None if self.entities is None else self.entities.get(entity, f"entity {entity}")
+
+    # Judgement
+
+    @property
+    def submerged(self) -> bool:
+        """Whether it was under water when last heard."""
+        return self.medium == MEDIUM_UNDERWATER or (self.report is not None and self.report.depth_m > SUBMERGED_DEPTH_M)
+
+    def can_start(self, now: float) -> bool:
+        """In service and ready for a plan, by messages that are not old."""
+        return (
+            self.operation_mode == OperationMode.SERVICE
+            and self.plan_state == PlanState.READY
+            and _fresh(self.operation_mode_at, now)
+            and _fresh(self.plan_state_at, now)
+        )
+
+    def executing(self, plan_id: str) -> bool:
+        """Whether its last plan state says that it executes a plan of this name."""
+        return self.plan_state in (PlanState.EXECUTING, PlanState.INITIALIZING) and self.plan_id == plan_id
+
+    def status(self, now: float) -> Status:
+        """The link's state and the reason for it."""
+        settings = self._settings
+        lost_after = max(settings.lost_after_s, settings.lost_after_wall_s * settings.time_scale)
+        if self.announcement is None:
+            ports = f"{settings.announce_ports[0]}-{settings.announce_ports[-1]}"
+            return Status(
+                NodeState.HEARD,
+                f"packets arrive but no announce: let it announce itself to UDP ports {ports} of this machine",
+            )
+        if self.address is None:
+            return Status(NodeState.HEARD, "its announce names no imc+udp address: enable its UDP transport")
+        if self.heard_at is None and self.announced_at is not None and self.first_announced_at is not None:
+            return self._without_telemetry(now, self.announced_at, self.first_announced_at)
+        silence = math.inf if self.heard_at is None else now - self.heard_at
+        if silence > lost_after:
+            return self._silent(silence)
+        if self.operation_mode is None or self.plan_state is None:
+            return Status(NodeState.ACTIVE, "waiting for its VehicleState and PlanControlState")
+        if self.plan_state in (PlanState.EXECUTING, PlanState.INITIALIZING):
+            if self.plan_state == PlanState.INITIALIZING:
+                return Status(NodeState.IN_PLAN, "starts a plan")
+            whose = "our plan" if self.plan_id == settings.plan_id else f"plan {self.plan_id!r} of another console"
+            return Status(NodeState.IN_PLAN, f"executes {whose}")
+        if self.operation_mode == OperationMode.SERVICE and self.plan_state == PlanState.READY:
+            return Status(NodeState.READY)
+        return Status(NodeState.ACTIVE, self._why_not_ready())
+
+    def _without_telemetry(self, now: float, announced_at: float, first_announced_at: float) -> Status:
+        if now - announced_at > ANNOUNCES_MISSED * self._settings.announce_period_s:
+            return Status(NodeState.LOST, "it announced itself and then fell silent")
+        if now - first_announced_at <= self._settings.telemetry_timeout_s:
+            return Status(NodeState.ANNOUNCED, "announced; its telemetry starts within 5 s of our heartbeats")
+        return Status(
+            NodeState.ANNOUNCED,
+            "announced but sends nothing to us: it may remember "
+            f"id 0x{self._settings.imc_id:04X} at another port (restart DUNE or return to that port), "
+            f"or a firewall blocks UDP port {self._settings.port}",
+        )
+
+    def _silent(self, silence: float) -> Status:
+        seconds = silence / self._settings.time_scale
+        foreign_plan = self.plan_state == PlanState.EXECUTING and self.plan_id != self._settings.plan_id
+        if self.submerged and foreign_plan:
+            return Status(
+                NodeState.EXPECTED_OFFLINE,
+                f"silent for {seconds:.0f} s, under water in plan {self.plan_id!r}: radio ends at the surface",
+            )
+        where = "under water" if self.submerged else "at the surface"
+        return Status(NodeState.LOST, f"silent for {seconds:.0f} s, last heard {where}")
+
+    def _why_not_ready(self) -> str:
+        mode = _enum_name(OperationMode, self.operation_mode)
+        if self.operation_mode == OperationMode.ERROR:
+            return f"in error: {self.error_text or 'no text given'}"
+        if self.plan_state == PlanState.BLOCKED:
+            return f"refuses plans (plan control blocked, mode {mode})"
+        return f"mode {mode}, plan control {_enum_name(PlanState, self.plan_state)}"
+
+    @property
+    def operation_mode_name(self) -> str | None:
+        """The operation mode in words."""
+        return None if self.operation_mode is None else _enum_name(OperationMode, self.operation_mode)
+
+    @property
+    def plan_state_name(self) -> str | None:
+        """The state of plan control in words."""
+        return None if self.plan_state is None else _enum_name(PlanState, self.plan_state)
+
+
+def _fresh(at: float | None, now: float) -> bool:
+    return at is not None and now - at <= STATE_MESSAGES_FRESH_S
+
+
+def _enum_name(kind: type[IntEnum], value: int | None) -> str:
+    try:
+        return kind(value).name.lower() if value is not None else "unknown"
+    except ValueError:
+        return f"unknown ({value})"

@@ -1,0 +1,131 @@
+"""Asks a vehicle for more frequent Distances and states, and gives it back its own rates afterwards."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import imcpy
+
+from imc_bridge.codec import Message
+
+ENTITY = "UDP"
+PARAMETER = "Rate Limiters"
+RETRY_S = 3.0
+MAX_TRIES = 5
+QUERY_TRIES = 2
+
+
+def merge_limiters(former: str, wanted: str) -> str:
+    """The former list with the wanted limits in it: ``"GpsFix:1, Distance:0.2"`` + ``"Distance:5"``."""
+    limits: dict[str, str] = {}
+    for text in (former, wanted):
+        for item in text.split(","):
+            name, separator, value = item.partition(":")
+            if separator:
+                limits[name.strip()] = value.strip()
+    return ", ".join(f"{name}:{value}" for name, value in limits.items())
+
+
+class RateRequest:
+    """The rate limiters of one vehicle: read, set until confirmed, restored.
+
+    Parameters
+    ----------
+    wanted
+        ``"Distance:5, EstimatedState:10"``; empty asks for nothing.
+    send
+        Sends a message to the vehicle.
+    """
+
+    def __init__(self, wanted: str, send: Callable[[Message], None]) -> None:
+        self._wanted = wanted
+        self._send = send
+        self._former: str | None = None
+        self._set: str | None = None
+        self._active = False
+        self._confirmed = False
+        self._tries = 0
+        self._due = 0.0
+
+    @property
+    def pending(self) -> bool:
+        """Whether something is still to be sent or confirmed."""
+        return self._active and not self._confirmed
+
+    @property
+    def text(self) -> str:
+        """How far it has come, in words."""
+        if not self._active:
+            return "as the vehicle has them"
+        if self._confirmed:
+            return f"set to {self._set}"
+        return "asked for" if self._tries < MAX_TRIES + QUERY_TRIES else "not confirmed by the vehicle"
+
+    def begin(self) -> None:
+        """Start asking; also after a restart of the vehicle, which forgets."""
+        if self._wanted:
+            self._active = True
+            self._confirmed = False
+            self._tries = 0
+            self._due = 0.0
+
+    def tick(self, now: float) -> None:
+        """Send what is due: first the query of the former value, then the request."""
+        if not self._active or self._confirmed or now < self._due or self._tries >= MAX_TRIES + QUERY_TRIES:
+            return
+        self._due = now + RETRY_S
+        self._tries += 1
+        if self._former is None and self._tries <= QUERY_TRIES:
+            query = imcpy.QueryEntityParameters()
+            query.name = ENTITY
+            # DUNE answers with every parameter visible to users in the global scope.
+            query.visibility = "developer"
+            query.scope = "global"
+            self._send(query)
+            return
+        self._set = merge_limiters(self._former or "", self._wanted)
+        self._send(_set_message(self._set))
+
+    def answered(self, message: Message, now: float) -> None:
+        """EntityParameters of the vehicle: the former value, or the confirmation."""
+        if str(message.name) != ENTITY:
+            return
+        for parameter in message.params:
+            if str(parameter.name) == PARAMETER:
+                value = str(parameter.value)
+                if self._set is not None and _same(value, self._set):
+                    self._confirmed = True
+                elif self._former is None and self._set is None:
+                    self._former = value
+                    self._due = now
+
+    def observed(self, state_rate_hz: float) -> None:
+        """Let a vehicle that does not answer confirm by what it sends."""
+        for item in self._wanted.split(","):
+            name, _, value = item.partition(":")
+            if name.strip() == "EstimatedState" and self._set is not None:
+                try:
+                    self._confirmed = self._confirmed or state_rate_hz >= 0.6 * float(value)
+                except ValueError:
+                    return
+
+    def restore(self) -> None:
+        """Give the vehicle its former rates back, when they are known."""
+        if self._active and self._set is not None and self._former is not None:
+            self._send(_set_message(self._former))
+        self._active = False
+        self._set = None
+
+
+def _same(a: str, b: str) -> bool:
+    return a.replace(" ", "") == b.replace(" ", "")
+
+
+def _set_message(value: str) -> Message:
+    parameter = imcpy.EntityParameter()
+    parameter.name = PARAMETER
+    parameter.value = value
+    message = imcpy.SetEntityParameters()
+    message.name = ENTITY
+    message.params.append(parameter)
+    return message

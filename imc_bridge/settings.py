@@ -1,0 +1,135 @@
+"""Everything that can be set about the IMC side, in one frozen place."""
+
+from __future__ import annotations
+
+import ipaddress
+from dataclasses import dataclass
+from typing import Literal
+
+STANDARD_ANNOUNCE_PORTS = (30100, 30101, 30102, 30103, 30104)
+STANDARD_MULTICAST_GROUP = "224.0.75.69"
+
+AltimeterGeometry = Literal["vertical", "body"]
+
+
+@dataclass(frozen=True, slots=True)
+class BridgeSettings:
+    """How this console appears on the IMC network and how it drives vehicles.
+
+    Every ``*_s`` value is in seconds of the vehicles' clock; with ``time_scale`` 20 a period of 1 s lasts 50 ms.
+
+    Raises
+    ------
+    ValueError
+        Naming the field, its value and what would be right.
+    """
+
+    imc_id: int = 0x3F01
+    """Our IMC address. Vehicles remember an id with its port until they restart: keep both fixed."""
+    name: str = "bathyfleet"
+    port: int = 6101
+    loopback_only: bool = False
+    """Reach only vehicles on this machine; nothing goes out on any network."""
+    interfaces: tuple[str, ...] = ()
+    """IPv4 addresses of the interfaces to announce on; empty means all of them."""
+    announce_ports: tuple[int, ...] = STANDARD_ANNOUNCE_PORTS
+    multicast_group: str = STANDARD_MULTICAST_GROUP
+    vehicles: tuple[str, ...] = ()
+    """Names of the vehicles to talk to; empty means every vehicle that announces itself."""
+    time_scale: float = 1.0
+    """How many times faster than the wall clock the vehicles live (simulations only)."""
+
+    announce_period_s: float = 10.0
+    heartbeat_period_s: float = 1.0
+    reference_period_s: float = 1.0
+    """A Reference has to reach a vehicle every 5 s or its plan fails."""
+    telemetry_timeout_s: float = 10.0
+    """An announced vehicle that sends nothing for this long is reported with the likely causes."""
+    lost_after_s: float = 10.0
+    release_after_s: float = 30.0
+    """A vehicle silent for this long is no longer ours: its plan has ended by itself."""
+    lost_after_wall_s: float = 1.0
+    """Silence shorter than this on the wall clock is never a loss, whatever ``time_scale`` says."""
+
+    plan_id: str = "bathyfleet"
+    follow_timeout_s: float = 30.0
+    loiter_radius_m: float = 7.5
+    engage_timeout_s: float = 15.0
+    start_timeout_s: float = 10.0
+    answer_timeout_s: float = 10.0
+    """A live vehicle that leaves references unanswered for this long has its plan restarted."""
+    max_restarts: int = 3
+    restart_forgiven_after_s: float = 60.0
+    depth_tolerance_m: float = 1.0
+
+    rate_limiters: str = "Distance:5, EstimatedState:10"
+    """Asked of every engaged vehicle, the former value is restored afterwards; empty leaves rates alone."""
+    state_events_per_s: float = 10.0
+    """At most so many state reports per vehicle and second of the wall clock are passed on."""
+
+    altimeter: AltimeterGeometry = "vertical"
+    """``vertical``: the range is the height above the bottom (DUNE's simulation); ``body``: fixed to the hull."""
+    max_range_m: float = 200.0
+    guard_radius_m: float = 20.0
+    """Soundings within this distance of the vehicle count as the bottom near it."""
+    guard_window_s: float = 30.0
+    unknown_bottom_depth_m: float = 2.0
+    """Deepest reference while no bottom has been measured near the vehicle."""
+
+    def __post_init__(self) -> None:
+        def check(field: str, good: bool, right: str) -> None:
+            if not good:
+                raise ValueError(f"{field} = {getattr(self, field)!r}: it must be {right}")
+
+        check(
+            "imc_id",
+            0 < self.imc_id < 0xFFFF,
+            "between 0x0001 and 0xFFFE",
+        )
+        check("name", bool(self.name) and len(self.name) <= 64, "1 to 64 characters")
+        check("port", 0 < self.port <= 65535, "between 1 and 65535")
+        ports = self.announce_ports
+        check(
+            "announce_ports",
+            bool(ports) and all(0 < p <= 65535 for p in ports),
+            "at least one port, 1 to 65535",
+        )
+        check(
+            "multicast_group",
+            _is_multicast(self.multicast_group),
+            "an IPv4 multicast address such as 224.0.75.69",
+        )
+        check("interfaces", all(map(_is_ipv4, self.interfaces)), "IPv4 addresses of this machine's interfaces")
+        check("time_scale", 0.01 <= self.time_scale <= 1000.0, "between 0.01 and 1000 (1 = real time)")
+        check("reference_period_s", 0.0 < self.reference_period_s < 5.0, "below 5 s, or vehicles give up")
+        check("plan_id", bool(self.plan_id), "a name that no other console uses")
+        check("altimeter", self.altimeter in ("vertical", "body"), "'vertical' or 'body'")
+        for field in (
+            "announce_period_s",
+            "heartbeat_period_s",
+            "telemetry_timeout_s",
+            "lost_after_s",
+            "release_after_s",
+            "follow_timeout_s",
+            "engage_timeout_s",
+            "start_timeout_s",
+            "answer_timeout_s",
+            "depth_tolerance_m",
+            "max_range_m",
+            "guard_radius_m",
+            "guard_window_s",
+            "state_events_per_s",
+        ):
+            check(field, getattr(self, field) > 0.0, "positive")
+
+
+def _is_ipv4(text: str) -> bool:
+    try:
+        ipaddress.IPv4Address(text)
+    except ValueError:
+        return False
+    return True
+
+
+def _is_multicast(text: str) -> bool:
+    return _is_ipv4(text) and ipaddress.IPv4Address(text).is_multicast

@@ -1,0 +1,1 @@
+"""What plays the world: sea floors, vehicles, sensors, networks and fake DUNE nodes."""

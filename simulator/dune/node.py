@@ -1,0 +1,458 @@
+"""One fake DUNE node: announces itself, sends telemetry, takes commands, over real UDP."""
+
+from __future__ import annotations
+
+import logging
+import math
+import struct
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from ipaddress import ip_address
+
+import imcpy
+import numpy as np
+
+from simulator.clock import SimulationClock
+from simulator.dune.contacts import REFRESH_PERIOD_S, Contacts
+from simulator.dune.entities import ANY, HARDWARE_DVL, HARDWARE_MULTIBEAM, SIMULATION, entity_list
+from simulator.dune.plan import PLAN_ENGINE, SUPERVISOR, PlanEngine
+from simulator.dune.rates import DEFAULT_LIMITS_HZ, Periodic, RateLimiter, RateLimiterError, parse_limits
+from simulator.dune.telemetry import Telemetry
+from simulator.network import Address, Endpoint, NetworkFaults, UdpEndpoint
+from simulator.sensors import SensorKind, cast_rays, to_local_frame
+from simulator.vehicle import STEP_S
+from simulator.world import SimulatedVehicle
+
+log = logging.getLogger(__name__)
+
+PORT_TRIES = 5
+"""DUNE takes the first free one of this many ports."""
+DEFAULT_ANNOUNCE_PORTS = (30100, 30101, 30102, 30103, 30104)
+ANNOUNCE_PERIOD_S = 10.0
+BOOT_S = 5.0
+UDP_ENTITY = "UDP"
+RATE_LIMITERS = "Rate Limiters"
+FORWARD_RANGE_M = 30.0
+
+_BROADCAST = 0xFFFF
+_HEADER = struct.Struct("<HHHdHBHB")
+_HEADER_BIG = struct.Struct(">HHHdHBHB")
+_SYNC = 0xFE54
+
+_ANNOUNCE = imcpy.Announce().msg_id
+_HEARTBEAT = imcpy.Heartbeat().msg_id
+_PLAN_CONTROL = imcpy.PlanControl().msg_id
+_ENTITY_LIST = imcpy.EntityList().msg_id
+_TRANSPORTED = frozenset({_HEARTBEAT, _PLAN_CONTROL, _ENTITY_LIST})
+"""What is heard and passed on to every active system, the sender included."""
+
+
+@dataclass(frozen=True, slots=True)
+class DuneOptions:
+    """Settings shared by the nodes of a fleet.
+
+    Attributes
+    ----------
+    bind_address
+        Where the imc+udp socket listens, and the address told in the announce.
+    announce_addresses, announce_ports
+        Every combination gets the announce.
+    faults
+        Of the network, in both directions.
+    chatter
+        Also send servo positions and attitude at full rate, as a real vehicle does.
+    boot_s
+        Vehicle time from start to service.
+    """
+
+    bind_address: str = "127.0.0.1"
+    announce_addresses: tuple[str, ...] = ("127.0.0.1",)
+    announce_ports: tuple[int, ...] = DEFAULT_ANNOUNCE_PORTS
+    faults: NetworkFaults = field(default_factory=NetworkFaults)
+    chatter: bool = False
+    boot_s: float = BOOT_S
+
+    def __post_init__(self) -> None:
+        try:
+            unspecified = ip_address(self.bind_address).is_unspecified
+        except ValueError:
+            unspecified = True
+        if unspecified:
+            raise ValueError(
+                f"bind address is {self.bind_address!r}; it must be an IP address of this host that consumers "
+                "reach, because the announce tells it to them"
+            )
+
+
+@dataclass(slots=True)
+class NodeCounts:
+    """What a node did with what it heard."""
+
+    accepted: int = 0
+    malformed: int = 0
+    strangers: int = 0
+    """Packets of systems that never announced the address they came from."""
+
+
+class FakeDune:
+    """One vehicle's DUNE, as a consumer sees it.
+
+    Parameters
+    ----------
+    vehicle
+        The vehicle on board of which it runs.
+    imc_id
+        Its IMC address.
+    port
+        First choice of the imc+udp port; the next four are tried when it is taken.
+    clock
+        Vehicle time.
+    options
+        Shared settings.
+    rng
+        Source of the network's faults.
+    """
+
+    def __init__(
+        self,
+        vehicle: SimulatedVehicle,
+        imc_id: int,
+        port: int,
+        clock: SimulationClock,
+        options: DuneOptions,
+        rng: np.random.Generator,
+    ) -> None:
+        if not 0 < imc_id < _BROADCAST:
+            raise ValueError(f"{vehicle.name}: IMC id is {imc_id:#x}; it must be 0x0001 to 0xfffe")
+        self.vehicle = vehicle
+        self.imc_id = imc_id
+        self.counts = NodeCounts()
+        self.contacts = Contacts()
+        self.limiter = RateLimiter(DEFAULT_LIMITS_HZ)
+        self.plan = PlanEngine(vehicle, imc_id, vehicle.terrain.frame, self.send, clock.now() + options.boot_s)
+        self.first_port = port
+        self._clock = clock
+        self._options = options
+        self._rng = rng
+        self._entities = dict(SIMULATION)
+        self._extra: dict[str, int] = {}
+        if vehicle.sonar.kind is SensorKind.DVL:
+            self._extra = HARDWARE_DVL
+        elif vehicle.sonar.kind is SensorKind.MULTIBEAM:
+            self._extra = HARDWARE_MULTIBEAM
+        self._entities |= self._extra
+        self._endpoint: Endpoint | None = None
+        self._announcer: Endpoint | None = None
+        self._telemetry: Telemetry | None = None
+        self._now_s = clock.now()
+        self._announce = Periodic(ANNOUNCE_PERIOD_S, self._now_s)
+        self._refresh = Periodic(REFRESH_PERIOD_S, self._now_s + REFRESH_PERIOD_S)
+        self._chatter_owed = 0.0
+        self._rate_text = ", ".join(f"{name}:{rate:g}" for name, rate in DEFAULT_LIMITS_HZ.items())
+        self._schedule: list[tuple[Periodic, Callable[[], None]]] = []
+        self._handlers: dict[int, Callable[[imcpy.Message, float], None]] = {
+            _HEARTBEAT: lambda message, now_s: None,
+            _PLAN_CONTROL: self._on_plan_control,
+            _ENTITY_LIST: self._on_entity_list,
+            imcpy.Reference().msg_id: self._on_reference,
+            imcpy.Abort().msg_id: self._on_abort,
+            imcpy.SetEntityParameters().msg_id: self._on_set_parameters,
+            imcpy.QueryEntityParameters().msg_id: self._on_query_parameters,
+        }
+
+    @property
+    def name(self) -> str:
+        """The vehicle's name."""
+        return self.vehicle.name
+
+    @property
+    def address(self) -> Address:
+        """Where the node listens."""
+        if self._endpoint is None:
+            raise RuntimeError(f"{self.name}: the node is not started")
+        return self._endpoint.address
+
+    async def start(self) -> None:
+        """Take the sockets and begin to announce. Raises OSError when none of the ports is free."""
+        host = self._options.bind_address
+        endpoint = None
+        for port in range(self.first_port, self.first_port + PORT_TRIES):
+            try:
+                endpoint = await UdpEndpoint.open(
+                    (host, port), self.receive, faults=self._options.faults, rng=self._rng
+                )
+                break
+            except OSError as error:
+                log.warning("%s: failed to bind to port %d: %s", self.name, port, error)
+        if endpoint is None:
+            last = self.first_port + PORT_TRIES - 1
+            raise OSError(f"{self.name}: none of the ports {self.first_port} to {last} is free on {host}")
+        announcer = await UdpEndpoint.open(
+            (host, 0),
+            lambda data, address: None,
+            faults=self._options.faults,
+            rng=self._rng,
+            broadcast=True,
+        )
+        self.attach(endpoint, announcer)
+
+    def attach(self, endpoint: Endpoint, announcer: Endpoint) -> None:
+        """Use these sockets, which :meth:`start` opens: for telemetry and commands, and for announces."""
+        self._endpoint, self._announcer = endpoint, announcer
+        host, port = endpoint.address
+        services = (
+            f"dune://0.0.0.0/uid/{1000 + self.imc_id};dune://0.0.0.0/version/2026.01.0;"
+            f"imc+info://0.0.0.0/version/5.4.31;imc+udp://{host}:{port}/"
+        )
+        self._telemetry = Telemetry(self.vehicle, self.vehicle.terrain.frame, self.name, services)
+        self._schedule = self._periodic_messages(self._telemetry)
+
+    def stop(self) -> None:
+        """Release the sockets."""
+        for endpoint in (self._endpoint, self._announcer):
+            if endpoint is not None:
+                endpoint.close()
+        self._endpoint = self._announcer = None
+
+    def send(
+        self,
+        message: imcpy.Message,
+        entity: int,
+        dst: int = _BROADCAST,
+        dst_ent: int = ANY,
+        src: int | None = None,
+    ) -> None:
+        """Send a message of this node to every active system."""
+        endpoint, destinations = self._endpoint, self.contacts.destinations
+        if endpoint is None or not destinations:
+            return
+        message.timestamp = self._now_s
+        message.src = self.imc_id if src is None else src
+        message.src_ent = entity
+        message.dst = dst
+        message.dst_ent = dst_ent
+        data = message.serialize()
+        for destination in destinations:
+            endpoint.send(data, destination)
+
+    def on_announce(self, data: bytes, sender: Address) -> None:
+        """Learn a system from a packet on an announce port."""
+        message = self._decode(data)
+        if isinstance(message, imcpy.Announce) and message.src != self.imc_id:
+            self.contacts.announced(message.src, message.sys_name, message.services)
+
+    def step(self, now_s: float) -> None:
+        """Advance by one step of vehicle time, to ``now_s``, and send what is due."""
+        self._now_s = now_s
+        ping = self.vehicle.step()
+        self.plan.tick(now_s)
+        if self._announce.due(now_s):
+            self._send_announce()
+        if self._refresh.due(now_s):
+            for contact, active in self.contacts.refresh(now_s):
+                doing = "activating" if active else "deactivating"
+                self._log_book(f"{doing} transmission to node '{contact.name}'")
+        if not self.contacts.destinations:
+            return
+        for periodic, emit in self._schedule:
+            if periodic.due(now_s):
+                emit()
+        if ping:
+            self._send_ranges()
+        if self._options.chatter:
+            self._send_chatter()
+
+    def _periodic_messages(self, t: Telemetry) -> list[tuple[Periodic, Callable[[], None]]]:
+        ids, now_s = self._entities, self._now_s
+
+        def limited(name: str, entity: int, build: Callable[[], imcpy.Message]) -> Callable[[], None]:
+            def emit() -> None:
+                if self.limiter.passes(name, entity, self._now_s):
+                    self.send(build(), entity)
+
+            return emit
+
+        def plain(entity: int, build: Callable[[], imcpy.Message]) -> Callable[[], None]:
+            return lambda: self.send(build(), entity)
+
+        return [
+            (Periodic(STEP_S, now_s), limited("EstimatedState", ids["Navigation"], t.estimated_state)),
+            (Periodic(STEP_S, now_s), limited("SimulatedState", ids["Simulation Engine"], t.simulated_state)),
+            (Periodic(1.0, now_s), plain(0, imcpy.Heartbeat)),
+            (Periodic(1.0 / 3.0, now_s), plain(PLAN_ENGINE, self.plan.plan_control_state)),
+            (Periodic(0.5, now_s), plain(SUPERVISOR, self.plan.vehicle_state)),
+            (Periodic(1.0, now_s), plain(ids["GPS"], t.gps_fix)),
+            (Periodic(1.0, now_s), plain(ids["Medium"], t.medium)),
+            (Periodic(1.0, now_s), plain(ids["Navigation"], t.navigation_uncertainty)),
+        ]
+
+    def _send_announce(self) -> None:
+        if self._announcer is None or self._telemetry is None:
+            return
+        message = self._telemetry.announce()
+        message.timestamp = self._now_s
+        message.src = self.imc_id
+        message.src_ent = SIMULATION["Service Announcer"]
+        message.dst = 0
+        message.dst_ent = ANY
+        data = message.serialize()
+        for host in self._options.announce_addresses:
+            for port in self._options.announce_ports:
+                self._announcer.send(data, (host, port))
+
+    def _send_ranges(self) -> None:
+        t = self._telemetry
+        if t is None:
+            return
+        vehicle, now_s, passes = self.vehicle, self._now_s, self.limiter.passes
+        if vehicle.sonar.kind is SensorKind.MULTIBEAM:
+            entity = self._entities["Multibeam"]
+            if passes("SonarData", entity, now_s):
+                swath = vehicle.measure()
+                beams = vehicle.sonar.beams
+                width = float(beams.tilt_rad[0] + beams.tilt_rad[-1])
+                self.send(t.sonar_data(swath, width, vehicle.sonar.max_range_m), entity)
+        else:
+            entities = (
+                [self._entities[f"DVL Beam {k}"] for k in range(4)]
+                if vehicle.sonar.kind is SensorKind.DVL
+                else [self._entities["Altimeter"]]
+            )
+            wanted = [passes("Distance", entity, now_s) for entity in entities]
+            if any(wanted):
+                for entity, send, measurement in zip(entities, wanted, vehicle.measure(), strict=True):
+                    if send:
+                        self.send(t.distance(measurement), entity)
+        forward = self._entities["Echo Sounder"]
+        if passes("Distance", forward, now_s):
+            self.send(t.forward_distance(self._forward_range_m()), forward)
+
+    def _forward_range_m(self) -> float:
+        m = self.vehicle.vehicle.motion
+        bow = to_local_frame(np.array([[1.0, 0.0, 0.0]]), m.heading_rad, m.pitch_rad, m.roll_rad)
+        found = cast_rays(self.vehicle.terrain, m.east_m, m.north_m, m.depth_m, bow, FORWARD_RANGE_M)[0]
+        return float(found) if math.isfinite(found) else FORWARD_RANGE_M
+
+    def _send_chatter(self) -> None:
+        """Attitude of an AHRS at 94 Hz and four servos each as often."""
+        self._chatter_owed += 94.0 * STEP_S
+        m = self.vehicle.vehicle.motion
+        while self._chatter_owed >= 1.0:
+            self._chatter_owed -= 1.0
+            euler = imcpy.EulerAngles()
+            euler.phi, euler.theta, euler.psi = m.roll_rad, m.pitch_rad, m.heading_rad
+            rates = imcpy.AngularVelocity()
+            rates.z = m.turn_rate_radps
+            for message in (euler, rates, imcpy.Acceleration()):
+                self.send(message, self._entities["AHRS"])
+            for servo in range(4):
+                position = imcpy.ServoPosition()
+                position.id = servo
+                self.send(position, self._entities["Servos"])
+
+    def receive(self, data: bytes, sender: Address) -> None:
+        """Take a packet from the network."""
+        header = _read_header(data)
+        if header is None:
+            self.counts.malformed += 1
+            return
+        message_id, source = header
+        handler = self._handlers.get(message_id)
+        if message_id == _ANNOUNCE:
+            self.on_announce(data, sender)
+            return
+        # Commands may come between two steps of the simulation.
+        now_s = max(self._now_s, self._clock.now())
+        if self.contacts.heard(source, sender, now_s) is None:
+            self.counts.strangers += 1
+            return
+        if handler is None:
+            return
+        message = self._decode(data)
+        if message is None:
+            return
+        self.counts.accepted += 1
+        self._now_s = now_s
+        if message_id in _TRANSPORTED and self._endpoint is not None:
+            for destination in self.contacts.destinations:
+                self._endpoint.send(data, destination)
+        handler(message, now_s)
+
+    def _decode(self, data: bytes) -> imcpy.Message | None:
+        try:
+            return imcpy.Packet.deserialize(data)
+        except (RuntimeError, ValueError) as error:
+            self.counts.malformed += 1
+            log.debug("%s: packet not understood: %s", self.name, error)
+            return None
+
+    def _on_plan_control(self, message: imcpy.Message, now_s: float) -> None:
+        if isinstance(message, imcpy.PlanControl) and message.dst == self.imc_id:
+            self.plan.on_plan_control(message, now_s)
+
+    def _on_reference(self, message: imcpy.Message, now_s: float) -> None:
+        if isinstance(message, imcpy.Reference) and message.dst == self.imc_id:
+            self.plan.on_reference(message, now_s)
+
+    def _on_abort(self, message: imcpy.Message, now_s: float) -> None:
+        if message.dst == self.imc_id:
+            who = f"{self.contacts.name_of(message.src)} - 0x{message.src:04X}"
+            self.plan.on_abort(f"{who} @ 0x{message.src_ent:02X}", now_s)
+
+    def _on_entity_list(self, message: imcpy.Message, now_s: float) -> None:
+        if not isinstance(message, imcpy.EntityList) or message.dst not in (self.imc_id, _BROADCAST):
+            return
+        if message.op == imcpy.EntityList.OperationEnum.QUERY:
+            report = imcpy.EntityList()
+            report.op = imcpy.EntityList.OperationEnum.REPORT
+            report.list = entity_list(self._extra)
+            self.send(report, 0, message.src)
+
+    def _on_set_parameters(self, message: imcpy.Message, now_s: float) -> None:
+        if not isinstance(message, imcpy.SetEntityParameters) or message.dst != self.imc_id:
+            return
+        if message.name != UDP_ENTITY:
+            return
+        for parameter in message.params:
+            if parameter.name != RATE_LIMITERS:
+                continue
+            try:
+                limits = parse_limits(parameter.value)
+            except RateLimiterError as error:
+                self._log_book(str(error))
+                continue
+            self.limiter.update(limits)
+            self._rate_text = parameter.value
+
+    def _on_query_parameters(self, message: imcpy.Message, now_s: float) -> None:
+        if not isinstance(message, imcpy.QueryEntityParameters) or message.dst != self.imc_id:
+            return
+        if message.name != UDP_ENTITY:
+            return
+        reply = imcpy.EntityParameters()
+        reply.name = UDP_ENTITY
+        parameter = imcpy.EntityParameter()
+        parameter.name = RATE_LIMITERS
+        parameter.value = self._rate_text
+        reply.params.append(parameter)
+        self.send(reply, self._entities[UDP_ENTITY], message.src)
+
+    def _log_book(self, text: str) -> None:
+        log.info("%s: %s", self.name, text)
+        entry = imcpy.LogBookEntry()
+        entry.htime = self._now_s
+        entry.context = "Transports.UDP"
+        entry.text = text
+        self.send(entry, self._entities[UDP_ENTITY])
+
+
+def _read_header(data: bytes) -> tuple[int, int] | None:
+    """Message id and source of a packet in either byte order, None where it is not IMC."""
+    if len(data) < _HEADER.size + 2:
+        return None
+    fields: Sequence[int] = _HEADER.unpack_from(data)
+    if fields[0] != _SYNC:
+        fields = _HEADER_BIG.unpack_from(data)
+        if fields[0] != _SYNC:
+            return None
+    return fields[1], fields[4]

@@ -1,0 +1,223 @@
+"""Sonars that look at the sea floor: single beam, four-beam DVL, multibeam swath."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simulator.terrain import Terrain
+from simulator.vehicle import Motion
+
+FloatArray = NDArray[np.float64]
+
+DVL_TILT_RAD = math.radians(22.5)
+
+
+class SensorKind(StrEnum):
+    """The sonars a vehicle can carry."""
+
+    SINGLE = "single"
+    DVL = "dvl"
+    MULTIBEAM = "multibeam"
+
+
+@dataclass(frozen=True, slots=True)
+class Beams:
+    """Directions of a sonar's beams in the vehicle's body, each array of shape (n,).
+
+    A beam leaves the vertical body axis by ``tilt_rad`` towards ``azimuth_rad`` (clockwise from the bow).
+    """
+
+    tilt_rad: FloatArray
+    azimuth_rad: FloatArray
+
+    def __len__(self) -> int:
+        return len(self.tilt_rad)
+
+    @property
+    def body(self) -> FloatArray:
+        """Unit vectors (forward, starboard, down), shape (n, 3)."""
+        sin = np.sin(self.tilt_rad)
+        return np.column_stack([sin * np.cos(self.azimuth_rad), sin * np.sin(self.azimuth_rad), np.cos(self.tilt_rad)])
+
+
+@dataclass(frozen=True, slots=True)
+class SonarNoise:
+    """Errors of a sonar.
+
+    Attributes
+    ----------
+    relative_sd
+        Standard deviation of xi in ``y = r (1 + xi)`` (MED13, AURO15).
+    outlier_rate
+        Probability that a return is false: half of them come short (fish, bubbles), half as a double echo.
+    dropout_rate
+        Probability that there is no return.
+    """
+
+    relative_sd: float = 0.0
+    outlier_rate: float = 0.0
+    dropout_rate: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name, value, most in (
+            ("relative_sd", self.relative_sd, 1.0),
+            ("outlier_rate", self.outlier_rate, 1.0),
+            ("dropout_rate", self.dropout_rate, 1.0),
+        ):
+            if not 0.0 <= value <= most:
+                raise ValueError(f"sonar noise: {name} is {value}; it must be within 0 to {most:g}")
+
+
+def beams_of(kind: SensorKind, *, swath_rad: float = math.radians(120.0), swath_beams: int = 32) -> Beams:
+    """The beams of a kind of sonar.
+
+    The DVL's beams 0 to 3 point to heading +0, 90, 180, 270 degrees, 22.5 degrees off the vertical; the swath
+    lies across the heading, from port to starboard.
+    """
+    if kind is SensorKind.SINGLE:
+        return Beams(np.zeros(1), np.zeros(1))
+    if kind is SensorKind.DVL:
+        return Beams(np.full(4, DVL_TILT_RAD), np.radians([0.0, 90.0, 180.0, 270.0]))
+    across = np.linspace(-0.5 * swath_rad, 0.5 * swath_rad, swath_beams)
+    return Beams(np.abs(across), np.where(across < 0.0, -0.5 * math.pi, 0.5 * math.pi))
+
+
+def to_local_frame(body: FloatArray, heading_rad: float, pitch_rad: float, roll_rad: float) -> FloatArray:
+    """Turn body vectors (forward, starboard, down) into (east, north, down), shape (n, 3) each."""
+    cr, sr = math.cos(roll_rad), math.sin(roll_rad)
+    cp, sp = math.cos(pitch_rad), math.sin(pitch_rad)
+    ch, sh = math.cos(heading_rad), math.sin(heading_rad)
+    x, y, z = body[:, 0], body[:, 1], body[:, 2]
+    y, z = cr * y - sr * z, sr * y + cr * z
+    x, z = cp * x + sp * z, -sp * x + cp * z
+    return np.column_stack([sh * x + ch * y, ch * x - sh * y, z])
+
+
+def cast_rays(
+    terrain: Terrain,
+    east_m: float,
+    north_m: float,
+    depth_m: float,
+    directions: FloatArray,
+    max_range_m: float,
+) -> FloatArray:
+    """Distance along each ray to the sea floor.
+
+    Marches in steps of half a cell to the first sample below the floor, then bisects to a millimetre. A ray
+    that grazes a crest over less than half a cell may pass it.
+
+    Parameters
+    ----------
+    directions
+        Unit vectors (east, north, down), shape (n, 3).
+
+    Returns
+    -------
+    Ranges in metres, shape (n,), NaN where nothing is hit within the range or the floor is unknown.
+    """
+    ranges = np.full(len(directions), np.nan)
+    down = directions[:, 2]
+    with np.errstate(divide="ignore"):
+        # A ray that goes down cannot pass the deepest point of the floor.
+        reach = np.where(down > 0.0, (terrain.max_depth_m - depth_m) / np.maximum(down, 1e-9), np.inf)
+    limit = min(max_range_m, float(np.max(np.minimum(reach, max_range_m))) + terrain.cell_m)
+    if limit <= 0.0:
+        return ranges
+    step = 0.5 * terrain.cell_m
+    at = np.arange(0.0, limit + step, step)
+    de, dn, dd = (directions[:, k, None] for k in range(3))
+    gap = terrain.depth_at(east_m + at * de, north_m + at * dn) - (depth_m + at * dd)
+    below = gap <= 0.0
+    hit = below.any(axis=1)
+    if not hit.any():
+        return ranges
+    first = np.argmax(below, axis=1)
+    # The sample before must be known and above the floor, or the ray came up from an unknown place.
+    valid = hit & (first > 0) & np.isfinite(gap[np.arange(len(gap)), np.maximum(first - 1, 0)])
+    index = np.flatnonzero(valid)
+    if index.size == 0:
+        return ranges
+    far = at[first[index]]
+    near = at[first[index] - 1]
+    d = directions[index]
+    for _ in range(max(1, math.ceil(math.log2(step / 1e-3)))):
+        middle = 0.5 * (near + far)
+        floor = terrain.depth_at(east_m + middle * d[:, 0], north_m + middle * d[:, 1])
+        deeper = floor <= depth_m + middle * d[:, 2]
+        far = np.where(deeper, middle, far)
+        near = np.where(deeper, near, middle)
+    found = 0.5 * (near + far)
+    ranges[index] = np.where(found <= max_range_m, found, np.nan)
+    return ranges
+
+
+class Sonar:
+    """One sonar on one vehicle.
+
+    Parameters
+    ----------
+    kind
+        Which one.
+    noise
+        Its errors.
+    rng
+        Source of the errors.
+    ping_period_s
+        Simulated time between two pings.
+    max_range_m, min_range_m
+        Outside of which nothing is returned.
+    """
+
+    def __init__(
+        self,
+        kind: SensorKind,
+        noise: SonarNoise,
+        rng: np.random.Generator,
+        *,
+        ping_period_s: float = 0.2,
+        max_range_m: float = 100.0,
+        min_range_m: float = 0.1,
+        swath_rad: float = math.radians(120.0),
+        swath_beams: int = 32,
+    ) -> None:
+        if not ping_period_s > 0.0:
+            raise ValueError(f"sonar: ping_period_s is {ping_period_s}; it must be positive")
+        self.kind = kind
+        self.noise = noise
+        self.beams = beams_of(kind, swath_rad=swath_rad, swath_beams=swath_beams)
+        self.ping_period_s = ping_period_s
+        self.max_range_m = max_range_m
+        self.min_range_m = min_range_m
+        self._rng = rng
+        self._body = self.beams.body
+
+    def true_ranges(self, terrain: Terrain, motion: Motion) -> FloatArray:
+        """Ranges without any error, shape (n_beams,), NaN for no return."""
+        if self.kind is SensorKind.SINGLE:
+            # An altimeter's cone is wider than the pitch of flight: it sees the point below, as DUNE's does.
+            floor = terrain.depth_at_point(motion.east_m, motion.north_m)
+            return np.array([floor - motion.depth_m])
+        directions = to_local_frame(self._body, motion.heading_rad, motion.pitch_rad, motion.roll_rad)
+        return cast_rays(terrain, motion.east_m, motion.north_m, motion.depth_m, directions, self.max_range_m)
+
+    def ping(self, terrain: Terrain, motion: Motion) -> FloatArray:
+        """Measured ranges, shape (n_beams,), NaN for no return."""
+        ranges = self.true_ranges(terrain, motion)
+        n, noise = len(ranges), self.noise
+        if noise.relative_sd > 0.0:
+            ranges = ranges * (1.0 + noise.relative_sd * self._rng.standard_normal(n))
+        if noise.outlier_rate > 0.0:
+            false = self._rng.random(n) < noise.outlier_rate
+            short = self._rng.random(n) < 0.5
+            wrong = np.where(short, ranges * self._rng.uniform(0.1, 0.9, n), 2.0 * ranges)
+            ranges = np.where(false, wrong, ranges)
+        if noise.dropout_rate > 0.0:
+            ranges = np.where(self._rng.random(n) < noise.dropout_rate, np.nan, ranges)
+        with np.errstate(invalid="ignore"):
+            inside = (ranges >= self.min_range_m) & (ranges <= self.max_range_m)
+        return np.where(inside, ranges, np.nan)

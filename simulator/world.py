@@ -1,0 +1,347 @@
+"""Simulated vehicles over a sea floor, without any network: motion, navigation and sonar in one.
+
+The fake DUNE nodes and the service's in-process fleet link are two faces of :class:`SimulatedVehicle`.
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from simulator.navigation import Navigation
+from simulator.sensors import SensorKind, Sonar, SonarNoise, to_local_frame
+from simulator.terrain import Terrain
+from simulator.vehicle import STEP_S, Guidance, Motion, Target, Vehicle, VehicleLimits
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """A position in the local frame; depth positive down."""
+
+    east_m: float
+    north_m: float
+    depth_m: float
+
+    def horizontal_distance_m(self, east_m: float, north_m: float) -> float:
+        """Distance in the plane to another place."""
+        return math.hypot(self.east_m - east_m, self.north_m - north_m)
+
+
+@dataclass(frozen=True, slots=True)
+class Measurement:
+    """One return of one beam.
+
+    Attributes
+    ----------
+    vehicle, time_s, source, beam
+        Whose, when (the vehicle's clock, seconds), by which device ("Altimeter", "DVL", "Multibeam"), beam.
+    range_m
+        Along the beam; NaN when there was no return.
+    position
+        Where the vehicle believed to be.
+    heading_rad, pitch_rad, roll_rad
+        Its attitude.
+    footprint
+        Where the beam met the bottom by the vehicle's own estimate; None without a return.
+    true_position
+        Where the vehicle really was.
+    """
+
+    vehicle: str
+    time_s: float
+    source: str
+    beam: int
+    range_m: float
+    position: Place
+    heading_rad: float
+    pitch_rad: float
+    roll_rad: float
+    footprint: Place | None
+    true_position: Place
+
+    @property
+    def valid(self) -> bool:
+        """Whether there was a return."""
+        return self.footprint is not None
+
+
+SOURCES = {
+    SensorKind.SINGLE: "Altimeter",
+    SensorKind.DVL: "DVL",
+    SensorKind.MULTIBEAM: "Multibeam",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class VehicleState:
+    """A vehicle at one moment.
+
+    ``position`` is its own estimate, ``true_position`` the truth; ``altitude_m`` is true and NaN over unknown
+    floor; ``position_variance_m2`` is per axis, as the vehicle reports it.
+    """
+
+    time_s: float
+    position: Place
+    true_position: Place
+    heading_rad: float
+    pitch_rad: float
+    roll_rad: float
+    speed_mps: float
+    altitude_m: float
+    position_variance_m2: float
+    has_fix: bool
+    guidance: Guidance
+    collisions: int
+    distance_m: float
+
+
+class SimulatedVehicle:
+    """A vehicle that swims over a terrain and measures it.
+
+    Parameters
+    ----------
+    name
+        Unique within the fleet.
+    terrain
+        The truth.
+    sensor
+        Kind of sonar.
+    start
+        (east, north, depth) in metres, heading optional through ``heading_rad``.
+    rng
+        Source of all its randomness; the same generator state gives the same run.
+    noise, drift_m2ps, current, limits
+        Sonar errors, growth of the position variance under water, water velocity (east, north), abilities.
+    ping_period_s
+        Simulated time between measurements.
+    start_time_s
+        The vehicle's clock at the start.
+
+    Raises
+    ------
+    ValueError
+        When the start lies outside of the terrain or below its bottom.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        terrain: Terrain,
+        sensor: SensorKind | str,
+        start: Sequence[float],
+        rng: np.random.Generator,
+        *,
+        heading_rad: float = 0.0,
+        noise: SonarNoise | None = None,
+        drift_m2ps: float = 0.0,
+        current: tuple[float, float] = (0.0, 0.0),
+        limits: VehicleLimits | None = None,
+        ping_period_s: float = 0.2,
+        max_range_m: float = 100.0,
+        swath_rad: float = math.radians(120.0),
+        swath_beams: int = 32,
+        start_time_s: float = 0.0,
+    ) -> None:
+        east, north, depth = (float(value) for value in start)
+        if not terrain.contains(east, north):
+            raise ValueError(
+                f"{name}: start ({east:g}, {north:g}) lies outside of the terrain; "
+                f"east must be 0 to {terrain.width_m:g} m and north 0 to {terrain.height_m:g} m"
+            )
+        floor = terrain.depth_at_point(east, north)
+        if depth < 0.0 or depth > floor:
+            raise ValueError(f"{name}: start depth {depth:g} m is not between the surface and {floor:.2f} m")
+        self.name = name
+        self.terrain = terrain
+        self.time_s = float(start_time_s)
+        self.vehicle = Vehicle(Motion(east, north, depth, heading_rad), limits, current)
+        sonar_rng, navigation_rng = rng.spawn(2)
+        self.navigation = Navigation(drift_m2ps, navigation_rng)
+        self.sonar = Sonar(
+            SensorKind(sensor),
+            noise or SonarNoise(),
+            sonar_rng,
+            ping_period_s=ping_period_s,
+            max_range_m=max_range_m,
+            swath_rad=swath_rad,
+            swath_beams=swath_beams,
+        )
+        self.collisions: list[tuple[float, Place]] = []
+        """Time and place of every contact with the bottom (one entry per contact, not per step)."""
+        self._arrival_radius_m = 0.0
+        self._touching = False
+        self._start_time_s = self.time_s
+        self._steps = 0
+        self._pending_s = 0.0
+        self._pings = 0
+
+    @property
+    def collided(self) -> bool:
+        """Whether it ever hit the bottom."""
+        return bool(self.collisions)
+
+    @property
+    def true_position(self) -> Place:
+        """Where it is."""
+        m = self.vehicle.motion
+        return Place(m.east_m, m.north_m, m.depth_m)
+
+    @property
+    def position(self) -> Place:
+        """Where it believes to be (depth comes from a pressure sensor and is true)."""
+        m = self.vehicle.motion
+        de, dn = self.navigation.error_m
+        return Place(m.east_m + de, m.north_m + dn, m.depth_m)
+
+    @property
+    def bottom_m(self) -> float:
+        """Depth of the sea floor below the vehicle, NaN where unknown."""
+        m = self.vehicle.motion
+        return self.terrain.depth_at_point(m.east_m, m.north_m)
+
+    @property
+    def state(self) -> VehicleState:
+        """Everything about it now."""
+        m = self.vehicle.motion
+        return VehicleState(
+            time_s=self.time_s,
+            position=self.position,
+            true_position=self.true_position,
+            heading_rad=m.heading_rad,
+            pitch_rad=m.pitch_rad,
+            roll_rad=m.roll_rad,
+            speed_mps=math.hypot(m.ve_mps, m.vn_mps),
+            altitude_m=self.bottom_m - m.depth_m,
+            position_variance_m2=self.navigation.variance_m2,
+            has_fix=self.navigation.has_fix,
+            guidance=self.vehicle.guidance,
+            collisions=len(self.collisions),
+            distance_m=self.vehicle.distance_m,
+        )
+
+    @property
+    def arrived(self) -> bool:
+        """Whether the last ``go_to`` has been reached (and the vehicle circles there)."""
+        return self.vehicle.target is not None and self.vehicle.guidance is Guidance.LOITER
+
+    def go_to(
+        self,
+        east_m: float,
+        north_m: float,
+        depth_m: float,
+        speed_mps: float = 1.2,
+        *,
+        arrival_radius_m: float = 5.0,
+        loiter_radius_m: float | None = None,
+        by_altitude: bool = False,
+    ) -> None:
+        """Head for a place and circle there; replaces the present target.
+
+        Parameters
+        ----------
+        east_m, north_m, depth_m
+            The place by the vehicle's own reckoning; ``depth_m`` is an altitude with ``by_altitude``.
+        speed_mps
+            Through the water, brought within the vehicle's limits.
+        arrival_radius_m
+            Within this distance in the plane the target counts as reached.
+        loiter_radius_m
+            Circle flown after arrival; the vehicle's own when None.
+        """
+        values = (east_m, north_m, depth_m, speed_mps, arrival_radius_m)
+        if not all(math.isfinite(value) for value in values):
+            raise ValueError(f"{self.name}: target {values} holds a value that is not finite")
+        self._arrival_radius_m = arrival_radius_m
+        self.vehicle.loiter_radius_m = loiter_radius_m or self.vehicle.limits.loiter_radius_m
+        self.vehicle.goto(Target(east_m, north_m, depth_m, speed_mps, by_altitude))
+
+    def stop(self) -> None:
+        """Motor off: the vehicle floats up."""
+        self.vehicle.idle()
+        self.vehicle.target = None
+
+    def advance(self, dt_s: float) -> list[Measurement]:
+        """Let simulated time pass and return what was measured, in time order.
+
+        Whole steps of 0.1 s are integrated; a remainder is kept for the next call.
+        """
+        if not (math.isfinite(dt_s) and dt_s >= 0.0):
+            raise ValueError(f"{self.name}: dt_s is {dt_s}; it must be a time of 0 or more seconds")
+        self._pending_s += dt_s
+        out: list[Measurement] = []
+        while self._pending_s >= STEP_S - 1e-9:
+            self._pending_s -= STEP_S
+            if self.step():
+                out += self.measure()
+        return out
+
+    def step(self) -> bool:
+        """One step of 0.1 s; tells whether a ping is due."""
+        vehicle = self.vehicle
+        m = vehicle.motion
+        hit = vehicle.step(self.navigation.error_m, self.bottom_m)
+        self._steps += 1
+        self.time_s = self._start_time_s + self._steps * STEP_S
+        if hit and not self._touching:
+            place = self.true_position
+            self.collisions.append((self.time_s, place))
+            log.warning(
+                "%s hit the bottom at east %.1f m, north %.1f m, depth %.2f m",
+                self.name,
+                place.east_m,
+                place.north_m,
+                place.depth_m,
+            )
+        self._touching = hit
+        self.navigation.step(m.depth_m, STEP_S)
+        target = vehicle.target
+        if (
+            target is not None
+            and vehicle.guidance is Guidance.GOTO
+            and self._arrival_radius_m > 0.0
+            and self.position.horizontal_distance_m(target.east_m, target.north_m) <= self._arrival_radius_m
+        ):
+            vehicle.loiter(vehicle.loiter_radius_m)
+        due = int((self._steps * STEP_S + 1e-9) / self.sonar.ping_period_s)
+        if due > self._pings:
+            self._pings = due
+            return True
+        return False
+
+    def measure(self) -> list[Measurement]:
+        """One ping now: a measurement per beam."""
+        m = self.vehicle.motion
+        ranges = self.sonar.ping(self.terrain, m)
+        here, true = self.position, self.true_position
+        if self.sonar.kind is SensorKind.SINGLE:
+            directions = np.array([[0.0, 0.0, 1.0]])
+        else:
+            directions = to_local_frame(self.sonar.beams.body, m.heading_rad, m.pitch_rad, m.roll_rad)
+        source = SOURCES[self.sonar.kind]
+        out = []
+        for beam, (r, (de, dn, dd)) in enumerate(zip(ranges.tolist(), directions.tolist(), strict=True)):
+            footprint = (
+                Place(here.east_m + r * de, here.north_m + r * dn, here.depth_m + r * dd) if math.isfinite(r) else None
+            )
+            out.append(
+                Measurement(
+                    vehicle=self.name,
+                    time_s=self.time_s,
+                    source=source,
+                    beam=beam,
+                    range_m=r,
+                    position=here,
+                    heading_rad=m.heading_rad,
+                    pitch_rad=m.pitch_rad,
+                    roll_rad=m.roll_rad,
+                    footprint=footprint,
+                    true_position=true,
+                )
+            )
+        return out

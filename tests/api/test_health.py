@@ -1,0 +1,88 @@
+"""Health and metrics."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+
+from app import __version__
+from app.main import Server, create_app
+from app.settings import Settings
+from app.storage import migrate
+from app.storage.prepare import DatabaseNotReadyError
+from tests.api.conftest import mission_spec, soundings
+
+
+@pytest.mark.parametrize("prefix", ["", "/api/v1"])
+async def test_health_is_in_the_api_and_at_the_root(server: Server, prefix: str) -> None:
+    async with httpx.AsyncClient(base_url=server.url + prefix) as client:
+        assert (await client.get("/health/live")).json() == {"status": "ok"}
+        ready = await client.get("/health/ready")
+        assert ready.status_code == 200
+        assert ready.json() == (await client.get("/health")).json()
+        assert ready.json()["version"] == __version__
+        assert ready.json()["components"]["database"] == "ok"
+
+
+async def test_a_lost_database_is_not_ready_but_alive(server: Server, client: httpx.AsyncClient) -> None:
+    await server.config.app.state.edge.service._database.close()  # type: ignore[union-attr]
+    server.config.app.state.edge.service._database.ping = _fail  # type: ignore[union-attr]
+    ready = await client.get("/health/ready")
+    assert (ready.status_code, ready.json()["status"]) == (503, "failing")
+    assert "disk is gone" in ready.json()["components"]["database"]
+    assert (await client.get("/health")).status_code == 200
+    assert (await client.get("/health/live")).status_code == 200
+
+
+async def _fail() -> None:
+    raise OSError("disk is gone")
+
+
+def values(text: str) -> dict[str, float]:
+    lines = [line for line in text.splitlines() if line and not line.startswith("#")]
+    return {line.rpartition(" ")[0]: float(line.rpartition(" ")[2]) for line in lines}
+
+
+async def test_metrics_count_what_happens(client: httpx.AsyncClient, mission: dict[str, Any]) -> None:
+    before = values((await client.get("/metrics")).text)
+    await client.get(f"/missions/{mission['id']}")
+    await client.post("/missions", json=mission_spec(vehicles=[]))
+    await client.post(f"/missions/{mission['id']}/measurements", json={"items": soundings(4)})
+    await client.get("/no/such/path")
+    after = values((await client.get("/metrics")).text)
+
+    def grown(name: str) -> float:
+        return after[name] - before.get(name, 0)
+
+    route = 'route="/api/v1/missions/{mission_id}"'
+    assert grown(f'bathyfleet_http_requests_total{{method="GET",{route},status="200"}}') == 1
+    assert grown(f'bathyfleet_http_request_seconds_count{{method="GET",{route}}}') == 1
+    assert grown('bathyfleet_http_requests_total{method="GET",route="unmatched",status="404"}') == 1
+    assert grown('bathyfleet_soundings_total{verdict="accepted"}') == 4
+    assert after['bathyfleet_missions{state="ready"}'] == 1
+    assert after['bathyfleet_missions{state="draft"}'] == 1
+    assert after["bathyfleet_vehicles_connected"] == 1
+    assert {"bathyfleet_steps_total", "bathyfleet_planning_seconds_count"} <= set(after)
+
+
+async def test_an_old_database_is_refused_unless_the_service_migrates_it(
+    make_settings: Callable[..., Settings], tmp_path: Path
+) -> None:
+    settings = make_settings(auto_migrate=False, database_url=f"sqlite+aiosqlite:///{tmp_path}/new.db")
+    app = create_app(settings)
+    with pytest.raises(DatabaseNotReadyError, match=r"the database is empty.*run 'bathyfleet migrate'"):
+        async with app.router.lifespan_context(app):
+            pass
+    assert await migrate.current(settings.database_url) is None
+    await migrate.upgrade(settings.database_url)
+    async with app.router.lifespan_context(app):
+        pass
+
+
+async def test_a_database_that_cannot_be_opened_is_named(make_settings: Callable[..., Settings]) -> None:
+    app = create_app(make_settings(database_url="sqlite+aiosqlite:////no/such/folder/fleet.db"))
+    with pytest.raises(DatabaseNotReadyError, match="unable to open database file; check database_url"):
+        async with app.router.lifespan_context(app):
+            pass

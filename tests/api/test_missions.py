@@ -1,0 +1,82 @@
+"""The life of a mission over REST."""
+
+import asyncio
+from typing import Any
+
+import httpx
+import pytest
+
+from tests.api.conftest import mission_spec, soundings
+
+
+async def test_a_new_mission_is_found_where_the_answer_says(client: httpx.AsyncClient) -> None:
+    answer = await client.post("/missions", json=mission_spec())
+    assert answer.status_code == 201
+    created = answer.json()
+    assert answer.headers["location"] == f"/api/v1/missions/{created['id']}"
+    assert created["state"] == "ready"
+    assert created["spec"]["limits"]["max_step_m"] == 10.0
+    seen = (await client.get(f"/missions/{created['id']}")).json()
+    assert seen["spec"] == created["spec"]
+    assert seen["vehicles"][0]["name"] == "rover"
+    assert [m["id"] for m in (await client.get("/missions")).json()] == [created["id"]]
+
+
+async def test_a_mission_without_a_vehicle_is_a_draft_until_it_gets_one(client: httpx.AsyncClient) -> None:
+    draft = (await client.post("/missions", json=mission_spec(vehicles=[]))).json()
+    assert draft["state"] == "draft"
+    path = f"/missions/{draft['id']}"
+    refused = await client.post(f"{path}/start")
+    assert refused.status_code == 409
+    assert "vehicles" in refused.json()["remedy"]
+
+    joined = await client.post(f"{path}/vehicles", json={"name": "rover", "kind": "rest"})
+    assert joined.status_code == 200, joined.text
+    assert joined.json()["state"] == "ready"
+    again = await client.post(f"{path}/vehicles", json={"name": "rover", "kind": "rest"})
+    assert (again.status_code, again.json()["type"]) == (409, "urn:bathyfleet:problem:conflict")
+
+    left = await client.delete(f"{path}/vehicles/rover")
+    assert left.status_code == 200, left.text
+    assert left.json()["state"] == "draft"
+    assert (await client.delete(f"{path}/vehicles/rover")).status_code == 404
+
+
+@pytest.mark.parametrize("body", [None, {}, {"note": "tide turns"}])
+async def test_actions_move_the_mission_and_keep_the_note(
+    client: httpx.AsyncClient, mission: dict[str, Any], body: dict[str, str] | None
+) -> None:
+    path = f"/missions/{mission['id']}"
+    for action, state in [("start", "running"), ("pause", "paused"), ("resume", "running"), ("abort", "aborted")]:
+        answer = (
+            await client.post(f"{path}/{action}", json=body)
+            if body is not None
+            else await client.post(f"{path}/{action}")
+        )
+        assert answer.status_code == 200, answer.text
+        assert answer.json()["mission"]["state"] == state
+    entries = (await client.get(f"{path}/events", headers={"Accept": "application/json"})).json()
+    assert "aborted" in " ".join(entry["message"] for entry in entries)
+    if body:
+        assert any(body["note"] in entry["message"] for entry in entries)
+    assert all("local operator" in e["message"] for e in entries if e["kind"] == "state")
+
+
+async def test_an_action_takes_no_unknown_fields(client: httpx.AsyncClient, mission: dict[str, Any]) -> None:
+    answer = await client.post(f"/missions/{mission['id']}/start", json={"nota": "x"})
+    assert answer.status_code == 422
+    assert answer.json()["errors"][0]["expected"] == "did you mean note?"
+    assert (await client.get(f"/missions/{mission['id']}")).json()["state"] == "ready"
+
+
+async def test_two_starts_at_the_same_time_start_once(client: httpx.AsyncClient, mission: dict[str, Any]) -> None:
+    answers = await asyncio.gather(*(client.post(f"/missions/{mission['id']}/start") for _ in range(2)))
+    assert sorted(answer.status_code for answer in answers) == [200, 409]
+
+
+async def test_vehicles_and_planners_are_listed(client: httpx.AsyncClient, mission: dict[str, Any]) -> None:
+    await client.post(f"/missions/{mission['id']}/measurements", json={"items": soundings(1)})
+    assert [v["name"] for v in (await client.get("/vehicles")).json()] == ["rover"]
+    planners = {p["name"]: p for p in (await client.get("/planners")).json()}
+    assert {"cao", "random", "lawnmower"} <= set(planners)
+    assert planners["cao"]["options"]["type"] == "object"

@@ -1,0 +1,99 @@
+"""The real service in a process of its own, which a test can kill and start again."""
+
+import contextlib
+import os
+import socket
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import httpx
+
+ROOT = Path(__file__).parents[2]
+BATHYFLEET = [sys.executable, "-c", "from app.cli import main; main()"]
+START_LIMIT_S = 60
+
+# About 59 m by 56 m.
+AREA = {
+    "type": "Polygon",
+    "coordinates": [[[-8.705, 41.185], [-8.7043, 41.185], [-8.7043, 41.1855], [-8.705, 41.1855], [-8.705, 41.185]]],
+}
+
+
+class Service:
+    """``bathyfleet serve`` with simulated vehicles, on one port and one database for all its lives."""
+
+    def __init__(self, folder: Path) -> None:
+        with socket.socket() as probe:
+            probe.bind(("127.0.0.1", 0))
+            self.port: int = probe.getsockname()[1]
+        self.url = f"http://127.0.0.1:{self.port}"
+        self._folder = folder
+        self._log = folder / "service.log"
+        self._process: subprocess.Popen[bytes] | None = None
+
+    @property
+    def _environment(self) -> dict[str, str]:
+        return os.environ | {
+            "BATHYFLEET_DATABASE_URL": f"sqlite+aiosqlite:///{self._folder / 'service.db'}",
+            "BATHYFLEET_IMC__ENABLED": "false",
+            "BATHYFLEET_TIME_SCALE": "5",
+            "PYTHONPATH": os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")]),
+        }
+
+    def make_token(self, name: str, role: str) -> str:
+        """Make an access token on the command line; from then on the service asks for one."""
+        made = subprocess.run(
+            [*BATHYFLEET, "token", "create", name, "--role", role],
+            cwd=self._folder,
+            env=self._environment,
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        return made.stdout.split()[-1]
+
+    def start(self) -> None:
+        """Start and wait until requests are answered."""
+        with self._log.open("ab") as log:
+            self._process = subprocess.Popen(
+                [*BATHYFLEET, "serve", "--port", str(self.port)],
+                cwd=self._folder,
+                env=self._environment,
+                stderr=log,
+                stdout=log,
+            )
+        end = time.monotonic() + START_LIMIT_S
+        while time.monotonic() < end and self._process.poll() is None:
+            with contextlib.suppress(httpx.TransportError):
+                if httpx.get(f"{self.url}/api/v1/health/live").is_success:
+                    return
+        raise AssertionError(f"the service did not start:\n{self._log.read_text()}")
+
+    def kill(self) -> None:
+        """End the process without any warning to it."""
+        if self._process is not None:
+            self._process.kill()
+            self._process.wait()
+            self._process = None
+
+    def get(self, path: str) -> Any:
+        answer = httpx.get(f"{self.url}/api/v1{path}", timeout=60)
+        return answer.raise_for_status().json()
+
+    def create(self, **changes: Any) -> str:
+        """Describe a mission over the API and return its id."""
+        spec = {
+            "name": "Harbour basin",
+            "area": AREA,
+            "steps": 400,
+            "vehicles": [{"name": "sim-1", "kind": "sim", "sensor": "dvl"}],
+            "planner": {"name": "random"},
+        }
+        answer = httpx.post(f"{self.url}/api/v1/missions", json=spec | changes, timeout=60)
+        return str(answer.raise_for_status().json()["id"])
+
+    def act(self, mission: str, action: str) -> None:
+        httpx.post(f"{self.url}/api/v1/missions/{mission}/{action}", timeout=60).raise_for_status()

@@ -1,0 +1,83 @@
+import json
+
+import pytest
+from typer.testing import CliRunner
+
+from app.evaluation.cli import evaluate_app
+from simulator.seafloors import generate
+from simulator.terrain_files import save_npz
+
+EXPLORE = {
+    "planner", "terrain", "seed", "robots", "landmarks", "steps", "remaining_pct", "t99", "sum_of_error", "history",
+    "distance", "wall_s", "plan_ms_median", "plan_ms_p99", "real_tries",
+}  # fmt: skip
+SURVEY = {"rmse_m", "l2_norm", "samples", "distance_m", "time_s", "coverage_pct"}
+
+
+@pytest.fixture(scope="module")
+def terrain(tmp_path_factory):
+    file = tmp_path_factory.mktemp("floor") / "harbour.npz"
+    save_npz(generate("harbour", 0, width_m=40.0, height_m=40.0), file)
+    return str(file)
+
+
+def call(*arguments):
+    return CliRunner().invoke(evaluate_app, list(arguments))
+
+
+def test_one_run_prints_one_object(terrain):
+    result = call("explore", "--terrain", terrain, "--landmarks", "80", "--steps", "5", "--json")
+    assert result.exit_code == 0
+    document = json.loads(result.stdout)
+    assert document.keys() >= EXPLORE
+    assert len(document["history"]) == 5
+
+
+def test_several_runs_print_runs_and_a_summary(terrain):
+    result = call(
+        "explore", "--terrain", terrain, "--landmarks", "80", "--steps", "4",
+        "--planner", "cao,random", "--seeds", "0:2",
+        "--json",
+    )  # fmt: skip
+    document = json.loads(result.stdout)
+    assert [(r["planner"], r["seed"]) for r in document["runs"]] == [
+        ("cao", 0),
+        ("cao", 1),
+        ("random", 0),
+        ("random", 1),
+    ]
+    spread = document["summary"]["cao"]["remaining_pct"]
+    assert spread.keys() == {"mean", "ci95", "min", "max"}
+    assert spread["min"] <= spread["mean"] <= spread["max"]
+
+
+def test_survey_prints_the_planner_beside_its_yardsticks(terrain):
+    result = call(
+        "survey", "--terrain", terrain, "--steps", "12", "--max-step", "8", "--sampling", "continuous", "--json"
+    )
+    document = json.loads(result.stdout)
+    for part in (document, document["usual_practice"], document["coverage"], document["oracle"]):
+        assert part.keys() >= SURVEY
+    assert "recorded_track" not in document
+
+
+def test_without_json_a_table_is_printed(terrain):
+    result = call("explore", "--terrain", terrain, "--landmarks", "50", "--steps", "3", "--planner", "random")
+    assert "remaining_pct" in result.stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--planner", "magic"], ["magic", "cao"]),
+        (["--seeds", "a:b"], ["a:b", "FIRST:END"]),
+        (["--seeds", "3:3"], ["no seed"]),
+        (["--regressors", "none"], ["none", "polynomial"]),
+        (["--terrain", "/nowhere/at-all.npz"], ["at-all.npz"]),
+    ],
+)
+def test_wrong_input_is_refused_in_words(terrain, arguments, words):
+    result = call("explore", "--terrain", terrain, *arguments)
+    assert result.exit_code == 2
+    for word in words:
+        assert word in result.output

@@ -1,0 +1,81 @@
+import numpy as np
+import pytest
+
+from app.evaluation.baselines import lawnmower_baselines
+from app.evaluation.survey import run_survey
+from app.evaluation.survey_world import SurveyScenario, along, default_map, fly_planner, rmse_m
+from app.exploration.options import PlannerOptions
+from simulator.seafloors import generate
+
+QUICK = PlannerOptions(search=40)
+
+
+@pytest.fixture(scope="module")
+def harbour():
+    return generate("harbour", 1, width_m=60.0, height_m=60.0)
+
+
+def test_continuous_soundings_cover_the_leg_and_steps_only_its_end():
+    start, end = np.array([0.0, 0.0, 2.0]), np.array([3.0, 4.0, 2.0])
+    assert along(start, end, "step").tolist() == [end.tolist()]
+    points = along(start, end, "continuous")
+    gaps = np.linalg.norm(np.diff(np.vstack([start, points]), axis=0), axis=1)
+    assert gaps == pytest.approx(np.full(len(points), gaps[0]))
+    assert 0.26 <= gaps[0] < 0.29
+    np.testing.assert_allclose(points[-1], end)
+
+
+def test_a_run_is_reproducible_and_obeys_its_constraints(harbour):
+    scenario = SurveyScenario(harbour, steps=12, seed=3)
+    first, second = (fly_planner(scenario, "cao", QUICK) for _ in range(2))
+    np.testing.assert_array_equal(first.positions_m, second.positions_m)
+    np.testing.assert_array_equal(first.soundings.depth_m, second.soundings.depth_m)
+    for before, after in zip(first.positions_m[:-1], first.positions_m[1:], strict=True):
+        assert scenario.constraints.feasible(before, after[None])[0]
+
+
+def test_a_survey_run_reports_the_planner_beside_its_yardsticks(harbour):
+    run = run_survey(SurveyScenario(harbour, steps=30, seed=0), "cao", QUICK)
+    relief = float(np.std(harbour.z_m))
+    for result in (run, run.usual_practice, run.coverage, run.oracle):
+        assert 0.0 < result.rmse_m < relief
+        assert result.l2_norm == pytest.approx(result.rmse_m * 60.0, rel=1e-6)
+        assert 0.0 <= result.coverage_pct <= 100.0
+        assert result.distance_m <= 2 * 300.0 + 1e-6
+    assert run.usual_practice.distance_m <= run.distance_m + 1e-6
+    assert run.ratio == pytest.approx(run.rmse_m / min(run.usual_practice.rmse_m, run.coverage.rmse_m))
+    assert run.recorded_track is None
+
+
+def test_baselines_travel_as_far_and_sound_as_often(harbour):
+    scenario = SurveyScenario(harbour)
+    pair = lawnmower_baselines(harbour, scenario.constraints, scenario.starts_m, 300.0, 4000, scenario.grid)
+    assert 400.0 < pair.same_distance.distance_m <= 600.0
+    assert 3000 < pair.same_soundings.samples <= 4002
+    assert pair.same_soundings.rmse_m < pair.same_distance.rmse_m
+
+
+def test_the_default_planner_beats_the_lawnmower_where_detail_is_concentrated():
+    ratios = []
+    for seed in (1, 2):
+        scenario = SurveyScenario(generate("harbour", seed), steps=80, seed=seed)
+        track = fly_planner(scenario, "cao", PlannerOptions())
+        ours, _ = rmse_m(default_map(track.soundings, scenario.grid), scenario.terrain)
+        pair = lawnmower_baselines(
+            scenario.terrain,
+            scenario.constraints,
+            scenario.starts_m,
+            float(track.distance_m.mean()),
+            len(track.soundings),
+            scenario.grid,
+        )
+        ratios.append(ours / pair.same_distance.rmse_m)
+    assert np.exp(np.mean(np.log(ratios))) < 1.0
+
+
+@pytest.mark.terrains
+def test_recorded_track_is_compared_where_the_terrain_has_one(terrains):
+    from app.evaluation.recorded import recorded_soundings
+
+    assert len(recorded_soundings(terrains / "leixoes_sharp.npz")) == 2560
+    assert recorded_soundings(terrains / "leixoes_slope.npz") is None

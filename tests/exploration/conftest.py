@@ -1,0 +1,7 @@
+import pytest
+from situations import SQUARE
+
+
+@pytest.fixture
+def square():
+    return SQUARE

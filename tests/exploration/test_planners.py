@@ -1,0 +1,232 @@
+import itertools
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from situations import SQUARE, make_belief, make_situation
+
+from app.estimation import RangeSensor, SingleBeam
+from app.exploration.bottom import Bottom
+from app.exploration.constraints import Constraints
+from app.exploration.options import PlannerOptions
+from app.exploration.planners import PLANNERS, create_planner
+from app.exploration.problem import Belief, Situation
+from app.exploration.regressors.survey import expected_variability
+
+QUICK = {"search": 30, "candidates": 24}
+KINDS = [("cao", "map"), ("cao", "polynomial"), ("lawnmower", "map"), ("random", "map")]
+SENSORS = [SingleBeam(), RangeSensor(visibility_m=25.0)]
+
+
+BEAM = SingleBeam()
+
+
+def make(name, regressors="map", sensor=BEAM):
+    return create_planner(name, PlannerOptions(regressors=regressors, **QUICK), sensor)
+
+
+def fly(planner, steps, *, total=60, seed=0, start=None, names=("a", "b"), constraints=None, belief=None):
+    """Fly a planner in closed loop; yields the situation and what was proposed."""
+    situation = make_situation(vehicles=names, positions=start, constraints=constraints, belief=belief, steps=total)
+    positions, soundings = situation.positions, situation.soundings_en_m
+    for step in range(1, steps + 1):
+        situation = make_situation(
+            step,
+            steps=total,
+            vehicles=names,
+            positions=positions,
+            soundings=soundings,
+            constraints=constraints,
+            belief=belief,
+        )
+        proposal = planner.propose(situation, np.random.default_rng([seed, step]))
+        yield situation, proposal
+        positions = proposal.positions
+        soundings = np.vstack([soundings, positions[:, :2]])
+
+
+limits = st.fixed_dictionaries(
+    {
+        "max_step_m": st.sampled_from([4.0, 10.0]),
+        "com_range_m": st.sampled_from([np.inf, 40.0]),
+        "min_separation_m": st.sampled_from([0.0, 3.0]),
+        "min_altitude_m": st.sampled_from([0.5, 2.0]),
+        "keep_out": st.sampled_from([(), (np.array([[30.0, 20.0], [60.0, 25.0], [50.0, 60.0], [35.0, 55.0]]),)]),
+    }
+)
+
+
+@pytest.mark.parametrize("sensor", SENSORS, ids=["bathymeter", "landmarks"])
+@pytest.mark.parametrize("kind", KINDS, ids="-".join)
+@given(limits=limits, seed=st.integers(0, 100))
+@settings(max_examples=5, deadline=None)
+def test_no_proposal_breaks_a_constraint(kind, sensor, limits, seed):
+    constraints = Constraints(SQUARE, max_depth_m=20.0, **limits)
+    belief = make_belief(seed)
+    bottom = Bottom.from_landmarks(belief.xy_m, belief.depth_m)
+    planner = make(*kind, sensor=sensor)
+    for situation, proposal in fly(planner, 6, seed=seed, constraints=constraints, belief=belief):
+        names = situation.vehicles
+        assert constraints.violations(names, situation.positions, proposal.positions, bottom) == ()
+
+
+@pytest.mark.parametrize("sensor", SENSORS, ids=["bathymeter", "landmarks"])
+@pytest.mark.parametrize("kind", KINDS, ids="-".join)
+def test_same_seed_same_answers(kind, sensor):
+    first, second = ([p.positions for _, p in fly(make(*kind, sensor=sensor), 5)] for _ in range(2))
+    np.testing.assert_array_equal(first, second)
+
+
+@pytest.mark.parametrize("sensor", SENSORS, ids=["bathymeter", "landmarks"])
+@pytest.mark.parametrize("kind", KINDS, ids="-".join)
+def test_permuting_vehicles_permutes_the_answer(kind, sensor):
+    names, start = ("a", "b", "c"), np.array([[3.0, 3, 2], [9.0, 3, 2], [15.0, 3, 2]])
+    straight = [p.positions for _, p in fly(make(*kind, sensor=sensor), 4, names=names, start=start)]
+    order = [2, 0, 1]
+    turned = fly(make(*kind, sensor=sensor), 4, names=tuple(names[i] for i in order), start=start[order])
+    for expected, (_, proposal) in zip(straight, turned, strict=True):
+        np.testing.assert_array_equal(expected[order], proposal.positions)
+
+
+@pytest.mark.parametrize("sensor", SENSORS, ids=["bathymeter", "landmarks"])
+@pytest.mark.parametrize("kind", KINDS, ids="-".join)
+def test_a_restored_planner_continues_as_if_nothing_had_happened(kind, sensor):
+    planner, memory = make(*kind, sensor=sensor), b""
+    for situation, proposal in fly(planner, 8):
+        if situation.step >= 4:
+            restored = make(*kind, sensor=sensor)
+            restored.restore(memory)
+            again = restored.propose(situation, np.random.default_rng([0, situation.step]))
+            np.testing.assert_array_equal(again.positions, proposal.positions)
+            assert restored.snapshot() == planner.snapshot()
+        memory = planner.snapshot()
+
+
+@pytest.mark.parametrize("memory", [b"", b"{}", b"[1]", b"\xff", b'{"kind":"cao","version":1,"memory":{}}'])
+@pytest.mark.parametrize("name", sorted(PLANNERS))
+def test_a_foreign_memory_is_refused(name, memory):
+    with pytest.raises(ValueError, match="planner memory"):
+        make(name).restore(memory)
+
+
+def test_an_unknown_planner_is_refused_with_the_known_ones():
+    with pytest.raises(ValueError, match="choose one of cao, lawnmower, random"):
+        create_planner("magic")
+
+
+@pytest.mark.parametrize("kind", KINDS, ids="-".join)
+def test_vehicles_may_leave_and_join_between_steps(kind):
+    planner = make(*kind)
+    teams = [("a", "b"), ("a", "b"), ("b",), ("b",), ("b", "c"), ("a", "b", "c"), ()]
+    places = {"a": [3.0, 3.0, 2.0], "b": [9.0, 3.0, 2.0], "c": [50.0, 50.0, 2.0]}
+    for step, names in enumerate(teams, 1):
+        at = np.array([places[v] for v in names]).reshape(-1, 3)
+        situation = make_situation(step, vehicles=names, positions=at)
+        proposal = planner.propose(situation, np.random.default_rng(step))
+        assert proposal.positions.shape == (len(names), 3)
+        if names:
+            assert situation.constraints.feasible(at, proposal.positions[None])[0]
+        places.update(zip(names, proposal.positions.tolist(), strict=True))
+
+
+def test_a_vehicle_outside_the_area_comes_back():
+    planner = make("random")
+    start = np.array([[-6.0, 50.0, 2.0]])
+    last = list(fly(planner, 4, names=("a",), start=start))[-1][1]
+    assert last.positions[0, 0] >= 0.0
+
+
+def track(planner, steps, **kwargs):
+    flown = [p.positions for _, p in fly(planner, steps, total=steps, **kwargs)]
+    start = make_situation(vehicles=kwargs.get("names", ("a", "b"))).positions
+    return np.stack([start, *flown])
+
+
+def distances_to_track(positions, spacing=0.5):
+    points = [
+        start + f * (end - start)
+        for j in range(positions.shape[1])
+        for start, end in itertools.pairwise(positions[:, j, :2])
+        for f in np.arange(0.0, 1.0, spacing / 10.0)
+    ]
+    axis = np.arange(1.0, 100.0, 2.0)
+    nodes = np.stack(np.meshgrid(axis, axis), axis=-1).reshape(-1, 2)
+    return np.sqrt(((nodes[:, None, :] - np.array(points)[None]) ** 2).sum(axis=2).min(axis=1))
+
+
+@pytest.mark.parametrize("name", ["lawnmower", "cao"])
+def test_surveys_leave_no_large_gap_where_nothing_is_known(name):
+    positions = track(make(name), 60, belief=make_belief(known=False))
+    # 1200 m in 10 000 m2: lines 8.3 m apart at best.
+    assert distances_to_track(positions).max() < 9.0
+
+
+def test_the_lawnmower_spends_its_budget_on_even_lines():
+    positions = track(make("lawnmower"), 60)
+    for j in range(2):
+        length = np.linalg.norm(np.diff(positions[:, j], axis=0), axis=1).sum()
+        assert 400.0 < length <= 600.0 + 1e-6
+
+
+def test_cao_goes_where_the_bottom_is_rough():
+    belief = make_belief(known=False, cell=2.5)
+    rough = (belief.xy_m > 60.0).all(axis=1)
+    weight = np.where(rough, 4.0, 0.3)
+    patchy = Belief(belief.xy_m, np.full(len(weight), 9.0), np.full(len(weight), 0.5), belief.accurate, weight, 20.0)
+    positions = track(create_planner("cao"), 60, belief=patchy)
+    axis = np.arange(1.0, 100.0, 2.0)
+    nodes = np.stack(np.meshgrid(axis, axis), axis=-1).reshape(-1, 2)
+    distance = distances_to_track(positions)
+    inside = (nodes > 60.0).all(axis=1)
+    assert np.mean(distance[inside] ** 2) < 0.6 * np.mean(distance[~inside] ** 2)
+
+
+def test_surveying_vehicles_keep_their_depths_and_the_clearance():
+    depth = np.where(make_belief().xy_m[:, 0] > 50.0, 3.0, 9.0)
+    belief = make_belief()
+    shelf = Belief(belief.xy_m, depth, belief.sd_m, belief.accurate, belief.weight, 20.0)
+    constraints = Constraints(SQUARE, max_step_m=10.0, max_depth_m=20.0, min_altitude_m=1.5)
+    bottom = Bottom.from_landmarks(shelf.xy_m, shelf.depth_m)
+    reached = []
+    for _, proposal in fly(make("lawnmower"), 40, belief=shelf, constraints=constraints):
+        floor = bottom.at(proposal.positions[:, :2])
+        assert (floor - proposal.positions[:, 2] >= 1.5 - 1e-6).all()
+        reached.extend(proposal.positions[:, 2])
+    assert max(reached) == pytest.approx(2.0)
+    assert min(reached) == pytest.approx(1.5, abs=0.01)
+
+
+def test_a_team_in_formation_keeps_in_touch():
+    cube = np.array([[-1.0, -1], [1, -1], [1, 1], [-1, 1]])
+    axis = np.linspace(-0.95, 0.95, 20)
+    east, north = np.meshgrid(axis, axis)
+    xy = np.column_stack([east.ravel(), north.ravel()])
+    n = len(xy)
+    belief = Belief(xy, np.full(n, 0.6), np.full(n, 0.1), np.zeros(n, bool), np.ones(n), 0.2)
+    constraints = Constraints(cube, (), 0.05, -1.0, 1.0, 0.05, 0.3)
+    positions = np.array([[-0.8, -0.8, 0.4], [-0.75, -0.8, 0.4], [-0.7, -0.8, 0.4]])
+    planner = create_planner("lawnmower", sensor=RangeSensor())
+    seen = np.zeros(n, dtype=bool)
+    for step in range(1, 301):
+        situation = Situation(
+            step, 300, ("a", "b", "c"), positions, np.full(3, np.nan), belief, np.zeros((0, 2)), constraints
+        )
+        after = planner.propose(situation, np.random.default_rng(step)).positions
+        assert constraints.feasible(positions, after[None])[0]
+        positions = after
+        seen |= RangeSensor().visible(positions, np.column_stack([xy, belief.depth_m])).any(axis=0)
+    assert seen.mean() > 0.99
+
+
+def test_an_edge_between_two_lines_counts_although_no_sounding_shows_it():
+    belief = make_belief(known=False)
+    east = belief.xy_m[:, 0]
+    step = Belief(
+        belief.xy_m, 6.0 + np.clip((east - 50.0) / 10.0, 0.0, 1.0), np.full(len(east), 0.3), belief.accurate,
+        np.ones(len(east)), 20.0,
+    )  # fmt: skip
+    variability = expected_variability(step, Bottom.from_landmarks(step.xy_m, step.depth_m))
+    on_edge = (east > 50.0) & (east < 60.0)
+    assert variability[on_edge].min() > 3.0 * variability[~on_edge & (np.abs(east - 55.0) > 10.0)].max()
+    assert np.allclose(expected_variability(belief, Bottom.unknown()), 1.0)

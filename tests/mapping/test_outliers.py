@@ -1,0 +1,75 @@
+"""Gross errors are found; steep and rough ground is left alone."""
+
+import numpy as np
+import pytest
+
+from app.mapping.gp import GaussianProcessMap
+from app.mapping.outliers import flag_outliers
+from app.mapping.types import Grid, Soundings
+
+
+def survey(seed: int, *, cliff: bool = False) -> Soundings:
+    """Lines 6 m apart, a sounding every 0.5 m, 1 % noise."""
+    east, north = (a.ravel() for a in np.meshgrid(np.arange(3.0, 60.0, 6.0), np.arange(0.0, 60.0, 0.5)))
+    depth = 12 + 0.05 * east + 0.5 * np.sin(north / 6)
+    if cliff:
+        depth += np.where(north > 30 + 0.2 * east, 4.0, 0.0)
+    sd = 0.01 * depth
+    return Soundings(east, north, depth + sd * np.random.default_rng(seed).standard_normal(len(east)), sd)
+
+
+def spoil(s: Soundings, seed: int) -> tuple[Soundings, np.ndarray]:
+    rng = np.random.default_rng(seed)
+    bad = rng.random(len(s)) < 0.02
+    factor = 1 + rng.uniform(0.15, 0.5, len(s)) * rng.choice([-1, 1], len(s))
+    return Soundings(s.east_m, s.north_m, np.where(bad, s.depth_m * factor, s.depth_m), s.sd_m), bad
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_gross_outliers_are_found_and_nothing_else(seed: int) -> None:
+    spoiled, bad = spoil(survey(seed), seed)
+    report = flag_outliers(spoiled)
+    assert np.mean(report.rejected[bad]) >= 0.9
+    assert not np.any(report.rejected & ~bad)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_cliff_is_no_outlier(seed: int) -> None:
+    """Beside a 4 m cliff an error of the same size may pass; no sounding of the cliff itself may be rejected."""
+    spoiled, bad = spoil(survey(seed, cliff=True), seed)
+    report = flag_outliers(spoiled)
+    assert not np.any(report.rejected & ~bad)
+    far = np.abs(spoiled.north_m - 30 - 0.2 * spoiled.east_m) > 6.0
+    assert np.mean(report.rejected[bad & far]) >= 0.75
+
+
+@pytest.mark.parametrize("cliff", [False, True], ids=["gentle", "cliff"])
+def test_clean_soundings_are_all_accepted(cliff: bool) -> None:
+    report = flag_outliers(survey(7, cliff=cliff))
+    assert not report.rejected.any()
+    assert set(report.reasons) == {""}
+
+
+def test_reasons_name_what_was_expected() -> None:
+    spoiled, _ = spoil(survey(0), 0)
+    report = flag_outliers(spoiled)
+    i = int(np.flatnonzero(report.rejected)[0])
+    assert f"{spoiled.depth_m[i]:.2f} m" in report.reasons[i]
+    assert f"{report.predicted_m[i]:.2f} m" in report.reasons[i]
+
+
+def test_outliers_do_not_bend_the_map() -> None:
+    clean = survey(1)
+    spoiled, bad = spoil(clean, 1)
+    grid = Grid(0.0, 0.0, 2.0, 30, 30)
+    expected = GaussianProcessMap().fit(clean).predict(grid)
+    result = GaussianProcessMap().fit(spoiled)
+    assert len(result.soundings_) <= np.sum(~bad) + 2
+    bend = result.predict(grid).depth_m - expected.depth_m
+    assert np.sqrt(np.mean(bend**2)) < 0.03
+
+
+@pytest.mark.parametrize("n", [1, 2, 3, 9])
+def test_a_handful_of_soundings_can_be_judged(n: int) -> None:
+    s = survey(0).take(np.arange(n))
+    assert flag_outliers(s).rejected.shape == (n,)

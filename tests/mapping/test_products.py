@@ -1,0 +1,178 @@
+"""Every file is opened again by a library that did not write it, or through an independent path."""
+
+import io
+import json
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+from matplotlib import pyplot as plt
+from PIL import Image
+from rasterio.errors import NotGeoreferencedWarning
+from rasterio.io import MemoryFile
+from rasterio.warp import transform
+
+from app.mapping.georeference import LocalFrame
+from app.mapping.products.colours import DEPTH_COLOURS, depth_range
+from app.mapping.products.contours import contours_geojson
+from app.mapping.products.geotiff import NODATA, geotiff
+from app.mapping.products.overlay import overlay_corners, overlay_png
+from app.mapping.products.picture import picture_png
+from app.mapping.products.text import map_xyz, soundings_csv, soundings_xyz
+from app.mapping.types import BathymetricMap, Grid, Soundings
+
+FRAME = LocalFrame(41.1850, -8.7040)
+GRID = Grid(west_m=-10.0, south_m=20.0, cell_m=2.0, rows=30, cols=40)
+DATUM = "EPSG:5861 (lowest astronomical tide)"
+
+
+@pytest.fixture
+def bathymetry() -> BathymetricMap:
+    east, north = np.meshgrid(GRID.east_m, GRID.north_m)
+    depth = 5.0 + 0.1 * (east + 10.0) + 0.02 * north
+    depth[25:, :5] = np.nan
+    count = np.zeros(depth.shape, np.int64)
+    count[:, 10] = 3
+    return BathymetricMap(
+        GRID,
+        depth,
+        np.where(np.isnan(depth), np.nan, 0.25),
+        count,
+        count > 0,
+        np.ones_like(depth),
+        8.0,
+        "test",
+    )
+
+
+@pytest.fixture
+def soundings() -> Soundings:
+    rng = np.random.default_rng(0)
+    return Soundings(rng.uniform(0, 50, 12), rng.uniform(20, 60, 12), rng.uniform(4, 9, 12), np.full(12, 0.07))
+
+
+def test_geotiff_holds_all_layers_north_up(bathymetry: BathymetricMap) -> None:
+    with MemoryFile(geotiff(bathymetry, FRAME, vertical_datum=DATUM)) as memory, memory.open() as file:
+        assert file.descriptions == ("depth", "uncertainty", "count", "sounded")
+        assert file.units[0] == "metre"
+        assert file.nodata == NODATA
+        assert file.tags()["VERTICAL_DATUM"] == DATUM
+        assert file.tags(ns="IMAGE_STRUCTURE")["LAYOUT"] == "COG"
+        assert file.bounds == pytest.approx((-10.0, 20.0, 70.0, 80.0))
+        depth = file.read(1, masked=True)
+        assert depth.mask[0, 0]  # the unknown corner is north-west, so first in a north-up file
+        np.testing.assert_allclose(depth[::-1].filled(np.nan), bathymetry.depth_m, rtol=1e-6)
+        np.testing.assert_array_equal(file.read(3)[::-1, 10], np.full(30, 3))
+        assert set(np.unique(file.read(4))) == {NODATA, 0.0, 1.0}
+
+
+def test_geotiff_lies_where_the_frame_says(bathymetry: BathymetricMap) -> None:
+    with MemoryFile(geotiff(bathymetry, FRAME, vertical_datum=DATUM)) as memory, memory.open() as file:
+        east, north = file.xy(29, 0)  # south-western cell
+        (lon,), (lat,) = transform(file.crs, "EPSG:4326", [east], [north])
+    assert (east, north) == (pytest.approx(-9.0), pytest.approx(21.0))
+    assert (lat, lon) == pytest.approx(tuple(map(float, FRAME.to_geographic(-9.0, 21.0))), abs=1e-9)
+
+
+def test_xyz_holds_the_known_cells(bathymetry: BathymetricMap) -> None:
+    text = map_xyz(bathymetry, FRAME, vertical_datum=DATUM)
+    rows = np.loadtxt(io.BytesIO(text), comments="#")
+    known = np.isfinite(bathymetry.depth_m)
+    np.testing.assert_allclose(rows[:, 2], bathymetry.depth_m[known], atol=5e-4)
+    np.testing.assert_allclose(rows[:, :2], GRID.centres_m[known.ravel()], atol=5e-4)
+    assert DATUM in text.decode()
+
+
+def test_xyz_of_sounded_cells_only_in_degrees(bathymetry: BathymetricMap) -> None:
+    text = map_xyz(bathymetry, FRAME, vertical_datum=DATUM, geographic=True, sounded_only=True)
+    rows = np.loadtxt(io.BytesIO(text), comments="#")
+    assert len(rows) == 30
+    assert np.all(rows[:, 5] == 1)
+    east, north = FRAME.to_local(rows[:, 1], rows[:, 0])
+    np.testing.assert_allclose(east, GRID.east_m[10], atol=2e-3)
+    np.testing.assert_allclose(north, GRID.north_m, atol=2e-3)
+
+
+def test_soundings_come_back_from_csv_and_xyz(soundings: Soundings) -> None:
+    table = np.genfromtxt(io.BytesIO(soundings_csv(soundings, FRAME)), delimiter=",", names=True)
+    np.testing.assert_allclose(table["depth_m"], soundings.depth_m, atol=5e-4)
+    east, north = FRAME.to_local(table["lat_deg"], table["lon_deg"])
+    np.testing.assert_allclose(
+        np.column_stack([east, north]), np.column_stack([table["east_m"], table["north_m"]]), atol=2e-3
+    )
+    rows = np.loadtxt(io.BytesIO(soundings_xyz(soundings, FRAME, vertical_datum=DATUM)), comments="#")
+    np.testing.assert_allclose(rows[:, 0], soundings.east_m, atol=5e-4)
+    np.testing.assert_allclose(rows[:, 2], soundings.depth_m, atol=5e-4)
+
+
+def test_overlay_pixels_are_the_cells_north_up(bathymetry: BathymetricMap) -> None:
+    image = np.asarray(Image.open(io.BytesIO(overlay_png(bathymetry, (4.0, 14.0)))))
+    assert image.shape == (30, 40, 4)
+    assert np.all(image[:5, :5, 3] == 0)
+    assert np.all(image[5:, 10, 3] == 255)
+    assert 0 < image[29, 11, 3] < 255
+    colour = DEPTH_COLOURS((bathymetry.depth_m[0, 20] - 4.0) / 10.0, bytes=True)
+    np.testing.assert_allclose(image[29, 20, :3].astype(int), colour[:3], atol=1)
+
+
+def test_overlay_opens_as_a_raster_too(bathymetry: BathymetricMap) -> None:
+    png = overlay_png(bathymetry, (0.0, 1.0), layer="uncertainty")
+    with MemoryFile(png) as memory, pytest.warns(NotGeoreferencedWarning), memory.open() as file:
+        assert (file.count, file.width, file.height) == (4, 40, 30)
+
+
+@pytest.mark.parametrize("range_m", [(5.0, 5.0), (9.0, 4.0), (0.0, float("inf"))])
+def test_an_empty_colour_range_is_refused(bathymetry: BathymetricMap, range_m: tuple[float, float]) -> None:
+    with pytest.raises(ValueError, match="range_m"):
+        overlay_png(bathymetry, range_m)
+
+
+def test_overlay_corners_run_clockwise_from_north_west() -> None:
+    lon, lat = np.transpose(overlay_corners(GRID, FRAME))
+    east, north = FRAME.to_local(lat, lon)
+    np.testing.assert_allclose(east, [-10, 70, 70, -10], atol=1e-3)
+    np.testing.assert_allclose(north, [80, 80, 20, 20], atol=1e-3)
+
+
+def test_picture_is_a_png_and_leaves_pyplot_alone(bathymetry: BathymetricMap) -> None:
+    png = picture_png(
+        bathymetry,
+        vertical_datum=DATUM,
+        title="Leixoes",
+        tracks={"lauv-1": np.array([[0.0, 30.0], [50.0, 70.0]])},
+    )
+    image = Image.open(io.BytesIO(png))
+    image.verify()
+    assert image.format == "PNG"
+    assert min(image.size) > 500
+    assert plt.get_fignums() == []
+
+
+def test_pictures_can_be_drawn_in_threads(bathymetry: BathymetricMap) -> None:
+    with ThreadPoolExecutor(3) as pool:
+        pictures = list(pool.map(lambda _: picture_png(bathymetry, vertical_datum=DATUM), range(3)))
+    assert pictures[0] == pictures[1] == pictures[2]
+
+
+def test_a_map_without_depth_has_no_colour_range(bathymetry: BathymetricMap) -> None:
+    bathymetry.depth_m[:] = np.nan
+    with pytest.raises(ValueError, match="no depth"):
+        depth_range(bathymetry)
+
+
+def test_contours_of_a_plane_are_straight_and_at_their_depth(bathymetry: BathymetricMap) -> None:
+    collection = json.loads(contours_geojson(bathymetry, FRAME, interval_m=1.0, vertical_datum=DATUM))
+    depths = [feature["properties"]["depth_m"] for feature in collection["features"]]
+    assert depths == [6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0, 13.0, 14.0]
+    for feature in collection["features"]:
+        for line in feature["geometry"]["coordinates"]:
+            lon, lat = np.transpose(line)
+            east, north = FRAME.to_local(lat, lon)
+            np.testing.assert_allclose(
+                5.0 + 0.1 * (east + 10.0) + 0.02 * north, feature["properties"]["depth_m"], atol=1e-3
+            )
+
+
+def test_too_many_contours_are_refused_with_a_suggestion(bathymetry: BathymetricMap) -> None:
+    with pytest.raises(ValueError, match="choose at least"):
+        contours_geojson(bathymetry, FRAME, interval_m=1e-4, vertical_datum=DATUM)

@@ -1,0 +1,144 @@
+"""From soundings to the map and the belief."""
+
+import threading
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+
+from app.missions.map_builder import MAX_LANDMARKS, MapBuilder, make_grid
+
+AREA = np.array([[0.0, 0.0], [30.0, 0.0], [30.0, 30.0], [0.0, 30.0]])
+
+
+def soundings(count: int, seed: int = 0) -> np.ndarray:
+    """Rows of east, north, depth, deviation over a slope."""
+    rng = np.random.default_rng(seed)
+    east, north = rng.uniform(0, 30, (2, count))
+    return np.column_stack([east, north, 6.0 + 0.1 * east, np.full(count, 0.05)])
+
+
+def built_of(*batches: np.ndarray) -> MapBuilder:
+    builder = MapBuilder(AREA, 1.0, 0.25)
+    for batch in batches:
+        builder.add(batch)
+    builder.build()
+    return builder
+
+
+def test_nothing_is_known_before_the_first_sounding() -> None:
+    builder = MapBuilder(AREA, 1.0, 0.25)
+    builder.add(np.zeros((0, 4)))
+    assert builder.build() is None
+    assert builder.build(thorough=True) is None
+    builder.learn()
+    belief = builder.belief()
+    assert builder.coverage_pct() == 0.0
+    assert not builder.stale
+    assert np.isnan(belief.depth_m).all()
+    assert np.isinf(belief.sd_m).all()
+    assert len(belief.xy_m) == 900
+
+
+def test_the_same_soundings_give_the_same_digest() -> None:
+    first, again = built_of(soundings(60)), built_of(soundings(60))
+    parts = built_of(*np.array_split(soundings(60), 4))
+    assert first.newest is not None
+    assert again.newest is not None
+    assert parts.newest is not None
+    assert first.newest.digest == again.newest.digest == parts.newest.digest
+    other = built_of(soundings(61)).newest
+    assert other is not None
+    assert other.digest != first.newest.digest
+
+
+def test_versions_grow_with_new_soundings_only() -> None:
+    builder = built_of(soundings(40))
+    first = builder.newest
+    assert builder.build() is first
+    builder.add(soundings(5, seed=1))
+    assert builder.stale
+    second = builder.build()
+    assert first is not None
+    assert second is not None
+    assert (first.version, first.soundings) == (1, 40)
+    assert (second.version, second.soundings) == (2, 45)
+    assert not builder.stale
+
+
+def test_the_map_is_that_of_the_sea_floor_and_the_belief_that_of_the_map() -> None:
+    builder = built_of(soundings(150))
+    builder.learn()
+    builder.add(soundings(20, seed=1))
+    newest = builder.build()
+    assert newest is not None
+    truth = 6.0 + 0.1 * builder.grid.centres_m[:, 0].reshape(30, 30)
+    assert np.sqrt(np.mean((newest.map.depth_m - truth) ** 2)) < 0.05
+    belief = builder.belief()
+    np.testing.assert_array_equal(belief.depth_m, newest.map.depth_m.ravel())
+    assert 0.0 < builder.coverage_pct() <= 100.0
+    np.testing.assert_array_equal(belief.accurate, belief.sd_m <= 0.25)
+
+
+def test_what_was_accurate_once_stays_so() -> None:
+    builder = built_of(soundings(150))
+    before = builder.belief().accurate
+    assert before.any()
+    builder.add(np.array([[15.0, 15.0, 9.0, 3.0], [16.0, 15.0, 4.0, 3.0]]))
+    builder.build()
+    assert (builder.belief().accurate | ~before).all()
+
+
+def test_soundings_that_come_while_a_map_is_built_are_in_the_next_one() -> None:
+    builder = MapBuilder(AREA, 1.0, 0.25)
+    batches = [soundings(7, seed) for seed in range(40)]
+    added = threading.Event()
+
+    def add_all() -> None:
+        for batch in batches:
+            builder.add(batch)
+        added.set()
+
+    with ThreadPoolExecutor(3) as pool:
+        adding = pool.submit(add_all)
+        versions = []
+        while not added.is_set():
+            for done in [pool.submit(builder.build), pool.submit(builder.build)]:
+                built = done.result()
+                versions.append(built.version if built else 0)
+            pool.submit(builder.learn).result()
+        adding.result()
+    final = builder.build()
+    assert final is not None
+    assert final.soundings == 7 * 40
+    assert versions == sorted(versions)
+    np.testing.assert_array_equal(np.sort(builder.sounded_at_m()[:, 0]), np.sort(np.concatenate(batches)[:, 0]))
+
+
+def test_one_gross_outlier_does_not_bend_a_product() -> None:
+    rows = soundings(200)
+    spoiled = np.vstack([rows, [[15.0, 15.0, 60.0, 0.05]]])
+    builder = MapBuilder(AREA, 1.0, 0.25)
+    builder.add(spoiled)
+    built = builder.build(thorough=True)
+    assert built is not None
+    assert built.map.depth_m[15, 15] == pytest.approx(7.55, abs=0.2)
+
+
+@pytest.mark.parametrize("cell_m", [0.2, 1.0, 5.0])
+def test_landmarks_are_few_enough_and_lie_in_the_area(cell_m: float) -> None:
+    triangle = np.array([[0.0, 0.0], [30.0, 0.0], [0.0, 30.0]])
+    builder = MapBuilder(triangle, cell_m, 0.25)
+    xy = builder.belief().xy_m
+    assert 0 < len(xy) <= 1.3 * MAX_LANDMARKS
+    assert (xy.sum(axis=1) <= 30.0).all()
+
+
+def test_the_grid_covers_the_area_without_a_needless_cell() -> None:
+    grid, inside = make_grid(AREA + 1e-7, 1.0)
+    assert (grid.rows, grid.cols) == (30, 30)
+    assert inside.all()
+    grid, inside = make_grid(np.array([[0.0, 0.0], [10.5, 0.0], [0.0, 4.0]]), 2.0)
+    assert (grid.rows, grid.cols) == (2, 6)
+    assert inside[0, 0]
+    assert not inside[1, 5]

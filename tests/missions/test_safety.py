@@ -1,0 +1,286 @@
+"""Nothing that breaks a limit is sent to a vehicle."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from shapely.geometry import LineString, Point, Polygon
+
+from app.exploration.bottom import Bottom
+from app.exploration.constraints import Constraints
+from app.exploration.problem import Belief, Proposal, Situation
+from app.missions import safety
+from app.missions.decision import Decision, Place, decide, make_constraints
+from app.missions.spec import MissionSpec
+from tests.missions.builders import make_spec, rectangle
+
+AREA = np.array([[0.0, 0.0], [60.0, 0.0], [60.0, 60.0], [0.0, 60.0]])
+KEEP_OUT = np.array([[20.0, 20.0], [30.0, 20.0], [30.0, 30.0], [20.0, 30.0]])
+LIMITS = Constraints(
+    AREA,
+    (KEEP_OUT,),
+    max_step_m=12.0,
+    max_depth_m=20.0,
+    min_altitude_m=1.0,
+    com_range_m=50.0,
+    min_separation_m=4.0,
+    min_vertical_separation_m=1.0,
+)
+
+
+def slope() -> Bottom:
+    """Three to nine metres deep from west to east."""
+    east, north = np.meshgrid(np.arange(1.0, 60.0, 2.0), np.arange(1.0, 60.0, 2.0))
+    return Bottom.from_landmarks(np.column_stack([east.ravel(), north.ravel()]), 3.0 + east.ravel() / 10.0)
+
+
+BOTTOM = slope()
+NAMES = ("a", "b", "c")
+
+
+def origins() -> np.ndarray[Any, np.dtype[np.float64]]:
+    return np.array([[10.0, 10.0, 1.0], [40.0, 10.0, 1.0], [10.0, 45.0, 1.0]])
+
+
+metres = st.floats(-80, 140) | st.just(math.nan) | st.just(math.inf)
+moves = st.lists(st.tuples(metres, metres, st.floats(-3, 30) | st.just(math.nan)), min_size=3, max_size=3)
+
+
+@settings(deadline=None, max_examples=100)
+@given(moves)
+def test_whatever_is_proposed_what_comes_out_breaks_no_limit(rows: list[tuple[float, float, float]]) -> None:
+    origin = origins()
+    proposed = np.array(rows)
+    checked = safety.check_step(NAMES, origin, proposed, LIMITS, BOTTOM)
+    assert np.isfinite(checked.positions).all()
+    final = checked.positions.copy()
+    for name in checked.refusals:
+        final[NAMES.index(name)] = origin[NAMES.index(name)]
+    broken = {v.vehicle for v in LIMITS.violations(NAMES, origin, final, BOTTOM)}
+    assert broken <= set(checked.refusals)
+    for i, name in enumerate(NAMES):
+        if name in checked.refusals or name in checked.corrections:
+            assert (checked.refusals | checked.corrections)[name]
+        else:
+            np.testing.assert_array_equal(checked.positions[i], proposed[i])
+        if name in checked.corrections:
+            np.testing.assert_array_equal(checked.positions[i], origin[i])
+
+
+@settings(deadline=None, max_examples=100)
+@given(moves)
+def test_checked_waypoints_keep_the_limits_by_plain_geometry(rows: list[tuple[float, float, float]]) -> None:
+    origin = origins()
+    checked = safety.check_step(NAMES, origin, np.array(rows), LIMITS, BOTTOM)
+    area, zone = Polygon(AREA), Polygon(KEEP_OUT)
+    sent = [i for i, name in enumerate(NAMES) if name not in checked.refusals]
+    for i in sent:
+        leg = LineString([origin[i, :2], checked.positions[i, :2]])
+        assert area.buffer(1e-5).covers(leg)
+        assert not zone.buffer(-1e-5).intersects(leg)
+        assert np.linalg.norm(checked.positions[i] - origin[i]) <= LIMITS.max_step_m + 1e-5
+        assert -1e-5 <= checked.positions[i, 2] <= LIMITS.max_depth_m + 1e-5
+    for i in sent:
+        for k in sent:
+            here, there = checked.positions[i], checked.positions[k]
+            if k > i and abs(here[2] - there[2]) < LIMITS.min_vertical_separation_m:
+                assert np.linalg.norm(here[:2] - there[:2]) >= LIMITS.min_separation_m - 1e-5
+
+
+def test_a_proposal_that_is_no_place_makes_the_vehicle_hold() -> None:
+    proposed = origins()
+    proposed[1] = math.nan
+    checked = safety.check_step(NAMES, origins(), proposed, LIMITS, BOTTOM)
+    np.testing.assert_array_equal(checked.positions[1], origins()[1])
+    assert "which is no place; the vehicle holds" in checked.corrections["b"]
+    assert checked.refusals == {}
+
+
+def test_holding_one_vehicle_makes_another_hold_that_would_have_passed_it() -> None:
+    origin = np.array([[10.0, 10.0, 1.0], [18.0, 10.0, 1.0]])
+    proposed = np.array([[30.0, 10.0, 1.0], [12.0, 10.0, 1.0]])  # too far; and to where the first stays
+    checked = safety.check_step(("a", "b"), origin, proposed, LIMITS, BOTTOM)
+    np.testing.assert_array_equal(checked.positions, origin)
+    assert set(checked.corrections) == {"a", "b"}
+
+
+def test_a_vehicle_that_cannot_even_hold_gets_no_waypoint() -> None:
+    aground = np.array([[10.0, 10.0, 3.5]])  # half a metre above a bottom of four metres
+    checked = safety.check_step(("a",), aground, aground + np.array([0.0, 5.0, 0.2]), LIMITS, BOTTOM)
+    assert "clearance" in checked.refusals["a"]
+    assert checked.corrections == {}
+
+
+@settings(deadline=None)
+@given(
+    st.tuples(st.floats(1, 58), st.floats(1, 58)),
+    st.tuples(st.floats(1, 58), st.floats(1, 58)),
+    st.floats(0, 15),
+    st.floats(0, 5),
+)
+def test_depth_of_travel_is_as_wanted_or_leaves_the_clearance(
+    start: tuple[float, float], end: tuple[float, float], wanted_m: float, clearance_m: float
+) -> None:
+    depth = safety.travel_depth_m(np.array(start), np.array(end), wanted_m, BOTTOM, clearance_m)
+    assert 0.0 <= depth <= wanted_m
+    along = np.linspace(0, 1, safety.LEG_SAMPLES)[:, None] * (np.array(end) - start) + start
+    shallowest = np.nanmin(BOTTOM.at(along))
+    assert depth == pytest.approx(min(wanted_m, max(0.0, shallowest - clearance_m)))
+
+
+def test_over_an_unknown_bottom_the_wanted_depth_counts() -> None:
+    assert safety.travel_depth_m(np.zeros(2), np.ones(2), 4.0, Bottom.unknown(), 2.0) == 4.0
+
+
+# Decisions
+
+
+class Wishes:
+    """A planner that proposes what it is told to."""
+
+    def __init__(self, positions: list[list[float]]) -> None:
+        self.positions = np.array(positions)
+        self.asked: list[Situation] = []
+
+    def propose(self, situation: Situation, rng: np.random.Generator) -> Proposal:
+        self.asked.append(situation)
+        return Proposal(self.positions, 0.5, {"gain": 1.0})
+
+    def snapshot(self) -> bytes:
+        return b"memory"
+
+    def restore(self, memory: bytes) -> None:
+        raise NotImplementedError
+
+
+def belief_of(depth_m: float = 9.0, sd_m: float = 0.5) -> Belief:
+    east, north = np.meshgrid(np.arange(1.0, 60.0, 4.0), np.arange(1.0, 60.0, 4.0))
+    n = east.size
+    return Belief(
+        np.column_stack([east.ravel(), north.ravel()]),
+        np.full(n, depth_m),
+        np.full(n, sd_m),
+        np.zeros(n, dtype=bool),
+        np.ones(n),
+        8.0,
+    )
+
+
+def place(name: str, east_m: float, north_m: float, depth_m: float = 2.0) -> Place:
+    return Place(name, np.array([east_m, north_m]), math.nan, depth_m)
+
+
+def decide_for(
+    places: list[Place], wishes: list[list[float]], belief: Belief | None = None, **changes: Any
+) -> tuple[Decision, Wishes, MissionSpec]:
+    spec = make_spec(60.0, **({"limits": {"max_step_m": 12.0, "max_depth_m": 20.0}} | changes))
+    planner = Wishes(wishes)
+    belief = belief or belief_of()
+    return decide(1, spec, make_constraints(spec), planner, places, belief, np.zeros((0, 2))), planner, spec
+
+
+def test_waypoints_are_as_proposed_at_each_vehicles_depth() -> None:
+    decision, planner, _ = decide_for(
+        [place("a", 10, 10), place("b", 40, 40, 3.0)], [[15.0, 12.0, 99.0], [42.0, 45.0, 99.0]]
+    )
+    np.testing.assert_allclose([leg.target_m for leg in decision.legs], [[15, 12, 2.0], [42, 45, 3.0]])
+    assert [leg.refusal for leg in decision.legs] == ["", ""]
+    assert (decision.objective, decision.terms, decision.memory, decision.notes) == (0.5, {"gain": 1.0}, b"memory", [])
+    (situation,) = planner.asked
+    assert (situation.step, situation.vehicles) == (1, ("a", "b"))
+
+
+def test_the_bottom_is_taken_to_be_shallower_than_estimated() -> None:
+    decision, _, _ = decide_for([place("a", 10, 10, 5.0)], [[12.0, 12.0, 5.0]], belief_of(6.0, 0.75))
+    assert decision.legs[0].target_m[2] == pytest.approx(6.0 - 2 * 0.75 - 1.0)
+
+
+def test_a_proposal_of_nan_holds_and_is_told() -> None:
+    decision, _, _ = decide_for([place("a", 10, 10)], [[math.nan, 12.0, 2.0]])
+    np.testing.assert_allclose(decision.legs[0].target_m, [10, 10, 2.0])
+    assert "the vehicle holds" in decision.notes[0]
+
+
+def test_a_leg_into_a_keep_out_zone_is_not_flown() -> None:
+    decision, _, _ = decide_for([place("a", 15, 25)], [[24.0, 25.0, 2.0]], keep_out=[rectangle(20, 20, 30, 30)])
+    np.testing.assert_allclose(decision.legs[0].target_m[:2], [15, 25])
+    assert "keep-out" in decision.notes[0]
+
+
+def test_a_vehicle_just_outside_is_planned_for_from_the_border() -> None:
+    decision, planner, _ = decide_for([place("a", -5, 30)], [[6.0, 30.0, 2.0]])
+    np.testing.assert_allclose(planner.asked[0].positions[0, :2], [0, 30], atol=0.05)
+    np.testing.assert_allclose(decision.legs[0].target_m[:2], [6, 30])
+
+
+def test_a_vehicle_far_outside_comes_at_the_surface_and_is_not_planned_for() -> None:
+    decision, planner, _ = decide_for([place("a", -100, 30), place("b", 30, 30)], [[33.0, 30.0, 2.0]])
+    by_name = {leg.vehicle: leg for leg in decision.legs}
+    np.testing.assert_allclose(by_name["a"].target_m, [1.0, 30.0, 0.0], atol=0.05)
+    assert planner.asked[0].vehicles == ("b",)
+    assert "a is 100 m outside the area" in decision.notes[0]
+
+
+def test_without_anyone_to_plan_for_the_planner_is_not_asked() -> None:
+    decision, planner, _ = decide_for([place("a", -100, 30)], [])
+    assert planner.asked == []
+    assert (decision.objective, decision.memory) == (None, b"memory")
+
+
+def test_the_way_in_goes_round_keep_out_zones() -> None:
+    quay = rectangle(-5, 10, 8, 60)  # along the western border, open in the south
+    decision, _, spec = decide_for([place("a", -40, 35)], [], keep_out=[quay])
+    (leg,) = decision.legs
+    assert leg.refusal == ""
+    zone, area = Polygon(spec.to_local(spec.keep_out[0])), Polygon(spec.local_area())
+    way = LineString([(-40, 35), leg.target_m[:2]])
+    assert area.covers(Point(leg.target_m[:2]))
+    assert way.distance(zone) > 0
+
+
+def test_a_vehicle_without_a_way_in_stays_where_it_is() -> None:
+    decision, _, _ = decide_for([place("a", -40, 35)], [], keep_out=[rectangle(-5, -500, 8, 500)])
+    (leg,) = decision.legs
+    assert "keep-out" in leg.refusal
+
+
+def test_vehicles_that_come_in_together_are_sent_apart() -> None:
+    decision, _, spec = decide_for([place(n, -40, 30 + i) for i, n in enumerate("abc")], [])
+    goals = [leg.target_m[:2] for leg in decision.legs]
+    for i, goal in enumerate(goals):
+        for other in goals[:i]:
+            assert np.linalg.norm(goal - other) >= spec.limits.min_separation_m
+
+
+@settings(deadline=None, max_examples=60)
+@given(
+    st.lists(st.tuples(st.floats(-60, 120), st.floats(-60, 120)), min_size=1, max_size=3),
+    st.lists(st.tuples(metres, metres, metres), min_size=3, max_size=3),
+    st.floats(1.5, 12.0),
+)
+def test_no_decision_breaks_a_limit_wherever_the_vehicles_are(
+    there: list[tuple[float, float]], wishes: list[tuple[float, float, float]], depth_m: float
+) -> None:
+    places = [place("abc"[i], *en, 1.0 + i) for i, en in enumerate(there)]
+    spec = make_spec(60.0, keep_out=[rectangle(20, 20, 30, 30)], limits={"max_step_m": 12.0, "max_depth_m": 20.0})
+    constraints = make_constraints(spec)
+    area, zone = Polygon(constraints.area), Polygon(constraints.keep_out[0])
+
+    class Team(Wishes):
+        def propose(self, situation: Situation, rng: np.random.Generator) -> Proposal:
+            return Proposal(np.array(wishes[: len(situation.vehicles)]), 0.0)
+
+    decision = decide(1, spec, constraints, Team([]), places, belief_of(depth_m), np.zeros((0, 2)))
+    assert sorted(leg.vehicle for leg in decision.legs) == [p.vehicle for p in places]
+    for leg in decision.legs:
+        if leg.refusal:
+            continue
+        start = next(p.en_m for p in places if p.vehicle == leg.vehicle)
+        assert np.isfinite(leg.target_m).all()
+        assert area.buffer(1e-3).covers(Point(leg.target_m[:2]))
+        if not zone.buffer(1e-3).contains(Point(start)):
+            assert not zone.buffer(-1e-3).intersects(LineString([start, leg.target_m[:2]]))
+        assert 0.0 <= leg.target_m[2] <= max(0.0, depth_m - 2 * 0.5 - 1.0) + 1e-6

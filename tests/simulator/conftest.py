@@ -1,0 +1,8 @@
+import pytest
+from dune_bench import Bench
+
+
+@pytest.fixture
+def bench():
+    """A node in service with a console that it talks to."""
+    return Bench().ready()

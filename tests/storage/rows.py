@@ -1,0 +1,131 @@
+"""One row of every table."""
+
+from datetime import UTC, datetime
+from typing import Any
+
+from app.storage.models import (
+    BatchRow,
+    EventRow,
+    MissionRow,
+    MissionVehicleRow,
+    PositionRow,
+    SoundingRow,
+    StepRow,
+    TokenRow,
+    WaypointRow,
+)
+
+TIME = datetime(2026, 6, 1, 12, 30, 15, 250_000, tzinfo=UTC)
+
+
+def mission(mission_id: str = "m1", **changes: Any) -> MissionRow:
+    values: dict[str, Any] = {
+        "id": mission_id,
+        "name": "Harbour",
+        "state": "ready",
+        "reason": "",
+        "spec": {"steps": 3, "area": [[-8.7, 41.18]]},
+        "created_at": TIME,
+        "updated_at": TIME,
+        "elapsed_s": 1.5,
+    }
+    return MissionRow(**(values | changes))
+
+
+def vehicle(mission_id: str = "m1", name: str = "a", slot: int = 0) -> MissionVehicleRow:
+    return MissionVehicleRow(
+        mission_id=mission_id, name=name, slot=slot, spec={"name": name}, joined_at=TIME, left_at=None
+    )
+
+
+def step(mission_id: str = "m1", number: int = 1) -> StepRow:
+    return StepRow(
+        mission_id=mission_id,
+        number=number,
+        committed_at=TIME,
+        objective=0.25,
+        terms={"gain": 1.0},
+        soundings=7,
+        map_digest="0" * 64,
+        memory=b"\x00memory",
+    )
+
+
+def waypoint(mission_id: str = "m1", number: int = 1, name: str = "a", **changes: Any) -> WaypointRow:
+    values: dict[str, Any] = {
+        "mission_id": mission_id,
+        "step": number,
+        "vehicle": name,
+        "lat_deg": 41.18,
+        "lon_deg": -8.7,
+        "east_m": 1.0,
+        "north_m": 2.0,
+        "depth_m": 3.0,
+        "status": "planned",
+        "reason": "",
+        "changed_at": TIME,
+    }
+    return WaypointRow(**(values | changes))
+
+
+def sounding(
+    mission_id: str = "m1", name: str = "a", time_s: float = 1.0, beam: int = 0, **changes: Any
+) -> dict[str, Any]:
+    values: dict[str, Any] = {
+        "mission_id": mission_id,
+        "vehicle": name,
+        "time_s": time_s,
+        "beam": beam,
+        "received_at": TIME,
+        "step": 0,
+        "source": "rest",
+        "lat_deg": 41.18,
+        "lon_deg": -8.7,
+        "east_m": 1.0,
+        "north_m": 2.0,
+        "vehicle_depth_m": 2.0,
+        "range_m": 8.0,
+        "raw_depth_m": 10.0,
+        "depth_m": 10.0,
+        "sd_m": 0.08,
+        "position_sd_m": None,
+        "verdict": "accepted",
+        "reason": "",
+    }
+    return values | changes
+
+
+def position(mission_id: str = "m1", name: str = "a", time_s: float = 1.0, lat_deg: float = 41.18) -> dict[str, Any]:
+    return {
+        "mission_id": mission_id,
+        "vehicle": name,
+        "time_s": time_s,
+        "lat_deg": lat_deg,
+        "lon_deg": -8.7,
+        "depth_m": 2.0,
+    }
+
+
+def one_of_each() -> list[list[Any]]:
+    """Rows in the order in which foreign keys allow them."""
+    return [
+        [mission()],
+        [vehicle(), step()],
+        [waypoint()],
+        [
+            SoundingRow(**sounding()),
+            PositionRow(**position()),
+            BatchRow(mission_id="m1", key="k", digest="d", answer={"accepted": 1}, created_at=TIME),
+            EventRow(mission_id="m1", time=TIME, level="info", kind="state", message="made", data={"by": "me"}),
+            TokenRow(
+                id="t1",
+                name="Ana",
+                role="operator",
+                vehicle=None,
+                token_hash="f" * 64,
+                created_at=TIME,
+                expires_at=None,
+                revoked_at=None,
+            ),
+        ],
+    ]

@@ -1,0 +1,135 @@
+"""What the queries answer."""
+
+import random
+
+import numpy as np
+
+from app.storage import events as event_queries
+from app.storage import missions as mission_queries
+from app.storage import soundings as sounding_queries
+from app.storage.database import Database
+from app.storage.models import EventRow
+from tests.storage.rows import TIME, mission, position, sounding, step, vehicle, waypoint
+
+
+async def _two_missions(database: Database) -> None:
+    async with database.writing() as session:
+        session.add_all([mission(), mission("m2")])
+
+
+async def test_a_sounding_is_known_by_vehicle_time_and_beam(database: Database) -> None:
+    await _two_missions(database)
+    first = [sounding(time_s=1.0), sounding(time_s=1.0, beam=1), sounding(time_s=2.0)]
+    async with database.writing() as session:
+        assert await sounding_queries.insert_new(session, first) == {("a", 1.0, 0), ("a", 1.0, 1), ("a", 2.0, 0)}
+    again = [
+        sounding(time_s=1.0, depth_m=99.0),
+        sounding(time_s=2.0, beam=1),
+        sounding(name="b", time_s=1.0),
+        sounding(name="b", time_s=1.0, depth_m=98.0),
+    ]
+    async with database.writing() as session:
+        assert await sounding_queries.insert_new(session, again) == {("a", 2.0, 1), ("b", 1.0, 0)}
+        assert await sounding_queries.insert_new(session, [sounding("m2")]) == {("a", 1.0, 0)}
+        assert await sounding_queries.insert_new(session, []) == set()
+    async with database.reading() as session:
+        rows = await sounding_queries.all_soundings(session, "m1")
+    assert [(r.vehicle, r.time_s, r.beam) for r in rows] == [
+        ("a", 1.0, 0),
+        ("a", 1.0, 1),
+        ("a", 2.0, 0),
+        ("a", 2.0, 1),
+        ("b", 1.0, 0),
+    ]
+    assert {row.depth_m for row in rows} == {10.0}  # what was there first stays
+
+
+async def test_unix_times_with_all_their_digits_are_told_apart_and_recognised(database: Database) -> None:
+    await _two_missions(database)
+    rng = random.Random(5)  # noqa: S311
+    times = sorted({1.795e9 + rng.random() * 1e5 for _ in range(500)})
+    times.append(float(np.nextafter(times[-1], np.inf)))
+    rows = [sounding(time_s=t) for t in times]
+    async with database.writing() as session:
+        assert len(await sounding_queries.insert_new(session, rows)) == len(times)
+    async with database.writing() as session:
+        assert await sounding_queries.insert_new(session, rows) == set()
+
+
+async def test_a_large_batch_is_stored_whole(database: Database) -> None:
+    await _two_missions(database)
+    rows = [
+        sounding(time_s=float(i), depth_m=float(i), verdict="rejected" if i % 3 else "accepted") for i in range(5000)
+    ]
+    async with database.writing() as session:
+        assert len(await sounding_queries.insert_new(session, rows)) == 5000
+    async with database.reading() as session:
+        assert await sounding_queries.counts(session, "m1") == {"accepted": 1667, "rejected": 3333}
+        assert await sounding_queries.counts(session, "m2") == {}
+        arrays = await sounding_queries.accepted_arrays(session, "m1")
+        assert (await sounding_queries.accepted_arrays(session, "m2")).shape == (0, 4)
+    np.testing.assert_array_equal(arrays[:, 2], np.arange(0.0, 5000.0, 3.0))
+
+
+async def test_newest_waypoints_are_one_for_each_vehicle(database: Database) -> None:
+    await _two_missions(database)
+    async with database.writing() as session:
+        session.add_all([vehicle(), vehicle(name="b", slot=1), step(), step(number=2), step("m2")])
+        await session.flush()
+        session.add_all([waypoint(), waypoint(number=2), waypoint(name="b"), waypoint("m2", name="c")])
+    async with database.writing() as session:
+        await mission_queries.set_waypoint_status(session, "m1", 2, "a", "reached", "there", TIME)
+    async with database.reading() as session:
+        newest = await mission_queries.newest_waypoints(session, "m1")
+        assert [(w.vehicle, w.step, w.status, w.reason) for w in newest] == [
+            ("a", 2, "reached", "there"),
+            ("b", 1, "planned", ""),
+        ]
+        last = await mission_queries.last_step(session, "m1")
+        assert last is not None
+        assert (last.number, last.memory) == (2, b"\x00memory")
+        assert [w.vehicle for w in await mission_queries.waypoints_of_step(session, "m1", 1)] == ["a", "b"]
+
+
+async def test_missions_by_state_and_age(database: Database) -> None:
+    async with database.writing() as session:
+        session.add_all(
+            [mission("old", state="running"), mission("new", state="paused", created_at=TIME.replace(year=2027))]
+        )
+    async with database.writing() as session:
+        await mission_queries.set_state(session, "old", "failed", "no power", TIME.replace(year=2028))
+        await mission_queries.add_elapsed(session, "old", 2.5, TIME)
+    async with database.reading() as session:
+        assert [row.id for row in await mission_queries.all_missions(session)] == ["new", "old"]
+        (failed,) = await mission_queries.missions_in(session, ["failed", "running"])
+    assert (failed.id, failed.reason, failed.elapsed_s) == ("old", "no power", 4.0)
+
+
+async def test_tracks_keep_the_order_in_which_they_were_heard(database: Database) -> None:
+    await _two_missions(database)
+    async with database.writing() as session:
+        await mission_queries.add_positions(
+            session, [position(lat_deg=41.3), position(lat_deg=41.1), position(name="b"), position("m2", lat_deg=1.0)]
+        )
+        await mission_queries.add_positions(session, [])
+    async with database.reading() as session:
+        tracks = await mission_queries.tracks(session, "m1")
+        last = await mission_queries.last_positions(session, "m1")
+    assert tracks == {"a": [(-8.7, 41.3), (-8.7, 41.1)], "b": [(-8.7, 41.18)]}
+    assert {name: row.lat_deg for name, row in last.items()} == {"a": 41.1, "b": 41.18}
+
+
+async def test_events_resume_after_any_of_them(database: Database) -> None:
+    await _two_missions(database)
+    async with database.writing() as session:
+        for i in range(6):
+            mission_id = "m1" if i % 2 else "m2"
+            session.add(EventRow(mission_id=mission_id, time=TIME, level="info", kind="k", message=str(i), data={}))
+            await session.flush()
+    async with database.reading() as session:
+        every = await event_queries.events_after(session, "m1", 0, 10)
+        assert [e.message for e in every] == ["1", "3", "5"]
+        rest = await event_queries.events_after(session, "m1", every[0].id, 1)
+        assert [e.message for e in rest] == ["3"]
+        assert await event_queries.last_event_id(session, "m1") == every[-1].id
+        assert await event_queries.last_event_id(session, "m3") == 0

@@ -1,0 +1,233 @@
+"""The command line: what a user sees and which code a script gets."""
+
+import contextlib
+import json
+import os
+import re
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+import rasterio
+
+from app.cli import main
+from tests.api.conftest import mission_spec, soundings
+
+ROOT = Path(__file__).resolve().parents[1]
+COMMAND = [sys.executable, "-c", "import sys; sys.argv[0] = 'bathyfleet'; from app.cli import main; main()"]
+
+
+@dataclass
+class Ended:
+    """How a command ended."""
+
+    code: int
+    stdout: str
+    stderr: str
+
+
+Run = Callable[..., Ended]
+
+
+@pytest.fixture
+def environment() -> dict[str, str]:
+    kept = {name: value for name, value in os.environ.items() if not name.startswith("BATHYFLEET_")}
+    return kept | {"PYTHONPATH": str(ROOT), "COLUMNS": "200", "NO_COLOR": "1", "BATHYFLEET_IMC__ENABLED": "false"}
+
+
+@pytest.fixture
+def bathyfleet(
+    tmp_path: Path,
+    environment: dict[str, str],
+    monkeypatch: pytest.MonkeyPatch,
+    capsysbinary: pytest.CaptureFixture[bytes],
+) -> Run:
+    """Run the console script's function with these arguments in an empty folder."""
+
+    def run(*arguments: str, **variables: str) -> Ended:
+        with monkeypatch.context() as patch:
+            patch.chdir(tmp_path)
+            patch.setattr(os, "environ", environment | variables)
+            patch.setattr(sys, "argv", ["bathyfleet", *arguments])
+            with pytest.raises(SystemExit) as ended:
+                main()
+        out, err = capsysbinary.readouterr()
+        return Ended(int(ended.value.code or 0), out.decode(), err.decode())
+
+    return run
+
+
+@contextlib.contextmanager
+def serving(folder: Path, environment: dict[str, str], *arguments: str) -> Iterator[tuple[subprocess.Popen[str], str]]:
+    """``bathyfleet serve`` on a free port, and its address."""
+    process = subprocess.Popen(
+        [*COMMAND, "serve", "--port", "0", *arguments],
+        cwd=folder,
+        env=environment,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    assert process.stderr is not None
+    try:
+        seen = ""
+        for line in process.stderr:
+            seen += line
+            if found := re.search(r"bathyfleet answers at (\S+)", line):
+                yield process, found[1]
+                return
+        pytest.fail(f"it did not start: {seen}")
+    finally:
+        process.kill()
+        process.communicate()
+
+
+def test_help_lists_every_command_without_loading_the_service(bathyfleet: Run) -> None:
+    shown = bathyfleet("--help")
+    assert shown.code == 0
+    for command in ("serve", "demo", "evaluate", "export", "doctor", "migrate", "token"):
+        assert command in shown.stdout
+    imported = subprocess.run(
+        [sys.executable, "-X", "importtime", "-c", "import app.cli"],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    for heavy in ("numpy", "fastapi", "sqlalchemy", "pydantic", "matplotlib"):
+        assert f" {heavy}\n" not in imported.stderr
+
+
+@pytest.mark.parametrize(
+    "command", ["serve", "demo", "evaluate", "evaluate explore", "export", "doctor", "migrate", "token", "token create"]
+)
+def test_every_command_explains_its_options(bathyfleet: Run, command: str) -> None:
+    shown = bathyfleet(*command.split(), "--help")
+    assert shown.code == 0
+    assert "Options" in shown.stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "variables", "code", "message"),
+    [
+        (["serve", "--host", "0.0.0.0"], {}, 1, "there is no access token: make one with 'bathyfleet token create"),
+        (["serve", "--database", "mysql://h"], {}, 2, "database_url (from the command line): use sqlite"),
+        (["serve", "--database", "sqlite:////no/folder/x.db"], {}, 1, "unable to open database file"),
+        (["serve"], {"BATHYFLEET_PROT": "1"}, 2, "did you mean BATHYFLEET_PORT?"),
+        (["serve"], {"BATHYFLEET_AUTO_MIGRATE": "false"}, 1, "the database is empty"),
+        (["serve", "--time-scale", "0"], {}, 2, "greater than 0"),
+        (["serve", "--host", "192.0.2.77", "--insecure"], {}, 1, "cannot listen on 192.0.2.77:8080"),
+        (["export", "nowhere"], {}, 1, "0 missions have ids that begin with 'nowhere'. There are: none"),
+        (["export", "nowhere", "--format", "doc"], {}, 2, "'doc' is not one of tif, xyz"),
+        (["token", "create", "x", "--role", "king"], {}, 2, "king"),
+        (["token", "create", "x", "--role", "viewer", "--vehicle", "a"], {}, 2, "only a token of role vehicle"),
+        (["token", "revoke", "zzz"], {}, 2, "no valid token has an id that begins with 'zzz'"),
+        (["migrate", "--down-to", "nonsense"], {}, 1, "Can't locate revision"),
+        (["demo", "--terrain", "nowhere.npz"], {}, 2, "does not exist"),
+        (["demo", "--vehicles", "0"], {}, 2, "--vehicles"),
+        (["evaluate", "explore"], {}, 2, "--terrain"),
+        (["fly"], {}, 2, "No such command 'fly'"),
+    ],
+)
+def test_expected_errors_are_said_without_a_traceback(
+    bathyfleet: Run, arguments: list[str], variables: dict[str, str], code: int, message: str
+) -> None:
+    ended = bathyfleet(*arguments, **variables)
+    assert ended.code == code, ended.stderr
+    assert message in ended.stderr
+    assert "Traceback" not in ended.stderr
+    assert ended.stdout == ""
+
+
+def test_a_port_that_is_taken_is_said(bathyfleet: Run) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        ended = bathyfleet("serve", "--port", str(taken.getsockname()[1]))
+    assert ended.code == 1
+    assert "Address already in use; choose another with --port or --host" in ended.stderr
+    assert "Traceback" not in ended.stderr
+
+
+def test_migrate_goes_up_and_down(bathyfleet: Run) -> None:
+    assert "from revision empty to" in bathyfleet("migrate").stdout
+    assert "already" in bathyfleet("migrate").stdout
+    assert "to empty" in bathyfleet("migrate", "--down-to", "base").stdout
+
+
+def test_tokens_are_made_listed_and_revoked(bathyfleet: Run) -> None:
+    made = bathyfleet("token", "create", "Maria", "--role", "viewer", "--days", "30")
+    assert re.fullmatch(r"bf_[\w-]{43}\n", made.stdout)
+    (listed,) = json.loads(bathyfleet("token", "list", "--json").stdout)
+    assert (listed["name"], listed["role"], listed["revoked_at"]) == ("Maria", "viewer", None)
+    assert listed["expires_at"] > listed["created_at"]
+    assert listed["id"] in bathyfleet("token", "list").stdout
+    assert bathyfleet("token", "revoke", listed["id"][:8]).code == 0
+    (revoked,) = json.loads(bathyfleet("token", "list", "--json").stdout)
+    assert revoked["revoked_at"]
+
+
+def test_a_mission_is_served_exported_and_found_again(
+    bathyfleet: Run, tmp_path: Path, environment: dict[str, str]
+) -> None:
+    with serving(tmp_path, environment) as (process, url), httpx.Client(base_url=f"{url}/api/v1") as client:
+        mission: dict[str, Any] = client.post("/missions", json=mission_spec()).json()
+        client.post(f"/missions/{mission['id']}/measurements", json={"items": soundings(12)})
+        exported_beside = bathyfleet("export", mission["id"], "--format", "csv", "--out", "-")
+        assert exported_beside.stdout.count("rover") == 12
+        process.send_signal(signal.SIGINT)
+        assert process.wait(20) == 0
+    written = bathyfleet("export", mission["id"][:8], "--format", "tif", "--out", "maps/basin.tif")
+    assert written.code == 0, written.stderr
+    with rasterio.open(tmp_path / "maps" / "basin.tif") as raster:
+        assert raster.count >= 2
+    bathyfleet("export", mission["id"], "--format", "png")
+    assert (tmp_path / "output" / "harbour-basin.png").stat().st_size > 1000
+
+    with serving(tmp_path, environment) as (process, url), httpx.Client(base_url=f"{url}/api/v1") as client:
+        assert client.get(f"/missions/{mission['id']}").json()["progress"]["soundings"] == 12
+        process.terminate()
+        assert process.wait(20) == 0
+
+
+def test_logs_are_json_lines_with_the_requests_id(tmp_path: Path, environment: dict[str, str]) -> None:
+    with serving(tmp_path, environment, "--log-format", "json") as (process, url):
+        httpx.get(f"{url}/api/v1/missions", headers={"X-Request-Id": "abc-1"})
+        process.send_signal(signal.SIGINT)
+        assert process.stderr is not None
+        lines = [json.loads(line) for line in process.stderr.read().splitlines()]
+    (request,) = [line for line in lines if line["event"] == "request"]
+    assert (request["request_id"], request["path"], request["status"]) == ("abc-1", "/api/v1/missions", 200)
+
+
+def test_the_doctor_says_what_is_missing(bathyfleet: Run) -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    variables = {"BATHYFLEET_IMC__PORT": str(port), "BATHYFLEET_IMC__LOOPBACK_ONLY": "true"}
+    ended = bathyfleet("doctor", "--seconds", "0.2", "--json", **variables)
+    assert ended.code == 1
+    diagnosis = json.loads(ended.stdout)
+    assert diagnosis["healthy"] is False
+    assert any("no vehicle" in finding["text"] and finding["remedy"] for finding in diagnosis["own"])
+    shown = bathyfleet("doctor", "--seconds", "0.2", **variables)
+    assert (shown.code, "no vehicle" in shown.stdout) == (1, True)
+
+
+def test_the_doctor_says_when_the_service_holds_the_port(bathyfleet: Run) -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as holder:
+        holder.bind(("0.0.0.0", 0))
+        ended = bathyfleet(
+            "doctor",
+            "--seconds",
+            "0.2",
+            BATHYFLEET_IMC__PORT=str(holder.getsockname()[1]),
+            BATHYFLEET_IMC__LOOPBACK_ONLY="true",
+        )
+    assert ended.code == 1
+    assert "Stop the service first" in ended.stderr
+    assert "Traceback" not in ended.stderr

@@ -1,0 +1,150 @@
+"""Settings: where they come from, and what a mistake in them is answered with."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from app.settings import Settings, SettingsError, is_loopback, load_settings
+
+
+@pytest.fixture(autouse=True)
+def _alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """No settings of the machine that runs the tests."""
+    import os
+
+    for name in list(os.environ):
+        if name.startswith("BATHYFLEET_"):
+            monkeypatch.delenv(name)
+    monkeypatch.chdir(tmp_path)
+
+
+def test_the_defaults_are_safe() -> None:
+    settings = load_settings()
+    assert settings.loopback
+    assert not settings.insecure
+    assert settings.migrates_itself
+    assert settings.service().database_url == "sqlite+aiosqlite:///bathyfleet.db"
+
+
+def test_the_command_line_beats_the_environment_beats_the_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "bathyfleet.toml").write_text('port = 1\nhost = "localhost"\ntime_scale = 2.5\n[imc]\nport = 7001\n')
+    monkeypatch.setenv("BATHYFLEET_PORT", "2")
+    monkeypatch.setenv("BATHYFLEET_HOST", "127.0.0.2")
+    monkeypatch.setenv("BATHYFLEET_IMC__NAME", "quay")
+    settings = load_settings(port=3, host=None)
+    assert (settings.port, settings.host, settings.time_scale) == (3, "127.0.0.2", 2.5)
+    assert (settings.imc.name, settings.imc.port) == ("quay", 7001)
+
+
+def test_the_file_may_lie_elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    file = tmp_path / "elsewhere.toml"
+    file.write_text("port = 4711\n")
+    monkeypatch.setenv("BATHYFLEET_CONFIG", str(file))
+    assert load_settings().port == 4711
+
+
+@pytest.mark.parametrize(
+    ("given", "used"),
+    [
+        ("sqlite:///a.db", "sqlite+aiosqlite:///a.db"),
+        ("sqlite+aiosqlite:///a.db", "sqlite+aiosqlite:///a.db"),
+        ("postgresql://u:p@h/n", "postgresql+asyncpg://u:p@h/n"),
+        ("postgres://h/n", "postgresql+asyncpg://h/n"),
+    ],
+)
+def test_usual_spellings_of_database_urls_are_understood(given: str, used: str) -> None:
+    assert load_settings(database_url=given).database_url == used
+
+
+def test_only_sqlite_is_migrated_without_being_asked() -> None:
+    assert not load_settings(database_url="postgresql://h/n").migrates_itself
+    assert load_settings(database_url="postgresql://h/n", auto_migrate=True).migrates_itself
+    assert not load_settings(auto_migrate=False).migrates_itself
+
+
+@pytest.mark.parametrize(
+    ("toml", "environment", "overrides", "message"),
+    [
+        ("prot = 1", {}, {}, "prot (from bathyfleet.toml) is not a setting: did you mean port?"),
+        ("[imc]\nprot = 1", {}, {}, "imc.prot (from bathyfleet.toml) is not a setting: did you mean port?"),
+        ("port = 70000", {}, {}, "port is 70000 (from bathyfleet.toml): input should be less than or equal to 65535"),
+        ('imc = "on"', {}, {}, "imc is 'on' (from bathyfleet.toml): input should be"),
+        ("port = ", {}, {}, "bathyfleet.toml is not TOML"),
+        (
+            "",
+            {"BATHYFLEET_PROT": "1"},
+            {},
+            "variable BATHYFLEET_PROT is not a setting: did you mean BATHYFLEET_PORT?",
+        ),
+        ("", {"BATHYFLEET_IMC__PROT": "1"}, {}, "did you mean BATHYFLEET_IMC__PORT?"),
+        ("", {"BATHYFLEET_IMC__PORT": "x"}, {}, "imc.port is 'x' (from BATHYFLEET_IMC__PORT): input should be a valid"),
+        ("", {"BATHYFLEET_ALLOWED_ORIGINS": "a"}, {}, "lists and tables are written as JSON"),
+        (
+            "",
+            {"BATHYFLEET_CONFIG": "/no/file.toml"},
+            {},
+            "names '/no/file.toml', which is not a file",
+        ),
+        ("", {}, {"time_scale": 0.0}, "time_scale is 0.0 (from the command line): input should be greater than 0"),
+        (
+            "",
+            {},
+            {"database_url": "mysql://h"},
+            "database_url (from the command line): use sqlite+",
+        ),
+    ],
+)
+def test_a_mistake_names_the_setting_its_source_and_what_would_be_right(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    toml: str,
+    environment: dict[str, str],
+    overrides: dict[str, Any],
+    message: str,
+) -> None:
+    (tmp_path / "bathyfleet.toml").write_text(toml)
+    for name, value in environment.items():
+        monkeypatch.setenv(name, value)
+    with pytest.raises(SettingsError) as caught:
+        load_settings(**overrides)
+    assert len(caught.value.problems) == 1
+    assert message in caught.value.problems[0]
+
+
+def test_a_password_is_never_shown(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("BATHYFLEET_DATABASE_URL", "oracle://me:swordfish@h/n")
+    with pytest.raises(SettingsError) as caught:
+        load_settings()
+    assert "swordfish" not in str(caught.value)
+
+
+def test_every_mistake_is_reported_at_once(tmp_path: Path) -> None:
+    (tmp_path / "bathyfleet.toml").write_text('port = "x"\ntime_scale = 0\ncolour = "red"\n')
+    with pytest.raises(SettingsError) as caught:
+        load_settings()
+    assert len(caught.value.problems) == 3
+
+
+@pytest.mark.parametrize(
+    ("host", "loopback"),
+    [
+        ("127.0.0.1", True),
+        ("127.9.9.9", True),
+        ("::1", True),
+        ("localhost", True),
+        ("0.0.0.0", False),
+        ("::", False),
+        ("192.0.2.1", False),
+        ("example.org", False),
+        ("", False),
+    ],
+)
+def test_what_counts_as_this_machine(host: str, loopback: bool) -> None:
+    assert is_loopback(host) is loopback
+    assert Settings(host=host).loopback is loopback
+
+
+def test_every_setting_is_explained() -> None:
+    for name, field in Settings.model_fields.items():
+        assert field.description or name in ("log_level", "log_format"), name
