@@ -133,7 +133,7 @@ async def test_a_mission_survives_being_killed_at_random_moments(tmp_path: Path)
         async with asyncio.timeout(PATIENCE_S * 4):
             await asyncio.gather(*flying)
             # The vehicles are stopped first; the last soundings go into the map before the mission counts as finished.
-            while (ended := (await api.get(f"/missions/{mission_id}")).json())["state"] == "running":
+            while (ended := (await api.get(f"/missions/{mission_id}")).json())["state"] == "running":  # noqa: ASYNC110
                 await asyncio.sleep(0.05)
 
     assert steps_at_kills[-1] < STEPS, "every kill came while the mission was running"
