@@ -10,10 +10,11 @@ from app.exploration.planners.cao import CaoPlanner
 from app.exploration.planners.formation import FormationLawnmower
 from app.exploration.planners.lawnmower import LawnmowerPlanner
 from app.exploration.planners.random_walk import RandomPlanner
+from app.exploration.planners.rollout import RolloutPlanner
 from app.exploration.problem import Belief, Situation
 
 PLANNERS: dict[str, type[PlannerBase]] = {
-    planner.name: planner for planner in (CaoPlanner, LawnmowerPlanner, RandomPlanner)
+    planner.name: planner for planner in (CaoPlanner, LawnmowerPlanner, RandomPlanner, RolloutPlanner)
 }
 
 

@@ -1,0 +1,212 @@
+"""A planner that is not greedy: whole-mission rollouts on the current map estimate (the future work of AURO15).
+
+Each step it keeps a plan for the team until everything is done, tries changes to it, each judged by flying the plan to
+its end over what is known and presumed of the sea floor, and flies the first step of the best. Nothing is ever really
+tried. What the next measurements show changes the landmarks' estimates, and with them the plan.
+"""
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.estimation import RangeSensor, Sensor
+from app.exploration.bottom import Bottom
+from app.exploration.options import PlannerOptions
+from app.exploration.planners.base import PlannerBase, settle
+from app.exploration.problem import Proposal, Situation
+from app.exploration.rollout.backbones import Backbone, backbones
+from app.exploration.rollout.flight import Course, Plan, Rules, Work, begin, fly_plan, fly_step, make_work, new_course
+from app.exploration.rollout.floor import Floor, estimate_floor, sample
+from app.exploration.rollout.free_space import Free, clear_ways, free_space, settle_waypoint
+from app.exploration.rollout.search import DRAWS, improve
+
+FloatArray = NDArray[np.float64]
+
+ROOM = 40
+HEIGHT = 0.45
+"""Flying height of first plans, in visibilities."""
+
+HEDGE = 1.5
+"""How much more information a landmark is presumed to need that was never seen, because its depth is a guess."""
+
+LINK_OF_RANGE = 29 / 30
+MAY_BE_LEFT = 0.008
+"""Part of all landmarks that a plan may leave over, until the team has come so far."""
+
+FIRST_SEARCH = 2500
+FRESH_EVERY = 8
+FRESH_STARTS = 4
+FRESH_SEARCH = 60
+
+
+@dataclass
+class _Best:
+    """A plan with its flight."""
+
+    plan: Plan
+    count: int
+    score: float
+    course: Course
+    left_need: FloatArray
+
+
+class RolloutPlanner(PlannerBase):
+    """See the module's text; for sensors that see landmarks from afar."""
+
+    name: ClassVar[str] = "rollout"
+
+    def __init__(self, options: PlannerOptions, sensor: Sensor) -> None:
+        if not isinstance(sensor, RangeSensor):
+            raise ValueError(f"sensor: whole-mission rollouts need a RangeSensor, not {type(sensor).__name__}")
+        super().__init__(options, sensor)
+        self._range = sensor
+        self._names: tuple[str, ...] = ()
+        self._kept: Backbone | None = None
+        self._heights: FloatArray = np.zeros(0)
+        self._planned = 0
+
+    def _remember(self) -> dict[str, Any]:
+        kept = self._kept
+        return {
+            "names": list(self._names),
+            "planned": self._planned,
+            "at_m": None if kept is None else kept.at_m,
+            "chain": None if kept is None else kept.chain,
+            "heights": self._heights,
+        }
+
+    def _recall(self, state: dict[str, Any]) -> None:
+        self._names, self._planned = tuple(state["names"]), int(state["planned"])
+        self._heights = np.array(state["heights"], dtype=np.float64)
+        self._kept = None
+        if state["at_m"] is not None:
+            at = np.array(state["at_m"], dtype=np.float64).reshape(-1, len(self._names), 2)
+            self._kept = Backbone(at, np.array(state["chain"], dtype=np.int64))
+
+    def _decide(self, team: Situation, bottom: Bottom, seed: int) -> Proposal:
+        if team.belief.accurate.all():
+            return Proposal(team.positions.copy(), 0.0)
+        if self._names != team.vehicles:
+            self._names, self._kept, self._planned = team.vehicles, None, 0
+        mission = _Mission(team, self._range, self.options, np.random.default_rng(seed))
+        best = None
+        if self._kept is not None and len(self._kept.at_m):
+            best = mission.plan(self._kept, self._heights)
+        fresh = self._planned % FRESH_EVERY == 0
+        if best is None or fresh:
+            for candidate in mission.fresh_starts(FRESH_STARTS):
+                if best is None or mission.refine(candidate, FRESH_SEARCH).score < best.score:
+                    best = candidate
+        if best is None:
+            return Proposal(team.positions.copy(), 0.0)
+        best = mission.refine(best, FIRST_SEARCH if self._planned == 0 else self.options.rollouts)
+        wish, passed = mission.first_step(best)
+        self._kept = Backbone(best.plan.at_m[passed : best.count].copy(), best.plan.chain.copy())
+        self._heights = best.plan.height_m[passed : best.count].copy()
+        self._planned += 1
+        positions, _ = settle(team, bottom, wish[None])
+        terms = {"finish": team.step - 1 + float(best.course.state[best.count, 0]), "waypoints": float(best.count)}
+        return Proposal(positions, -best.score, terms)
+
+
+class _Mission:
+    """Everything about a step that plans are judged by."""
+
+    def __init__(
+        self, team: Situation, sensor: RangeSensor, options: PlannerOptions, rng: np.random.Generator
+    ) -> None:
+        constraints, belief = team.constraints, team.belief
+        visibility = sensor.visibility_m
+        self._rng = rng
+        self._start = np.ascontiguousarray(team.positions)
+        self._sight = visibility
+        self._area = constraints.area
+        self._com_range = constraints.com_range_m
+        self._link = constraints.com_range_m * LINK_OF_RANGE
+        self._horizon = float(max(1, team.steps_total - team.step + 1))
+        unknown = min(constraints.max_depth_m, float(team.positions[:, 2].max()) + HEIGHT * visibility)
+        self._floor: Floor = estimate_floor(
+            belief, constraints.area, visibility, constraints.min_altitude_m, unknown
+        )
+        self._free: Free = free_space(constraints)
+        self._rules = Rules(
+            constraints.max_step_m,
+            constraints.com_range_m,
+            constraints.min_depth_m,
+            min(constraints.max_depth_m, 1e9),
+            visibility,
+            sensor.relative_noise,
+            self._free.everywhere,
+        )
+        self._work: Work = self._left(belief.xy_m, belief.depth_m, belief.sd_m, belief.accurate, options)
+
+    def _left(
+        self, xy: FloatArray, depth: FloatArray, sd: FloatArray, accurate: NDArray[np.bool_], options: PlannerOptions
+    ) -> Work:
+        open_ = ~accurate
+        floor = self._floor
+        xyz = np.column_stack([xy[open_], depth[open_]])
+        unseen = np.isnan(xyz[:, 2])
+        for k in np.flatnonzero(unseen):
+            xyz[k, 2] = sample(floor.depth_m, floor.west_m, floor.south_m, floor.cell_m, xyz[k, 0], xyz[k, 1])
+        enough = 1.0 / options.accuracy_sd_m**2
+        have = np.where(np.isfinite(sd[open_]), 1.0 / np.maximum(sd[open_], 1e-9) ** 2, 0.0)
+        need = np.maximum(1e-6 * enough, np.where(unseen, HEDGE * enough, enough - have))
+        allowed = np.floor(MAY_BE_LEFT * len(xy))
+        if open_.sum() <= allowed:
+            allowed = 0.0
+        return make_work(xyz, need, self._area, self._sight / 2, allowed, len(xy))
+
+    def plan(self, backbone: Backbone, heights: FloatArray) -> _Best | None:
+        """Complete team waypoints to a plan and fly it; None when there is no allowed way."""
+        n, count = len(self._start), min(len(backbone.at_m), ROOM - 4)
+        plan = Plan(np.zeros((ROOM, n, 2)), np.zeros(ROOM), backbone.chain)
+        plan.at_m[:count], plan.height_m[:count] = backbone.at_m[:count], heights[:count]
+        for k in range(count):
+            if not settle_waypoint(self._free, plan.at_m[k], plan.chain, self._link):
+                return None
+        start = np.ascontiguousarray(self._start[:, :2])
+        if not self._free.everywhere:
+            k = 0
+            while k < count:
+                changed = clear_ways(self._free, plan, count, start, k, k, self._link)
+                if changed < 0:
+                    return None
+                k += 1 + changed - count
+                count = changed
+        course = new_course(ROOM, n, len(self._work.need))
+        begin(course, self._start, self._work)
+        left_need = np.empty(len(self._work.need))
+        score = fly_plan(
+            course, 0, plan, count, self._work, self._floor, self._rules, self._horizon, np.inf, left_need, course
+        )
+        return _Best(plan, count, float(score), course, left_need)
+
+    def fresh_starts(self, most: int) -> list[_Best]:
+        """Return the best of the sweeps over what is left."""
+        sweeps = backbones(
+            self._work.xyz[:, :2], self._start[:, :2], self._area, self._sight, self._com_range, self._link
+        )
+        height = HEIGHT * self._sight
+        flown = [self.plan(sweep, np.full(len(sweep.at_m), height)) for sweep in sweeps]
+        return sorted((best for best in flown if best is not None), key=lambda best: best.score)[:most]
+
+    def refine(self, best: _Best, changes: int) -> _Best:
+        """Try so many changes; the plan is improved in place."""
+        n = len(self._start)
+        trial = Plan(np.zeros_like(best.plan.at_m), np.zeros(ROOM), best.plan.chain)
+        scratch = new_course(ROOM, n, len(self._work.need))
+        best.count, best.score = improve(
+            best.course, best.plan, best.count, best.score, best.left_need, scratch, trial,
+            np.empty(len(self._work.need)), self._rng.random((changes, DRAWS)), self._work, self._floor, self._rules,
+            self._horizon, self._free, self._link,
+        )  # fmt: skip
+        return best
+
+    def first_step(self, best: _Best) -> tuple[FloatArray, int]:
+        """Return where the vehicles go now, (n_vehicles, 3), and how many waypoints that passes."""
+        wish = np.empty_like(self._start)
+        passed = fly_step(self._start, best.plan, 0, best.count, self._floor, self._rules, wish) if best.count else 0
+        return (wish, passed) if best.count else (self._start.copy(), 0)

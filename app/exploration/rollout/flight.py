@@ -1,0 +1,395 @@
+"""Flies a team plan over the estimated floor, step by step under the constraints, and foretells when all is done.
+
+A plan is a list of *team waypoints*: the horizontal positions of all vehicles, shape (n_vehicles, 2), and a height
+above the smoothed floor. Between two of them every vehicle goes straight, all arriving at the same time: links that hold
+at both waypoints then hold all the way, because a distance between two points that move evenly is convex in time.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from app.exploration.rollout.floor import Floor, sample
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+WORTH_OF_EARLY = 1.1
+"""Steps that a plan may take longer for one step's whole remainder done earlier: sum over time of the part remaining."""
+
+PER_WAYPOINT = 0.05
+"""Steps that a simpler plan is preferred by, per waypoint."""
+
+UNFINISHED = 12.0
+PER_LEFT = 0.8
+"""Steps charged to a plan that ends unfinished: once, and per landmark left over and per one's missing information."""
+
+CLIMB_PASSES = 3
+DIVE_OF_STEP = 0.5
+"""Part of a step that a vehicle sinks at most while it goes on: sinking may wait, climbing may not."""
+
+
+class Work(NamedTuple):
+    """Landmarks still to be done, sorted by the bucket (square cell, row by row) they lie in.
+
+    Attributes
+    ----------
+    xyz : (m, 3)
+        Where they are presumed to be, depth positive down.
+    need : (m,)
+        Information (1/m^2) each still lacks.
+    first : (n_rows * n_cols + 1,)
+        Where each bucket starts.
+    west_m, south_m, bucket_m : float
+        Outer corner of the first bucket, side of a bucket.
+    rows, cols : int
+        Numbers of buckets.
+    allowed : float
+        How many landmarks may be left over when the plan counts as finished.
+    total : float
+        All landmarks of the mission, done ones included.
+    """
+
+    xyz: FloatArray
+    need: FloatArray
+    first: IntArray
+    west_m: float
+    south_m: float
+    bucket_m: float
+    rows: int
+    cols: int
+    allowed: float
+    total: float
+
+
+class Rules(NamedTuple):
+    """What flying obeys, and what the sensor does; lengths in metres."""
+
+    step_m: float
+    com_range_m: float
+    min_depth_m: float
+    max_depth_m: float
+    visibility_m: float
+    relative_noise: float
+    cut_corners: bool
+
+
+class Plan(NamedTuple):
+    """A team plan with room for more waypoints than it has.
+
+    Attributes
+    ----------
+    at_m : (room, n_vehicles, 2)
+        Horizontal positions.
+    height_m : (room,)
+        Height above the smoothed floor on the way to the waypoint.
+    chain : (n_vehicles,)
+        Order of the vehicles in which neighbours keep within communication range.
+    """
+
+    at_m: FloatArray
+    height_m: FloatArray
+    chain: IntArray
+
+
+def make_work(
+    xyz: FloatArray, need: FloatArray, area: FloatArray, bucket_m: float, allowed: float, total: int
+) -> Work:
+    """Sort landmarks (m, 3) into buckets over the bounding box of ``area`` (n, 2)."""
+    low, high = area.min(axis=0), area.max(axis=0)
+    cols, rows = (max(1, int(k)) for k in np.ceil((high - low) / bucket_m))
+    col = np.clip(np.floor((xyz[:, 0] - low[0]) / bucket_m), 0, cols - 1).astype(np.int64)
+    row = np.clip(np.floor((xyz[:, 1] - low[1]) / bucket_m), 0, rows - 1).astype(np.int64)
+    bucket = row * cols + col
+    order = np.argsort(bucket, kind="stable")
+    first = np.zeros(rows * cols + 1, dtype=np.int64)
+    first[1:] = np.cumsum(np.bincount(bucket, minlength=rows * cols))
+    return Work(
+        np.ascontiguousarray(xyz[order], dtype=np.float64),
+        np.ascontiguousarray(need[order], dtype=np.float64),
+        first,
+        float(low[0]),
+        float(low[1]),
+        float(bucket_m),
+        rows,
+        cols,
+        float(allowed),
+        float(max(1, total)),
+    )
+
+
+@njit(cache=True, nogil=True)
+def look(x: float, y: float, z: float, work: Work, rules: Rules, need: FloatArray) -> int:
+    """Take what a vehicle sees at (x, y, z) from ``need``; return how many landmarks that completes."""
+    reach = rules.visibility_m
+    v2 = reach * reach
+    gain = 1.0 / (rules.relative_noise * rules.relative_noise)
+    b = work.bucket_m
+    low = max(0, int(np.floor((y - reach - work.south_m) / b)))
+    high = min(work.rows - 1, int(np.floor((y + reach - work.south_m) / b)))
+    done = 0
+    for row in range(low, high + 1):
+        # The chord of the circle of sight across this row of buckets.
+        south = work.south_m + row * b
+        gap = max(0.0, max(south - y, y - south - b))
+        half = np.sqrt(max(0.0, v2 - gap * gap))
+        left = max(0, int(np.floor((x - half - work.west_m) / b)))
+        right = min(work.cols - 1, int(np.floor((x + half - work.west_m) / b)))
+        if right < left:
+            continue
+        for m in range(work.first[row * work.cols + left], work.first[row * work.cols + right + 1]):
+            if need[m] <= 0.0:
+                continue
+            dx = work.xyz[m, 0] - x
+            dy = work.xyz[m, 1] - y
+            dz = work.xyz[m, 2] - z
+            r2 = dx * dx + dy * dy + dz * dz
+            if r2 < v2:
+                need[m] -= gain * dz * dz / (r2 * r2)
+                if need[m] <= 0.0:
+                    done += 1
+    return done
+
+
+@njit(cache=True, nogil=True)
+def advance(at: FloatArray, plan: Plan, k: int, count: int, reach: float, cut: bool, out: FloatArray) -> int:
+    """Move the team horizontally along its plan, the vehicle with the longest way by ``reach``.
+
+    Writes the new positions into ``out`` (n_vehicles, 2) and returns the index of the next waypoint to be reached.
+    """
+    n = len(at)
+    left = reach
+    for i in range(n):
+        out[i, 0] = at[i, 0]
+        out[i, 1] = at[i, 1]
+    while k < count:
+        longest = 0.0
+        for i in range(n):
+            longest = max(longest, np.hypot(plan.at_m[k, i, 0] - out[i, 0], plan.at_m[k, i, 1] - out[i, 1]))
+        if longest > left:
+            f = left / longest
+            for i in range(n):
+                out[i, 0] += f * (plan.at_m[k, i, 0] - out[i, 0])
+                out[i, 1] += f * (plan.at_m[k, i, 1] - out[i, 1])
+            return k
+        for i in range(n):
+            out[i, 0] = plan.at_m[k, i, 0]
+            out[i, 1] = plan.at_m[k, i, 1]
+        left -= longest
+        k += 1
+        if left < 0.02 * reach or (not cut and longest > 0.02 * reach):
+            break
+    return k
+
+
+@njit(cache=True, nogil=True)
+def fly_step(
+    at: FloatArray, plan: Plan, k: int, count: int, floor: Floor, rules: Rules, out: FloatArray
+) -> int:
+    """Fly one step from ``at`` (n_vehicles, 3) into ``out``; return the index of the next waypoint to be reached."""
+    n = len(at)
+    step = rules.step_m * (1.0 - 1e-9)
+    here = at[:, :2]
+    reach = step
+    there = np.empty((n, 2))
+    after = k
+    for trial in range(CLIMB_PASSES):
+        after = advance(here, plan, k, count, reach, rules.cut_corners, there)
+        height = plan.height_m[min(k, count - 1)]
+        longest = 0.0
+        for i in range(n):
+            x, y = there[i, 0], there[i, 1]
+            wish = sample(floor.smooth_m, floor.west_m, floor.south_m, floor.cell_m, x, y) - height
+            limit = sample(floor.deepest_m, floor.west_m, floor.south_m, floor.cell_m, x, y)
+            wish = max(rules.min_depth_m, min(rules.max_depth_m, wish, limit))
+            out[i, 2] = wish
+            rise = wish - at[i, 2]
+            if rise > 0.0:
+                rise = min(rise, DIVE_OF_STEP * step)
+            longest = max(longest, np.sqrt((x - at[i, 0]) ** 2 + (y - at[i, 1]) ** 2 + rise * rise))
+        if longest <= step or trial == CLIMB_PASSES - 1:
+            break
+        reach *= max(0.2, step / longest)
+    for i in range(n):
+        out[i, 0] = there[i, 0]
+        out[i, 1] = there[i, 1]
+    # Neighbours in the chain keep in range in three dimensions too: the deeper one comes up.
+    for turn in range(2):
+        for e in range(n - 1):
+            i = plan.chain[e] if turn == 0 else plan.chain[n - 1 - e]
+            j = plan.chain[e + 1] if turn == 0 else plan.chain[n - 2 - e]
+            d2 = (out[i, 0] - out[j, 0]) ** 2 + (out[i, 1] - out[j, 1]) ** 2
+            free = rules.com_range_m * rules.com_range_m - d2
+            if free > 0.0 and free < np.inf:
+                allowed = 0.99 * np.sqrt(free)
+                out[i, 2] = min(out[i, 2], out[j, 2] + allowed)
+                out[j, 2] = min(out[j, 2], out[i, 2] + allowed)
+    for i in range(n):
+        d2 = (out[i, 0] - at[i, 0]) ** 2 + (out[i, 1] - at[i, 1]) ** 2
+        allowed = np.sqrt(max(0.0, step * step - d2))
+        out[i, 2] = min(max(out[i, 2], at[i, 2] - allowed), at[i, 2] + allowed)
+    return after
+
+
+class Course(NamedTuple):
+    """The state in which a flight first looked at each waypoint, so that a changed plan is flown from there only.
+
+    Attributes
+    ----------
+    at_m : (room + 1, n_vehicles, 3)
+        Positions at the beginning of that step; row k belongs to waypoint k.
+    need : (room + 1, m)
+        What the landmarks lacked then.
+    state : (room + 1, 4)
+        Steps flown, landmarks left, cost so far, index of the waypoint then heading for.
+    """
+
+    at_m: FloatArray
+    need: FloatArray
+    state: FloatArray
+
+
+def new_course(room: int, vehicles: int, landmarks: int) -> Course:
+    """Return an empty course."""
+    return Course(np.zeros((room + 1, vehicles, 3)), np.zeros((room + 1, landmarks)), np.zeros((room + 1, 4)))
+
+
+@njit(cache=True, nogil=True)
+def begin(course: Course, at: FloatArray, work: Work) -> None:
+    """Make the present the state from which waypoint 0 is first looked at."""
+    course.at_m[0] = at
+    course.need[0] = work.need
+    left = 0.0
+    for m in range(len(work.need)):
+        if work.need[m] > 0.0:
+            left += 1.0
+    course.state[0, 0] = 0.0
+    course.state[0, 1] = left
+    course.state[0, 2] = 0.0
+    course.state[0, 3] = 0.0
+
+
+@njit(cache=True, nogil=True)
+def fly_plan(
+    course: Course,
+    origin: int,
+    plan: Plan,
+    count: int,
+    work: Work,
+    floor: Floor,
+    rules: Rules,
+    horizon: float,
+    bound: float,
+    left_need: FloatArray,
+    save: Course,
+) -> float:
+    """Return the score of a plan in steps; less is better, inf as soon as it cannot be better than ``bound``.
+
+    Parameters
+    ----------
+    course : Course
+        Where to begin: the state at which waypoint ``origin`` is first looked at.
+    plan : Plan
+        With ``count`` waypoints.
+    horizon : float
+        Steps left of the mission.
+    left_need : (m,)
+        Overwritten: what the landmarks lack in the end.
+    save : Course
+        Rows after ``origin`` are overwritten by this flight's states.
+    """
+    n = course.at_m.shape[1]
+    at = course.at_m[origin].copy()
+    after = np.empty((n, 3))
+    left_need[:] = course.need[origin]
+    t = course.state[origin, 0]
+    left = course.state[origin, 1]
+    cost = course.state[origin, 2]
+    k = int(course.state[origin, 3])
+    saved = origin
+    waypoints = PER_WAYPOINT * count
+    while left > work.allowed and k < count and t < horizon:
+        if t + cost + waypoints >= bound:
+            return np.inf
+        next_k = fly_step(at, plan, k, count, floor, rules, after)
+        # What the flight looks at in this step is saved as it was before the step.
+        while saved < next_k and saved < count:
+            saved += 1
+            save.at_m[saved] = at
+            save.need[saved] = left_need
+            save.state[saved, 0] = t
+            save.state[saved, 1] = left
+            save.state[saved, 2] = cost
+            save.state[saved, 3] = k
+        before = left
+        for i in range(n):
+            left -= look(after[i, 0], after[i, 1], after[i, 2], work, rules, left_need)
+        at[:] = after
+        k = next_k
+        if left <= work.allowed:
+            part = (before - work.allowed) / (before - left)
+            t += part
+            cost += WORTH_OF_EARLY * part * left / work.total
+            break
+        t += 1.0
+        cost += WORTH_OF_EARLY * left / work.total
+    # Waypoints never looked at: the states do not matter, but must lead nowhere wrong.
+    while saved < count:
+        saved += 1
+        save.at_m[saved] = at
+        save.need[saved] = left_need
+        save.state[saved, 0] = t
+        save.state[saved, 1] = left
+        save.state[saved, 2] = cost
+        save.state[saved, 3] = k
+    score = t + cost + waypoints
+    if left > work.allowed:
+        score += UNFINISHED + (horizon if t >= horizon else 0.0)
+        score += leftover(at, work, rules, left_need)
+    return score
+
+
+@njit(cache=True, nogil=True)
+def leftover(at: FloatArray, work: Work, rules: Rules, need: FloatArray) -> float:
+    """Return the charge for what a plan leaves: landmarks, missing information, and a tour over their buckets."""
+    buckets = work.rows * work.cols
+    count = np.zeros(buckets)
+    missing = 0.0
+    left = 0.0
+    for k in range(buckets):
+        for m in range(work.first[k], work.first[k + 1]):
+            if need[m] > 0.0:
+                count[k] += 1.0
+                left += 1.0
+                missing += min(1.0, need[m] / max(work.need[m], 1e-12))
+    charge = PER_LEFT * (left - work.allowed + missing)
+    x = 0.0
+    y = 0.0
+    for i in range(len(at)):
+        x += at[i, 0] / len(at)
+        y += at[i, 1] / len(at)
+    reach = rules.visibility_m
+    length = 0.0
+    spare = work.allowed
+    while left > spare:
+        best = np.inf
+        chosen = -1
+        for k in range(buckets):
+            if count[k] > 0.0:
+                d = np.hypot(
+                    work.west_m + (k % work.cols + 0.5) * work.bucket_m - x,
+                    work.south_m + (k // work.cols + 0.5) * work.bucket_m - y,
+                )
+                if d < best:
+                    best = d
+                    chosen = k
+        if chosen < 0:
+            break
+        length += max(0.0, best - 0.5 * reach)
+        x = work.west_m + (chosen % work.cols + 0.5) * work.bucket_m
+        y = work.south_m + (chosen // work.cols + 0.5) * work.bucket_m
+        left -= count[chosen]
+        count[chosen] = 0.0
+    return charge + length / rules.step_m

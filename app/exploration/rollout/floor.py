@@ -1,0 +1,149 @@
+"""The sea floor that a rollout flies over: estimated from the landmarks seen so far, on a small raster."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter
+from scipy.spatial import cKDTree
+
+from app.exploration.problem import Belief
+
+FloatArray = NDArray[np.float64]
+
+CELLS_PER_VISIBILITY = 8.0
+MAX_CELLS_PER_SIDE = 96
+NEIGHBOURS = 6
+FADE = 2.5
+"""Distance, in visibilities, over which what the seen landmarks say fades to their mean."""
+
+ENVELOPE_SLOPE = 1.2
+"""Steepest climb that plans rely on: rise over run."""
+
+
+
+MARGIN = 0.1
+"""Clearance that plans add to the required one, in visibilities, because the floor is an estimate."""
+
+
+class Floor(NamedTuple):
+    """Rasters over the area; the first row is the southernmost, the first column the westernmost.
+
+    Attributes
+    ----------
+    west_m, south_m, cell_m : float
+        Centre of the first cell, and the distance between cells.
+    depth_m : (rows, cols)
+        Estimated depth.
+    smooth_m : (rows, cols)
+        The same without detail: what a team keeps its height above.
+    deepest_m : (rows, cols)
+        Deepest that a vehicle may be, so that it clears the floor here and can climb every rise ahead.
+    """
+
+    west_m: float
+    south_m: float
+    cell_m: float
+    depth_m: FloatArray
+    smooth_m: FloatArray
+    deepest_m: FloatArray
+
+
+def estimate_floor(
+    belief: Belief, area: FloatArray, visibility_m: float, clearance_m: float, unknown_m: float
+) -> Floor:
+    """Estimate the floor from a belief.
+
+    Parameters
+    ----------
+    area : (n, 2)
+        Polygon whose bounding box the raster covers.
+    visibility_m : float
+        Sets the raster's cell and how far estimates reach.
+    clearance_m : float
+        Least distance of vehicles above the floor.
+    unknown_m : float
+        Depth to presume while nothing was seen.
+    """
+    low, high = area.min(axis=0), area.max(axis=0)
+    cell = max(visibility_m / CELLS_PER_VISIBILITY, float((high - low).max()) / MAX_CELLS_PER_SIDE)
+    cols, rows = (max(2, int(k)) for k in np.ceil((high - low) / cell) + 1)
+    east, north = np.meshgrid(low[0] + cell * np.arange(cols), low[1] + cell * np.arange(rows))
+    known = np.isfinite(belief.depth_m)
+    if known.any():
+        depth = _from_neighbours(
+            belief.xy_m[known],
+            belief.depth_m[known],
+            belief.sd_m[known],
+            np.column_stack([east.ravel(), north.ravel()]),
+            visibility_m,
+        ).reshape(rows, cols)
+    else:
+        depth = np.full((rows, cols), unknown_m)
+    smooth = gaussian_filter(depth, 0.25 * visibility_m / cell, mode="nearest")
+    limit = depth - clearance_m - MARGIN * visibility_m
+    return Floor(float(low[0]), float(low[1]), float(cell), depth, smooth, _envelope(limit, cell))
+
+
+def _from_neighbours(
+    seen_m: FloatArray, depth_m: FloatArray, sd_m: FloatArray, at_m: FloatArray, visibility_m: float
+) -> FloatArray:
+    """Weigh the closest seen landmarks by distance and trust; far from all of them return their mean."""
+    k = min(NEIGHBOURS, len(seen_m))
+    distance, index = cKDTree(seen_m).query(at_m, k=k)
+    distance, index = distance.reshape(len(at_m), k), index.reshape(len(at_m), k)
+    weight = 1.0 / ((distance / visibility_m) ** 2 + 0.01) / (sd_m[index] ** 2 + (0.05 * visibility_m) ** 2)
+    local = (weight * depth_m[index]).sum(axis=1) / weight.sum(axis=1)
+    trust = np.exp(-np.maximum(0.0, distance[:, 0] / visibility_m - 0.25) / FADE)
+    return np.asarray(trust * local + (1.0 - trust) * depth_m.mean())
+
+
+@njit(cache=True, nogil=True)
+def _envelope(limit: FloatArray, cell: float) -> FloatArray:
+    """Return min over p' of limit(p') + slope |p - p'|, by sweeps there and back over the raster."""
+    rows, cols = limit.shape
+    out = limit.copy()
+    near = ENVELOPE_SLOPE * cell
+    far = ENVELOPE_SLOPE * cell * np.sqrt(2.0)
+    for _ in range(2):
+        for r in range(rows):
+            for c in range(cols):
+                best = out[r, c]
+                if c > 0:
+                    best = min(best, out[r, c - 1] + near)
+                if r > 0:
+                    best = min(best, out[r - 1, c] + near)
+                    if c > 0:
+                        best = min(best, out[r - 1, c - 1] + far)
+                    if c < cols - 1:
+                        best = min(best, out[r - 1, c + 1] + far)
+                out[r, c] = best
+        for r in range(rows - 1, -1, -1):
+            for c in range(cols - 1, -1, -1):
+                best = out[r, c]
+                if c < cols - 1:
+                    best = min(best, out[r, c + 1] + near)
+                if r < rows - 1:
+                    best = min(best, out[r + 1, c] + near)
+                    if c > 0:
+                        best = min(best, out[r + 1, c - 1] + far)
+                    if c < cols - 1:
+                        best = min(best, out[r + 1, c + 1] + far)
+                out[r, c] = best
+    return out
+
+
+@njit(cache=True, nogil=True, inline="always")
+def sample(raster: FloatArray, west: float, south: float, cell: float, x: float, y: float) -> float:
+    """Interpolate a raster bilinearly at (x, y); beyond its border the border's value counts."""
+    rows, cols = raster.shape
+    u = min(max((x - west) / cell, 0.0), cols - 1.000001)
+    v = min(max((y - south) / cell, 0.0), rows - 1.000001)
+    c = int(u)
+    r = int(v)
+    u -= c
+    v -= r
+    lower = raster[r, c] * (1.0 - u) + raster[r, c + 1] * u
+    upper = raster[r + 1, c] * (1.0 - u) + raster[r + 1, c + 1] * u
+    return float(lower * (1.0 - v) + upper * v)

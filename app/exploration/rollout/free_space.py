@@ -1,0 +1,182 @@
+"""Where vehicles may be, on a fine raster: pushes waypoints to allowed places and finds ways round what is forbidden."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+from scipy.ndimage import binary_erosion, distance_transform_edt
+from shapely import Polygon
+
+from app.exploration.constraints import Constraints, inside_area
+from app.exploration.rollout.flight import Plan
+
+FloatArray = NDArray[np.float64]
+
+CELLS_PER_SIDE = 160
+DETOURS = 4
+"""Most waypoints inserted to bring the team round what lies in the way."""
+
+
+class Free(NamedTuple):
+    """Raster of allowed cells.
+
+    Attributes
+    ----------
+    west_m, south_m, cell_m : float
+        Outer corner of the first cell, side of a cell.
+    allowed : (rows, cols)
+        Cells whose surroundings are allowed too.
+    nearest : (rows, cols, 2)
+        Row and column of the allowed cell closest to each.
+    everywhere : bool
+        Whether straight legs between allowed places never leave them: a convex area without zones.
+    """
+
+    west_m: float
+    south_m: float
+    cell_m: float
+    allowed: NDArray[np.bool_]
+    nearest: NDArray[np.int64]
+    everywhere: bool
+
+
+def free_space(constraints: Constraints) -> Free:
+    """Rasterise the area without its keep-out zones."""
+    area = constraints.area
+    low, high = area.min(axis=0), area.max(axis=0)
+    cell = float((high - low).max()) / CELLS_PER_SIDE
+    cols, rows = (max(1, int(k)) for k in np.ceil((high - low) / cell - 1e-9))
+    east, north = np.meshgrid(low[0] + cell * (np.arange(cols) + 0.5), low[1] + cell * (np.arange(rows) + 0.5))
+    allowed = inside_area(constraints, np.column_stack([east.ravel(), north.ravel()])).reshape(rows, cols)
+    polygon = Polygon(area)
+    everywhere = not constraints.keep_out and bool(np.isclose(polygon.area, polygon.convex_hull.area))
+    if not everywhere:
+        eroded = binary_erosion(allowed, np.ones((3, 3), dtype=bool), border_value=1)
+        allowed = eroded if eroded.any() else allowed
+    if not allowed.any():
+        allowed = np.ones_like(allowed)
+    index = distance_transform_edt(~allowed, return_distances=False, return_indices=True)
+    return Free(
+        float(low[0]), float(low[1]), cell, allowed, np.ascontiguousarray(np.moveaxis(index, 0, -1)).astype(np.int64),
+        everywhere,
+    )  # fmt: skip
+
+
+@njit(cache=True, nogil=True)
+def is_allowed(free: Free, x: float, y: float) -> bool:
+    """Whether the cell around (x, y) is allowed."""
+    c = int(np.floor((x - free.west_m) / free.cell_m))
+    r = int(np.floor((y - free.south_m) / free.cell_m))
+    return 0 <= r < free.allowed.shape[0] and 0 <= c < free.allowed.shape[1] and bool(free.allowed[r, c])
+
+
+@njit(cache=True, nogil=True)
+def push(free: Free, at: FloatArray) -> None:
+    """Move positions (n_vehicles, 2) that are not allowed to the closest allowed cell."""
+    rows, cols = free.allowed.shape
+    for i in range(len(at)):
+        c = min(max(int(np.floor((at[i, 0] - free.west_m) / free.cell_m)), 0), cols - 1)
+        r = min(max(int(np.floor((at[i, 1] - free.south_m) / free.cell_m)), 0), rows - 1)
+        if free.allowed[r, c] and is_allowed(free, at[i, 0], at[i, 1]):
+            continue
+        at[i, 0] = free.west_m + (free.nearest[r, c, 1] + 0.5) * free.cell_m
+        at[i, 1] = free.south_m + (free.nearest[r, c, 0] + 0.5) * free.cell_m
+
+
+@njit(cache=True, nogil=True)
+def leg_allowed(free: Free, ax: float, ay: float, bx: float, by: float) -> bool:
+    """Whether a leg stays allowed, once it has come to an allowed place."""
+    if free.everywhere:
+        return True
+    pieces = max(1, int(np.ceil(2.0 * np.hypot(bx - ax, by - ay) / free.cell_m)))
+    been = False
+    for k in range(pieces + 1):
+        f = k / pieces
+        inside = is_allowed(free, ax + f * (bx - ax), ay + f * (by - ay))
+        if been and not inside:
+            return False
+        been = been or inside
+    return been
+
+
+@njit(cache=True, nogil=True)
+def pull_together(at: FloatArray, chain: NDArray[np.int64], link: float) -> bool:
+    """Bring neighbours in the chain that are farther apart than ``link`` closer; False when that does not succeed."""
+    n = len(chain)
+    for _ in range(6):
+        worst = 0.0
+        for e in range(n - 1):
+            i, j = chain[e], chain[e + 1]
+            dx = at[j, 0] - at[i, 0]
+            dy = at[j, 1] - at[i, 1]
+            d = np.hypot(dx, dy)
+            worst = max(worst, d)
+            if d > link:
+                f = 0.5 * (d - 0.999 * link) / d
+                at[i, 0] += f * dx
+                at[i, 1] += f * dy
+                at[j, 0] -= f * dx
+                at[j, 1] -= f * dy
+        if worst <= link:
+            return True
+    return False
+
+
+@njit(cache=True, nogil=True)
+def settle_waypoint(free: Free, at: FloatArray, chain: NDArray[np.int64], link: float) -> bool:
+    """Make a team waypoint (n_vehicles, 2) obey area, zones and links; False when that does not succeed."""
+    for _ in range(4):
+        push(free, at)
+        if pull_together(at, chain, link):
+            ok = True
+            for i in range(len(at)):
+                ok = ok and is_allowed(free, at[i, 0], at[i, 1])
+            if ok:
+                return True
+    return False
+
+
+@njit(cache=True, nogil=True)
+def _team_leg_allowed(free: Free, a: FloatArray, b: FloatArray) -> bool:
+    for i in range(len(a)):
+        if not leg_allowed(free, a[i, 0], a[i, 1], b[i, 0], b[i, 1]):
+            return False
+    return True
+
+
+@njit(cache=True, nogil=True)
+def insert(plan: Plan, count: int, k: int) -> None:
+    """Make room for a waypoint at ``k``; the caller fills it."""
+    for i in range(count, k, -1):
+        plan.at_m[i] = plan.at_m[i - 1]
+        plan.height_m[i] = plan.height_m[i - 1]
+
+
+@njit(cache=True, nogil=True)
+def clear_ways(free: Free, plan: Plan, count: int, start: FloatArray, first: int, last: int, link: float) -> int:
+    """Make the legs that lead to the waypoints ``first`` .. ``last`` allowed, inserting detours where needed.
+
+    Returns the new number of waypoints; -1 when some leg stays forbidden.
+    """
+    if free.everywhere:
+        return count
+    room = len(plan.height_m)
+    k = max(0, first)
+    inserted = 0
+    while k <= min(last, count - 1):
+        before = start if k == 0 else plan.at_m[k - 1]
+        if _team_leg_allowed(free, before, plan.at_m[k]):
+            k += 1
+            continue
+        if inserted >= DETOURS or count >= room:
+            return -1
+        middle = 0.5 * (before + plan.at_m[k])
+        if not settle_waypoint(free, middle, plan.chain, link):
+            return -1
+        insert(plan, count, k)
+        plan.at_m[k] = middle
+        count += 1
+        last += 1
+        inserted += 1
+    return count
