@@ -31,6 +31,9 @@ HEIGHT = 0.45
 HEDGE = 1.5
 """How much more information a landmark is presumed to need that was never seen, because its depth is a guess."""
 
+PARTS = (1.0, 0.8, 0.5, 0.2)
+"""Parts of a step to try when the whole one is not feasible."""
+
 LINK_OF_RANGE = 29 / 30
 MAY_BE_LEFT = 0.008
 """Part of all landmarks that a plan may leave over, until the team has come so far."""
@@ -90,7 +93,7 @@ class RolloutPlanner(PlannerBase):
             return Proposal(team.positions.copy(), 0.0)
         if self._names != team.vehicles:
             self._names, self._kept, self._planned = team.vehicles, None, 0
-        mission = _Mission(team, self._range, self.options, np.random.default_rng(seed))
+        mission = _Mission(team, bottom, self._range, self.options, np.random.default_rng(seed))
         best = None
         if self._kept is not None and len(self._kept.at_m):
             best = mission.plan(self._kept, self._heights)
@@ -102,11 +105,12 @@ class RolloutPlanner(PlannerBase):
         if best is None:
             return Proposal(team.positions.copy(), 0.0)
         best = mission.refine(best, FIRST_SEARCH if self._planned == 0 else self.options.rollouts)
-        wish, passed = mission.first_step(best)
+        wishes, passed_by = mission.first_step(best)
+        positions, taken = settle(team, bottom, wishes)
+        passed = passed_by[taken] if np.array_equal(positions, wishes[taken]) else 0
         self._kept = Backbone(best.plan.at_m[passed : best.count].copy(), best.plan.chain.copy())
         self._heights = best.plan.height_m[passed : best.count].copy()
         self._planned += 1
-        positions, _ = settle(team, bottom, wish[None])
         terms = {"finish": team.step - 1 + float(best.course.state[best.count, 0]), "waypoints": float(best.count)}
         return Proposal(positions, -best.score, terms)
 
@@ -115,7 +119,12 @@ class _Mission:
     """Everything about a step that plans are judged by."""
 
     def __init__(
-        self, team: Situation, sensor: RangeSensor, options: PlannerOptions, rng: np.random.Generator
+        self,
+        team: Situation,
+        bottom: Bottom,
+        sensor: RangeSensor,
+        options: PlannerOptions,
+        rng: np.random.Generator,
     ) -> None:
         constraints, belief = team.constraints, team.belief
         visibility = sensor.visibility_m
@@ -128,7 +137,7 @@ class _Mission:
         self._horizon = float(max(1, team.steps_total - team.step + 1))
         unknown = min(constraints.max_depth_m, float(team.positions[:, 2].max()) + HEIGHT * visibility)
         self._floor: Floor = estimate_floor(
-            belief, constraints.area, visibility, constraints.min_altitude_m, unknown
+            belief, bottom, constraints.area, visibility, constraints.min_altitude_m, unknown
         )
         self._free: Free = free_space(constraints)
         self._rules = Rules(
@@ -205,8 +214,21 @@ class _Mission:
         )  # fmt: skip
         return best
 
-    def first_step(self, best: _Best) -> tuple[FloatArray, int]:
-        """Return where the vehicles go now, (n_vehicles, 3), and how many waypoints that passes."""
-        wish = np.empty_like(self._start)
-        passed = fly_step(self._start, best.plan, 0, best.count, self._floor, self._rules, wish) if best.count else 0
-        return (wish, passed) if best.count else (self._start.copy(), 0)
+    def first_step(self, best: _Best) -> tuple[FloatArray, list[int]]:
+        """Return where the vehicles may go now, and how many waypoints each of these wishes passes.
+
+        The first of the wishes (k, n_vehicles, 3) is the plan's; the others go less far and higher, for when the sea
+        floor that the constraints hold to has steps that the plan's estimate smooths.
+        """
+        wishes, passed = [], []
+        for part in PARTS:
+            wish = np.empty_like(self._start)
+            rules = self._rules._replace(step_m=part * self._rules.step_m)
+            after = int(fly_step(self._start, best.plan, 0, best.count, self._floor, rules, wish))
+            spare = np.sqrt(self._rules.step_m**2 - np.minimum(part * self._rules.step_m, self._rules.step_m) ** 2)
+            wishes.append(wish)
+            passed.append(after)
+            if part < 1.0:
+                wishes.append(wish - [0.0, 0.0, 0.99 * spare])
+                passed.append(after)
+        return np.array(wishes), passed

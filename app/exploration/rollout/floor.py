@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 from scipy.spatial import cKDTree
 
+from app.exploration.bottom import Bottom
 from app.exploration.problem import Belief
 
 FloatArray = NDArray[np.float64]
@@ -51,12 +52,14 @@ class Floor(NamedTuple):
 
 
 def estimate_floor(
-    belief: Belief, area: FloatArray, visibility_m: float, clearance_m: float, unknown_m: float
+    belief: Belief, bottom: Bottom, area: FloatArray, visibility_m: float, clearance_m: float, unknown_m: float
 ) -> Floor:
     """Estimate the floor from a belief.
 
     Parameters
     ----------
+    bottom : Bottom
+        What the constraints hold for the sea floor; vehicles must clear it as well.
     area : (n, 2)
         Polygon whose bounding box the raster covers.
     visibility_m : float
@@ -83,6 +86,10 @@ def estimate_floor(
         depth = np.full((rows, cols), unknown_m)
     smooth = gaussian_filter(depth, 0.25 * visibility_m / cell, mode="nearest")
     limit = depth - clearance_m - MARGIN * visibility_m
+    # The constraints' sea floor has steps between cells: whatever lies within a cell of a node counts there.
+    shifts = np.stack(np.meshgrid(*[np.linspace(-cell, cell, 5)] * 2), axis=-1).reshape(-1, 1, 1, 2)
+    around = bottom.at(np.stack([east, north], axis=-1) + shifts)
+    limit = np.minimum(limit, np.where(np.isnan(around), np.inf, around).min(axis=0) - clearance_m)
     return Floor(float(low[0]), float(low[1]), float(cell), depth, smooth, _envelope(limit, cell))
 
 
