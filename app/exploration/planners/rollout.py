@@ -10,9 +10,11 @@ from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
+from shapely import Polygon
 
 from app.estimation import RangeSensor, Sensor
 from app.exploration.bottom import Bottom
+from app.exploration.constraints import Constraints
 from app.exploration.options import PlannerOptions
 from app.exploration.planners.base import PlannerBase, settle
 from app.exploration.problem import Proposal, Situation
@@ -38,7 +40,16 @@ LINK_OF_RANGE = 29 / 30
 MAY_BE_LEFT = 0.008
 """Part of all landmarks that a plan may leave over, until the team has come so far."""
 
-FIRST_SEARCH = 2500
+BUCKETS = 3
+"""Buckets of landmarks per visibility."""
+
+SWATH_EXCESS = 1.2
+"""How far a team may exceed, on average, the landmarks in the swath that it sees."""
+
+FIRST_SEARCH = 1500
+LAST_SHARE = 4
+"""Part of the search that is enough once the plan's own goal is reached."""
+
 FRESH_EVERY = 8
 FRESH_STARTS = 4
 FRESH_SEARCH = 60
@@ -69,6 +80,7 @@ class RolloutPlanner(PlannerBase):
         self._kept: Backbone | None = None
         self._heights: FloatArray = np.zeros(0)
         self._planned = 0
+        self._free: tuple[Constraints, Free] | None = None
 
     def _remember(self) -> dict[str, Any]:
         kept = self._kept
@@ -93,7 +105,9 @@ class RolloutPlanner(PlannerBase):
             return Proposal(team.positions.copy(), 0.0)
         if self._names != team.vehicles:
             self._names, self._kept, self._planned = team.vehicles, None, 0
-        mission = _Mission(team, bottom, self._range, self.options, np.random.default_rng(seed))
+        if self._free is None or not _same(self._free[0], team.constraints):
+            self._free = (team.constraints, free_space(team.constraints))
+        mission = _Mission(team, bottom, self._free[1], self._range, self.options, np.random.default_rng(seed))
         best = None
         if self._kept is not None and len(self._kept.at_m):
             best = mission.plan(self._kept, self._heights)
@@ -104,7 +118,7 @@ class RolloutPlanner(PlannerBase):
                     best = candidate
         if best is None:
             return Proposal(team.positions.copy(), 0.0)
-        best = mission.refine(best, FIRST_SEARCH if self._planned == 0 else self.options.rollouts)
+        best = mission.refine(best, self._effort(mission))
         wishes, passed_by = mission.first_step(best)
         positions, taken = settle(team, bottom, wishes)
         passed = passed_by[taken] if np.array_equal(positions, wishes[taken]) else 0
@@ -114,6 +128,21 @@ class RolloutPlanner(PlannerBase):
         terms = {"finish": team.step - 1 + float(best.course.state[best.count, 0]), "waypoints": float(best.count)}
         return Proposal(positions, -best.score, terms)
 
+    def _effort(self, mission: "_Mission") -> int:
+        """Return how many changes to try now: many for the first plan, few for what little is left in the end."""
+        if self._planned == 0:
+            return FIRST_SEARCH
+        return self.options.rollouts if mission.far_from_done else self.options.rollouts // LAST_SHARE
+
+
+def _same(a: Constraints, b: Constraints) -> bool:
+    """Whether two sets of limits leave the same free space."""
+    return a is b or (
+        np.array_equal(a.area, b.area)
+        and len(a.keep_out) == len(b.keep_out)
+        and all(np.array_equal(x, y) for x, y in zip(a.keep_out, b.keep_out, strict=True))
+    )
+
 
 class _Mission:
     """Everything about a step that plans are judged by."""
@@ -122,6 +151,7 @@ class _Mission:
         self,
         team: Situation,
         bottom: Bottom,
+        free: Free,
         sensor: RangeSensor,
         options: PlannerOptions,
         rng: np.random.Generator,
@@ -139,7 +169,7 @@ class _Mission:
         self._floor: Floor = estimate_floor(
             belief, bottom, constraints.area, visibility, constraints.min_altitude_m, unknown
         )
-        self._free: Free = free_space(constraints)
+        self._free = free
         self._rules = Rules(
             constraints.max_step_m,
             constraints.com_range_m,
@@ -166,10 +196,21 @@ class _Mission:
         allowed = np.floor(MAY_BE_LEFT * len(xy))
         if open_.sum() <= allowed:
             allowed = 0.0
-        return make_work(xyz, need, self._area, self._sight / 2, allowed, len(xy))
+        density = len(xy) / float(Polygon(self._area).area)
+        links = min(self._link, 2 * self._sight) * (len(self._start) - 1)
+        most = SWATH_EXCESS * density * self._rules.step_m * (2 * self._sight + links)
+        return make_work(xyz, need, self._area, self._sight / BUCKETS, allowed, len(xy), max(1.0, most))
 
-    def plan(self, backbone: Backbone, heights: FloatArray) -> _Best | None:
-        """Complete team waypoints to a plan and fly it; None when there is no allowed way."""
+    @property
+    def far_from_done(self) -> bool:
+        """Whether more is left than a plan may leave over."""
+        return self._work.allowed > 0.0
+
+    def plan(self, backbone: Backbone, heights: FloatArray, course: Course | None = None) -> _Best | None:
+        """Complete team waypoints to a plan and fly it; None when there is no allowed way.
+
+        A ``course`` given is overwritten instead of making a new one.
+        """
         n, count = len(self._start), min(len(backbone.at_m), ROOM - 4)
         plan = Plan(np.zeros((ROOM, n, 2)), np.zeros(ROOM), backbone.chain)
         plan.at_m[:count], plan.height_m[:count] = backbone.at_m[:count], heights[:count]
@@ -185,7 +226,7 @@ class _Mission:
                     return None
                 k += 1 + changed - count
                 count = changed
-        course = new_course(ROOM, n, len(self._work.need))
+        course = new_course(ROOM, n, len(self._work.need)) if course is None else course
         begin(course, self._start, self._work)
         left_need = np.empty(len(self._work.need))
         score = fly_plan(
@@ -198,9 +239,12 @@ class _Mission:
         sweeps = backbones(
             self._work.xyz[:, :2], self._start[:, :2], self._area, self._sight, self._com_range, self._link
         )
-        height = HEIGHT * self._sight
-        flown = [self.plan(sweep, np.full(len(sweep.at_m), height)) for sweep in sweeps]
-        return sorted((best for best in flown if best is not None), key=lambda best: best.score)[:most]
+        heights = np.full(ROOM, HEIGHT * self._sight)
+        scratch = new_course(ROOM, len(self._start), len(self._work.need))
+        flown = [(self.plan(sweep, heights, scratch), sweep) for sweep in sweeps]
+        order = sorted(((best.score, k) for k, (best, _) in enumerate(flown) if best is not None))
+        chosen = [self.plan(flown[k][1], heights) for _, k in order[:most]]
+        return [best for best in chosen if best is not None]
 
     def refine(self, best: _Best, changes: int) -> _Best:
         """Try so many changes; the plan is improved in place."""

@@ -50,6 +50,8 @@ class Work(NamedTuple):
         How many landmarks may be left over when the plan counts as finished.
     total : float
         All landmarks of the mission, done ones included.
+    most_per_step : float
+        How many landmarks the team can hardly exceed per step in the long run.
     """
 
     xyz: FloatArray
@@ -62,6 +64,7 @@ class Work(NamedTuple):
     cols: int
     allowed: float
     total: float
+    most_per_step: float
 
 
 class Rules(NamedTuple):
@@ -95,7 +98,13 @@ class Plan(NamedTuple):
 
 
 def make_work(
-    xyz: FloatArray, need: FloatArray, area: FloatArray, bucket_m: float, allowed: float, total: int
+    xyz: FloatArray,
+    need: FloatArray,
+    area: FloatArray,
+    bucket_m: float,
+    allowed: float,
+    total: int,
+    most_per_step: float,
 ) -> Work:
     """Sort landmarks (m, 3) into buckets over the bounding box of ``area`` (n, 2)."""
     low, high = area.min(axis=0), area.max(axis=0)
@@ -117,6 +126,7 @@ def make_work(
         cols,
         float(allowed),
         float(max(1, total)),
+        float(most_per_step),
     )
 
 
@@ -311,7 +321,8 @@ def fly_plan(
     saved = origin
     waypoints = PER_WAYPOINT * count
     while left > work.allowed and k < count and t < horizon:
-        if t + cost + waypoints >= bound:
+        least = (left - work.allowed) / work.most_per_step
+        if t + cost + waypoints + least * (1.0 + 0.5 * WORTH_OF_EARLY * left / work.total) >= bound:
             return np.inf
         next_k = fly_step(at, plan, k, count, floor, rules, after)
         # What the flight looks at in this step is saved as it was before the step.
