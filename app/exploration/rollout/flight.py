@@ -26,9 +26,7 @@ UNFINISHED = 12.0
 PER_LEFT = 0.8
 """Steps charged to a plan that ends unfinished: once, and per landmark left over and per one's missing information."""
 
-CLIMB_PASSES = 3
-DIVE_OF_STEP = 0.5
-"""Part of a step that a vehicle sinks at most while it goes on: sinking may wait, climbing may not."""
+CLIMB_PASSES = 4
 
 
 class Work(NamedTuple):
@@ -195,6 +193,21 @@ def advance(at: FloatArray, plan: Plan, k: int, count: int, reach: float, cut: b
 
 
 @njit(cache=True, nogil=True)
+def _keep_links(at: FloatArray, chain: IntArray, com_range: float) -> None:
+    """Raise the deeper one of neighbours in the chain until they are in range in three dimensions too."""
+    n = len(chain)
+    for turn in range(2):
+        for e in range(n - 1):
+            i = chain[e] if turn == 0 else chain[n - 1 - e]
+            j = chain[e + 1] if turn == 0 else chain[n - 2 - e]
+            free = com_range * com_range - (at[i, 0] - at[j, 0]) ** 2 - (at[i, 1] - at[j, 1]) ** 2
+            if 0.0 < free < np.inf:
+                allowed = 0.98 * np.sqrt(free)
+                at[i, 2] = min(at[i, 2], at[j, 2] + allowed)
+                at[j, 2] = min(at[j, 2], at[i, 2] + allowed)
+
+
+@njit(cache=True, nogil=True)
 def fly_step(
     at: FloatArray, plan: Plan, k: int, count: int, floor: Floor, rules: Rules, out: FloatArray
 ) -> int:
@@ -208,34 +221,26 @@ def fly_step(
     for trial in range(CLIMB_PASSES):
         after = advance(here, plan, k, count, reach, rules.cut_corners, there)
         height = plan.height_m[min(k, count - 1)]
-        longest = 0.0
         for i in range(n):
             x, y = there[i, 0], there[i, 1]
             wish = sample(floor.smooth_m, floor.west_m, floor.south_m, floor.cell_m, x, y) - height
             limit = sample(floor.deepest_m, floor.west_m, floor.south_m, floor.cell_m, x, y)
-            wish = max(rules.min_depth_m, min(rules.max_depth_m, wish, limit))
-            out[i, 2] = wish
-            rise = wish - at[i, 2]
-            if rise > 0.0:
-                rise = min(rise, DIVE_OF_STEP * step)
-            longest = max(longest, np.sqrt((x - at[i, 0]) ** 2 + (y - at[i, 1]) ** 2 + rise * rise))
-        if longest <= step or trial == CLIMB_PASSES - 1:
+            spare = np.sqrt(max(0.0, step * step - (x - at[i, 0]) ** 2 - (y - at[i, 1]) ** 2))
+            # Sinking may wait.
+            out[i, 2] = min(max(rules.min_depth_m, min(rules.max_depth_m, wish, limit)), at[i, 2] + spare)
+            out[i, 0] = x
+            out[i, 1] = y
+        _keep_links(out, plan.chain, rules.com_range_m)
+        longest = 0.0
+        for i in range(n):
+            longest = max(
+                longest,
+                np.sqrt((out[i, 0] - at[i, 0]) ** 2 + (out[i, 1] - at[i, 1]) ** 2 + (out[i, 2] - at[i, 2]) ** 2),
+            )
+        if longest <= step * (1.0 + 1e-9):
             break
-        reach *= max(0.2, step / longest)
-    for i in range(n):
-        out[i, 0] = there[i, 0]
-        out[i, 1] = there[i, 1]
-    # Neighbours in the chain keep in range in three dimensions too: the deeper one comes up.
-    for turn in range(2):
-        for e in range(n - 1):
-            i = plan.chain[e] if turn == 0 else plan.chain[n - 1 - e]
-            j = plan.chain[e + 1] if turn == 0 else plan.chain[n - 2 - e]
-            d2 = (out[i, 0] - out[j, 0]) ** 2 + (out[i, 1] - out[j, 1]) ** 2
-            free = rules.com_range_m * rules.com_range_m - d2
-            if free > 0.0 and free < np.inf:
-                allowed = 0.99 * np.sqrt(free)
-                out[i, 2] = min(out[i, 2], out[j, 2] + allowed)
-                out[j, 2] = min(out[j, 2], out[i, 2] + allowed)
+        # Climbing may not wait: the team goes less far.
+        reach *= max(0.2, 0.98 * step / longest)
     for i in range(n):
         d2 = (out[i, 0] - at[i, 0]) ** 2 + (out[i, 1] - at[i, 1]) ** 2
         allowed = np.sqrt(max(0.0, step * step - d2))
