@@ -36,6 +36,11 @@ HEDGE = 1.5
 PARTS = (1.0, 0.8, 0.5, 0.2)
 """Parts of a step to try when the whole one is not feasible."""
 
+OUTLETS = 400
+"""Random moves to choose from where the plan's next step is not feasible."""
+
+UP_COUNTS = 0.3
+
 LINK_OF_RANGE = 29 / 30
 MAY_BE_LEFT = 0.008
 """Part of all landmarks that a plan may leave over, until the team has come so far."""
@@ -120,8 +125,11 @@ class RolloutPlanner(PlannerBase):
             return Proposal(team.positions.copy(), 0.0)
         best = mission.refine(best, self._effort(mission))
         wishes, passed_by = mission.first_step(best)
-        positions, taken = settle(team, bottom, wishes)
-        passed = passed_by[taken] if np.array_equal(positions, wishes[taken]) else 0
+        feasible = np.flatnonzero(team.constraints.feasible(team.positions, wishes, bottom))
+        if len(feasible):
+            positions, passed = wishes[feasible[0]], passed_by[feasible[0]]
+        else:
+            positions, passed = mission.way_out(team, bottom, wishes[0]), 0
         self._kept = Backbone(best.plan.at_m[passed : best.count].copy(), best.plan.chain.copy())
         self._heights = best.plan.height_m[passed : best.count].copy()
         self._planned += 1
@@ -214,18 +222,24 @@ class _Mission:
         n, count = len(self._start), min(len(backbone.at_m), ROOM - 4)
         plan = Plan(np.zeros((ROOM, n, 2)), np.zeros(ROOM), backbone.chain)
         plan.at_m[:count], plan.height_m[:count] = backbone.at_m[:count], heights[:count]
-        for k in range(count):
-            if not settle_waypoint(self._free, plan.at_m[k], plan.chain, self._link):
-                return None
         start = np.ascontiguousarray(self._start[:, :2])
-        if not self._free.everywhere:
-            k = 0
-            while k < count:
-                changed = clear_ways(self._free, plan, count, start, k, k, self._link)
-                if changed < 0:
-                    return None
-                k += 1 + changed - count
-                count = changed
+        k = 0
+        while k < count:
+            # What cannot be reached is left to the search.
+            changed = -1
+            if settle_waypoint(self._free, plan.at_m[k], plan.chain, self._link):
+                changed = int(clear_ways(self._free, plan, count, start, k, k, self._link))
+            if changed < 0:
+                plan.at_m[k : count - 1], plan.height_m[k : count - 1] = (
+                    plan.at_m[k + 1 : count].copy(),
+                    plan.height_m[k + 1 : count].copy(),
+                )
+                count -= 1
+                continue
+            k += 1 + changed - count
+            count = changed
+        if count == 0:
+            return None
         course = new_course(ROOM, n, len(self._work.need)) if course is None else course
         begin(course, self._start, self._work)
         left_need = np.empty(len(self._work.need))
@@ -276,3 +290,23 @@ class _Mission:
                 wishes.append(wish - [0.0, 0.0, 0.99 * spare])
                 passed.append(after)
         return np.array(wishes), passed
+
+    def way_out(self, team: Situation, bottom: Bottom, wish: FloatArray) -> FloatArray:
+        """Return the feasible one of many random moves (n_vehicles, 3) that comes closest to a wish that is not.
+
+        Part of the moves change the whole team alike, part of them every vehicle on its own; going up counts little
+        because it is what most often helps.
+        """
+        n, step = len(wish), self._rules.step_m * (1 - 1e-9)
+        alike = np.linspace(0.0, 1.0, OUTLETS)[:, None, None]
+        towards = (wish - self._start) * (1.0 - alike) * self._rng.random((OUTLETS, n, 1))
+        noise = alike * step * self._rng.standard_normal((OUTLETS, n, 3))
+        moves = towards + noise
+        moves *= np.minimum(1.0, step / np.maximum(np.linalg.norm(moves, axis=2, keepdims=True), 1e-12))
+        candidates = self._start + moves
+        feasible = candidates[team.constraints.feasible(self._start, candidates, bottom)]
+        if len(feasible) == 0:
+            return settle(team, bottom, wish[None])[0]
+        off = feasible - wish
+        off[..., 2] *= np.where(off[..., 2] < 0.0, UP_COUNTS, 1.0)
+        return np.asarray(feasible[np.argmin(np.linalg.norm(off, axis=2).sum(axis=1))])

@@ -14,8 +14,11 @@ from app.exploration.rollout.flight import Plan
 FloatArray = NDArray[np.float64]
 
 CELLS_PER_SIDE = 160
-DETOURS = 4
+DETOURS = 6
 """Most waypoints inserted to bring the team round what lies in the way."""
+
+CLOSED_UP = (1.0, 0.5, 0.2)
+"""Sizes of the team, in those of the wish, that are tried where it does not fit."""
 
 
 class Free(NamedTuple):
@@ -85,22 +88,6 @@ def push(free: Free, at: FloatArray) -> None:
 
 
 @njit(cache=True, nogil=True)
-def leg_allowed(free: Free, ax: float, ay: float, bx: float, by: float) -> bool:
-    """Whether a leg stays allowed, once it has come to an allowed place."""
-    if free.everywhere:
-        return True
-    pieces = max(1, int(np.ceil(2.0 * np.hypot(bx - ax, by - ay) / free.cell_m)))
-    been = False
-    for k in range(pieces + 1):
-        f = k / pieces
-        inside = is_allowed(free, ax + f * (bx - ax), ay + f * (by - ay))
-        if been and not inside:
-            return False
-        been = been or inside
-    return been
-
-
-@njit(cache=True, nogil=True)
 def pull_together(at: FloatArray, chain: NDArray[np.int64], link: float) -> bool:
     """Bring neighbours in the chain that are farther apart than ``link`` closer; False when that does not succeed."""
     n = len(chain)
@@ -125,24 +112,61 @@ def pull_together(at: FloatArray, chain: NDArray[np.int64], link: float) -> bool
 
 @njit(cache=True, nogil=True)
 def settle_waypoint(free: Free, at: FloatArray, chain: NDArray[np.int64], link: float) -> bool:
-    """Make a team waypoint (n_vehicles, 2) obey area, zones and links; False when that does not succeed."""
-    for _ in range(4):
-        push(free, at)
-        if pull_together(at, chain, link):
-            ok = True
-            for i in range(len(at)):
-                ok = ok and is_allowed(free, at[i, 0], at[i, 1])
-            if ok:
-                return True
+    """Make a team waypoint (n_vehicles, 2) obey area, zones and links; False when that does not succeed.
+
+    Where the team does not fit as it is (zones may drive it apart) it is tried closed up.
+    """
+    n = len(at)
+    wish = at.copy()
+    x = 0.0
+    y = 0.0
+    for i in range(n):
+        x += at[i, 0] / n
+        y += at[i, 1] / n
+    for scale in CLOSED_UP:
+        for i in range(n):
+            at[i, 0] = x + scale * (wish[i, 0] - x)
+            at[i, 1] = y + scale * (wish[i, 1] - y)
+        for _ in range(3):
+            push(free, at)
+            if pull_together(at, chain, link):
+                ok = True
+                for i in range(n):
+                    ok = ok and is_allowed(free, at[i, 0], at[i, 1])
+                if ok:
+                    return True
     return False
 
 
 @njit(cache=True, nogil=True)
-def _team_leg_allowed(free: Free, a: FloatArray, b: FloatArray) -> bool:
+def _worst_place(free: Free, a: FloatArray, b: FloatArray) -> float:
+    """Return where on the way from a to b (n_vehicles, 2) a vehicle gets deepest into what is forbidden.
+
+    As a fraction of the way; -1 when the whole way is allowed. Until a vehicle first comes to an allowed place it is
+    on its way out, and that is no offence.
+    """
+    rows, cols = free.allowed.shape
+    deepest = 0
+    place = -1.0
     for i in range(len(a)):
-        if not leg_allowed(free, a[i, 0], a[i, 1], b[i, 0], b[i, 1]):
-            return False
-    return True
+        pieces = max(1, int(np.ceil(2.0 * np.hypot(b[i, 0] - a[i, 0], b[i, 1] - a[i, 1]) / free.cell_m)))
+        been = False
+        for k in range(pieces + 1):
+            f = k / pieces
+            x = a[i, 0] + f * (b[i, 0] - a[i, 0])
+            y = a[i, 1] + f * (b[i, 1] - a[i, 1])
+            if is_allowed(free, x, y):
+                been = True
+                continue
+            if not been and k < pieces:
+                continue
+            c = min(max(int(np.floor((x - free.west_m) / free.cell_m)), 0), cols - 1)
+            r = min(max(int(np.floor((y - free.south_m) / free.cell_m)), 0), rows - 1)
+            d2 = 1 + (free.nearest[r, c, 0] - r) ** 2 + (free.nearest[r, c, 1] - c) ** 2
+            if d2 > deepest:
+                deepest = d2
+                place = f
+    return place
 
 
 @njit(cache=True, nogil=True)
@@ -166,16 +190,17 @@ def clear_ways(free: Free, plan: Plan, count: int, start: FloatArray, first: int
     inserted = 0
     while k <= min(last, count - 1):
         before = start if k == 0 else plan.at_m[k - 1]
-        if _team_leg_allowed(free, before, plan.at_m[k]):
+        place = _worst_place(free, before, plan.at_m[k])
+        if place < 0.0:
             k += 1
             continue
         if inserted >= DETOURS or count >= room:
             return -1
-        middle = 0.5 * (before + plan.at_m[k])
-        if not settle_waypoint(free, middle, plan.chain, link):
+        round_it = before + place * (plan.at_m[k] - before)
+        if not settle_waypoint(free, round_it, plan.chain, link):
             return -1
         insert(plan, count, k)
-        plan.at_m[k] = middle
+        plan.at_m[k] = round_it
         count += 1
         last += 1
         inserted += 1
