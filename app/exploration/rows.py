@@ -4,12 +4,14 @@ A *row* is three numbers: where its middle is (east, north) and the gap between 
 same direction, across the lines.
 """
 
-from dataclasses import dataclass
+import itertools
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from shapely import LineString, MultiLineString
-from shapely.prepared import prep
+from shapely import LineString, MultiLineString, MultiPoint, Polygon
+from shapely.prepared import PreparedGeometry, prep
 
 from app.exploration.constraints import Constraints, inside_area
 from app.exploration.routes import FreeSpace
@@ -24,7 +26,7 @@ OUTLIERS = 0.01
 """Part of the unfinished landmarks on either side that do not widen the strip to be swept."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class RowSpace:
     """Where a row of ``n`` vehicles may be: the mission's area in coordinates across (u) and along (v) the lines.
 
@@ -48,11 +50,27 @@ class RowSpace:
     closed_m: float
     edge_m: float
 
-    def __post_init__(self) -> None:
-        loose = FreeSpace(self.constraints, 0.0).region.buffer(1e-6)
-        object.__setattr__(self, "_free", prep(loose))
-        half_width = (self.n - 1) / 2 * self.closed_m + self.edge_m
-        object.__setattr__(self, "_closed_free", FreeSpace(self.constraints, half_width))
+    @cached_property
+    def _free(self) -> PreparedGeometry:
+        return prep(FreeSpace(self.constraints, 0.0).region.buffer(1e-6))
+
+    @cached_property
+    def _middles(self) -> FreeSpace:
+        return FreeSpace(self._for_middles(), self.edge_m / 2)
+
+    def _for_middles(self) -> Constraints:
+        """Return the limits of the middle of a row that has closed up: its ends must keep the mission's."""
+        half = (self.n - 1) / 2 * self.closed_m * self.axes[0]
+        zones = [MultiPoint(np.vstack([zone - half, zone + half])).convex_hull for zone in self.constraints.keep_out]
+        shifted = [Polygon(self.constraints.area + k * half) for k in (-1, 1)]
+        area = shifted[0].intersection(shifted[1])
+        if not isinstance(area, Polygon) or area.is_empty:
+            return self.constraints
+        return replace(
+            self.constraints,
+            area=np.asarray(area.exterior.coords)[:-1],
+            keep_out=tuple(np.asarray(zone.exterior.coords)[:-1] for zone in zones if isinstance(zone, Polygon)),
+        )
 
     @property
     def axes(self) -> FloatArray:
@@ -80,11 +98,11 @@ class RowSpace:
         return np.asarray(inside_area(self.constraints, slots.reshape(-1, 2)).reshape(len(rows), self.n).all(axis=1))
 
     def way(self, start: FloatArray, goal: FloatArray) -> FloatArray:
-        """Return the rows (k, 3) from ``start`` (3,), left out, to ``goal`` (3,): straight, or closed up round zones."""
+        """Return the rows (k, 3) from ``start`` (3,), left out, to ``goal`` (3,), closed up where zones are in the way."""
         legs = np.stack([self.slots(start), self.slots(goal)], axis=1)
-        if self._free.covers(MultiLineString([LineString(leg) for leg in legs])):  # type: ignore[attr-defined]
+        if self._free.covers(MultiLineString([LineString(leg) for leg in legs])):
             return goal[None]
-        middles = self._closed_free.way(start[:2], goal[:2])  # type: ignore[attr-defined]
+        middles = self._middles.way(start[:2], goal[:2])
         closed = np.column_stack([middles, np.full(len(middles), min(self.closed_m, start[2], goal[2]))])
         here = np.append(start[:2], closed[0, 2])
         return np.vstack([here, closed, goal])
@@ -166,10 +184,10 @@ def _line(space: RowSpace, strip: tuple[float, float], ends: tuple[float, float]
         for box in boxes
         if box[:, 0].max() + space.edge_m > low and box[:, 0].min() - space.edge_m < high
     ]
-    cuts = sorted({ends[0], ends[1], *(float(v) for box in beside for v in (box[0][1], box[1][1])
-                                       if ends[0] < v < ends[1])})  # fmt: skip
+    edges = [float(v) for box in beside for v in (box[0][1], box[1][1])]
+    cuts = [ends[0], *sorted({v for v in edges if ends[0] < v < ends[1]}), ends[1]]
     rows: list[FloatArray] = []
-    for v0, v1 in zip(cuts[:-1], cuts[1:], strict=True):
+    for v0, v1 in itertools.pairwise(cuts):
         blocked = [(float(b[0][0]), float(b[1][0])) for b in beside if b[0][1] < (v0 + v1) / 2 < b[1][1]]
         left, right = _widest_free(low, high, blocked)
         if right - left >= space.n * space.closed_m / 2:

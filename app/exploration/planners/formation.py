@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from app.estimation import RangeSensor, Sensor
 from app.exploration.bottom import Bottom
+from app.exploration.constraints import Constraints
 from app.exploration.lattice import longer_axis_rad
 from app.exploration.options import PlannerOptions
 from app.exploration.planners.base import PlannerBase, at_depth, settle
@@ -48,6 +49,7 @@ SLOT_TOLERANCE = 0.05
 CLOSING_IN = 0.5
 """Of a step: by so much the vehicles must come closer to their slots while the row goes on."""
 
+GAPS_TRIED = 12
 STUCK_STEPS = 4
 LOOKS = 12
 """Steps over a place after which it is left for later."""
@@ -80,6 +82,7 @@ class FormationLawnmower(PlannerBase):
         self._idle = 0
         self._later: list[int] = []
         self._asked: dict[str, list[float]] = {}
+        self._space: RowSpace | None = None
         self._touched = np.zeros((0, 3))
         r = np.arange(-5, 6) * RING
         ring = np.stack(np.meshgrid(r, r), axis=-1).reshape(-1, 2)
@@ -111,7 +114,7 @@ class FormationLawnmower(PlannerBase):
         constraints, origin, n = team.constraints, team.positions, len(team.vehicles)
         gap = min(GAP_OF_RANGE * constraints.com_range_m, GAP_OF_VISIBILITY * self._reach)
         closed = max(CLOSED_OF_GAP * gap, min(gap, 1.2 * constraints.min_separation_m))
-        space = RowSpace(constraints, longer_axis_rad(constraints.area), n, closed, EDGE * self._reach)
+        space = self._space_of(constraints, n, closed)
         if self._names != team.vehicles:
             self._form_up(team, space, gap)
         self._next_target(team, space, gap)
@@ -127,9 +130,7 @@ class FormationLawnmower(PlannerBase):
             depths = self._depths(team, bottom, slots, lifted)
             # A row that waits gets ready for what comes: by itself the place where it is never lets it go on.
             ahead = depths if advance == ADVANCE[0] else ahead
-            wish = at_depth(
-                constraints, bottom, origin, slots, np.minimum(depths, ahead) if advance == 0.0 else depths
-            )
+            wish = at_depth(constraints, bottom, origin, slots, np.minimum(depths, ahead) if advance == 0.0 else depths)
             lag = self._lag(wish, space.slots(row))
             kept = lag <= max(SLOT_TOLERANCE * step, lag_now - CLOSING_IN * step)
             wishes.append(wish)
@@ -145,6 +146,12 @@ class FormationLawnmower(PlannerBase):
         self._asked = dict(zip(team.vehicles, positions.tolist(), strict=True))
         self._idle = self._idle + 1 if moved < SLOT_TOLERANCE * step else 0
         return Proposal(positions, 0.0, {"left": float(len(self._route))})
+
+    def _space_of(self, constraints: Constraints, n: int, closed: float) -> RowSpace:
+        """Return the space for rows, the same object as long as nothing changes: preparing it takes time."""
+        if self._space is None or self._space.constraints is not constraints or self._space.n != n:
+            self._space = RowSpace(constraints, longer_axis_rad(constraints.area), n, closed, EDGE * self._reach)
+        return self._space
 
     def _lag(self, positions: FloatArray, slots: FloatArray) -> float:
         return float(np.hypot(*(positions[:, :2] - slots[self._order]).T).max())
@@ -166,7 +173,9 @@ class FormationLawnmower(PlannerBase):
         rank = np.argsort(np.argsort(space.to_uv(en)[:, 0], kind="stable"))
         self._names, self._order = team.vehicles, [int(k) for k in rank]
         spread = float(np.ptp(space.to_uv(en)[:, 0])) / max(1, space.n - 1)
-        self._row = np.append(en.mean(axis=0), np.clip(spread, space.closed_m, gap))
+        gaps = np.linspace(np.clip(spread, space.closed_m, gap), 0.0, GAPS_TRIED)
+        rows = np.column_stack([np.tile(en.mean(axis=0), (GAPS_TRIED, 1)), gaps])
+        self._row = rows[int(np.argmax(space.allowed(rows)))]  # beside a border it must begin narrow
         self._target, self._later = -1, []
         unfinished = team.belief.xy_m[~team.belief.accurate]
         self._route = self._lines(space, unfinished, gap) if len(unfinished) else np.zeros((0, 3))
@@ -178,8 +187,8 @@ class FormationLawnmower(PlannerBase):
         """Choose where to go once the lines are flown: more lines where much is left, else the closest place left."""
         done = team.belief.accurate
         if self._idle >= STUCK_STEPS:  # something is in the way: leave it for later
-            self._idle, self._route = 0, self._route[1:]
-            self._looks = LOOKS
+            self._idle, self._looks, rest = 0, LOOKS, self._route[1:]
+            self._route = np.vstack([space.way(self._row, rest[0]), rest[1:]]) if len(rest) else rest
         if self._target >= 0:
             self._looks += len(self._route) == 0
             if not done[self._target] and self._looks < LOOKS:
