@@ -1,6 +1,5 @@
 """The lawnmower of a team that must stay in communication range: side by side, at a spacing that keeps the links."""
 
-import itertools
 from typing import Any, ClassVar
 
 import numpy as np
@@ -8,27 +7,63 @@ from numpy.typing import NDArray
 
 from app.estimation import RangeSensor, Sensor
 from app.exploration.bottom import Bottom
-from app.exploration.lattice import Sweep, boustrophedon, even_lines, longer_axis_rad
+from app.exploration.constraints import Constraints
+from app.exploration.lattice import longer_axis_rad
 from app.exploration.options import PlannerOptions
 from app.exploration.planners.base import PlannerBase, at_depth, settle
 from app.exploration.problem import Proposal, Situation
-from app.exploration.routes import FreeSpace, next_waypoint
+from app.exploration.rows import EDGE, RowSpace, lines_over
 
 FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
 
-SPACING_OF_RANGE = 0.85
+GAP_OF_RANGE, GAP_OF_VISIBILITY = 0.85, 0.64
+LINK_OF_RANGE = 0.97
+CLOSED_OF_GAP = 0.45
+"""Gap of a row that has closed up for a narrow passage or for what single lines left over."""
+
+INSET_OF_VISIBILITY = 0.5
+"""How far before the end of what is to be seen a line ends."""
+
 HEIGHT_OF_VISIBILITY = 0.45
+SMOOTHING_OF_VISIBILITY = 0.375
+LOOKOUT_OF_VISIBILITY = 0.75
+RING = 0.15
+"""Of the visibility: pitch of the places around a vehicle at which the bottom is asked for."""
+
+CLEARANCE_FACTOR = 1.8
+"""Of the least altitude: kept above the estimated bottom, which is uncertain."""
+
+STEEPEST = 1.2
+"""Slope at which vehicles climb ahead of rising ground."""
+
+DESCENT_OF_STEP = 0.6
+FELT_OF_STEP = 0.01
+ESCAPE_OF_STEP = 0.9
+"""Of a step: how much a vehicle climbs that has just been lifted by its altimeter."""
+
 ADVANCE = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2, 0.1, 0.0)
-CLIMB_OF_STEP = 0.6
-LIFTS = (0.0, 0.5, 1.0)
-SLOT_TOLERANCE = 0.02
-"""Of a step: how close to its slot a vehicle must get before the formation goes on."""
+SLOT_TOLERANCE = 0.05
+"""Of a step: how close to its slot a vehicle must get before the row goes on."""
+
+CLOSING_IN = 0.5
+"""Of a step: by so much the vehicles must come closer to their slots while the row goes on."""
+
+GAPS_TRIED = 12
+STUCK_STEPS = 4
+LOOKS = 12
+"""Steps over a place after which it is left for later."""
+
+WORTH_LINES = 0.08
+"""Part of all landmarks that must be unfinished for another set of lines; fewer are visited one by one."""
 
 
 class FormationLawnmower(PlannerBase):
-    """A rigid row of vehicles sweeps the area; its middle follows the lines, every vehicle keeps its height.
+    """A row of vehicles sweeps the area along parallel lines, and then goes to what the lines left over.
 
-    A finished sweep is followed by one across it, as an operator would do with what is left.
+    The row keeps its direction, its height above the (smoothed) bottom and its links, slows down where a vehicle has to
+    climb, and closes up to pass obstacles. When the team changes, lines for the new row are laid over what is
+    unfinished.
     """
 
     name: ClassVar[str] = "lawnmower"
@@ -37,90 +72,173 @@ class FormationLawnmower(PlannerBase):
         if not isinstance(sensor, RangeSensor):
             raise ValueError(f"sensor: the formation needs a RangeSensor, not {type(sensor).__name__}")
         super().__init__(options, sensor)
-        self._height = HEIGHT_OF_VISIBILITY * sensor.visibility_m
         self._reach = sensor.visibility_m
         self._names: tuple[str, ...] = ()
-        self._turned = False
-        self._offsets = np.zeros((0, 2))
-        self._middle = np.zeros(2)
-        self._route = np.zeros((0, 2))
+        self._row = np.zeros(3)
+        self._route = np.zeros((0, 3))
+        self._order: list[int] = []
+        self._target = -1
+        self._looks = 0
+        self._idle = 0
+        self._later: list[int] = []
+        self._asked: dict[str, list[float]] = {}
+        self._space: RowSpace | None = None
+        self._touched = np.zeros((0, 3))
+        r = np.arange(-5, 6) * RING
+        ring = np.stack(np.meshgrid(r, r), axis=-1).reshape(-1, 2)
+        self._ring = ring[np.hypot(*ring.T) <= LOOKOUT_OF_VISIBILITY] * self._reach
 
     def _remember(self) -> dict[str, Any]:
         return {
             "names": list(self._names),
-            "turned": self._turned,
-            "offsets": self._offsets,
-            "middle": self._middle,
+            "row": self._row,
             "route": self._route,
+            "order": self._order,
+            "target": self._target,
+            "looks": self._looks,
+            "idle": self._idle,
+            "later": self._later,
+            "asked": self._asked,
+            "touched": self._touched,
         }
 
     def _recall(self, state: dict[str, Any]) -> None:
-        self._names, self._turned = tuple(state["names"]), bool(state["turned"])
-        self._offsets, self._route = (np.array(state[k], dtype=np.float64).reshape(-1, 2) for k in ("offsets", "route"))
-        self._middle = np.array(state["middle"], dtype=np.float64)
+        self._names, self._row = tuple(state["names"]), np.array(state["row"], dtype=np.float64)
+        self._route = np.array(state["route"], dtype=np.float64).reshape(-1, 3)
+        self._order, self._later = ([int(k) for k in state[key]] for key in ("order", "later"))
+        self._asked = {str(k): [float(x) for x in v] for k, v in state["asked"].items()}
+        self._touched = np.array(state["touched"], dtype=np.float64).reshape(-1, 3)
+        self._target, self._looks, self._idle = (int(state[key]) for key in ("target", "looks", "idle"))
 
     def _decide(self, team: Situation, bottom: Bottom, seed: int) -> Proposal:
+        constraints, origin, n = team.constraints, team.positions, len(team.vehicles)
+        gap = min(GAP_OF_RANGE * constraints.com_range_m, GAP_OF_VISIBILITY * self._reach)
+        closed = max(CLOSED_OF_GAP * gap, min(gap, 1.2 * constraints.min_separation_m))
+        space = self._space_of(constraints, n, closed)
         if self._names != team.vehicles:
-            self._form_up(team)
-        elif len(self._route) == 0:
-            self._turned = not self._turned
-            self._form_up(team)
-        constraints, origin = team.constraints, team.positions
+            self._form_up(team, space, gap)
+        self._next_target(team, space, gap)
+
+        lifted = self._feel_bottom(team)
         step = constraints.max_step_m * (1 - 1e-9)
-        climb = CLIMB_OF_STEP * step
-        wishes: list[FloatArray] = []
-        ends: list[tuple[FloatArray, int]] = []
-        ranks: list[tuple[bool, bool, float]] = []
-        for lift, advance in itertools.product(LIFTS, ADVANCE):
-            x, y, passed = next_waypoint(
-                self._middle[0], self._middle[1], self._route, 0, len(self._route), max(1e-9, advance * step)
-            )
-            middle = np.array([x, y]) if advance > 0 else self._middle
-            slots = middle + self._offsets
-            depths = self._depths(team, bottom, slots) - lift * self._height
-            wish = at_depth(
-                constraints, bottom, origin, slots, np.clip(depths, origin[:, 2] - climb, origin[:, 2] + climb)
-            )
-            lag = float(np.hypot(*(wish[:, :2] - slots).T).max())
-            # Holding the row comes last: only going on, if need be with a gap or higher, brings other ground below it.
-            ranks.append((advance == 0.0, lag > SLOT_TOLERANCE * step, lift))
+        lag_now = self._lag(origin, space.slots(self._row))
+        wishes, rows, passed, ranks = [], [], [], []
+        ahead = origin[:, 2]
+        for advance in ADVANCE:
+            row, behind = space.along(self._row, self._route, advance * step)
+            slots = space.slots(row)[self._order]
+            depths = self._depths(team, bottom, slots, lifted)
+            # A row that waits gets ready for what comes: by itself the place where it is never lets it go on.
+            ahead = depths if advance == ADVANCE[0] else ahead
+            wish = at_depth(constraints, bottom, origin, slots, np.minimum(depths, ahead) if advance == 0.0 else depths)
+            lag = self._lag(wish, space.slots(row))
+            kept = lag <= max(SLOT_TOLERANCE * step, lag_now - CLOSING_IN * step)
             wishes.append(wish)
-            ends.append((middle, passed if advance > 0 else 0))
-        order = sorted(range(len(wishes)), key=lambda k: ranks[k])
-        wishes, ends = [wishes[k] for k in order], [ends[k] for k in order]
-        positions, taken = settle(team, bottom, np.array(wishes))
+            rows.append(row)
+            passed.append(behind)
+            ranks.append((not kept, advance if not kept else -advance))
+        best = sorted(range(len(wishes)), key=lambda k: ranks[k])
+        positions, first = settle(team, bottom, np.array([wishes[k] for k in best]))
+        taken = best[first]
         if np.allclose(positions, wishes[taken]):
-            self._middle, passed = ends[taken]
-            self._route = self._route[passed:]
+            self._row, self._route = rows[taken], self._route[passed[taken] :]
+        moved = float(np.linalg.norm(positions - origin, axis=1).max())
+        self._asked = dict(zip(team.vehicles, positions.tolist(), strict=True))
+        self._idle = self._idle + 1 if moved < SLOT_TOLERANCE * step else 0
         return Proposal(positions, 0.0, {"left": float(len(self._route))})
 
-    def _form_up(self, team: Situation) -> None:
-        constraints, n = team.constraints, len(team.vehicles)
-        en = team.positions[:, :2]
-        gap = min(SPACING_OF_RANGE * constraints.com_range_m, self._reach)
-        direction = longer_axis_rad(constraints.area) + (np.pi / 2 if self._turned else 0.0)
-        sweep = Sweep(constraints, FreeSpace(constraints, 0.0), direction)
-        u = sweep.to_uv(constraints.area)[:, 0]
-        passes = max(1, int(np.ceil(np.ptp(u) / (n * gap) - 1e-9)))
-        # The outermost vehicles keep half a gap from the border, whatever the width.
-        gap = min(gap, float(np.ptp(u)) / (n * passes))
-        across = (np.argsort(np.argsort(sweep.to_uv(en)[:, 0], kind="stable")) - (n - 1) / 2) * gap
-        self._offsets = sweep.to_en(np.column_stack([across, np.zeros(n)]))
-        self._middle = en.mean(axis=0)
-        self._names = team.vehicles
-        if len(self._route) == 0:
-            low, high = float(u.min()), float(u.max())
-            self._route = boustrophedon(sweep, self._middle, low, high, np.inf, lines=even_lines(low, high, passes))
-            inset = min(self._reach / 2, float(np.ptp(sweep.to_uv(constraints.area)[:, 1])) / 4)
-            v = sweep.to_uv(self._route)
-            ends = sweep.to_uv(constraints.area)[:, 1]
-            v[:, 1] = np.clip(v[:, 1], ends.min() + inset, ends.max() - inset)
-            self._route = sweep.to_en(v)
+    def _space_of(self, constraints: Constraints, n: int, closed: float) -> RowSpace:
+        """Return the space for rows, the same object as long as nothing changes: preparing it takes time."""
+        if self._space is None or self._space.constraints is not constraints or self._space.n != n:
+            self._space = RowSpace(constraints, longer_axis_rad(constraints.area), n, closed, EDGE * self._reach)
+        return self._space
 
-    def _depths(self, team: Situation, bottom: Bottom, slots: FloatArray) -> FloatArray:
-        """Return depths at the survey height above the mean known bottom around the slots; unknown: as deep as now."""
-        ring = np.array([[0.0, 0.0], [1, 0], [-1, 0], [0, 1], [0, -1]]) * 0.25 * self._reach
-        floor = bottom.at(slots[:, None, :] + ring)
-        known = np.isfinite(floor).any(axis=1)
-        mean = np.where(known, np.nansum(floor, axis=1) / np.maximum(1, np.isfinite(floor).sum(axis=1)), 0.0)
-        return np.where(known, mean - self._height, team.positions[:, 2])
+    def _lag(self, positions: FloatArray, slots: FloatArray) -> float:
+        return float(np.hypot(*(positions[:, :2] - slots[self._order]).T).max())
+
+    def _feel_bottom(self, team: Situation) -> BoolArray:
+        """Return which vehicles (n,) were lifted by their altimeters, and remember where the bottom is that near.
+
+        Ranges do not tell up from down: of a wall that rises above a vehicle the estimates are wrong.
+        """
+        asked = np.array([self._asked.get(name, at) for name, at in zip(team.vehicles, team.positions, strict=True)])
+        lifted = asked[:, 2] - team.positions[:, 2] > FELT_OF_STEP * team.constraints.max_step_m
+        felt = team.positions[lifted] + [0.0, 0.0, team.constraints.min_altitude_m]
+        self._touched = np.vstack([self._touched, felt])
+        return np.asarray(lifted, dtype=np.bool_)
+
+    def _form_up(self, team: Situation, space: RowSpace, gap: float) -> None:
+        """Begin a row where the vehicles are, and lay lines over what is unfinished."""
+        en = team.positions[:, :2]
+        rank = np.argsort(np.argsort(space.to_uv(en)[:, 0], kind="stable"))
+        self._names, self._order = team.vehicles, [int(k) for k in rank]
+        spread = float(np.ptp(space.to_uv(en)[:, 0])) / max(1, space.n - 1)
+        gaps = np.linspace(np.clip(spread, space.closed_m, gap), 0.0, GAPS_TRIED)
+        rows = np.column_stack([np.tile(en.mean(axis=0), (GAPS_TRIED, 1)), gaps])
+        self._row = rows[int(np.argmax(space.allowed(rows)))]  # beside a border it must begin narrow
+        self._target, self._later = -1, []
+        unfinished = team.belief.xy_m[~team.belief.accurate]
+        self._route = self._lines(space, unfinished, gap) if len(unfinished) else np.zeros((0, 3))
+
+    def _lines(self, space: RowSpace, unfinished: FloatArray, gap: float) -> FloatArray:
+        return lines_over(space, self._row, unfinished, gap, INSET_OF_VISIBILITY * self._reach)
+
+    def _next_target(self, team: Situation, space: RowSpace, gap: float) -> None:
+        """Choose where to go once the lines are flown: more lines where much is left, else the closest place left."""
+        done = team.belief.accurate
+        if self._idle >= STUCK_STEPS:  # something is in the way: leave it for later
+            self._idle, self._looks, rest = 0, LOOKS, self._route[1:]
+            self._route = np.vstack([space.way(self._row, rest[0]), rest[1:]]) if len(rest) else rest
+        if self._target >= 0:
+            self._looks += len(self._route) == 0
+            if not done[self._target] and self._looks < LOOKS:
+                return
+            self._later += [] if done[self._target] else [self._target]
+            self._target, self._route = -1, np.zeros((0, 3))
+        if len(self._route) or done.all():
+            return
+        left = np.setdiff1d(np.flatnonzero(~done), self._later)
+        if len(left) == 0:
+            left, self._later = np.flatnonzero(~done), []
+        if len(left) > WORTH_LINES * len(done):
+            self._route = self._lines(space, team.belief.xy_m[left], gap)
+            return
+        # A row for every place and every vehicle that could go there.
+        k = np.arange(space.n) - (space.n - 1) / 2
+        middles = team.belief.xy_m[left][:, None] - space.closed_m * k[:, None] * space.axes[0]
+        rows = np.concatenate([middles, np.full((*middles.shape[:2], 1), space.closed_m)], axis=2).reshape(-1, 3)
+        cost = np.hypot(*(rows[:, :2] - self._row[:2]).T) + np.where(space.allowed(rows), 0.0, 1e9)
+        best = int(np.argmin(cost))
+        self._target, self._looks = int(left[best // space.n]), 0
+        self._route = space.way(self._row, rows[best])
+
+    def _depths(self, team: Situation, bottom: Bottom, slots: FloatArray, lifted: BoolArray) -> FloatArray:
+        """Return the depths (n,) at which the vehicles should be in the slots (n, 2)."""
+        constraints, origin = team.constraints, team.positions
+        step = constraints.max_step_m * (1 - 1e-9)
+        around = np.hypot(*self._ring.T)
+        floor = bottom.at(slots[:, None, :] + self._ring)
+        near = np.where(around <= SMOOTHING_OF_VISIBILITY * self._reach, floor, np.nan)
+        known = np.isfinite(near).any(axis=1)
+        mean = np.where(known, np.nansum(near, axis=1) / np.maximum(1, np.isfinite(near).sum(axis=1)), 0.0)
+        blind = origin[:, 2] + (DESCENT_OF_STEP * step if self._target >= 0 else 0.0)
+        wish = np.where(known, mean - HEIGHT_OF_VISIBILITY * self._reach, blind)
+        safe = floor - CLEARANCE_FACTOR * constraints.min_altitude_m + STEEPEST * around
+        wish = np.fmin(wish, np.fmin.reduce(safe, axis=1))
+        if len(self._touched):
+            away = np.hypot(*(slots[:, None] - self._touched[:, :2]).transpose(2, 0, 1))
+            above = self._touched[:, 2] - CLEARANCE_FACTOR * constraints.min_altitude_m + STEEPEST * away
+            wish = np.minimum(wish, above.min(axis=1))
+            wish = np.where(lifted, np.minimum(wish, origin[:, 2] - ESCAPE_OF_STEP * step), wish)
+        wish = np.minimum(wish, origin[:, 2] + DESCENT_OF_STEP * step)
+        # Neighbours stay in range: the deeper one gives way, upwards is always free.
+        by_rank = np.argsort(self._order)
+        apart = np.hypot(*np.diff(slots[by_rank], axis=0).T)
+        link = LINK_OF_RANGE * constraints.com_range_m
+        drop = np.sqrt(np.maximum(0.0, link**2 - apart**2)) if np.isfinite(link) else np.full(len(apart), np.inf)
+        depth = wish[by_rank]
+        for k in range(1, len(depth)):
+            depth[k] = min(depth[k], depth[k - 1] + drop[k - 1])
+        for k in range(len(depth) - 1, 0, -1):
+            depth[k - 1] = min(depth[k - 1], depth[k] + drop[k - 1])
+        return np.asarray(depth[self._order])
