@@ -1,7 +1,8 @@
 """``bathyfleet evaluate``: planners against each other, without a network."""
 
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -185,9 +186,71 @@ def survey(
     _compare(runs, columns, jobs, as_json=as_json)
 
 
-def _compare(jobs: Sequence[Job], columns: tuple[str, ...], processes: int, *, as_json: bool) -> None:
+@evaluate_app.command()
+def tables(
+    out: Annotated[
+        Path, typer.Option(help="Folder of report, pictures and results; an existing one is completed.")
+    ] = Path("docs/results"),
+    seeds: Annotated[str, typer.Option(help="FIRST:END (END excluded), or a list 1,5,9.")] = "0:10",
+    terrains: Annotated[
+        Path | None, typer.Option(help="Folder of real terrain files; generated ones are added.")
+    ] = None,
+    steps: Annotated[int, typer.Option(min=1)] = 500,
+    jobs: Jobs = 1,
+    only: Annotated[str | None, typer.Option(help="One or more tables, separated by commas.")] = None,
+    quick: Annotated[bool, typer.Option("--quick", help="A small version: few tries, few landmarks.")] = False,
+) -> None:
+    """Rerun the papers' tables and figures over many seeds, beside our planners and the lawnmower, and report."""
+    from app.evaluation.tables.facts import made
+    from app.evaluation.tables.plots import draw
+    from app.evaluation.tables.report import Report, markdown
+    from app.evaluation.tables.setups import jobs_of, sections
+    from app.evaluation.tables.store import Results
+    from app.evaluation.tables.terrains import report_terrains
+
+    known = sections(steps, quick=quick)
+    names = [section.name for section in known] if only is None else [name.strip() for name in only.split(",")]
+    for name in names:
+        if name not in [section.name for section in known]:
+            there = ", ".join(section.name for section in known)
+            raise typer.BadParameter(f"there is no {name!r}; choose from {there}", param_hint="--only")
+    if terrains is not None and not terrains.is_dir():
+        raise typer.BadParameter(f"{terrains} is not a folder", param_hint="--terrains")
+    chosen = [section for section in known if section.name in names]
+    try:
+        sea_floors, missing = report_terrains(terrains)
+    except (TerrainError, OSError) as error:
+        raise typer.BadParameter(str(error), param_hint="--terrains") from error
+    seed_list = _seed_list(0, seeds)
+    out.mkdir(parents=True, exist_ok=True)
+    results = Results(out / "exploration.jsonl")
+    open_ = [job for job in jobs_of(chosen, sea_floors, seed_list, steps) if job.key not in results.runs]
+    with _progress() as bar:
+        task = bar.add_task("tables", total=len(open_))
+        for run in run_jobs(open_, jobs, lambda job, step: bar.update(task, description=job.title)):
+            results.add(run)
+            bar.advance(task)
+
+    command = f"bathyfleet evaluate tables --seeds {seeds} --steps {steps} --jobs {jobs}"
+    command += "".join([" --terrains FOLDER" if terrains else "", f" --only {only}" if only else ""])
+    report = Report(
+        results.runs,
+        chosen,
+        [terrain.name for terrain in sea_floors],
+        missing,
+        seed_list,
+        steps,
+        made(command + (" --quick" if quick else ""), jobs),
+        {},
+    )
+    pictures = {name: f"images/{file}" for name, file in draw(report, out / "images").items()}
+    (out / "exploration.md").write_text(markdown(replace(report, pictures=pictures)) + "\n", encoding="utf-8")
+    typer.echo(f"{out / 'exploration.md'}: {len(open_)} runs made, {len(results.runs)} kept")
+
+
+@contextmanager
+def _progress() -> Iterator[Progress]:
     console = Console(stderr=True)
-    runs: list[dict[str, Any]] = []
     with Progress(
         TextColumn("{task.description}"),
         BarColumn(),
@@ -197,6 +260,12 @@ def _compare(jobs: Sequence[Job], columns: tuple[str, ...], processes: int, *, a
         transient=True,
         disable=not console.is_terminal,
     ) as bar:
+        yield bar
+
+
+def _compare(jobs: Sequence[Job], columns: tuple[str, ...], processes: int, *, as_json: bool) -> None:
+    runs: list[dict[str, Any]] = []
+    with _progress() as bar:
         task = bar.add_task("", total=sum(job.steps for job in jobs))
 
         def show(job: Job, step: int) -> None:

@@ -15,6 +15,9 @@ from app.exploration.planners.base import PlannerBase
 from app.exploration.problem import Situation
 
 OSARSES = "osarses"
+UNSEEN_DEPTH = (DEEPEST + SHALLOWEST) / 2
+"""What a landmark that nobody has seen is taken to be, where errors are summed."""
+
 EXPLORERS = (*sorted(PLANNERS), OSARSES)
 
 
@@ -23,6 +26,7 @@ class ExploreRun:
     """What came of a run; names as in the command's JSON.
 
     ``robots`` is the team at the start; ``broken_constraints`` counts the steps of single vehicles that broke a limit.
+    ``sum_of_error`` is AURO15 eq. (25): over all steps, the norm of the error of all landmarks.
     """
 
     planner: str
@@ -63,7 +67,7 @@ def run_explore(
         else create_planner(planner, options, scenario.sensor)
     )
     world.landmarks = world.measure(world.positions, world.landmarks, noise)
-    history, plan_s, distance, broken = [], [], 0.0, 0
+    history, plan_s, distance, broken, error = [], [], 0.0, 0, 0.0
     for step in range(1, scenario.steps + 1):
         world.change_team(step)
         situation = Situation(
@@ -85,10 +89,9 @@ def run_explore(
         world.positions = positions
         world.landmarks = world.measure(positions, world.landmarks, noise)
         history.append(100.0 * float(1.0 - world.landmarks.accurate.mean()))
+        error += float(np.linalg.norm(np.nan_to_num(world.landmarks.depth_m, nan=UNSEEN_DEPTH) - world.truth[:, 2]))
         progress(step)
     below = np.flatnonzero(np.array(history) <= 1.0)
-    unseen = (DEEPEST + SHALLOWEST) / 2
-    error = np.abs(np.nan_to_num(world.landmarks.depth_m, nan=unseen) - world.truth[:, 2]).sum()
     return ExploreRun(
         planner=planner,
         terrain=scenario.terrain.name,
@@ -98,7 +101,7 @@ def run_explore(
         steps=scenario.steps,
         remaining_pct=history[-1],
         t99=int(below[0]) + 1 if len(below) else None,
-        sum_of_error=float(error),
+        sum_of_error=error,
         history=history,
         distance=distance,
         wall_s=time.perf_counter() - began,

@@ -11,6 +11,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 from shapely import LineString, MultiLineString, MultiPoint, Polygon
+from shapely.geometry.base import BaseGeometry
 from shapely.prepared import PreparedGeometry, prep
 
 from app.exploration.constraints import Constraints, inside_area
@@ -51,7 +52,7 @@ class RowSpace:
     edge_m: float
 
     @cached_property
-    def _free(self) -> PreparedGeometry:
+    def _free(self) -> "PreparedGeometry[BaseGeometry]":
         return prep(FreeSpace(self.constraints, 0.0).region.buffer(1e-6))
 
     @cached_property
@@ -98,7 +99,7 @@ class RowSpace:
         return np.asarray(inside_area(self.constraints, slots.reshape(-1, 2)).reshape(len(rows), self.n).all(axis=1))
 
     def way(self, start: FloatArray, goal: FloatArray) -> FloatArray:
-        """Return the rows (k, 3) from ``start`` (3,), left out, to ``goal`` (3,), closed up where zones are in the way."""
+        """Return the rows (k, 3) from ``start`` (3,), left out, to ``goal`` (3,), closed up round zones."""
         legs = np.stack([self.slots(start), self.slots(goal)], axis=1)
         if self._free.covers(MultiLineString([LineString(leg) for leg in legs])):
             return goal[None]

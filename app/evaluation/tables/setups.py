@@ -1,0 +1,274 @@
+"""What is run for the report: sections of rows, each row one setup that is flown over terrains and seeds."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from typing import Any
+
+import orjson
+
+from app.evaluation.cube_world import ExploreScenario
+from app.evaluation.explore import OSARSES, run_explore
+from app.evaluation.jobs import Progress
+from app.evaluation.team_changes import TeamChanges
+from app.exploration.objective import ObjectiveWeights
+from app.exploration.options import PlannerOptions
+from app.exploration.planners import PLANNERS
+from simulator.terrain import Terrain
+
+HISTORY_EVERY = 5
+"""Steps between the values of the history that is kept."""
+
+ALL_TERMS = (1, 2, 3)
+
+
+@dataclass(frozen=True)
+class Setup:
+    """One way of running the scenario.
+
+    Attributes
+    ----------
+    planner : str
+        By name.
+    tries, terms
+        Of ``osarses``: real tries per step, and which of J1, J2, J3 count besides J.
+    robots, landmarks : int
+        As in :class:`ExploreScenario`; landmarks None: one per cell.
+    keep_out, lost, joining, line_of_sight
+        As there.
+    """
+
+    planner: str
+    tries: int = 0
+    terms: tuple[int, ...] = ALL_TERMS
+    regressors: str = "map"
+    robots: int = 3
+    landmarks: int | None = 1100
+    keep_out: float = 0.0
+    lost: tuple[tuple[int, int], ...] = ()
+    joining: tuple[tuple[int, int], ...] = ()
+    line_of_sight: bool = False
+
+    def scenario(self, terrain: Terrain, seed: int, steps: int) -> ExploreScenario:
+        """Return the scenario of one run."""
+        return ExploreScenario(
+            terrain,
+            self.robots,
+            self.landmarks,
+            steps,
+            seed,
+            keep_out_fraction=self.keep_out,
+            changes=TeamChanges(self.lost, self.joining),
+            line_of_sight=self.line_of_sight,
+        )
+
+    @property
+    def options(self) -> PlannerOptions:
+        """The planner's settings."""
+        return PlannerOptions.model_validate({"regressors": self.regressors, "tries": self.tries})
+
+    @property
+    def weights(self) -> ObjectiveWeights:
+        """The objective by which real tries are judged."""
+        return ObjectiveWeights(*(float(k in self.terms) for k in ALL_TERMS))
+
+
+@dataclass(frozen=True)
+class Section:
+    """One table of the report.
+
+    Attributes
+    ----------
+    name : str
+        For the command line.
+    title, text : str
+        Heading, and what stands below it.
+    rows : tuple of (label, setup)
+        In order.
+    terrains : int or None
+        How many of the terrains it uses, the first ones; None: all.
+    published : dict
+        Row label -> what the papers report, in words.
+    """
+
+    name: str
+    title: str
+    text: str
+    rows: tuple[tuple[str, Setup], ...]
+    terrains: int | None = None
+    published: dict[str, str] = field(default_factory=dict)
+
+
+def sections(steps: int, *, quick: bool = False) -> tuple[Section, ...]:
+    """Return the report's tables for runs of so many steps; the quick ones leave out what takes long."""
+    change = max(1, steps // 10)
+    many = 5 if quick else 50
+    three, ten = Setup("cao"), Setup("cao", robots=10)
+    tries = tuple(sorted({0, 5, many}))
+    return (
+        Section(
+            "table1",
+            "AURO15 table 1: the plain objective J deadlocks",
+            "OSARSES judged by J alone. Remaining landmarks after the last step.",
+            tuple(
+                (f"OSARSES({c}), {_landmarks(n)}", Setup(OSARSES, c, (), landmarks=n))
+                for n in _landmark_counts(quick)
+                for c in tries[1:]
+            ),
+            2,
+            {
+                "OSARSES(5), 1100 landmarks": "91.9 / 87.5 %",
+                "OSARSES(50), 1100 landmarks": "88.9 / 89.6 % (with 500 tries 85.3 / 89.8 %)",
+                "OSARSES(5), every cell": "84.9 / 87.8 %",
+                "OSARSES(50), every cell": "85 / 86.3 % (70 tries)",
+            },
+        ),
+        Section(
+            "figure2",
+            "AURO15 figure 2: what each term is worth",
+            f"OSARSES({many}) judged by J and the named terms. The paper gives bars and says that J1 brings "
+            "the dramatic improvement.",
+            tuple(
+                (" + ".join(["J", *(f"J{k}" for k in terms)]), Setup(OSARSES, many, terms))
+                for terms in ((), (1,), (2,), (3,), (1, 2), (1, 3), (2, 3), ALL_TERMS)
+            ),
+            2,
+            {"J": "85-92 %", "J + J1 + J2 + J3": "1.8 % (Map #1, 500 tries)"},
+        ),
+        *(
+            Section(
+                f"figure{number}",
+                f"AURO15 figure {number}: {cao.robots} vehicles",
+                "OSARSES(C) really tries C moves per step, which no vehicle can; the others try none. The paper's CAO "
+                "is nearest to the polynomial regressors.",
+                tuple(
+                    (f"{label}, {_landmarks(n)}", replace(setup, landmarks=n))
+                    for n in _landmark_counts(quick)
+                    for label, setup in (
+                        *((f"OSARSES({c})", Setup(OSARSES, c, robots=cao.robots)) for c in tries),
+                        ("CAO, polynomial", replace(cao, regressors="polynomial")),
+                        ("CAO, map", cao),
+                    )
+                ),
+                2,
+                published,
+            )
+            for number, cao, published in (
+                (
+                    5,
+                    three,
+                    {
+                        "OSARSES(0), 1100 landmarks": "86.85 / 91.58 % (PCAO18)",
+                        "OSARSES(5), 1100 landmarks": "23.2 / 40.67 % (PCAO18)",
+                        "OSARSES(50), 1100 landmarks": "3.89 / 13.4 % (PCAO18)",
+                        "CAO, polynomial, 1100 landmarks": "about 17.6 / 37 %",
+                    },
+                ),
+                (6, ten, {"CAO, polynomial, 1100 landmarks": "80.2 / 71.4 % better than OSARSES(0)"}),
+            )
+        ),
+        Section(
+            "planners",
+            "Planners against the formation lawnmower",
+            "t99: first step with at most 1 % remaining. The lawnmower flies under the same constraints, waits for its "
+            "vehicles and visits what its lines left over.",
+            _planner_rows(Setup("cao")),
+        ),
+        *(
+            Section(name, title, text, _planner_rows(setup))
+            for name, title, text, setup in (
+                (
+                    "keep-out",
+                    "Keep-out zones over 15 % of the area",
+                    "Rectangles drawn by the seed.",
+                    Setup("cao", keep_out=0.15),
+                ),
+                (
+                    "lose",
+                    f"One of three vehicles lost at step {change}",
+                    "The second one.",
+                    Setup("cao", lost=((2, change),)),
+                ),
+                (
+                    "join",
+                    f"A fourth vehicle joins at step {change}",
+                    "Launched near another.",
+                    Setup("cao", joining=((1, change),)),
+                ),
+                (
+                    "line-of-sight",
+                    "The sea floor hides what lies behind it",
+                    "AURO15 eq. (24); the planners are not told.",
+                    Setup("cao", line_of_sight=True),
+                ),
+            )
+        ),
+    )
+
+
+def _landmarks(count: int | None) -> str:
+    return "every cell" if count is None else f"{count} landmarks"
+
+
+def _landmark_counts(quick: bool) -> tuple[int | None, ...]:
+    return (300,) if quick else (1100, None)
+
+
+def _planner_rows(setup: Setup) -> tuple[tuple[str, Setup], ...]:
+    """Return the setup with every planner there is."""
+    rows = []
+    for name in sorted(PLANNERS):
+        if name == "cao":
+            rows.append(("CAO, map", replace(setup, planner=name)))
+            rows.append(("CAO, polynomial", replace(setup, planner=name, regressors="polynomial")))
+        else:
+            rows.append((name, replace(setup, planner=name)))
+    return tuple(rows)
+
+
+@dataclass(frozen=True)
+class TableJob:
+    """One run for the report."""
+
+    setup: Setup
+    terrain: Terrain
+    seed: int
+    steps: int
+
+    @property
+    def title(self) -> str:
+        """What it is, for the progress bar."""
+        return f"{self.setup.planner}, {self.terrain.name}, seed {self.seed}"
+
+    @property
+    def key(self) -> str:
+        """What makes the run what it is, as text: equal keys, equal results."""
+        return run_key(self.setup, self.terrain.name, self.seed, self.steps)
+
+    def run(self, progress: Progress) -> dict[str, Any]:
+        """Run it; the history is thinned."""
+        scenario = self.setup.scenario(self.terrain, self.seed, self.steps)
+        result = asdict(
+            run_explore(scenario, self.setup.planner, self.setup.options, progress, weights=self.setup.weights)
+        )
+        result["history"] = [round(x, 3) for x in result["history"][HISTORY_EVERY - 1 :: HISTORY_EVERY]]
+        return {"key": self.key, "setup": asdict(self.setup), **result}
+
+
+def run_key(setup: Setup, terrain: str, seed: int, steps: int) -> str:
+    """Return what makes a run what it is, as text."""
+    return orjson.dumps([asdict(setup), terrain, seed, steps], option=orjson.OPT_SORT_KEYS).decode()
+
+
+def jobs_of(
+    chosen: Sequence[Section], terrains: Sequence[Terrain], seeds: Sequence[int], steps: int
+) -> Iterator[TableJob]:
+    """Yield every run once, seed by seed, so that an interrupted evaluation has whole seeds."""
+    seen: set[str] = set()
+    for seed in seeds:
+        for section in chosen:
+            for terrain in terrains[: section.terrains]:
+                for _, setup in section.rows:
+                    job = TableJob(setup, terrain, seed, steps)
+                    if job.key not in seen:
+                        seen.add(job.key)
+                        yield job
