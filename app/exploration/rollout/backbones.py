@@ -99,3 +99,26 @@ def _chains(here_m: FloatArray, com_range_m: float) -> list[NDArray[np.int64]]:
             best, cost = order, total
     chain = np.array(best, dtype=np.int64)
     return [chain, chain[::-1].copy()]
+
+
+def with_team(plan: Backbone, before: tuple[str, ...], now: tuple[str, ...]) -> Backbone | None:
+    """Return a plan for a team that has changed: who is left closes up, newcomers lengthen the row; None for nobody.
+
+    Parameters
+    ----------
+    plan : Backbone
+        For the vehicles ``before``, in that order.
+    now : tuple of str
+        The vehicles from now on.
+    """
+    row = [before[k] for k in plan.chain if before[k] in now]
+    if not row or len(plan.at_m) == 0:
+        return None
+    columns = {name: plan.at_m[:, before.index(name)] for name in row}
+    for name in now:
+        if name not in columns:
+            end, inner = columns[row[-1]], columns[row[-2 if len(row) > 1 else -1]]
+            columns[name] = 2 * end - inner
+            row.append(name)
+    at = np.stack([columns[name] for name in now], axis=1)
+    return Backbone(at, np.array([now.index(name) for name in row], dtype=np.int64))

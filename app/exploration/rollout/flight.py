@@ -408,4 +408,4 @@ def leftover(at: FloatArray, work: Work, rules: Rules, need: FloatArray) -> floa
         y = work.south_m + (chosen // work.cols + 0.5) * work.bucket_m
         left -= count[chosen]
         count[chosen] = 0.0
-    return charge + length / rules.step_m
+    return float(charge + length / rules.step_m)

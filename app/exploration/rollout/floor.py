@@ -98,8 +98,8 @@ def _from_neighbours(
 ) -> FloatArray:
     """Weigh the closest seen landmarks by distance and trust; far from all of them return their mean."""
     k = min(NEIGHBOURS, len(seen_m))
-    distance, index = cKDTree(seen_m).query(at_m, k=k)
-    distance, index = distance.reshape(len(at_m), k), index.reshape(len(at_m), k)
+    found = cKDTree(seen_m).query(at_m, k=k)
+    distance, index = (np.asarray(part).reshape(len(at_m), k) for part in found)
     weight = 1.0 / ((distance / visibility_m) ** 2 + 0.01) / (sd_m[index] ** 2 + (0.05 * visibility_m) ** 2)
     local = (weight * depth_m[index]).sum(axis=1) / weight.sum(axis=1)
     trust = np.exp(-np.maximum(0.0, distance[:, 0] / visibility_m - 0.25) / FADE)
