@@ -16,7 +16,7 @@ from app.exploration.rollout.floor import Floor, sample
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
-WORTH_OF_EARLY = 1.1
+WORTH_OF_EARLY = 2.5
 """Steps that a plan may take longer for one step's whole remainder done earlier: sum over time of the part remaining."""
 
 PER_WAYPOINT = 0.05
