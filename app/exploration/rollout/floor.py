@@ -84,7 +84,7 @@ def estimate_floor(
         ).reshape(rows, cols)
     else:
         depth = np.full((rows, cols), unknown_m)
-    smooth = gaussian_filter(depth, 0.25 * visibility_m / cell, mode="nearest")
+    smooth = gaussian_filter(depth, 0.12 * visibility_m / cell, mode="nearest")
     limit = depth - clearance_m - MARGIN * visibility_m
     # The constraints' sea floor has steps between cells: whatever lies within a cell of a node counts there.
     shifts = np.stack(np.meshgrid(*[np.linspace(-cell, cell, 5)] * 2), axis=-1).reshape(-1, 1, 1, 2)
