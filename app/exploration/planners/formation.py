@@ -22,7 +22,7 @@ LINK_OF_RANGE = 0.97
 CLOSED_OF_GAP = 0.45
 """Gap of a row that has closed up for a narrow passage or for what single lines left over."""
 
-INSET_OF_VISIBILITY = 0.5
+INSET_OF_VISIBILITY = 0.4
 """How far before the end of what is to be seen a line ends."""
 
 HEIGHT_OF_VISIBILITY = 0.45
