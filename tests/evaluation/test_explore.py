@@ -67,6 +67,25 @@ def test_a_lost_vehicle_does_not_stall_the_others(smooth, planner):
     assert result.history[-1] < result.history[10]
 
 
+@pytest.mark.parametrize(
+    "happens",
+    [
+        {},
+        {"keep_out_fraction": 0.15},
+        {"changes": TeamChanges(lost=((2, 30),))},
+        {"changes": TeamChanges(joining=((1, 30),))},
+        {"robots": 2},
+        {"robots": 8},
+    ],
+    ids=["nothing", "keep-out", "loss", "newcomer", "two", "many"],
+)
+def test_the_lawnmower_finishes_whatever_happens_and_hardly_breaks_a_limit(smooth, happens):
+    scenario = ExploreScenario(smooth, landmarks=300, steps=280, **happens)
+    result = run_explore(scenario, "lawnmower", PlannerOptions())
+    assert result.t99 is not None
+    assert result.broken_constraints <= 0.04 * scenario.robots * scenario.steps
+
+
 def test_vehicles_keep_their_numbers_when_others_leave_and_join(smooth):
     changes = TeamChanges(lost=((1, 2), (4, 3)), joining=((2, 2),))
     world = World(ExploreScenario(smooth, landmarks=300, changes=changes))

@@ -22,7 +22,7 @@ LINK_OF_RANGE = 0.97
 CLOSED_OF_GAP = 0.45
 """Gap of a row that has closed up for a narrow passage or for what single lines left over."""
 
-INSET_OF_VISIBILITY = 0.5
+INSET_OF_VISIBILITY = 0.4
 """How far before the end of what is to be seen a line ends."""
 
 HEIGHT_OF_VISIBILITY = 0.45
@@ -231,11 +231,15 @@ class FormationLawnmower(PlannerBase):
             wish = np.minimum(wish, above.min(axis=1))
             wish = np.where(lifted, np.minimum(wish, origin[:, 2] - ESCAPE_OF_STEP * step), wish)
         wish = np.minimum(wish, origin[:, 2] + DESCENT_OF_STEP * step)
-        # Neighbours stay in range: the deeper one gives way, upwards is always free.
+        return self._in_range(constraints, slots, wish)
+
+    def _in_range(self, constraints: Constraints, slots: FloatArray, wish: FloatArray) -> FloatArray:
+        """Return the depths (n,) with which neighbours in the row stay in range: the deeper one gives way, upwards."""
         by_rank = np.argsort(self._order)
-        apart = np.hypot(*np.diff(slots[by_rank], axis=0).T)
         link = LINK_OF_RANGE * constraints.com_range_m
-        drop = np.sqrt(np.maximum(0.0, link**2 - apart**2)) if np.isfinite(link) else np.full(len(apart), np.inf)
+        if not np.isfinite(link):
+            return wish
+        drop = np.sqrt(np.maximum(0.0, link**2 - (np.diff(slots[by_rank], axis=0) ** 2).sum(axis=1)))
         depth = wish[by_rank]
         for k in range(1, len(depth)):
             depth[k] = min(depth[k], depth[k - 1] + drop[k - 1])
