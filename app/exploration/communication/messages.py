@@ -18,8 +18,8 @@ byte   bits content
 Every entry takes 5 bytes: index of the landmark (16 bits), flag "accurately estimated" (1), code of the standard
 deviation (7), depth (16). Every neighbour takes 10: number (8), east, north, depth (3x24). Positions and depths are
 multiples of a 2^24-1-th (2^16-1-th) part of their range and saturate at its ends. The standard deviation is
-``accuracy * 2^((code - 32) / 16)``, rounded up so that nobody ever claims to know more than he does: steps of 4.4 % from
-a quarter of the accuracy threshold to 58 times it; code 127 stands for anything larger (infinite).
+``accuracy * 2^((code - 32) / 16)``, rounded up so that nobody ever claims to know more than he does: steps of
+4.4 % from a quarter of the accuracy threshold to 58 times it; code 127 stands for anything larger (infinite).
 
 Beyond the paper, an entry about a landmark that is not accurate carries the sender's *estimate from all its own looks*
 and its standard deviation instead of a single range. For a Gaussian estimate that is all that the ranges have to say,
@@ -217,7 +217,7 @@ class WireFormat:
         return np.asarray(self.low + q * self.position_resolution_m, dtype=np.float64)
 
     def _pack_entries(self, entries: Entries) -> bytes:
-        if len(entries) and not (0 <= entries.index.min() and entries.index.max() < MAX_LANDMARKS):
+        if len(entries) and not (entries.index.min() >= 0 and entries.index.max() < MAX_LANDMARKS):
             raise MessageError(f"entries: an index lies outside [0, {MAX_LANDMARKS})")
         fraction = np.clip((entries.depth_m - self.low[2]) / (self.high[2] - self.low[2]), 0.0, 1.0)
         depth = np.rint(fraction * _DEPTH_TOP).astype(np.uint64)

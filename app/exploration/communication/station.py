@@ -205,7 +205,8 @@ class StationNode:
         )
 
     def _presumed(self) -> FloatArray:
-        return np.sum([member.presumed for member in self._members.values()], axis=0, initial=0.0)
+        presumed = [member.presumed for member in self._members.values()]
+        return np.asarray(np.sum(presumed, axis=0), dtype=np.float64) if presumed else np.zeros(len(self._xy))
 
     def _guess(self, positions: FloatArray) -> FloatArray:
         """Return depths (n,), unknown ones as that of the closest known landmark."""
