@@ -25,6 +25,8 @@ FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 IntArray = NDArray[np.int64]
 
+NOTHING = np.zeros(0, dtype=np.int64)
+
 PRESUMED_FOR = 20
 """Steps after the last look for which a landmark is presumed to have been measured although no report says so."""
 
@@ -34,7 +36,8 @@ class _Member:
     """A vehicle as the station knows it; arrays are (n_landmarks,).
 
     ``confirmed`` is the information of others that the vehicle is known to have received, ``finished`` what it is known
-    to count to ``A``, ``presumed`` the information that it should have gained since its last report of each landmark.
+    to count to ``A``, ``presumed`` the information that it should have gained since its last report of each landmark,
+    ``told`` what it has reported in this step.
     """
 
     position: FloatArray
@@ -44,6 +47,7 @@ class _Member:
     presumed: FloatArray
     step: int
     heard: bool = True
+    told: IntArray = field(default_factory=lambda: NOTHING)
     sent: Entries = field(default_factory=Entries.none)
 
 
@@ -57,8 +61,8 @@ class StationNode:
 
     Beyond the paper:
 
-    - Estimates of several vehicles are put together (they stem from different looks). What only this finishes is told
-      first of all to the closest vehicle, so that at least one vehicle knows. Everything else goes by distance.
+    - Estimates of several vehicles are put together (they stem from different looks), so that the station may know a
+      landmark accurately that no vehicle does.
     - The station knows the sensors and where the vehicles were: a landmark that they must have measured is presumed to
       be known that well until a report tells, or until ``PRESUMED_FOR`` steps have passed.
 
@@ -110,6 +114,12 @@ class StationNode:
         return self._known
 
     @property
+    def known_sd_m(self) -> FloatArray:
+        """Standard deviations as far as reports prove them, (n,); inf where there are none."""
+        with np.errstate(divide="ignore"):
+            return np.asarray(1.0 / np.sqrt(self._information), dtype=np.float64)
+
+    @property
     def accurate(self) -> BoolArray:
         """``A`` for the planner, (n,): proven, or presumed."""
         return np.asarray(self._known | (self._information + self._presumed() > self._needed), dtype=np.bool_)
@@ -133,7 +143,7 @@ class StationNode:
         """Begin a step: nobody was heard yet."""
         self._count += 1
         for member in self._members.values():
-            member.heard = False
+            member.heard, member.told = False, NOTHING
 
     def receive(self, message: bytes) -> Report:
         """Take in a vehicle's report; one that comes late or twice changes nothing."""
@@ -154,7 +164,8 @@ class StationNode:
             member.finished[index[member.sent.accurate]] = True
         member.sent = Entries.none()
         member.reported.take(report.entries)
-        member.presumed[report.entries.index] = 0.0
+        member.told = report.entries.index
+        member.presumed[member.told] = 0.0
         finished = report.entries.index[report.entries.accurate]
         member.finished[finished] = True
         self._known[finished] = True
@@ -175,6 +186,7 @@ class StationNode:
         self._reach = reachable(positions, visible_by, self._xy, self._travel_m)
         for member, gain in zip(members, gained, strict=True):
             if member.heard:
+                gain[member.told] = 0.0  # the report included this step's look
                 member.presumed += gain
                 self._presumed_at[gain > 0.0] = self._count
         stale = self._count - self._presumed_at > PRESUMED_FOR
@@ -226,14 +238,7 @@ class StationNode:
         news = information > WORTH_TELLING * member.confirmed
         waiting = np.flatnonzero(~member.finished & (self._known | news))
         distance = np.hypot(*(self._xy[waiting] - member.position[:2]).T)
-        orphan = ~np.any([m.finished for m in self._members.values()], axis=0) & self._known
-        adopted = np.zeros(len(waiting), dtype=np.bool_)
-        orphans = np.flatnonzero(orphan[waiting])
-        if len(orphans):
-            places = np.array([m.position[:2] for m in self._members.values() if m.heard or m is member])
-            squared = ((self._xy[waiting[orphans], None] - places) ** 2).sum(axis=2)
-            adopted[orphans] = distance[orphans] ** 2 <= squared.min(axis=1) + 1e-12
-        chosen = fill(waiting[np.lexsort((distance, ~adopted))], self._xy, self._capacity, self._apart_m)
+        chosen = fill(waiting[np.argsort(distance, kind="stable")], self._xy, self._capacity, self._apart_m)
         with np.errstate(divide="ignore"):
             sd = 1.0 / np.sqrt(information[chosen])
         return Entries(chosen, np.nan_to_num(depth[chosen], nan=self._wire.low[2]), sd, self._known[chosen])
