@@ -3,6 +3,7 @@
 from app.estimation.beams import Attitude, BeamSonar, Dvl, Echoes, Multibeam
 from app.estimation.landmarks import LandmarkEstimator, Landmarks, LandmarkSets, landmark_sets
 from app.estimation.landmarks_3d import Landmark3DEstimator, Landmarks3D
+from app.estimation.line_of_sight import in_sight
 from app.estimation.sensors import RangeSensor, Sensor, SingleBeam
 from app.estimation.team import SensorTeam
 
@@ -21,5 +22,6 @@ __all__ = [
     "Sensor",
     "SensorTeam",
     "SingleBeam",
+    "in_sight",
     "landmark_sets",
 ]
