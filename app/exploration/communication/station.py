@@ -46,7 +46,7 @@ class _Member:
     confirmed: FloatArray
     presumed: FloatArray
     step: int
-    heard: bool = True
+    heard_at: int = 0
     told: IntArray = field(default_factory=lambda: NOTHING)
     sent: Entries = field(default_factory=Entries.none)
 
@@ -139,11 +139,15 @@ class StationNode:
         """Return where a vehicle last said it was, (3,)."""
         return self._members[number].position
 
+    def heard_within(self, steps: int) -> tuple[int, ...]:
+        """Return the numbers of the vehicles that were heard in one of the last ``steps`` steps, ascending."""
+        return tuple(k for k in self.members if self._count - self._members[k].heard_at < steps)
+
     def begin(self) -> None:
         """Begin a step: nobody was heard yet."""
         self._count += 1
         for member in self._members.values():
-            member.heard, member.told = False, NOTHING
+            member.told = NOTHING
 
     def receive(self, message: bytes) -> Report:
         """Take in a vehicle's report; one that comes late or twice changes nothing."""
@@ -157,7 +161,7 @@ class StationNode:
             self._members[report.vehicle] = member
         elif not 0 < (report.step - member.step) % STEPS < STEPS // 2:
             return report
-        member.position, member.step, member.heard = report.position, report.step, True
+        member.position, member.step, member.heard_at = report.position, report.step, self._count
         if report.acknowledges:
             index = member.sent.index
             member.confirmed[index] = 1.0 / member.sent.sd_m**2
@@ -185,7 +189,7 @@ class StationNode:
         visible_by = gained > 0.0
         self._reach = reachable(positions, visible_by, self._xy, self._travel_m)
         for member, gain in zip(members, gained, strict=True):
-            if member.heard:
+            if member.heard_at == self._count:
                 gain[member.told] = 0.0  # the report included this step's look
                 member.presumed += gain
                 self._presumed_at[gain > 0.0] = self._count
@@ -209,7 +213,7 @@ class StationNode:
                 member.step,
                 number,
                 waypoint,
-                member.heard,
+                member.heard_at == self._count,
                 np.array(neighbours, dtype=np.int64),
                 np.array([self.position(k) for k in neighbours]).reshape(-1, 3),
                 member.sent,
