@@ -47,6 +47,7 @@ class _Member:
     presumed: FloatArray
     step: int
     heard_at: int = 0
+    waypoint: FloatArray | None = None
     told: IntArray = field(default_factory=lambda: NOTHING)
     sent: Entries = field(default_factory=Entries.none)
 
@@ -56,7 +57,7 @@ class StationNode:
 
     Each step: :meth:`begin`, :meth:`receive` every report that arrives, :meth:`conclude`, plan with :attr:`depth_m`,
     :attr:`sd_m` and :attr:`accurate`, then send each vehicle its :meth:`order`. A vehicle is known from its first
-    report on, so that one can join at any time; one that falls silent keeps its last position and what it has told, and
+    report on, so that one can join at any time; one that falls silent is presumed to have followed its last order and
     holds up nobody.
 
     Beyond the paper:
@@ -136,7 +137,7 @@ class StationNode:
         return tuple(sorted(self._members))
 
     def position(self, number: int) -> FloatArray:
-        """Return where a vehicle last said it was, (3,)."""
+        """Return where a vehicle is, (3,): where it said it was, one step of silence later where it was sent."""
         return self._members[number].position
 
     def heard_within(self, steps: int) -> tuple[int, ...]:
@@ -148,6 +149,8 @@ class StationNode:
         self._count += 1
         for member in self._members.values():
             member.told = NOTHING
+            if member.heard_at == self._count - 1 and member.waypoint is not None:
+                member.position = member.waypoint  # until it says otherwise
 
     def receive(self, message: bytes) -> Report:
         """Take in a vehicle's report; one that comes late or twice changes nothing."""
@@ -207,6 +210,7 @@ class StationNode:
             if near
         )
         neighbours = [k for _, k in by_distance[:MAX_NEIGHBOURS]]
+        member.waypoint = np.asarray(waypoint, dtype=np.float64)
         member.sent = self._choose(number, member)
         return self._wire.encode_order(
             Order(

@@ -134,13 +134,26 @@ def test_a_silent_vehicle_holds_up_nobody_and_tells_all_when_it_is_back():
         fleet.sense()
         orders = fleet.exchange(silent={1})
         assert set(orders) == {0, 2}
-    np.testing.assert_array_equal(fleet.station.position(1), where)
+    np.testing.assert_allclose(fleet.station.position(1), where, atol=1e-6)
     untold = fleet.vehicles[1].own.accurate & ~fleet.station.known_accurate
     for _ in range(10):
         orders = fleet.exchange()
     assert set(orders) == {0, 1, 2}
     np.testing.assert_allclose(fleet.station.position(1), fleet.positions[1], atol=1e-6)
     assert fleet.station.known_accurate[untold].all()
+
+
+def test_a_vehicle_that_is_not_heard_once_is_presumed_to_have_followed_its_order():
+    fleet = Fleet(2, vehicles=1)
+    fleet.sense()
+    fleet.exchange()
+    goal = fleet.positions[0] + np.array([0.03, 0.0, 0.0])
+    fleet.station.order(0, goal)
+    for _ in range(3):  # once is enough: what it did after that, nobody knows
+        fleet.station.begin()
+        fleet.station.conclude()
+        np.testing.assert_array_equal(fleet.station.position(0), goal)
+        fleet.station.order(0, goal + 1.0)
 
 
 def test_a_vehicle_joins_on_the_fly_and_learns_what_the_others_know():
