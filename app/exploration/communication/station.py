@@ -28,7 +28,10 @@ IntArray = NDArray[np.int64]
 NOTHING = np.zeros(0, dtype=np.int64)
 
 PRESUMED_FOR = 20
-"""Steps after the last look for which a landmark is presumed to have been measured although no report says so."""
+"""Steps after the last look for which a landmark is presumed to have been measured although no report says so.
+
+Steps with a full report do not count: there was no room to say so.
+"""
 
 
 @dataclass
@@ -37,7 +40,8 @@ class _Member:
 
     ``confirmed`` is the information of others that the vehicle is known to have received, ``finished`` what it is known
     to count to ``A``, ``presumed`` the information that it should have gained since its last report of each landmark,
-    ``told`` what it has reported in this step.
+    ``looked_at`` when it gained that by its ``clock``, which stands still while its reports are full, ``told`` what it
+    has reported in this step.
     """
 
     position: FloatArray
@@ -45,7 +49,9 @@ class _Member:
     finished: BoolArray
     confirmed: FloatArray
     presumed: FloatArray
+    looked_at: IntArray
     step: int
+    clock: int = 0
     heard_at: int = 0
     waypoint: FloatArray | None = None
     told: IntArray = field(default_factory=lambda: NOTHING)
@@ -65,7 +71,7 @@ class StationNode:
     - Estimates of several vehicles are put together (they stem from different looks), so that the station may know a
       landmark accurately that no vehicle does.
     - The station knows the sensors and where the vehicles were: a landmark that they must have measured is presumed to
-      be known that well until a report tells, or until ``PRESUMED_FOR`` steps have passed.
+      be known that well until a report tells, or until ``PRESUMED_FOR`` steps with room to tell have passed.
 
     Parameters
     ----------
@@ -99,7 +105,6 @@ class StationNode:
         self._needed = 1.0 / wire.accuracy_sd_m**2
         self._members: dict[int, _Member] = {}
         self._known = np.zeros(n, dtype=np.bool_)
-        self._presumed_at = np.zeros(n, dtype=np.int64)
         self._count = 0
         self._depth, self._information = np.full(n, np.nan), np.zeros(n)
         self._reach: BoolArray = np.zeros((0, 0), dtype=np.bool_)
@@ -159,7 +164,13 @@ class StationNode:
         member = self._members.get(report.vehicle)
         if member is None:
             member = _Member(
-                report.position, Contribution.nothing(n), np.zeros(n, np.bool_), np.zeros(n), np.zeros(n), report.step
+                report.position,
+                Contribution.nothing(n),
+                np.zeros(n, np.bool_),
+                np.zeros(n),
+                np.zeros(n),
+                np.zeros(n, np.int64),
+                report.step,
             )
             self._members[report.vehicle] = member
         elif not 0 < (report.step - member.step) % STEPS < STEPS // 2:
@@ -195,10 +206,9 @@ class StationNode:
             if member.heard_at == self._count:
                 gain[member.told] = 0.0  # the report included this step's look
                 member.presumed += gain
-                self._presumed_at[gain > 0.0] = self._count
-        stale = self._count - self._presumed_at > PRESUMED_FOR
-        for member in members:
-            member.presumed[stale] = 0.0
+                member.looked_at[gain > 0.0] = member.clock
+            member.clock += len(member.told) < self._capacity
+            member.presumed[member.clock - member.looked_at > PRESUMED_FOR] = 0.0
 
     def order(self, number: int, waypoint: FloatArray) -> bytes:
         """Return the message to a vehicle: where to go next, who is near, what others have found out."""
