@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from app.estimation.sensors import RangeSensor
+from app.estimation.sensors import RangeSensor, Sensor
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -70,7 +70,7 @@ class LandmarkEstimator:
 
     Attributes
     ----------
-    sensor : RangeSensor
+    sensor : Sensor
         Gives the noise.
     accuracy_sd_m : float
         A landmark whose standard deviation falls below this belongs to ``A``, for ever.
@@ -78,7 +78,7 @@ class LandmarkEstimator:
         A landmark measured more often than this counts as accurate too (AURO15 footnote 3).
     """
 
-    sensor: RangeSensor = RangeSensor()  # noqa: RUF009 - frozen
+    sensor: Sensor = RangeSensor()  # noqa: RUF009 - frozen
     accuracy_sd_m: float = 0.02
     visit_cap: int = 200
 

@@ -5,6 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from app.estimation.beams import BeamSonar
+
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
@@ -62,4 +64,4 @@ class SingleBeam:
         return np.maximum(1e-3, self.relative_noise * np.abs(bottom_depth_m - vehicle_depth_m))
 
 
-Sensor = RangeSensor | SingleBeam
+Sensor = RangeSensor | SingleBeam | BeamSonar

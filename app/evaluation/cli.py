@@ -13,7 +13,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 
 from app.evaluation.cube_world import COM_RANGE, ExploreScenario
-from app.evaluation.explore import EXPLORERS, run_explore
+from app.evaluation.explore import EXPLORERS, OSARSES, run_explore
 from app.evaluation.jobs import Job, run_jobs
 from app.evaluation.jobs import Progress as StepProgress
 from app.evaluation.recorded import recorded_soundings
@@ -21,6 +21,7 @@ from app.evaluation.summary import summarise
 from app.evaluation.survey import run_survey
 from app.evaluation.survey_world import Sampling, SurveyScenario
 from app.evaluation.team_changes import TeamChanges, parse_changes
+from app.exploration.communication.messages import MAX_ENTRIES
 from app.exploration.options import PlannerOptions
 from app.exploration.planners import PLANNERS
 from app.mapping.types import Soundings
@@ -119,12 +120,23 @@ def explore(
     line_of_sight: Annotated[
         bool, typer.Option("--line-of-sight", help="The true sea floor hides what lies behind it.")
     ] = False,
+    capacity: Annotated[
+        int | None,
+        typer.Option(min=1, max=MAX_ENTRIES, help="Landmark entries per message each way; unlimited by default."),
+    ] = None,
+    message_loss: Annotated[
+        float, typer.Option(min=0.0, max=1.0, metavar="FRACTION", help="Messages lost; needs --capacity.")
+    ] = 0.0,
     regressors: Regressors = "map",
     jobs: Jobs = 1,
     as_json: Json = False,
 ) -> None:
     """Run the papers' scenario: landmarks in the cube [-1, 1]^3 (AURO15 section 6)."""
     names = _planners(planner, EXPLORERS)
+    if capacity is not None and OSARSES in names:
+        raise typer.BadParameter(
+            "osarses tries its moves on everything that is known; leave it out", param_hint="--capacity"
+        )
     sea_floor = _terrain(terrain)
     count = _landmark_count(landmarks)
     changes = TeamChanges(_changes(lose, "--lose"), _changes(join, "--join"))
@@ -145,6 +157,8 @@ def explore(
                     keep_out_fraction=keep_out,
                     changes=changes,
                     line_of_sight=line_of_sight,
+                    capacity=capacity,
+                    message_loss=message_loss,
                 )
             except ValueError as error:
                 raise typer.BadParameter(str(error)) from None

@@ -13,6 +13,7 @@ from app.estimation import LandmarkEstimator, Landmarks, RangeSensor, in_sight, 
 from app.evaluation.keep_out import draw_keep_out
 from app.evaluation.team_changes import TeamChanges, launch_site
 from app.exploration.bottom import Bottom
+from app.exploration.communication.messages import MAX_LANDMARKS
 from app.exploration.constraints import Constraints, inside_area
 from app.exploration.objective import Objective, ObjectiveWeights, VehicleProgress, objective
 from app.exploration.problem import Belief
@@ -20,6 +21,7 @@ from simulator.terrain import Terrain
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
+IntArray = NDArray[np.int64]
 
 CLEARANCE = 0.05
 MAX_STEP = 0.05
@@ -108,6 +110,10 @@ class ExploreScenario:
         Vehicles that are lost and that join.
     line_of_sight : bool
         Whether the true sea floor hides what lies behind it.
+    capacity : int or None
+        Most landmark entries in a message between a vehicle and the station; None: everybody knows everything.
+    message_loss : float
+        Probability that a message is lost; only with a capacity.
     """
 
     terrain: Terrain
@@ -120,10 +126,22 @@ class ExploreScenario:
     keep_out_fraction: float = 0.0
     changes: TeamChanges = NO_CHANGES
     line_of_sight: bool = False
+    capacity: int | None = None
+    message_loss: float = 0.0
 
     def __post_init__(self) -> None:
         self.changes.check(self.robots, self.steps)
+        self._check_messages()
         _ = self.constraints  # draws the zones, which may not fit
+
+    def _check_messages(self) -> None:
+        if self.capacity is None:
+            if self.message_loss > 0.0:
+                raise ValueError("message loss: only messages of a limited capacity can be lost; set a capacity too")
+            return
+        count = np.isfinite(self.terrain.z_m).sum() if self.landmarks is None else self.landmarks
+        if count > MAX_LANDMARKS:
+            raise ValueError(f"capacity: messages can name {MAX_LANDMARKS} landmarks, not {count}; use fewer landmarks")
 
     @cached_property
     def constraints(self) -> Constraints:
@@ -183,7 +201,7 @@ class World:
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the vehicles that are there, in the order of ``positions``."""
-        return tuple(f"auv-{k + 1}" for k in self.team)
+        return names_of(self.team)
 
     def change_team(self, step: int) -> None:
         """Take away and add the vehicles that the scenario loses and joins when a step begins."""
@@ -250,3 +268,8 @@ class World:
         sets = landmark_sets(landmarks, self.visible(positions), self.team)
         earlier, last = progress[-2:] if len(progress) >= 2 else (None, None)
         return objective(positions, points, sets, before, earlier, last, weights)
+
+
+def names_of(vehicles: IntArray) -> tuple[str, ...]:
+    """Return the names of vehicles by number, counted from 0."""
+    return tuple(f"auv-{k + 1}" for k in vehicles)

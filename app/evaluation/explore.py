@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from app.evaluation.cube_world import DEEPEST, SHALLOWEST, ExploreScenario, World
+from app.evaluation.cube_world import DEEPEST, SHALLOWEST, ExploreScenario, World, names_of
 from app.evaluation.osarses import Osarses
+from app.evaluation.teams import LimitedTeam, UnlimitedTeam
 from app.exploration.objective import ObjectiveWeights
 from app.exploration.options import PlannerOptions
 from app.exploration.planners import PLANNERS, create_planner
@@ -25,8 +26,9 @@ EXPLORERS = (*sorted(PLANNERS), OSARSES)
 class ExploreRun:
     """What came of a run; names as in the command's JSON.
 
-    ``robots`` is the team at the start; ``broken_constraints`` counts the steps of single vehicles that broke a limit.
-    ``sum_of_error`` is AURO15 eq. (25): over all steps, the norm of the error of all landmarks.
+    ``robots`` is the team at the start; ``broken_constraints`` counts the steps of single vehicles that broke a limit;
+    ``sum_of_error`` is AURO15 eq. (25): over all steps, the norm of the error of all landmarks; ``message_bytes`` is
+    what vehicles and station sent under limited communication.
     """
 
     planner: str
@@ -45,6 +47,8 @@ class ExploreRun:
     plan_ms_p99: float
     real_tries: int
     broken_constraints: int
+    capacity: int | None
+    message_bytes: int
 
 
 def run_explore(
@@ -56,8 +60,11 @@ def run_explore(
 ) -> ExploreRun:
     """Run the closed loop with a planner by name, or ``osarses`` with ``options.tries`` real tries per step.
 
-    ``weights`` are those of the objective by which ``osarses`` judges its tries.
+    ``weights`` are those of the objective by which ``osarses`` judges its tries. It tries them on everything that is
+    known, so that it cannot be run with a limited capacity (ValueError).
     """
+    if planner == OSARSES and scenario.capacity is not None:
+        raise ValueError("capacity: osarses tries its moves on everything that is known; leave the capacity out")
     began = time.perf_counter()
     world = World(scenario)
     noise, choice = (np.random.default_rng([scenario.seed, k]) for k in (1, 2))
@@ -66,30 +73,36 @@ def run_explore(
         if planner == OSARSES
         else create_planner(planner, options, scenario.sensor)
     )
-    world.landmarks = world.measure(world.positions, world.landmarks, noise)
+    team = (
+        LimitedTeam(world, scenario.capacity, scenario.message_loss, np.random.default_rng([scenario.seed, 5]))
+        if scenario.capacity is not None
+        else UnlimitedTeam(world)
+    )
+    team.sense(noise)
     history, plan_s, distance, broken, error = [], [], 0.0, 0, 0.0
     for step in range(1, scenario.steps + 1):
         world.change_team(step)
+        vehicles, at, belief = team.report(step)
         situation = Situation(
             step,
             scenario.steps,
-            world.names,
-            world.positions,
-            np.full(len(world.team), np.nan),
-            world.belief,
+            names_of(vehicles),
+            at,
+            np.full(len(vehicles), np.nan),
+            belief,
             np.zeros((0, 2)),
             scenario.constraints,
         )
         t0 = time.perf_counter()
         proposal = chooser.propose(situation, choice)
         plan_s.append(time.perf_counter() - t0)
-        positions = world.clear(proposal.positions)
+        positions = world.clear(team.order(vehicles, proposal.positions))
         broken += world.broken(positions)
         distance += float(np.linalg.norm(positions - world.positions, axis=1).sum())
         world.positions = positions
-        world.landmarks = world.measure(positions, world.landmarks, noise)
-        history.append(100.0 * float(1.0 - world.landmarks.accurate.mean()))
-        error += float(np.linalg.norm(np.nan_to_num(world.landmarks.depth_m, nan=UNSEEN_DEPTH) - world.truth[:, 2]))
+        team.sense(noise)
+        history.append(100.0 * float(1.0 - team.landmarks.accurate.mean()))
+        error += float(np.linalg.norm(np.nan_to_num(team.landmarks.depth_m, nan=UNSEEN_DEPTH) - world.truth[:, 2]))
         progress(step)
     below = np.flatnonzero(np.array(history) <= 1.0)
     return ExploreRun(
@@ -109,4 +122,6 @@ def run_explore(
         plan_ms_p99=1e3 * float(np.quantile(plan_s, 0.99)),
         real_tries=options.tries * scenario.steps if planner == OSARSES else 0,
         broken_constraints=broken,
+        capacity=scenario.capacity,
+        message_bytes=team.sent_bytes,
     )

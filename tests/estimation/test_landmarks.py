@@ -96,3 +96,40 @@ def test_noise_grows_with_range():
     assert depth[:2000].std() == pytest.approx(0.02, rel=0.1)
     assert depth[2000:].std() == pytest.approx(0.2, rel=0.1)
     assert beam.sd_m(vehicle, bottom)[[0, -1]].tolist() == pytest.approx([0.02, 0.2])
+
+
+def kalman(prior, variance, position, xy, y, noise):
+    """One range, one landmark, written out: an iterated extended Kalman filter with a scalar state."""
+    h2 = float(((xy - position[:2]) ** 2).sum())
+    z = prior
+    for _ in range(3):
+        drop = z - position[2]
+        r = np.sqrt(h2 + drop * drop)
+        slope = drop / r
+        gain = variance * slope / (slope * variance * slope + (noise * r) ** 2)
+        z = prior + gain * (y - r - slope * (prior - z))
+    return z, 1.0 / (1.0 / variance + (slope / (noise * r)) ** 2)
+
+
+@given(seed=st.integers(0, 10_000))
+@settings(max_examples=30, deadline=None)
+def test_agrees_with_an_iterated_kalman_filter_landmark_by_landmark(seed):
+    rng = np.random.default_rng(seed)
+    truth = np.column_stack([rng.uniform(-0.15, 0.15, (8, 2)), rng.uniform(0.55, 0.7, 8)])
+    state, estimator = Landmarks.unknown(truth[:, :2]), LandmarkEstimator(SENSOR)
+    for _ in range(6):
+        position = np.array([*rng.uniform(-0.1, 0.1, 2), 0.3])
+        y = SENSOR.measure(position, truth, rng)
+        after = estimator.update(state, 0, position, np.arange(8), y)
+        for m in np.flatnonzero(state.seen):
+            z, variance = kalman(state.depth_m[m], state.variance_m2[m], position, truth[m, :2], y[m], 0.1)
+            assert after.depth_m[m] == pytest.approx(z, abs=1e-3)
+            assert after.variance_m2[m] == pytest.approx(variance, rel=0.02)
+        state = after
+
+
+def test_measuring_nothing_changes_nothing():
+    state = Landmarks.unknown(np.zeros((3, 2)))
+    after = LandmarkEstimator(SENSOR).update(state, 0, np.zeros(3), np.zeros(0, dtype=np.int64), np.zeros(0))
+    assert not after.accurate.any()
+    assert not after.seen.any()

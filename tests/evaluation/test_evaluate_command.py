@@ -79,6 +79,13 @@ def test_the_team_may_change_and_zones_be_kept_out(terrain):
     assert document["robots"] == 3
 
 
+def test_explore_under_limited_communication(terrain):
+    result = call("explore", "--terrain", terrain, "--landmarks", "60", "--steps", "6", "--capacity", "10", "--json")
+    document = json.loads(result.stdout)
+    assert document["capacity"] == 10
+    assert 0 < document["message_bytes"] <= 6 * 3 * (64 + 64 + 20)
+
+
 def test_survey_prints_the_planner_beside_its_yardsticks(terrain):
     result = call(
         "survey", "--terrain", terrain, "--steps", "12", "--max-step", "8", "--sampling", "continuous", "--json"
@@ -106,6 +113,9 @@ def test_without_json_a_table_is_printed(terrain):
         (["--lose", "1@1,2@2,3@3"], ["step 3", "no vehicle"]),
         (["--join", "1@501"], ["1@501", "1 to 500"]),
         (["--keep-out", "0.9"], ["0.9", "0.3"]),
+        (["--capacity", "0"], ["--capacity", "greater than or equal to 1"]),
+        (["--capacity", "10", "--planner", "osarses"], ["osarses", "everything"]),
+        (["--message-loss", "0.1"], ["message loss", "capacity"]),
         (["--regressors", "none"], ["none", "polynomial"]),
         (["--terrain", "/nowhere/at-all.npz"], ["at-all.npz"]),
     ],

@@ -1,0 +1,254 @@
+"""Landmarks whose whole position is unknown: an extended Kalman filter per landmark, from ranges (MED13, NGCUV12).
+
+A range says nothing of the direction. The first look therefore starts a bundle of filters, spread evenly over the half
+sphere below the vehicle; every further look updates all of them and weighs each by how well it foretold the range, as
+in a Gaussian-sum filter. Once the bundle as a whole is narrow enough to be linearised about, it becomes a single filter
+with the bundle's mean and covariance. The predicted range's mean and variance are of second order, which keeps the
+covariance honest while a point is still uncertain across the beam.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from app.estimation.sensors import RangeSensor, Sensor
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+IntArray = NDArray[np.int64]
+
+BUNDLE = 48
+"""Filters that a first look starts."""
+
+NARROW = 0.15
+"""A bundle becomes one filter when its standard deviation, all axes together, is below this part of the range."""
+
+
+@dataclass(frozen=True)
+class Landmarks3D:
+    """What is known of ``n`` points; every update returns a new object.
+
+    Attributes
+    ----------
+    position_m : (n, 3)
+        Estimates; NaN where never seen.
+    covariance_m2 : (n, 3, 3)
+        Their covariances; inf on the diagonal where never seen.
+    looks : (n,)
+        How often each was measured.
+    accurate : (n,)
+        The set ``A``; only grows.
+    credited : (n,)
+        Which vehicle brought the landmark into ``A``; -1 where none did.
+    spread : (k,)
+        The landmarks that still are a bundle of filters.
+    means, covariances, weights : (k, BUNDLE, 3), (k, BUNDLE, 3, 3), (k, BUNDLE)
+        The bundles.
+    """
+
+    position_m: FloatArray
+    covariance_m2: FloatArray
+    looks: IntArray
+    accurate: BoolArray
+    credited: IntArray
+    spread: IntArray
+    means: FloatArray
+    covariances: FloatArray
+    weights: FloatArray
+
+    @classmethod
+    def unknown(cls, n: int) -> "Landmarks3D":
+        """Return ``n`` landmarks that nobody has seen."""
+        covariance = np.zeros((n, 3, 3))
+        covariance[:, range(3), range(3)] = np.inf
+        return cls(
+            np.full((n, 3), np.nan),
+            covariance,
+            np.zeros(n, dtype=np.int64),
+            np.zeros(n, dtype=np.bool_),
+            np.full(n, -1, dtype=np.int64),
+            np.zeros(0, dtype=np.int64),
+            np.zeros((0, BUNDLE, 3)),
+            np.zeros((0, BUNDLE, 3, 3)),
+            np.zeros((0, BUNDLE)),
+        )
+
+    @property
+    def fixed(self) -> BoolArray:
+        """Which landmarks are a single filter by now, (n,)."""
+        result = self.looks > 0
+        result[self.spread] = False
+        return np.asarray(result, dtype=np.bool_)
+
+    @property
+    def sd_m(self) -> FloatArray:
+        """Standard deviations of east, north and depth, (n, 3)."""
+        return np.sqrt(np.diagonal(self.covariance_m2, axis1=1, axis2=2))
+
+
+@dataclass(frozen=True)
+class Landmark3DEstimator:
+    """The filter; see the module's text.
+
+    Attributes
+    ----------
+    sensor : Sensor
+        Gives the noise: ``y = r (1 + noise xi)``.
+    accuracy_sd_m : float
+        A landmark belongs to ``A`` once all three standard deviations are below this (MED13 footnote 3).
+    visit_cap : int
+        A landmark measured more often than this counts as accurate too (AURO15 footnote 3).
+    """
+
+    sensor: Sensor = RangeSensor()  # noqa: RUF009 - frozen
+    accuracy_sd_m: float = 0.02
+    visit_cap: int = 200
+
+    def update(
+        self, landmarks: Landmarks3D, vehicle: int, position: FloatArray, index: IntArray, ranges: FloatArray
+    ) -> Landmarks3D:
+        """Take in the ranges that one vehicle measured.
+
+        Parameters
+        ----------
+        vehicle : int
+            Row of the vehicle, to be credited with the landmarks it completes.
+        position : (3,)
+            Where it measured.
+        index : (k,)
+            Which landmarks it measured, each at most once.
+        ranges : (k,)
+            The noisy ranges.
+        """
+        noise = self.sensor.relative_noise
+        where = np.asarray(position, dtype=np.float64)
+        mean, covariance, looks = landmarks.position_m.copy(), landmarks.covariance_m2.copy(), landmarks.looks.copy()
+        first = index[looks[index] == 0]
+        spread = np.concatenate([landmarks.spread, first])
+        means, covariances, weights = _start(where, ranges[looks[index] == 0], noise)
+        means = np.concatenate([landmarks.means, means])
+        covariances = np.concatenate([landmarks.covariances, covariances])
+        weights = np.concatenate([landmarks.weights, weights])
+        row = np.full(len(looks), -1, dtype=np.int64)
+        row[spread] = np.arange(len(spread))
+        single = _take(where, index, ranges, noise, looks, row, mean, covariance, means, covariances, weights)
+        looks[index] += 1
+
+        variance = covariance[index][:, range(3), range(3)]
+        done = (variance < self.accuracy_sd_m**2).all(axis=1) | (looks[index] > self.visit_cap)
+        accurate, credited = landmarks.accurate.copy(), landmarks.credited.copy()
+        fresh = index[done & ~accurate[index]]
+        accurate[fresh] = True
+        credited[fresh] = vehicle
+        still = ~single
+        return Landmarks3D(
+            mean,
+            covariance,
+            looks,
+            accurate,
+            credited,
+            spread[still],
+            means[still],
+            covariances[still],
+            weights[still],
+        )
+
+
+def _start(position: FloatArray, ranges: FloatArray, noise: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return bundles on the lower half sphere about ``position`` (3,), one for each of ``ranges`` (k,)."""
+    i = np.arange(BUNDLE) + 0.5
+    down = i / BUNDLE
+    azimuth = np.pi * (1.0 + np.sqrt(5.0)) * i
+    flat = np.sqrt(1.0 - down**2)
+    u = np.column_stack([flat * np.cos(azimuth), flat * np.sin(azimuth), down])
+    # Half the side of a filter's share of the half sphere, in ranges: neighbours overlap without a gap.
+    across = 0.5 * np.sqrt(2.0 * np.pi / BUNDLE)
+    along = u[:, :, None] * u[:, None, :]
+    shape = noise**2 * along + across**2 * (np.eye(3) - along)
+    means = position + ranges[:, None, None] * (1.0 - across**2) * u
+    covariances = ranges[:, None, None, None] ** 2 * shape
+    return means, covariances, np.full((len(ranges), BUNDLE), 1.0 / BUNDLE)
+
+
+@njit(cache=True, nogil=True)
+def _take(
+    position: FloatArray,
+    index: IntArray,
+    ranges: FloatArray,
+    noise: float,
+    looks: IntArray,
+    row: IntArray,
+    mean: FloatArray,
+    covariance: FloatArray,
+    means: FloatArray,
+    covariances: FloatArray,
+    weights: FloatArray,
+) -> BoolArray:
+    """Update everything in place; return which bundles have become a single filter."""
+    single = np.zeros(len(means), dtype=np.bool_)
+    for k in range(len(index)):
+        m = index[k]
+        b = row[m]
+        if b < 0:
+            _filter(mean[m], covariance[m], position, ranges[k], noise)
+            continue
+        if looks[m] > 0:
+            _weigh(means[b], covariances[b], weights[b], position, ranges[k], noise)
+        _match(means[b], covariances[b], weights[b], mean[m], covariance[m])
+        spread = covariance[m, 0, 0] + covariance[m, 1, 1] + covariance[m, 2, 2]
+        single[b] = spread < (NARROW * ranges[k]) ** 2
+    return single
+
+
+@njit(cache=True, nogil=True)
+def _filter(mean: FloatArray, covariance: FloatArray, position: FloatArray, y: float, noise: float) -> float:
+    """Kalman update in place; return the log-likelihood of the range (up to a constant)."""
+    u = mean - position
+    r = max(np.sqrt((u * u).sum()), 1e-9)
+    u /= r
+    Pu = np.zeros(3)
+    for i in range(3):
+        for j in range(3):
+            Pu[i] += covariance[i, j] * u[j]
+    along = (u * Pu).sum()
+    # The Hessian of the range is (I - u u') / r; its traces with P and with P Hessian P.
+    across = (covariance[0, 0] + covariance[1, 1] + covariance[2, 2] - along) / r
+    twice = ((covariance * covariance).sum() - 2.0 * (Pu * Pu).sum() + along * along) / (r * r)
+    predicted = r + 0.5 * across
+    variance = along + 0.5 * twice + noise * noise * (predicted * predicted + along)
+    innovation = y - predicted
+    for i in range(3):
+        mean[i] += Pu[i] / variance * innovation
+        for j in range(3):
+            covariance[i, j] -= Pu[i] * Pu[j] / variance
+    return float(-0.5 * (innovation * innovation / variance + np.log(variance)))
+
+
+@njit(cache=True, nogil=True)
+def _weigh(
+    means: FloatArray, covariances: FloatArray, weights: FloatArray, position: FloatArray, y: float, noise: float
+) -> None:
+    """Update a bundle in place; filters that have lost all weight are left as they are."""
+    scores = np.full(len(weights), -np.inf)
+    for h in range(len(weights)):
+        if weights[h] > 0.0:
+            scores[h] = np.log(weights[h]) + _filter(means[h], covariances[h], position, y, noise)
+    likely = np.exp(scores - scores.max())
+    likely = np.where(likely < 1e-9, 0.0, likely)
+    weights[:] = likely / likely.sum()
+
+
+@njit(cache=True, nogil=True)
+def _match(
+    means: FloatArray, covariances: FloatArray, weights: FloatArray, mean: FloatArray, covariance: FloatArray
+) -> None:
+    """Set mean (3,) and covariance (3, 3) to those of the bundle."""
+    mean[:] = 0.0
+    covariance[:] = 0.0
+    for h in range(len(weights)):
+        mean += weights[h] * means[h]
+    for h in range(len(weights)):
+        d = means[h] - mean
+        covariance += weights[h] * (covariances[h] + np.outer(d, d))

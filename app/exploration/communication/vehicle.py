@@ -1,0 +1,142 @@
+"""A vehicle under limited communication: what it has measured, what it was told, what it has yet to tell."""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.estimation import LandmarkEstimator, Landmarks
+from app.exploration.communication.messages import MAX_ENTRIES, STEPS, Entries, Order, Report, WireFormat
+from app.exploration.communication.selection import distance_to_receivers, fill
+from app.exploration.communication.shared import Contribution, fuse
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+IntArray = NDArray[np.int64]
+
+WORTH_TELLING = 1.1
+"""An estimate is sent again when its information has grown by this factor since the receiver confirmed it."""
+
+
+class VehicleNode:
+    """On-board knowledge and the vehicle's half of the exchange (AURO15 sec. 3.4).
+
+    Each step: :meth:`sense`, then :meth:`report` goes out and, when something comes back, :meth:`receive`.
+
+    Reported are the landmarks newly in ``A_j`` (index, estimate, flag) and those seen but not accurate (index, estimate
+    so far, flag), both sorted by distance to the vehicles in the reachable exploration area, at most ``capacity``.
+
+    Beyond the paper, what found no room stays queued until the station has confirmed it or it is superseded: by newer
+    figures of the same landmark, or by the news that someone else has finished it. The order is: newly accurate ones,
+    then unfinished ones out of sight (no look will add to them, and only the station can put them together with what
+    others know), then unfinished ones in sight; each by distance.
+
+    Parameters
+    ----------
+    number : int
+        Of the vehicle, the same as the station knows it by.
+    xy_m : (n_landmarks, 2)
+        Where the landmarks are.
+    estimator : LandmarkEstimator
+        Of this vehicle's own sensor.
+    wire : WireFormat
+        Agreed with the station.
+    capacity : int
+        Most entries in a message.
+    apart_m : float
+        Landmarks closer together than this are near-duplicates.
+    """
+
+    def __init__(
+        self,
+        number: int,
+        xy_m: FloatArray,
+        estimator: LandmarkEstimator,
+        wire: WireFormat,
+        capacity: int = 10,
+        apart_m: float = 0.0,
+    ) -> None:
+        n = len(xy_m)
+        self.number = number
+        self.own = Landmarks.unknown(xy_m)
+        self.waypoint: FloatArray | None = None
+        self._estimator, self._wire = estimator, wire
+        self._capacity, self._apart_m = min(capacity, MAX_ENTRIES), apart_m
+        self._told = Contribution.nothing(n)
+        self._done = np.zeros(n, dtype=np.bool_)
+        self._settled = np.zeros(n, dtype=np.bool_)
+        self._confirmed = np.zeros(n)
+        self._in_sight = np.zeros(n, dtype=np.bool_)
+        self._receivers: FloatArray = np.zeros((0, 3))
+        self._sent = np.zeros(0, dtype=np.int64)
+        self._heard = False
+
+    @property
+    def accurate(self) -> BoolArray:
+        """``A`` as this vehicle knows it, (n,): from its own looks, with what it was told, or told so outright."""
+        return self._done
+
+    @property
+    def knowledge(self) -> Landmarks:
+        """What the vehicle knows: its own looks put together with what the others have found out."""
+        depth, information = self._fused()
+        with np.errstate(divide="ignore"):
+            return replace(self.own, depth_m=depth, variance_m2=1.0 / information, accurate=self._done)
+
+    def sense(self, position: FloatArray, index: IntArray, ranges: FloatArray) -> None:
+        """Take in this vehicle's own ranges (k,) to landmarks ``index`` (k,) from ``position`` (3,)."""
+        self.own = self._estimator.update(self.own, self.number, position, index, ranges)
+        self._in_sight[:] = False
+        self._in_sight[index] = True
+        self._finish()
+
+    def report(self, step: int, position: FloatArray) -> bytes:
+        """Return the message to the station after the looks of this step."""
+        self._sent = self._choose(position)
+        entries = Entries(
+            self._sent,
+            self.own.depth_m[self._sent],
+            np.sqrt(self.own.variance_m2[self._sent]),
+            self._done[self._sent],
+        )
+        acknowledges, self._heard = self._heard, False
+        return self._wire.encode_report(Report(step % STEPS, self.number, position, acknowledges, entries))
+
+    def receive(self, message: bytes) -> Order:
+        """Take in the station's answer to the last report, and return it."""
+        order = self._wire.decode_order(message)
+        if order.vehicle != self.number:
+            raise ValueError(f"order: meant for vehicle {order.vehicle}, received by {self.number}")
+        self._heard = True
+        self.waypoint = order.waypoint
+        self._receivers = order.neighbour_positions
+        if order.acknowledges:
+            self._confirmed[self._sent] = 1.0 / self.own.variance_m2[self._sent]
+            self._settled[self._sent] |= self._done[self._sent]
+        self._sent = np.zeros(0, dtype=np.int64)
+        self._told.take(order.entries)
+        finished = order.entries.index[order.entries.accurate]
+        self._done[finished] = True
+        self._settled[finished] = True  # the station knows already
+        self._finish()
+        return order
+
+    def _fused(self) -> tuple[FloatArray, FloatArray]:
+        own = Contribution(np.nan_to_num(self.own.depth_m), 1.0 / self.own.variance_m2)
+        return fuse([own, self._told], len(self._done))
+
+    def _finish(self) -> None:
+        information = 1.0 / self.own.variance_m2 + self._told.information
+        self._done |= self.own.accurate | (information > 1.0 / self._estimator.accuracy_sd_m**2)
+
+    def _choose(self, position: FloatArray) -> IntArray:
+        information = 1.0 / self.own.variance_m2
+        news = information > WORTH_TELLING * self._confirmed
+        sendable = self.own.variance_m2 < self._wire.largest_sd_m**2
+        finished = self._done & ~self._settled & self.own.seen
+        unfinished = ~self._done & news & sendable
+        waiting = np.flatnonzero(finished | unfinished)
+        receivers = self._receivers if len(self._receivers) else position[None]
+        distance = distance_to_receivers(self.own.xy_m[waiting], receivers[:, :2])
+        group = np.where(finished[waiting], 0, np.where(self._in_sight[waiting], 2, 1))
+        return fill(waiting[np.lexsort((distance, group))], self.own.xy_m, self._capacity, self._apart_m)

@@ -1,0 +1,129 @@
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.optimize import least_squares
+from scipy.stats import chi2
+
+from app.estimation import Landmark3DEstimator, Landmarks3D, RangeSensor
+
+SENSOR = RangeSensor(visibility_m=0.4, relative_noise=0.1)
+
+
+def patrol(seed, steps, n, vehicles=3):
+    """Three vehicles wander over landmarks; yields truth and knowledge after every step."""
+    rng = np.random.default_rng(seed)
+    truth = np.column_stack([rng.uniform(-0.3, 0.3, (n, 2)), rng.uniform(0.5, 0.7, n)])
+    positions = np.column_stack([rng.uniform(-0.3, 0.3, (vehicles, 2)), np.full(vehicles, 0.3)])
+    known, estimator = Landmarks3D.unknown(n), Landmark3DEstimator(SENSOR)
+    for _ in range(steps):
+        move = rng.standard_normal((vehicles, 3))
+        positions = positions + 0.05 * move / np.linalg.norm(move, axis=1, keepdims=True)
+        positions = np.clip(positions, [-0.35, -0.35, 0.15], [0.35, 0.35, 0.42])
+        visible_by = SENSOR.visible(positions, truth)
+        for j, position in enumerate(positions):
+            index = np.flatnonzero(visible_by[j])
+            known = estimator.update(known, j, position, index, SENSOR.measure(position, truth[index], rng))
+        yield truth, known
+
+
+def nees(truth, known):
+    seen = known.looks > 0
+    error = known.position_m[seen] - truth[seen]
+    return np.einsum("ki,kij,kj->k", error, np.linalg.inv(known.covariance_m2[seen]), error)
+
+
+def test_errors_are_as_large_as_the_filter_says():
+    """Normalised estimation error squared: chi-square with 3 degrees per landmark, independent between landmarks."""
+    runs = [[nees(t, k) for t, k in patrol(seed, 25, 4)] for seed in range(50)]
+    for step in (3, 6, 12, 24):
+        errors = np.concatenate([run[step] for run in runs])
+        low, high = chi2.ppf([0.001, 0.999], 3 * len(errors)) / len(errors)
+        assert low < errors.mean() < high
+        assert (errors < chi2.ppf(0.95, 3)).mean() > 0.91
+
+
+def test_estimates_close_in_on_the_truth():
+    *_, (truth, known) = patrol(1, 120, 40)
+    fixed = known.fixed
+    assert fixed.mean() > 0.8
+    assert np.sqrt(np.mean((known.position_m[fixed] - truth[fixed]) ** 2)) < 0.04
+    assert known.accurate.any()
+
+
+def test_matches_a_batch_solution_of_all_ranges():
+    """Gauss-Newton over every range at once, from the truth, is the slow but exact reference."""
+    rng = np.random.default_rng(3)
+    truth = np.array([[0.05, -0.1, 0.6], [-0.1, 0.08, 0.55]])
+    positions = np.column_stack([rng.uniform(-0.25, 0.25, (150, 2)), rng.uniform(0.2, 0.4, 150)])
+    known, estimator, ranges = Landmarks3D.unknown(2), Landmark3DEstimator(SENSOR), []
+    for position in positions:
+        ranges.append(SENSOR.measure(position, truth, rng))
+        known = estimator.update(known, 0, position, np.array([0, 1]), ranges[-1])
+    for m, point in enumerate(truth):
+        true_ranges = np.linalg.norm(positions - point, axis=1)
+
+        def residual(x, m=m, true_ranges=true_ranges):
+            return (np.array(ranges)[:, m] - np.linalg.norm(positions - x, axis=1)) / (0.1 * true_ranges)
+
+        batch = least_squares(residual, point)
+        covariance = np.linalg.inv(batch.jac.T @ batch.jac)
+        apart = known.position_m[m] - batch.x
+        assert apart @ np.linalg.solve(covariance, apart) < 1.0
+        np.testing.assert_allclose(np.sqrt(np.diag(known.covariance_m2[m])), np.sqrt(np.diag(covariance)), rtol=0.15)
+
+
+@given(seed=st.integers(0, 500))
+@settings(max_examples=10, deadline=None)
+def test_what_is_known_accurately_stays_so_and_single_filters_only_narrow(seed):
+    last = None
+    for _, known in patrol(seed, 25, 10):
+        seen = known.looks > 0
+        assert np.isfinite(known.position_m[seen]).all()
+        assert (np.linalg.eigvalsh(known.covariance_m2[seen]) > 0.0).all()
+        if last is not None:
+            assert (known.accurate | ~last.accurate).all()
+            assert (known.fixed | ~last.fixed).all()
+            narrower = last.covariance_m2[last.fixed] - known.covariance_m2[last.fixed]
+            assert (np.linalg.eigvalsh(narrower) > -1e-12).all()
+        last = known
+
+
+def test_a_single_range_leaves_the_direction_open():
+    known = Landmark3DEstimator(SENSOR).update(Landmarks3D.unknown(1), 0, np.zeros(3), np.array([0]), np.array([0.3]))
+    assert not known.fixed[0]
+    np.testing.assert_allclose(known.position_m[0], [0.0, 0.0, 0.15], atol=0.02)
+    assert (known.sd_m[0] > 0.07).all()
+
+
+def test_looks_along_a_line_cannot_tell_its_sides_apart():
+    """A straight leg leaves two mirror images: the estimate must not settle on one of them."""
+    rng = np.random.default_rng(0)
+    truth = np.array([[0.0, 0.15, 0.5]])
+    known, estimator = Landmarks3D.unknown(1), Landmark3DEstimator(SENSOR)
+    for x in np.linspace(-0.25, 0.25, 60):
+        position = np.array([x, 0.0, 0.3])
+        known = estimator.update(known, 0, position, np.array([0]), SENSOR.measure(position, truth, rng))
+    assert not known.fixed[0]
+    assert known.sd_m[0, 1] > 0.1
+
+
+def test_looked_at_too_often_counts_as_done_and_is_credited():
+    estimator = Landmark3DEstimator(SENSOR, visit_cap=3)
+    known = Landmarks3D.unknown(2)
+    for _ in range(4):
+        assert not known.accurate.any()
+        known = estimator.update(known, 2, np.zeros(3), np.array([1]), np.array([0.3]))
+    assert known.accurate.tolist() == [False, True]
+    assert known.credited.tolist() == [-1, 2]
+
+
+def test_the_order_of_landmarks_does_not_matter():
+    rng = np.random.default_rng(5)
+    ranges = rng.uniform(0.2, 0.4, 6)
+    index, shuffled = np.arange(6), rng.permutation(6)
+    estimator = Landmark3DEstimator(SENSOR)
+    straight = estimator.update(Landmarks3D.unknown(6), 0, np.zeros(3), index, ranges)
+    mixed = estimator.update(Landmarks3D.unknown(6), 0, np.zeros(3), shuffled, ranges[shuffled])
+    np.testing.assert_array_equal(straight.position_m, mixed.position_m)
+    assert straight.position_m[:, 2] == pytest.approx(ranges / 2, rel=0.1)
