@@ -17,8 +17,8 @@ from app.estimation import RangeSensor, Sensor
 from app.exploration.bottom import Bottom
 from app.exploration.measured import MeasuredObjective
 from app.exploration.options import PlannerOptions
-from app.exploration.planners.base import vehicle_rng
 from app.exploration.problem import Situation
+from app.exploration.regressors.moves import team_moves
 
 FloatArray = NDArray[np.float64]
 
@@ -34,11 +34,11 @@ class LandmarkRegressors:
             raise ValueError(f"sensor: landmark regressors need a RangeSensor, not {type(sensor).__name__}")
         self._options = options
         self._sensor = sensor
-        self._measured = MeasuredObjective(sensor)
+        self._measured = MeasuredObjective(sensor, options)
         self._accurate = 0
         self._idle = 0
 
-    def begin(self, team: Situation, bottom: Bottom, seed: int) -> float:
+    def begin(self, team: Situation, bottom: Bottom, seed: int) -> FloatArray:
         """See :class:`app.exploration.planners.cao.Regressors`."""
         self._team, self._seed = team, seed
         belief = team.belief
@@ -76,15 +76,7 @@ class LandmarkRegressors:
         """Whole steps, the team's common heading mixed with each vehicle's own, and random moves of size alpha."""
         team, step = self._team, self._team.constraints.max_step_m * (1 - 1e-9)
         n = self._options.candidates * len(team.vehicles)
-        own = [vehicle_rng(self._seed, name).standard_normal((n, 3)) for name in team.vehicles]
-        common = np.random.default_rng([self._seed, 2]).standard_normal((n, 1, 3))
-        mix = np.linspace(0.0, 1.0, n)[:, None, None]
-        zeta = mix * common + (1.0 - mix) * np.stack(own, axis=1)
-        length = np.maximum(np.linalg.norm(zeta, axis=2, keepdims=True), 1e-12)
-        whole = (np.arange(n) % 4 != 3)[:, None, None]
-        moves = np.where(whole, step * zeta / length, alpha * step * zeta)
-        moves *= np.minimum(1.0, step / np.maximum(np.linalg.norm(moves, axis=2, keepdims=True), 1e-12))
-        return team.positions + moves
+        return team.positions + team_moves(self._seed, team.vehicles, n, 3, step, alpha)
 
     def regressors(self, candidates: FloatArray) -> FloatArray:
         """See the module's text."""
