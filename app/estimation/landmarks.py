@@ -31,7 +31,7 @@ class Landmarks:
     accurate : (n,)
         The set ``A``; only grows.
     credited : (n,)
-        Which vehicle brought the landmark into ``A`` (``A_j``); -1 where none did.
+        Number of the vehicle that brought the landmark into ``A`` (``A_j``); -1 where none did.
     """
 
     xy_m: FloatArray
@@ -90,7 +90,7 @@ class LandmarkEstimator:
         Parameters
         ----------
         vehicle : int
-            Row of the vehicle, to be credited with the landmarks it completes.
+            Number of the vehicle, to be credited with the landmarks it completes; the same for as long as it lives.
         position : (3,)
             Where it measured.
         index : (k,)
@@ -176,9 +176,14 @@ class LandmarkSets:
         return np.asarray(self.visible & ~self.accurate, dtype=np.bool_)
 
 
-def landmark_sets(landmarks: Landmarks, visible_by: BoolArray) -> LandmarkSets:
-    """Return the sets for the visibility ``visible_by`` (n_vehicles, n)."""
+def landmark_sets(landmarks: Landmarks, visible_by: BoolArray, vehicles: IntArray | None = None) -> LandmarkSets:
+    """Return the sets for the visibility ``visible_by`` (n_vehicles, n).
+
+    ``vehicles`` (n_vehicles,) are the numbers under which the rows' vehicles are credited: a team that lost some has
+    others than 0, 1, 2 ... (the default).
+    """
     hidden = ~visible_by.any(axis=0) & ~landmarks.accurate
     seen_before = hidden & landmarks.seen
-    count = np.array([(landmarks.credited == j).sum() for j in range(len(visible_by))], dtype=np.int64)
+    numbers = np.arange(len(visible_by)) if vehicles is None else vehicles
+    count = (landmarks.credited[None, :] == numbers[:, None]).sum(axis=1).astype(np.int64)
     return LandmarkSets(landmarks.accurate, count, visible_by, seen_before if seen_before.any() else hidden)

@@ -1,7 +1,7 @@
 """``bathyfleet evaluate``: planners against each other, without a network."""
 
-from collections.abc import Callable
-from dataclasses import asdict
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -13,24 +13,79 @@ from rich.table import Table
 
 from app.evaluation.cube_world import COM_RANGE, ExploreScenario
 from app.evaluation.explore import EXPLORERS, run_explore
+from app.evaluation.jobs import Job, run_jobs
+from app.evaluation.jobs import Progress as StepProgress
 from app.evaluation.recorded import recorded_soundings
 from app.evaluation.summary import summarise
 from app.evaluation.survey import run_survey
 from app.evaluation.survey_world import Sampling, SurveyScenario
+from app.evaluation.team_changes import TeamChanges, parse_changes
 from app.exploration.options import PlannerOptions
-from app.exploration.planners import PLANNERS, warm_up
+from app.exploration.planners import PLANNERS
+from app.mapping.types import Soundings
 from simulator.terrain import Terrain, TerrainError
 from simulator.terrain_files import load_terrain
 
 evaluate_app = typer.Typer(help="Compare planners in closed loop, without a network.", no_args_is_help=True)
-
-Run = Callable[[str, int, Callable[[int], None]], dict[str, Any]]
 
 TerrainFile = Annotated[Path, typer.Option("--terrain", help="Sea floor: .npz, .asc, GeoTIFF, .xyz or .csv.")]
 Seed = Annotated[int, typer.Option(help="Seed of everything random.")]
 Seeds = Annotated[str | None, typer.Option(help="Several runs: FIRST:END (END excluded), or a list 1,5,9.")]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object, nothing else, to standard output.")]
 Regressors = Annotated[str, typer.Option(help="What CAO's estimator is linear in: map or polynomial.")]
+Jobs = Annotated[int, typer.Option(min=1, help="Processes; with several seeds or planners, runs at a time.")]
+
+EVERY_CELL = "all"
+
+
+@dataclass(frozen=True)
+class ExploreJob:
+    """One run of ``explore``."""
+
+    scenario: ExploreScenario
+    planner: str
+    options: PlannerOptions
+
+    @property
+    def title(self) -> str:
+        """What it is, for the progress bar."""
+        return f"{self.planner}, seed {self.scenario.seed}"
+
+    @property
+    def steps(self) -> int:
+        """Its length."""
+        return self.scenario.steps
+
+    def run(self, progress: StepProgress) -> dict[str, Any]:
+        """Run it."""
+        return asdict(run_explore(self.scenario, self.planner, self.options, progress))
+
+
+@dataclass(frozen=True)
+class SurveyJob:
+    """One run of ``survey``."""
+
+    scenario: SurveyScenario
+    planner: str
+    options: PlannerOptions
+    recorded: Soundings | None
+
+    @property
+    def title(self) -> str:
+        """What it is, for the progress bar."""
+        return f"{self.planner}, seed {self.scenario.seed}"
+
+    @property
+    def steps(self) -> int:
+        """Its length."""
+        return self.scenario.steps
+
+    def run(self, progress: StepProgress) -> dict[str, Any]:
+        """Run it."""
+        result = asdict(run_survey(self.scenario, self.planner, self.options, progress, self.recorded))
+        if self.recorded is None:
+            del result["recorded_track"], result["ratio_recorded"]
+        return result
 
 
 @evaluate_app.command()
@@ -38,7 +93,9 @@ def explore(
     terrain: TerrainFile,
     planner: Annotated[str, typer.Option(help=f"One or more of {', '.join(EXPLORERS)}, separated by commas.")] = "cao",
     robots: Annotated[int, typer.Option(min=1, max=100)] = 3,
-    landmarks: Annotated[int, typer.Option(min=1, help="Number of landmarks, spread at random.")] = 1100,
+    landmarks: Annotated[
+        str, typer.Option(help="Number of landmarks, spread at random; all: one per cell of the terrain file.")
+    ] = "1100",
     steps: Annotated[int, typer.Option(min=1)] = 500,
     seed: Seed = 0,
     seeds: Seeds = None,
@@ -46,22 +103,54 @@ def explore(
         int | None, typer.Option(min=0, help="Candidates per vehicle; for osarses the number of real tries.")
     ] = None,
     com_range: Annotated[float, typer.Option(min=0.01, help="Communication range.")] = COM_RANGE,
+    keep_out: Annotated[
+        float, typer.Option(metavar="FRACTION", help="Part of the area covered by keep-out rectangles.")
+    ] = 0.0,
+    lose: Annotated[
+        str | None, typer.Option(metavar="K@T,...", help="Vehicle K is lost when step T begins; 1 is the first.")
+    ] = None,
+    join: Annotated[
+        str | None,
+        typer.Option(
+            metavar="K@T,...", help="K vehicles join when step T begins, half to 0.8 of the range from another."
+        ),
+    ] = None,
+    line_of_sight: Annotated[
+        bool, typer.Option("--line-of-sight", help="The true sea floor hides what lies behind it.")
+    ] = False,
     regressors: Regressors = "map",
+    jobs: Jobs = 1,
     as_json: Json = False,
 ) -> None:
     """Run the papers' scenario: landmarks in the cube [-1, 1]^3 (AURO15 section 6)."""
     names = _planners(planner, EXPLORERS)
     sea_floor = _terrain(terrain)
-
-    def run(name: str, which: int, progress: Callable[[int], None]) -> dict[str, Any]:
+    count = _landmark_count(landmarks)
+    changes = TeamChanges(_changes(lose, "--lose"), _changes(join, "--join"))
+    runs = []
+    for name in names:
         options = _options(regressors, None if name == "osarses" else candidates)
         if name == "osarses":
             options = options.model_copy(update={"tries": candidates or 0})
-        scenario = ExploreScenario(sea_floor, robots, landmarks, steps, which, com_range)
-        return asdict(run_explore(scenario, name, options, progress))
+        for which in _seed_list(seed, seeds):
+            try:
+                scenario = ExploreScenario(
+                    sea_floor,
+                    robots,
+                    count,
+                    steps,
+                    which,
+                    com_range,
+                    keep_out_fraction=keep_out,
+                    changes=changes,
+                    line_of_sight=line_of_sight,
+                )
+            except ValueError as error:
+                raise typer.BadParameter(str(error)) from None
+            runs.append(ExploreJob(scenario, name, options))
 
-    columns = ("planner", "seed", "remaining_pct", "t99", "distance", "plan_ms_median", "wall_s")
-    _compare(run, names, _seed_list(seed, seeds), steps, columns, as_json=as_json)
+    columns = ("planner", "seed", "remaining_pct", "t99", "broken_constraints", "plan_ms_median")
+    _compare(runs, columns, jobs, as_json=as_json)
 
 
 @evaluate_app.command()
@@ -76,6 +165,7 @@ def survey(
     seeds: Seeds = None,
     candidates: Annotated[int | None, typer.Option(min=4, help="Candidates per vehicle.")] = None,
     regressors: Regressors = "map",
+    jobs: Jobs = 1,
     as_json: Json = False,
 ) -> None:
     """Run the papers' field experiment: map a sea floor with a single beam, beside the usual practice (AURO15)."""
@@ -86,23 +176,17 @@ def survey(
     sea_floor = _terrain(terrain)
     recorded = recorded_soundings(terrain)
     options = _options(regressors, candidates)
-
-    def run(name: str, which: int, progress: Callable[[int], None]) -> dict[str, Any]:
-        scenario = SurveyScenario(sea_floor, vehicles, steps, max_step, how, seed=which)
-        result = asdict(run_survey(scenario, name, options, progress, recorded))
-        if recorded is None:
-            del result["recorded_track"], result["ratio_recorded"]
-        return result
-
+    runs = [
+        SurveyJob(SurveyScenario(sea_floor, vehicles, steps, max_step, how, seed=which), name, options, recorded)
+        for name in names
+        for which in _seed_list(seed, seeds)
+    ]
     columns = ("planner", "seed", "rmse_m", "ratio", "samples", "distance_m", "plan_ms_median")
-    _compare(run, names, _seed_list(seed, seeds), steps, columns, as_json=as_json)
+    _compare(runs, columns, jobs, as_json=as_json)
 
 
-def _compare(
-    run: Run, planners: list[str], seeds: list[int], steps: int, columns: tuple[str, ...], *, as_json: bool
-) -> None:
+def _compare(jobs: Sequence[Job], columns: tuple[str, ...], processes: int, *, as_json: bool) -> None:
     console = Console(stderr=True)
-    warm_up()
     runs: list[dict[str, Any]] = []
     with Progress(
         TextColumn("{task.description}"),
@@ -113,11 +197,13 @@ def _compare(
         transient=True,
         disable=not console.is_terminal,
     ) as bar:
-        for name in planners:
-            for which in seeds:
-                task = bar.add_task(f"{name}, seed {which}", total=steps)
-                runs.append(run(name, which, lambda step, task=task: bar.update(task, completed=step)))  # type: ignore[misc]
-                bar.remove_task(task)
+        task = bar.add_task("", total=sum(job.steps for job in jobs))
+
+        def show(job: Job, step: int) -> None:
+            bar.update(task, description=job.title, completed=sum(j.steps for j in jobs[: len(runs)]) + step)
+
+        for run in run_jobs(jobs, processes, show):
+            runs.append(run)  # noqa: PERF402 - ``show`` counts them
     if as_json:
         single = len(runs) == 1
         document = runs[0] if single else {"runs": runs, "summary": summarise(runs)}
@@ -152,6 +238,23 @@ def _seed_list(seed: int, seeds: str | None) -> list[int]:
     if not chosen or min(chosen) < 0:
         raise typer.BadParameter(f"{seeds!r} holds no seed, or a negative one", param_hint="--seeds")
     return chosen
+
+
+def _landmark_count(text: str) -> int | None:
+    if text == EVERY_CELL:
+        return None
+    if not text.isdecimal() or int(text) < 1:
+        raise typer.BadParameter(
+            f"{text!r} is neither a number of at least 1 nor {EVERY_CELL!r}", param_hint="--landmarks"
+        )
+    return int(text)
+
+
+def _changes(text: str | None, option: str) -> tuple[tuple[int, int], ...]:
+    try:
+        return parse_changes(text)
+    except ValueError as error:
+        raise typer.BadParameter(str(error), param_hint=option) from None
 
 
 def _options(regressors: str, candidates: int | None) -> PlannerOptions:

@@ -8,6 +8,7 @@ import numpy as np
 
 from app.evaluation.cube_world import DEEPEST, SHALLOWEST, ExploreScenario, World
 from app.evaluation.osarses import Osarses
+from app.exploration.objective import ObjectiveWeights
 from app.exploration.options import PlannerOptions
 from app.exploration.planners import PLANNERS, create_planner
 from app.exploration.planners.base import PlannerBase
@@ -19,7 +20,10 @@ EXPLORERS = (*sorted(PLANNERS), OSARSES)
 
 @dataclass(frozen=True)
 class ExploreRun:
-    """What came of a run; names as in the command's JSON."""
+    """What came of a run; names as in the command's JSON.
+
+    ``robots`` is the team at the start; ``broken_constraints`` counts the steps of single vehicles that broke a limit.
+    """
 
     planner: str
     terrain: str
@@ -36,6 +40,7 @@ class ExploreRun:
     plan_ms_median: float
     plan_ms_p99: float
     real_tries: int
+    broken_constraints: int
 
 
 def run_explore(
@@ -43,27 +48,39 @@ def run_explore(
     planner: str,
     options: PlannerOptions,
     progress: Callable[[int], None] = lambda step: None,
+    weights: ObjectiveWeights = ObjectiveWeights(),  # noqa: B008 - frozen
 ) -> ExploreRun:
-    """Run the closed loop with a planner by name, or ``osarses`` with ``options.tries`` real tries per step."""
+    """Run the closed loop with a planner by name, or ``osarses`` with ``options.tries`` real tries per step.
+
+    ``weights`` are those of the objective by which ``osarses`` judges its tries.
+    """
     began = time.perf_counter()
     world = World(scenario)
     noise, choice = (np.random.default_rng([scenario.seed, k]) for k in (1, 2))
-    names = tuple(f"auv-{k + 1}" for k in range(scenario.robots))
     chooser: PlannerBase | Osarses = (
-        Osarses(world, options.tries, noise)
+        Osarses(world, options.tries, noise, weights)
         if planner == OSARSES
         else create_planner(planner, options, scenario.sensor)
     )
     world.landmarks = world.measure(world.positions, world.landmarks, noise)
-    history, plan_s, distance, headings = [], [], 0.0, np.full(scenario.robots, np.nan)
+    history, plan_s, distance, broken = [], [], 0.0, 0
     for step in range(1, scenario.steps + 1):
+        world.change_team(step)
         situation = Situation(
-            step, scenario.steps, names, world.positions, headings, world.belief, np.zeros((0, 2)), scenario.constraints
+            step,
+            scenario.steps,
+            world.names,
+            world.positions,
+            np.full(len(world.team), np.nan),
+            world.belief,
+            np.zeros((0, 2)),
+            scenario.constraints,
         )
         t0 = time.perf_counter()
         proposal = chooser.propose(situation, choice)
         plan_s.append(time.perf_counter() - t0)
         positions = world.clear(proposal.positions)
+        broken += world.broken(positions)
         distance += float(np.linalg.norm(positions - world.positions, axis=1).sum())
         world.positions = positions
         world.landmarks = world.measure(positions, world.landmarks, noise)
@@ -77,7 +94,7 @@ def run_explore(
         terrain=scenario.terrain.name,
         seed=scenario.seed,
         robots=scenario.robots,
-        landmarks=scenario.landmarks,
+        landmarks=len(world.truth),
         steps=scenario.steps,
         remaining_pct=history[-1],
         t99=int(below[0]) + 1 if len(below) else None,
@@ -88,4 +105,5 @@ def run_explore(
         plan_ms_median=1e3 * float(np.median(plan_s)),
         plan_ms_p99=1e3 * float(np.quantile(plan_s, 0.99)),
         real_tries=options.tries * scenario.steps if planner == OSARSES else 0,
+        broken_constraints=broken,
     )

@@ -10,6 +10,7 @@ from simulator.terrain_files import save_npz
 EXPLORE = {
     "planner", "terrain", "seed", "robots", "landmarks", "steps", "remaining_pct", "t99", "sum_of_error", "history",
     "distance", "wall_s", "plan_ms_median", "plan_ms_p99", "real_tries",
+    "broken_constraints",
 }  # fmt: skip
 SURVEY = {"rmse_m", "l2_norm", "samples", "distance_m", "time_s", "coverage_pct"}
 
@@ -51,6 +52,33 @@ def test_several_runs_print_runs_and_a_summary(terrain):
     assert spread["min"] <= spread["mean"] <= spread["max"]
 
 
+def test_any_number_of_processes_gives_the_same_runs_in_the_same_order(terrain):
+    arguments = ("explore", "--terrain", terrain, "--landmarks", "60", "--steps", "3", "--planner", "random,lawnmower",
+                 "--seeds", "0:2", "--json")  # fmt: skip
+    one, two = (json.loads(call(*arguments, "--jobs", str(n)).stdout)["runs"] for n in (1, 2))
+    for run in (*one, *two):
+        for key in ("wall_s", "plan_ms_median", "plan_ms_p99"):
+            del run[key]
+    assert one == two
+
+
+def test_every_cell_can_be_a_landmark(terrain):
+    result = call(
+        "explore", "--terrain", terrain, "--landmarks", "all", "--steps", "1", "--planner", "random", "--json"
+    )
+    assert json.loads(result.stdout)["landmarks"] == 1600
+
+
+def test_the_team_may_change_and_zones_be_kept_out(terrain):
+    result = call(
+        "explore", "--terrain", terrain, "--landmarks", "80", "--steps", "6", "--planner", "lawnmower",
+        "--keep-out", "0.1", "--lose", "1@2,3@4", "--join", "2@5", "--line-of-sight", "--json",
+    )  # fmt: skip
+    document = json.loads(result.stdout)
+    assert len(document["history"]) == 6
+    assert document["robots"] == 3
+
+
 def test_survey_prints_the_planner_beside_its_yardsticks(terrain):
     result = call(
         "survey", "--terrain", terrain, "--steps", "12", "--max-step", "8", "--sampling", "continuous", "--json"
@@ -72,6 +100,12 @@ def test_without_json_a_table_is_printed(terrain):
         (["--planner", "magic"], ["magic", "cao"]),
         (["--seeds", "a:b"], ["a:b", "FIRST:END"]),
         (["--seeds", "3:3"], ["no seed"]),
+        (["--landmarks", "many"], ["many", "all"]),
+        (["--lose", "2"], ["'2'", "K@T"]),
+        (["--lose", "4@10"], ["4@10", "1, 2, 3"]),
+        (["--lose", "1@1,2@2,3@3"], ["step 3", "no vehicle"]),
+        (["--join", "1@501"], ["1@501", "1 to 500"]),
+        (["--keep-out", "0.9"], ["0.9", "0.3"]),
         (["--regressors", "none"], ["none", "polynomial"]),
         (["--terrain", "/nowhere/at-all.npz"], ["at-all.npz"]),
     ],

@@ -3,8 +3,11 @@ import pytest
 
 from app.evaluation.cube_world import CubeTerrain, ExploreScenario, World
 from app.evaluation.explore import run_explore
+from app.evaluation.team_changes import TeamChanges
+from app.exploration.constraints import inside_area
 from app.exploration.options import PlannerOptions
 from simulator.seafloors import generate
+from simulator.terrain import Terrain
 
 
 @pytest.fixture(scope="module")
@@ -12,8 +15,8 @@ def smooth():
     return generate("smooth", 2, width_m=80.0, height_m=60.0)
 
 
-def run(terrain, planner, steps=120, seed=0, **options):
-    scenario = ExploreScenario(terrain, landmarks=300, steps=steps, seed=seed)
+def run(terrain, planner, steps=120, seed=0, changes=TeamChanges(), **options):  # noqa: B008 - frozen
+    scenario = ExploreScenario(terrain, landmarks=300, steps=steps, seed=seed, changes=changes)
     return run_explore(scenario, planner, PlannerOptions(**options))
 
 
@@ -56,3 +59,85 @@ def test_vehicles_never_touch_the_true_bottom(smooth):
     lifted = world.clear(deep)
     np.testing.assert_allclose(world.cube.depth_at(lifted[:, :2]) - lifted[:, 2], 0.05)
     np.testing.assert_array_equal(world.clear(world.positions), world.positions)
+
+
+@pytest.mark.parametrize("planner", ["cao", "lawnmower", "random", "osarses"])
+def test_a_lost_vehicle_does_not_stall_the_others(smooth, planner):
+    result = run(smooth, planner, steps=40, changes=TeamChanges(lost=((2, 10),)), tries=2)
+    assert result.history[-1] < result.history[10]
+
+
+def test_vehicles_keep_their_numbers_when_others_leave_and_join(smooth):
+    changes = TeamChanges(lost=((1, 2), (4, 3)), joining=((2, 2),))
+    world = World(ExploreScenario(smooth, landmarks=300, changes=changes))
+    third = world.positions[2]
+    teams = []
+    for step in (1, 2, 3):
+        world.change_team(step)
+        teams.append(world.names)
+    assert teams == [("auv-1", "auv-2", "auv-3"), ("auv-2", "auv-3", "auv-4", "auv-5"), ("auv-2", "auv-3", "auv-5")]
+    np.testing.assert_array_equal(world.positions[1], third)
+    for step in range(20):
+        world.landmarks = world.measure(world.positions, world.landmarks, np.random.default_rng(step))
+    assert set(world.landmarks.credited[world.landmarks.accurate]) <= {1, 2, 4}
+    assert (world.landmarks.credited == 1).any()
+    counted = world.evaluate(world.positions, world.landmarks, 0, []).progress.accurate
+    assert counted.sum() == world.landmarks.accurate.sum()
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_newcomer_is_launched_within_range_of_a_team_member_at_its_height(smooth, seed):
+    scenario = ExploreScenario(
+        smooth, landmarks=10, seed=seed, changes=TeamChanges(joining=((1, 1),)), keep_out_fraction=0.15
+    )
+    world = World(scenario)
+    heights = world.cube.depth_at(world.positions[:, :2]) - world.positions[:, 2]
+    world.change_team(1)
+    newcomer, others = world.positions[3], world.positions[:3]
+    height = world.cube.depth_at(newcomer[None, :2])[0] - newcomer[2]
+    distances = np.linalg.norm(others - newcomer, axis=1)
+    horizontal = np.linalg.norm((others - newcomer)[:, :2], axis=1)
+    launched_beside = np.isclose(heights, height) & (distances <= 0.8 * 0.3)
+    assert launched_beside.any()
+    assert (horizontal[launched_beside] >= 0.5 * 0.3 * 0.2).any()
+    assert inside_area(scenario.constraints, newcomer[None, :2])[0]
+
+
+def test_landmarks_lie_outside_the_keep_out_zones(smooth):
+    for landmarks in (200, None):
+        scenario = ExploreScenario(smooth, landmarks=landmarks, keep_out_fraction=0.2)
+        world = World(scenario)
+        assert inside_area(scenario.constraints, world.truth[:, :2]).all()
+        assert np.isfinite(world.truth).all()
+
+
+def test_every_cell_of_known_depth_is_a_landmark_when_asked():
+    z = np.random.default_rng(0).uniform(3.0, 9.0, (6, 8))
+    z[2, 3] = np.nan
+    world = World(ExploreScenario(Terrain(z, 2.0), landmarks=None))
+    assert len(world.truth) == 47
+    np.testing.assert_allclose(
+        world.truth[0], [-1.0 + 0.125, -0.75 + 0.125, 0.2 + 0.8 * (z[0, 0] - np.nanmin(z)) / np.ptp(z[np.isfinite(z)])]
+    )
+
+
+def test_the_sea_floor_hides_what_lies_behind_it_when_asked():
+    z = np.full((40, 40), 10.0)
+    z[:, 19:21] = 2.0
+    open_, hidden = (World(ExploreScenario(Terrain(z, 1.0), line_of_sight=los)) for los in (False, True))
+    beside = np.array([[-0.1, 0.0, 0.9]])
+    behind = open_.truth[:, 0] > 0.1
+    assert open_.visible(beside)[0, behind].any()
+    assert not hidden.visible(beside)[0, behind].any()
+    before = open_.truth[:, 0] < -0.08
+    np.testing.assert_array_equal(open_.visible(beside)[0, before], hidden.visible(beside)[0, before])
+
+
+def test_a_broken_limit_is_counted_once_per_vehicle(smooth):
+    world = World(ExploreScenario(smooth))
+    assert world.broken(world.positions) == 0
+    too_far = world.positions + np.array([0.08, 0.0, 0.0])
+    assert world.broken(too_far) == 3
+    world.positions = world.positions + np.array([[0.0], [0.4], [0.8]])  # out of range of each other already
+    nearer = world.positions - np.array([[0.0], [0.01], [0.02]])
+    assert world.broken(nearer) == 0

@@ -1,0 +1,52 @@
+"""Many runs, one after the other or in several processes, with the same results in the same order."""
+
+import multiprocessing
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from typing import Any, Protocol
+
+from app.exploration.planners import warm_up
+
+Progress = Callable[[int], None]
+
+
+class Job(Protocol):
+    """One run; must be picklable when several processes are used."""
+
+    @property
+    def title(self) -> str:
+        """What it is, for the progress bar."""
+        ...
+
+    @property
+    def steps(self) -> int:
+        """Its length."""
+        ...
+
+    def run(self, progress: Progress) -> dict[str, Any]:
+        """Run it, telling every step, and return the object of the command's JSON."""
+        ...
+
+
+def run_jobs(
+    jobs: Sequence[Job], processes: int, progress: Callable[[Job, int], None] = lambda job, step: None
+) -> Iterator[dict[str, Any]]:
+    """Yield the result of every job, in the order of ``jobs``.
+
+    With one process ``progress`` is told every step of the job that runs; with several, each job once it is done.
+    Processes are spawned, so nothing depends on what this one has loaded.
+    """
+    warm_up()  # the spawned processes then find everything compiled
+    if processes == 1 or len(jobs) < 2:
+        for job in jobs:
+            yield job.run(lambda step, job=job: progress(job, step))  # type: ignore[misc]
+        return
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(min(processes, len(jobs)), context, warm_up) as pool:
+        for job, result in zip(jobs, pool.map(_run, jobs), strict=True):
+            progress(job, job.steps)
+            yield result
+
+
+def _run(job: Job) -> dict[str, Any]:
+    return job.run(lambda step: None)
