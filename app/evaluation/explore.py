@@ -8,14 +8,14 @@ import numpy as np
 
 from app.evaluation.cube_world import DEEPEST, SHALLOWEST, ExploreScenario, World
 from app.evaluation.osarses import Osarses
-from app.exploration.objective import ObjectiveWeights
+from app.evaluation.tries import GradientTrier, Trier
 from app.exploration.options import PlannerOptions
-from app.exploration.planners import PLANNERS, create_planner
+from app.exploration.planners import ONLY_IN_SIMULATION, PLANNERS, create_planner
 from app.exploration.planners.base import PlannerBase
 from app.exploration.problem import Situation
 
-OSARSES = "osarses"
-EXPLORERS = (*sorted(PLANNERS), OSARSES)
+OSARSES, TRIED_SPSA, TRIED_FDSA = ONLY_IN_SIMULATION
+EXPLORERS = (*sorted(PLANNERS), *ONLY_IN_SIMULATION)
 
 
 @dataclass(frozen=True)
@@ -48,20 +48,12 @@ def run_explore(
     planner: str,
     options: PlannerOptions,
     progress: Callable[[int], None] = lambda step: None,
-    weights: ObjectiveWeights = ObjectiveWeights(),  # noqa: B008 - frozen
 ) -> ExploreRun:
-    """Run the closed loop with a planner by name, or ``osarses`` with ``options.tries`` real tries per step.
-
-    ``weights`` are those of the objective by which ``osarses`` judges its tries.
-    """
+    """Run the closed loop with one of ``EXPLORERS``; ``osarses`` makes ``options.tries`` real tries per step."""
     began = time.perf_counter()
     world = World(scenario)
     noise, choice = (np.random.default_rng([scenario.seed, k]) for k in (1, 2))
-    chooser: PlannerBase | Osarses = (
-        Osarses(world, options.tries, noise, weights)
-        if planner == OSARSES
-        else create_planner(planner, options, scenario.sensor)
-    )
+    chooser = _chooser(planner, options, world, noise)
     world.landmarks = world.measure(world.positions, world.landmarks, noise)
     history, plan_s, distance, broken = [], [], 0.0, 0
     for step in range(1, scenario.steps + 1):
@@ -104,6 +96,14 @@ def run_explore(
         wall_s=time.perf_counter() - began,
         plan_ms_median=1e3 * float(np.median(plan_s)),
         plan_ms_p99=1e3 * float(np.quantile(plan_s, 0.99)),
-        real_tries=options.tries * scenario.steps if planner == OSARSES else 0,
+        real_tries=chooser.real_tries if isinstance(chooser, Trier) else 0,
         broken_constraints=broken,
     )
+
+
+def _chooser(planner: str, options: PlannerOptions, world: World, noise: np.random.Generator) -> PlannerBase | Trier:
+    if planner == OSARSES:
+        return Osarses(world, options.tries, noise, options.objective)
+    if planner in (TRIED_SPSA, TRIED_FDSA):
+        return GradientTrier("spsa" if planner == TRIED_SPSA else "fdsa", world, noise, options.objective)
+    return create_planner(planner, options, world.scenario.sensor)

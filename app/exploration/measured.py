@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.estimation import LandmarkSets, RangeSensor
-from app.exploration.objective import ObjectiveWeights, closest_squared, med13_objective, objective
+from app.exploration.objective import ObjectiveWeights, closest_squared, med13_objective, objective, with_depths
 from app.exploration.options import PlannerOptions
 from app.exploration.problem import Belief, Situation
 
@@ -54,16 +54,17 @@ class MeasuredObjective:
         first = self._accurate is None or len(self._accurate) != len(belief.accurate)
         known_before = belief.accurate if self._accurate is None or first else self._accurate
         fresh = belief.accurate & ~known_before
+        seen_before = sensor.visible(self._positions, points)
+        points = with_depths(points)
         value = self._evaluate(team.positions, points, belief, visible_by, int(fresh.sum()))
         if not self._by_vehicle:
             result = np.array([np.nan if first else value])
         elif first or self._names != team.vehicles:
             result = np.full(n, np.nan)
         else:
-            gained = np.zeros(n)
+            gained = np.zeros(n, dtype=np.int64)
             if fresh.any():
                 gained = np.bincount(closest_squared(team.positions, points[fresh])[1], minlength=n)
-            seen_before = sensor.visible(self._positions, points)
             result = np.empty(n)
             for j in range(n):
                 without, visible_without = team.positions.copy(), visible_by.copy()

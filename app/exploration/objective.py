@@ -123,7 +123,9 @@ def objective(
     """
     n = len(positions)
     gained = float(sets.accurate.sum() - accurate_before)
-    J1_by, J2_by, J3_by = _terms(np.ascontiguousarray(positions), _known(landmarks_m), sets.unfinished_by, sets.pending)
+    J1_by, J2_by, J3_by = _terms(
+        np.ascontiguousarray(positions), with_depths(landmarks_m), sets.unfinished_by, sets.pending
+    )
     opened = switches(earlier, before, weights)
     s1, s2, s3 = opened if opened is not None else (np.full(n, k) for k in (weights.K1, weights.K2, weights.K3))
     return Objective(
@@ -143,13 +145,15 @@ def med13_objective(
     The cost is the sum, over landmarks that are visible but not accurate, of the squared distance to the closest
     vehicle, plus K for each that is neither visible nor accurate.
     """
-    J1_by, J2_by, _ = _terms(np.ascontiguousarray(positions), _known(landmarks_m), sets.unfinished_by, sets.pending)
+    J1_by, J2_by, _ = _terms(
+        np.ascontiguousarray(positions), with_depths(landmarks_m), sets.unfinished_by, sets.pending
+    )
     hidden = int((~sets.visible & ~sets.accurate).sum())
     progress = VehicleProgress(sets.accurate_count_by.astype(np.float64), J1_by, J2_by)
     return Objective(0.0, float(-K * hidden), float(J2_by.sum()), 0.0, progress)
 
 
-def _known(landmarks_m: FloatArray) -> FloatArray:
+def with_depths(landmarks_m: FloatArray) -> FloatArray:
     """Return the landmarks (n, 3) with unknown depths at the mean of the known ones."""
     points = np.array(landmarks_m, dtype=np.float64)
     unknown = np.isnan(points[:, 2])

@@ -24,7 +24,8 @@ from app.exploration.regressors.survey import SurveyRegressors
 FloatArray = NDArray[np.float64]
 
 WINDOW = 30
-"""Steps to which theta is fitted, unless the options or the regressors say otherwise."""
+POLYNOMIAL_WINDOW = 15
+"""Steps to which theta is fitted unless the options say otherwise: a polynomial only holds close by."""
 
 
 class Regressors(Protocol):
@@ -89,7 +90,8 @@ class CaoPlanner(PlannerBase):
     def _decide(self, team: Situation, bottom: Bottom, seed: int) -> Proposal:
         measured = np.atleast_1d(self._model.begin(team, bottom, seed))
         prior, stiffness = self._model.prior(team)
-        window = self.options.window or getattr(self._model, "window", WINDOW)
+        default = POLYNOMIAL_WINDOW if self.options.regressors == "polynomial" else WINDOW
+        window = self.options.window or default
         rows = len(team.vehicles) if self._by_vehicle else 1
         estimator = Estimator(prior, stiffness, max(rows * window, len(prior) + 5))
         estimator.recall([row for row in self._history if len(row[0]) == len(prior)])

@@ -22,4 +22,5 @@ def team_moves(seed: int, vehicles: tuple[str, ...], n: int, dims: int, step: fl
     length = np.maximum(np.linalg.norm(zeta, axis=2, keepdims=True), 1e-12)
     whole = (np.arange(n) % 4 != 3)[:, None, None]
     moves = np.where(whole, step * zeta / length, alpha * step * zeta)
-    return moves * np.minimum(1.0, step / np.maximum(np.linalg.norm(moves, axis=2, keepdims=True), 1e-12))
+    moves *= np.minimum(1.0, step / np.maximum(np.linalg.norm(moves, axis=2, keepdims=True), 1e-12))
+    return np.asarray(moves, dtype=np.float64)

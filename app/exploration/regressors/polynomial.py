@@ -25,8 +25,6 @@ class PolynomialRegressors:
     more parameters than a window of steps can determine.
     """
 
-    window = 15
-
     def __init__(self, options: PlannerOptions, sensor: Sensor, at_cruise: AtCruise | None) -> None:
         """Move at cruise depth by ``at_cruise`` in bathymeter missions, in three dimensions without it."""
         self._options = options
