@@ -88,6 +88,7 @@ class LandmarkRegressors:
         reach = np.linalg.norm(configurations - self._team.positions, axis=2).max(axis=0, initial=0.0)
         starts, index = within_reach(self._team.positions, self._points, reach, self._sensor.visibility_m)
         return predict(
+            self._team.positions,
             configurations,
             self._points[index],
             index,
