@@ -122,6 +122,11 @@ def test_an_unknown_planner_is_refused_with_the_known_ones():
         create_planner("magic")
 
 
+def test_a_yardstick_that_really_tries_its_moves_is_refused_with_the_reason():
+    with pytest.raises(ValueError, match="osarses really tries its moves"):
+        create_planner("osarses")
+
+
 @pytest.mark.parametrize("kind", KINDS, ids="-".join)
 def test_vehicles_may_leave_and_join_between_steps(kind):
     planner = make(*kind)
