@@ -31,7 +31,9 @@ class RangeSensor:
 
         Landmarks of unknown depth (NaN) are not visible.
         """
-        squared = ((positions[:, None, :] - landmarks[None, :, :]) ** 2).sum(axis=2)
+        # Axis by axis: a sum over a last axis of length 3 is several times slower.
+        dx, dy, dz = (positions[:, k, None] - landmarks[None, :, k] for k in range(3))
+        squared = dx * dx + dy * dy + dz * dz
         with np.errstate(invalid="ignore"):
             return np.asarray(squared < self.visibility_m**2, dtype=np.bool_)
 

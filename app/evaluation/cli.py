@@ -22,6 +22,7 @@ from app.evaluation.survey import run_survey
 from app.evaluation.survey_world import Sampling, SurveyScenario
 from app.evaluation.team_changes import TeamChanges, parse_changes
 from app.exploration.communication.messages import MAX_ENTRIES
+from app.exploration.objective import TERMS
 from app.exploration.options import PlannerOptions
 from app.exploration.planners import PLANNERS
 from app.mapping.types import Soundings
@@ -128,6 +129,10 @@ def explore(
         float, typer.Option(min=0.0, max=1.0, metavar="FRACTION", help="Messages lost; needs --capacity.")
     ] = 0.0,
     regressors: Regressors = "map",
+    objective: Annotated[str, typer.Option(help=f"What is measured after a step: {', '.join(TERMS)}.")] = "full",
+    contribution: Annotated[
+        str, typer.Option(help="CAO learns from the whole team's J or each vehicle's.")
+    ] = "vehicle",
     jobs: Jobs = 1,
     as_json: Json = False,
 ) -> None:
@@ -142,7 +147,7 @@ def explore(
     changes = TeamChanges(_changes(lose, "--lose"), _changes(join, "--join"))
     runs = []
     for name in names:
-        options = _options(regressors, None if name == "osarses" else candidates)
+        options = _options(regressors, None if name == "osarses" else candidates, objective, contribution)
         if name == "osarses":
             options = options.model_copy(update={"tries": candidates or 0})
         for which in _seed_list(seed, seeds):
@@ -340,10 +345,17 @@ def _changes(text: str | None, option: str) -> tuple[tuple[int, int], ...]:
         raise typer.BadParameter(str(error), param_hint=option) from None
 
 
-def _options(regressors: str, candidates: int | None) -> PlannerOptions:
-    if regressors not in ("map", "polynomial"):
-        raise typer.BadParameter(f"{regressors!r} is neither map nor polynomial", param_hint="--regressors")
-    settings: dict[str, Any] = {"regressors": regressors}
+def _options(
+    regressors: str, candidates: int | None, objective: str = "full", contribution: str = "vehicle"
+) -> PlannerOptions:
+    for name, value, known in (
+        ("regressors", regressors, ("map", "polynomial")),
+        ("objective", objective, TERMS),
+        ("contribution", contribution, ("team", "vehicle")),
+    ):
+        if value not in known:
+            raise typer.BadParameter(f"{value!r} is none of {', '.join(known)}", param_hint=f"--{name}")
+    settings: dict[str, Any] = {"regressors": regressors, "objective": objective, "contribution": contribution}
     if candidates is not None:
         settings["candidates"] = max(4, candidates)
     return PlannerOptions(**settings)

@@ -9,17 +9,17 @@ import numpy as np
 from app.evaluation.cube_world import DEEPEST, SHALLOWEST, ExploreScenario, World, names_of
 from app.evaluation.osarses import Osarses
 from app.evaluation.teams import LimitedTeam, UnlimitedTeam
-from app.exploration.objective import ObjectiveWeights
+from app.evaluation.tries import GradientTrier, Trier
 from app.exploration.options import PlannerOptions
-from app.exploration.planners import PLANNERS, create_planner
+from app.exploration.planners import ONLY_IN_SIMULATION, PLANNERS, create_planner
 from app.exploration.planners.base import PlannerBase
 from app.exploration.problem import Situation
 
-OSARSES = "osarses"
+OSARSES, TRIED_SPSA, TRIED_FDSA = ONLY_IN_SIMULATION
+EXPLORERS = (*sorted(PLANNERS), *ONLY_IN_SIMULATION)
+
 UNSEEN_DEPTH = (DEEPEST + SHALLOWEST) / 2
 """What a landmark that nobody has seen is taken to be, where errors are summed."""
-
-EXPLORERS = (*sorted(PLANNERS), OSARSES)
 
 
 @dataclass(frozen=True)
@@ -56,23 +56,17 @@ def run_explore(
     planner: str,
     options: PlannerOptions,
     progress: Callable[[int], None] = lambda step: None,
-    weights: ObjectiveWeights = ObjectiveWeights(),  # noqa: B008 - frozen
 ) -> ExploreRun:
-    """Run the closed loop with a planner by name, or ``osarses`` with ``options.tries`` real tries per step.
+    """Run the closed loop with one of ``EXPLORERS``; ``osarses`` makes ``options.tries`` real tries per step.
 
-    ``weights`` are those of the objective by which ``osarses`` judges its tries. It tries them on everything that is
-    known, so that it cannot be run with a limited capacity (ValueError).
+    Those that really try try on everything that is known: they cannot be run with a limited capacity (ValueError).
     """
-    if planner == OSARSES and scenario.capacity is not None:
-        raise ValueError("capacity: osarses tries its moves on everything that is known; leave the capacity out")
+    if planner in ONLY_IN_SIMULATION and scenario.capacity is not None:
+        raise ValueError(f"capacity: {planner} tries its moves on everything that is known; leave the capacity out")
     began = time.perf_counter()
     world = World(scenario)
     noise, choice = (np.random.default_rng([scenario.seed, k]) for k in (1, 2))
-    chooser: PlannerBase | Osarses = (
-        Osarses(world, options.tries, noise, weights)
-        if planner == OSARSES
-        else create_planner(planner, options, scenario.sensor)
-    )
+    chooser = _chooser(planner, options, world, noise)
     team = (
         LimitedTeam(world, scenario.capacity, scenario.message_loss, np.random.default_rng([scenario.seed, 5]))
         if scenario.capacity is not None
@@ -120,8 +114,16 @@ def run_explore(
         wall_s=time.perf_counter() - began,
         plan_ms_median=1e3 * float(np.median(plan_s)),
         plan_ms_p99=1e3 * float(np.quantile(plan_s, 0.99)),
-        real_tries=options.tries * scenario.steps if planner == OSARSES else 0,
+        real_tries=chooser.real_tries if isinstance(chooser, Trier) else 0,
         broken_constraints=broken,
         capacity=scenario.capacity,
         message_bytes=team.sent_bytes,
     )
+
+
+def _chooser(planner: str, options: PlannerOptions, world: World, noise: np.random.Generator) -> PlannerBase | Trier:
+    if planner == OSARSES:
+        return Osarses(world, options.tries, noise, options.objective)
+    if planner in (TRIED_SPSA, TRIED_FDSA):
+        return GradientTrier("spsa" if planner == TRIED_SPSA else "fdsa", world, noise, options.objective)
+    return create_planner(planner, options, world.scenario.sensor)

@@ -1,65 +1,53 @@
 """OSARSES (AURO15 algorithm 1): really try C random feasible moves in simulation, take the best. A yardstick only."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from app.evaluation.cube_world import World
+from app.evaluation.tries import Trier
 from app.exploration.bottom import Bottom
-from app.exploration.objective import ObjectiveWeights, VehicleProgress
+from app.exploration.objective import Terms
 from app.exploration.problem import Proposal, Situation
+
+FloatArray = NDArray[np.float64]
 
 DRAWS = 64
 """Random moves drawn at once; those that are not feasible do not count as tries."""
 
 MAX_DRAWS = 20_000
+SPREAD = 0.6
+"""Standard deviation of a move per coordinate, as a fraction of the largest step; longer moves are shortened to it."""
 
 
-class Osarses:
-    """Stands where a planner stands, but looks into the simulated world, which no planner can.
+class Osarses(Trier):
+    """Takes the best of ``tries`` random feasible moves and of staying; 0 tries are one random feasible move.
 
-    ``tries`` = 0 is one random feasible move per step; ``weights`` switch terms of the objective off (AURO15 fig. 2).
+    That the team may stay is what makes plain J a deadlock: where nobody can gain, no move is better than none.
     """
 
-    def __init__(
-        self,
-        world: World,
-        tries: int,
-        rng: np.random.Generator,
-        weights: ObjectiveWeights = ObjectiveWeights(),  # noqa: B008 - frozen
-    ) -> None:
-        self._world = world
+    def __init__(self, world: World, tries: int, rng: np.random.Generator, terms: Terms = "full") -> None:
+        super().__init__(world, rng, terms)
         self._tries = tries
-        self._noise = rng
-        self._weights = weights
-        self._progress: list[VehicleProgress] = []
-        self._names: tuple[str, ...] = ()
 
-    def propose(self, situation: Situation, rng: np.random.Generator) -> Proposal:
-        """Return the best of the configurations tried."""
-        if situation.vehicles != self._names:  # progress is told per vehicle
-            self._progress, self._names = [], situation.vehicles
-        wanted = max(1, self._tries)
-        candidates = self._feasible(situation, wanted, rng)
+    def _decide(self, situation: Situation, rng: np.random.Generator) -> Proposal:
+        moves = self._feasible(situation, max(1, self._tries), rng)
         if self._tries == 0:
-            return Proposal(candidates[0], 0.0)
-        world, before = self._world, int(self._world.landmarks.accurate.sum())
-        outcomes = []
-        for positions in candidates:
-            cleared = world.clear(positions)
-            landmarks = world.measure(cleared, world.landmarks, self._noise)
-            outcomes.append(world.evaluate(cleared, landmarks, before, self._progress, self._weights))
+            return Proposal(moves[0], 0.0)
+        candidates = [situation.positions, *moves]
+        outcomes = [self._try(positions) for positions in candidates]
+        self.real_tries -= 1  # to stay is not to try a move
         best = int(np.argmax([outcome.total for outcome in outcomes]))
-        self._progress = [*self._progress[-1:], outcomes[best].progress]
         return Proposal(candidates[best], outcomes[best].total, outcomes[best].terms)
 
-    def _feasible(self, situation: Situation, wanted: int, rng: np.random.Generator) -> np.ndarray:
+    def _feasible(self, situation: Situation, wanted: int, rng: np.random.Generator) -> FloatArray:
         origin, constraints = situation.positions, situation.constraints
         bottom = Bottom.from_landmarks(situation.belief.xy_m, situation.belief.depth_m)
-        found: list[np.ndarray] = []
+        step = constraints.max_step_m * (1 - 1e-9)
+        found: list[FloatArray] = []
         for _ in range(MAX_DRAWS // DRAWS):
-            direction = rng.standard_normal((DRAWS, *origin.shape))
-            direction /= np.linalg.norm(direction, axis=2, keepdims=True)
-            length = constraints.max_step_m * (1 - 1e-9) * rng.random((DRAWS, len(origin), 1)) ** (1 / 3)
-            moves = origin + direction * length
+            move = SPREAD * step * rng.standard_normal((DRAWS, *origin.shape))
+            move *= np.minimum(1.0, step / np.linalg.norm(move, axis=2, keepdims=True))
+            moves = origin + move
             found.extend(moves[constraints.feasible(origin, moves, bottom)])
             if len(found) >= wanted:
                 break

@@ -55,8 +55,10 @@ class Bottom:
         cols, rows = (int(k) for k in np.ceil((high - low) / spacing + 1e-9).astype(int) + 1)
         west, south = low - spacing / 2
         east, north = np.meshgrid(west + (np.arange(cols) + 0.5) * spacing, south + (np.arange(rows) + 0.5) * spacing)
-        distance, nearest = cKDTree(xy_m[known]).query(np.column_stack([east.ravel(), north.ravel()]))
-        depth = np.where(distance <= 2 * spacing, depth_m[known][nearest], np.nan)
+        tree = cKDTree(xy_m[known], balanced_tree=False, compact_nodes=False)
+        cells = np.column_stack([east.ravel(), north.ravel()])
+        _, nearest = tree.query(cells, distance_upper_bound=np.nextafter(2 * spacing, np.inf))
+        depth = np.append(depth_m[known], np.nan)[nearest]
         return cls(float(west), float(south), spacing, depth.reshape(rows, cols))
 
     def at(self, en_m: FloatArray) -> FloatArray:

@@ -13,7 +13,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from app.exploration.bottom import Bottom
-from app.exploration.geometry import enters, inside, leaves, signed_distance
+from app.exploration.geometry import convex, enters, inside, leaves, signed_distance
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -261,6 +261,7 @@ def _excess(
     n_candidates, n, _ = candidates.shape
     out = np.zeros((n_candidates, n, 10))
     area_now = np.empty(n)
+    round_area = convex(area)
     forbidden_now = np.zeros(n)
     for i in range(n):
         area_now[i] = signed_distance(area, origin[i, 0], origin[i, 1])
@@ -273,7 +274,8 @@ def _excess(
             bx, by, bz = candidates[c, i, 0], candidates[c, i, 1], candidates[c, i, 2]
             outside = signed_distance(area, bx, by)
             out[c, i, 0] = max(0.0, outside)
-            if area_now[i] <= 1e-6 and outside <= 1e-6 and leaves(area, ax, ay, bx, by, 1e-6):
+            within = area_now[i] <= 1e-6 and outside <= 1e-6
+            if within and not round_area and leaves(area, ax, ay, bx, by, 1e-6):
                 out[c, i, 1] = np.inf
             for z in range(len(starts) - 1):
                 zone = keep_out[starts[z] : starts[z + 1]]

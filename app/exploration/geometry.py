@@ -57,6 +57,17 @@ def signed_distance(polygon: FloatArray, x: float, y: float) -> float:
 
 
 @njit(cache=True, nogil=True)
+def convex(polygon: FloatArray) -> bool:
+    """Whether no vertex of the (simple, counter-clockwise) polygon points inwards."""
+    n = polygon.shape[0]
+    for i in range(n):
+        a, b, c = polygon[i], polygon[(i + 1) % n], polygon[(i + 2) % n]
+        if (b[0] - a[0]) * (c[1] - b[1]) - (b[1] - a[1]) * (c[0] - b[0]) < -1e-9:
+            return False
+    return True
+
+
+@njit(cache=True, nogil=True)
 def _side(ax: float, ay: float, bx: float, by: float, px: float, py: float) -> float:
     return (bx - ax) * (py - ay) - (by - ay) * (px - ax)
 

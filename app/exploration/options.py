@@ -4,6 +4,8 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from app.exploration.objective import Terms
+
 
 class PlannerOptions(BaseModel):
     """Settings of the planners. Every planner reads those that concern it."""
@@ -14,8 +16,24 @@ class PlannerOptions(BaseModel):
         "map",
         description="What CAO's estimator is linear in: predictions from the current map, or powers of raw positions.",
     )
+    objective: Terms = Field(
+        "full",
+        description="What CAO measures after each step where landmarks are seen: AURO15's objective up to one of its "
+        "terms, or MED13's cost.",
+    )
+    contribution: Literal["team", "vehicle"] = Field(
+        "vehicle",
+        description="What CAO learns from where landmarks are seen: the team's objective, or for each vehicle the "
+        "difference that its last move made to it.",
+    )
+    degree: int = Field(1, ge=1, le=3, description="Highest power of a vehicle's position in polynomial regressors.")
     candidates: int = Field(48, ge=4, le=10_000, description="Candidates per vehicle that CAO weighs in a step (N).")
-    window: int = Field(30, ge=2, le=1000, description="Past steps to which CAO fits its estimator (L + T_h).")
+    window: int | None = Field(
+        None,
+        ge=2,
+        le=1000,
+        description="Past steps to which CAO fits its estimator (L + T_h); by default 30, with polynomials 15.",
+    )
     alpha: float = Field(1.0, gt=0, le=10, description="First size of random moves, as a fraction of the largest step.")
     alpha_decay: float = Field(
         0.6,

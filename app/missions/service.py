@@ -14,7 +14,7 @@ import orjson
 import structlog
 
 from app.exploration.options import PlannerOptions
-from app.exploration.planners import PLANNERS
+from app.exploration.planners import ONLY_IN_SIMULATION, PLANNERS, REFUSAL
 from app.exploration.planners import warm_up as planning_warm_up
 from app.mapping.georeference import LocalFrame
 from app.mapping.gp import warm_up as mapping_warm_up
@@ -611,10 +611,11 @@ class MissionService:
         await live.journal.log(level, "state", words, state=state, actor=actor)
 
     def _check_planner(self, spec: MissionSpec) -> None:
-        if spec.planner.name not in PLANNERS:
-            raise InvalidRequestError(
-                "planner.name", f"there is no planner {spec.planner.name!r}", f"use one of {', '.join(PLANNERS)}"
-            )
+        name, use = spec.planner.name, f"use one of {', '.join(PLANNERS)}"
+        if name in ONLY_IN_SIMULATION:
+            raise InvalidRequestError("planner.name", REFUSAL.format(name=name), use)
+        if name not in PLANNERS:
+            raise InvalidRequestError("planner.name", f"there is no planner {name!r}", use)
 
     def _check_vehicle(self, vehicle: VehicleSpec, spec: MissionSpec, path: str) -> None:
         prefix = f"{path}." if path else ""

@@ -15,7 +15,14 @@ from app.exploration.problem import Belief, Situation
 from app.exploration.regressors.survey import expected_variability
 
 QUICK = {"search": 30, "candidates": 24}
-KINDS = [("cao", "map"), ("cao", "polynomial"), ("lawnmower", "map"), ("random", "map")]
+KINDS = [
+    ("cao", "map"),
+    ("cao", "polynomial"),
+    ("lawnmower", "map"),
+    ("random", "map"),
+    ("spsa", "map"),
+    ("fdsa", "map"),
+]
 SENSORS = [SingleBeam(), RangeSensor(visibility_m=25.0)]
 
 
@@ -111,8 +118,13 @@ def test_a_foreign_memory_is_refused(name, memory):
 
 
 def test_an_unknown_planner_is_refused_with_the_known_ones():
-    with pytest.raises(ValueError, match="choose one of cao, lawnmower, random"):
+    with pytest.raises(ValueError, match="choose one of cao, fdsa, lawnmower, random, spsa"):
         create_planner("magic")
+
+
+def test_a_yardstick_that_really_tries_its_moves_is_refused_with_the_reason():
+    with pytest.raises(ValueError, match="osarses really tries its moves"):
+        create_planner("osarses")
 
 
 @pytest.mark.parametrize("kind", KINDS, ids="-".join)

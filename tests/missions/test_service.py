@@ -426,6 +426,7 @@ async def test_a_vehicle_that_comes_back_later_is_told_that_it_takes_no_part(ser
     ("changes", "field"),
     [
         ({"planner": {"name": "oracle"}}, "planner.name"),
+        ({"planner": {"name": "osarses"}}, "planner.name"),
         ({"vehicles": [{"name": "a", "kind": "imc"}]}, "vehicles.0.kind"),
         ({"vehicles": [{"name": "a", "kind": "rest", "depth_m": 31}]}, "vehicles.0.depth_m"),
     ],

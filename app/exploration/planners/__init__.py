@@ -8,14 +8,21 @@ from app.exploration.options import PlannerOptions
 from app.exploration.planners.base import PlannerBase
 from app.exploration.planners.cao import CaoPlanner
 from app.exploration.planners.formation import FormationLawnmower
+from app.exploration.planners.gradient import FdsaPlanner, SpsaPlanner
 from app.exploration.planners.lawnmower import LawnmowerPlanner
 from app.exploration.planners.random_walk import RandomPlanner
 from app.exploration.planners.rollout import RolloutPlanner
 from app.exploration.problem import Belief, Situation
 
 PLANNERS: dict[str, type[PlannerBase]] = {
-    planner.name: planner for planner in (CaoPlanner, LawnmowerPlanner, RandomPlanner, RolloutPlanner)
+    planner.name: planner
+    for planner in (CaoPlanner, LawnmowerPlanner, RandomPlanner, RolloutPlanner, SpsaPlanner, FdsaPlanner)
 }
+
+ONLY_IN_SIMULATION = ("osarses", "spsa-tried", "fdsa-tried")
+"""Yardsticks that really try their moves and take them back, as only ``bathyfleet evaluate explore`` can."""
+
+REFUSAL = "{name} really tries its moves before it takes one, which only bathyfleet evaluate explore can simulate"
 
 
 def create_planner(
@@ -39,6 +46,8 @@ def create_planner(
     ValueError
         When there is no planner of that name.
     """
+    if name in ONLY_IN_SIMULATION:
+        raise ValueError(f"planner: {REFUSAL.format(name=name)}")
     try:
         planner = PLANNERS[name]
     except KeyError:

@@ -23,12 +23,19 @@ from app.exploration.regressors.survey import SurveyRegressors
 
 FloatArray = NDArray[np.float64]
 
+WINDOW = 30
+POLYNOMIAL_WINDOW = 15
+"""Steps to which theta is fitted unless the options say otherwise: a polynomial only holds close by."""
+
 
 class Regressors(Protocol):
     """What CAO's estimator is linear in, with the candidates that it makes sense to ask about."""
 
-    def begin(self, team: Situation, bottom: Bottom, seed: int) -> float:
-        """Take up a new situation; return the objective measured for the last choice (NaN when there was none)."""
+    def begin(self, team: Situation, bottom: Bottom, seed: int) -> float | FloatArray:
+        """Take up a new situation; return the objective measured for the last choice (NaN when there was none).
+
+        Where the options say so, each vehicle's contribution to it instead, (n_vehicles,).
+        """
         ...
 
     def prior(self, team: Situation) -> tuple[FloatArray, float]:
@@ -69,7 +76,8 @@ class CaoPlanner(PlannerBase):
         super().__init__(options, sensor)
         self._model = self._regressors()
         self._history: list[Any] = []
-        self._last: list[float] | None = None
+        self._last: list[list[float]] = []
+        self._by_vehicle = options.contribution == "vehicle" and not self._surveys
         self._size = MoveSize(options.alpha, options.alpha_decay, options.alpha_floor)
 
     def _regressors(self) -> Regressors:
@@ -80,15 +88,20 @@ class CaoPlanner(PlannerBase):
         return LandmarkRegressors(self.options, self.sensor)
 
     def _decide(self, team: Situation, bottom: Bottom, seed: int) -> Proposal:
-        J = self._model.begin(team, bottom, seed)
+        measured = np.atleast_1d(self._model.begin(team, bottom, seed))
         prior, stiffness = self._model.prior(team)
-        estimator = Estimator(prior, stiffness, max(self.options.window, len(prior) + 5))
+        default = POLYNOMIAL_WINDOW if self.options.regressors == "polynomial" else WINDOW
+        window = self.options.window or default
+        rows = len(team.vehicles) if self._by_vehicle else 1
+        estimator = Estimator(prior, stiffness, max(rows * window, len(prior) + 5))
         estimator.recall([row for row in self._history if len(row[0]) == len(prior)])
-        if self._last is not None and len(self._last) == len(prior):
-            estimator.observe(np.array(self._last), J)
+        if len(self._last) == len(measured):
+            for row, J in zip(self._last, measured, strict=True):
+                if len(row) == len(prior):
+                    estimator.observe(np.array(row), float(J))
         theta = self._model.trusted(estimator.theta)
 
-        candidates = self._model.candidates(self._size.next(gained=not J <= 0.0))
+        candidates = self._model.candidates(self._size.next(gained=not measured.sum() <= 0.0))
         feasible = candidates[team.constraints.feasible(team.positions, candidates, bottom)]
         if len(feasible) == 0:
             positions, _ = settle(team, bottom, candidates)
@@ -99,9 +112,21 @@ class CaoPlanner(PlannerBase):
 
         self._model.chosen(feasible[best])
         self._history = estimator.remember()
-        self._last = [float(x) for x in phi[best]]
+        self._last = self._explained(team, feasible[best], phi[best]).tolist()
         terms = {f"theta_{k}": float(x) for k, x in enumerate(theta)} if len(theta) <= 8 else {}
         return Proposal(feasible[best], float(J_hat[best]), {"feasible": float(len(feasible)), **terms})
+
+    def _explained(self, team: Situation, chosen: FloatArray, phi: FloatArray) -> FloatArray:
+        """Return the regressors (k, L) of the figures (k,) that will be measured after this choice.
+
+        For contributions these are the differences that the vehicles' moves make to phi, as the estimator is linear.
+        """
+        if not self._by_vehicle:
+            return phi[None]
+        left_behind = np.repeat(chosen[None], len(chosen), axis=0)
+        each = np.arange(len(chosen))
+        left_behind[each, each] = team.positions
+        return phi - self._model.regressors(left_behind)
 
     def _remember(self) -> dict[str, Any]:
         return {
@@ -114,5 +139,5 @@ class CaoPlanner(PlannerBase):
     def _recall(self, state: dict[str, Any]) -> None:
         self._model.recall(state["model"])
         self._history = list(state["history"])
-        self._last = None if state["last"] is None else [float(x) for x in state["last"]]
+        self._last = [[float(x) for x in row] for row in state["last"]]
         self._size.t, self._size.raised = (int(k) for k in state["size"])

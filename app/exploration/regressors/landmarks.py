@@ -9,7 +9,6 @@ different ones under a communication limit would hold each other back for ever.
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
@@ -17,8 +16,9 @@ from app.estimation import RangeSensor, Sensor
 from app.exploration.bottom import Bottom
 from app.exploration.measured import MeasuredObjective
 from app.exploration.options import PlannerOptions
-from app.exploration.planners.base import vehicle_rng
 from app.exploration.problem import Situation
+from app.exploration.regressors.landmark_predictions import predict, within_reach
+from app.exploration.regressors.moves import team_moves
 
 FloatArray = NDArray[np.float64]
 
@@ -34,11 +34,11 @@ class LandmarkRegressors:
             raise ValueError(f"sensor: landmark regressors need a RangeSensor, not {type(sensor).__name__}")
         self._options = options
         self._sensor = sensor
-        self._measured = MeasuredObjective(sensor)
+        self._measured = MeasuredObjective(sensor, options)
         self._accurate = 0
         self._idle = 0
 
-    def begin(self, team: Situation, bottom: Bottom, seed: int) -> float:
+    def begin(self, team: Situation, bottom: Bottom, seed: int) -> FloatArray:
         """See :class:`app.exploration.planners.cao.Regressors`."""
         self._team, self._seed = team, seed
         belief = team.belief
@@ -46,7 +46,9 @@ class LandmarkRegressors:
         depth = belief.depth_m.copy()
         known = np.isfinite(depth)
         if known.any() and not known.all():
-            _, nearest = cKDTree(belief.xy_m[known]).query(belief.xy_m[~known])
+            _, nearest = cKDTree(belief.xy_m[known], balanced_tree=False, compact_nodes=False).query(
+                belief.xy_m[~known]
+            )
             depth[~known] = depth[known][nearest]
         elif not known.any():
             depth[:] = team.positions[:, 2].max() + self._sensor.visibility_m / 2
@@ -76,23 +78,21 @@ class LandmarkRegressors:
         """Whole steps, the team's common heading mixed with each vehicle's own, and random moves of size alpha."""
         team, step = self._team, self._team.constraints.max_step_m * (1 - 1e-9)
         n = self._options.candidates * len(team.vehicles)
-        own = [vehicle_rng(self._seed, name).standard_normal((n, 3)) for name in team.vehicles]
-        common = np.random.default_rng([self._seed, 2]).standard_normal((n, 1, 3))
-        mix = np.linspace(0.0, 1.0, n)[:, None, None]
-        zeta = mix * common + (1.0 - mix) * np.stack(own, axis=1)
-        length = np.maximum(np.linalg.norm(zeta, axis=2, keepdims=True), 1e-12)
-        whole = (np.arange(n) % 4 != 3)[:, None, None]
-        moves = np.where(whole, step * zeta / length, alpha * step * zeta)
-        moves *= np.minimum(1.0, step / np.maximum(np.linalg.norm(moves, axis=2, keepdims=True), 1e-12))
-        return team.positions + moves
+        return team.positions + team_moves(self._seed, team.vehicles, n, 3, step, alpha)
 
     def regressors(self, candidates: FloatArray) -> FloatArray:
         """See the module's text."""
         if len(self._points) == 0:
             return np.zeros((len(candidates), 3))
-        return _predict(
-            np.ascontiguousarray(candidates),
-            self._points,
+        configurations = np.ascontiguousarray(candidates)
+        reach = np.linalg.norm(configurations - self._team.positions, axis=2).max(axis=0, initial=0.0)
+        starts, index = within_reach(self._team.positions, self._points, reach, self._sensor.visibility_m)
+        return predict(
+            self._team.positions,
+            configurations,
+            self._points[index],
+            index,
+            starts,
             self._needed,
             self._goals,
             self._sensor.visibility_m,
@@ -111,42 +111,3 @@ class LandmarkRegressors:
         """Take up what :meth:`remember` returned."""
         self._measured.recall(state["measured"])
         self._accurate, self._idle = int(state["accurate"]), int(state["idle"])
-
-
-@njit(cache=True, nogil=True)
-def _predict(
-    candidates: FloatArray,
-    points: FloatArray,
-    needed: FloatArray,
-    goals: FloatArray,
-    visibility: float,
-    noise: float,
-    step: float,
-) -> FloatArray:
-    c, n, _ = candidates.shape
-    v2 = visibility * visibility
-    common = len(goals) == 1
-    out = np.zeros((c, 3))
-    closest = np.empty(n)
-    for k in range(c):
-        closest[:] = np.inf
-        for m in range(len(points)):
-            information = 0.0
-            for i in range(n):
-                dx = candidates[k, i, 0] - points[m, 0]
-                dy = candidates[k, i, 1] - points[m, 1]
-                dz = points[m, 2] - candidates[k, i, 2]
-                r2 = dx * dx + dy * dy + dz * dz
-                if r2 < v2:
-                    information += dz * dz / (noise * noise * r2 * r2 + 1e-12)
-                closest[i] = min(closest[i], r2)
-            if information > 0.0:
-                progress = min(1.0, information / needed[m])
-                out[k, 0] += progress
-                if progress >= 1.0:
-                    out[k, 1] += 1.0
-        for i in range(n):
-            if common:
-                closest[i] = ((candidates[k, i] - goals[0]) ** 2).sum()
-            out[k, 2] -= np.sqrt(closest[i]) / step
-    return out

@@ -19,6 +19,7 @@ from scipy.spatial import cKDTree
 
 from app.exploration.bottom import Bottom
 from app.exploration.constraints import inside_area
+from app.exploration.geometry import convex
 from app.exploration.options import PlannerOptions
 from app.exploration.planners.base import vehicle_rng
 from app.exploration.planners.handover import hand_over
@@ -191,7 +192,7 @@ class SurveyRegressors:
         return improve(
             self._d2, self._px, self._py, self._nodes.weight, self._en, self._headings, roomy, counts, locked,
             self._step_m, self._steps, self._scale, POWER, TURN_PENALTY, self._spacing, area, flat, starts,
-            _convex(area), MARGIN_M, rng.random((tries, DRAWS)),
+            convex(area), MARGIN_M, rng.random((tries, DRAWS)),
         )  # fmt: skip
 
     @property
@@ -307,9 +308,3 @@ def thin_nodes(team: Situation, variability: FloatArray) -> Nodes:
 def _cell(xy: FloatArray) -> float:
     size = np.ptp(xy, axis=0)
     return float(np.sqrt(max(size[0], 1e-9) * max(size[1], 1e-9) / len(xy)))
-
-
-def _convex(polygon: FloatArray) -> bool:
-    edges = np.roll(polygon, -1, axis=0) - polygon
-    after = np.roll(edges, -1, axis=0)
-    return bool((edges[:, 0] * after[:, 1] - edges[:, 1] * after[:, 0] >= -1e-9).all())

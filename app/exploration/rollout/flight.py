@@ -1,8 +1,8 @@
 """Flies a team plan over the estimated floor, step by step under the constraints, and foretells when all is done.
 
 A plan is a list of *team waypoints*: the horizontal positions of all vehicles, shape (n_vehicles, 2), and a height
-above the smoothed floor. Between two of them every vehicle goes straight, all arriving at the same time: links that hold
-at both waypoints then hold all the way, because a distance between two points that move evenly is convex in time.
+above the smoothed floor. Between two of them every vehicle goes straight, all arriving at the same time: links that
+hold at both waypoints then hold all the way, because a distance between two points that move evenly is convex in time.
 """
 
 from typing import NamedTuple
@@ -17,7 +17,7 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 WORTH_OF_EARLY = 2.5
-"""Steps that a plan may take longer for one step's whole remainder done earlier: sum over time of the part remaining."""
+"""What the sum over time of the part that remains counts, against a step more in the end: early gains are surer."""
 
 PER_WAYPOINT = 0.05
 """Steps that a simpler plan is preferred by, per waypoint."""
@@ -218,7 +218,7 @@ def fly_step(
     reach = step
     there = np.empty((n, 2))
     after = k
-    for trial in range(CLIMB_PASSES):
+    for _ in range(CLIMB_PASSES):
         after = advance(here, plan, k, count, reach, rules.cut_corners, there)
         height = plan.height_m[min(k, count - 1)]
         for i in range(n):

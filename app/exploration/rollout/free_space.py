@@ -1,4 +1,4 @@
-"""Where vehicles may be, on a fine raster: pushes waypoints to allowed places and finds ways round what is forbidden."""
+"""Where vehicles may be, on a fine raster: moves waypoints to allowed places, finds ways round what is forbidden."""
 
 from typing import NamedTuple
 

@@ -965,6 +965,26 @@ export interface components {
              */
             regressors: "map" | "polynomial";
             /**
+             * Objective
+             * @description What CAO measures after each step where landmarks are seen: AURO15's objective up to one of its terms, or MED13's cost.
+             * @default full
+             * @enum {string}
+             */
+            objective: "J" | "J+J1" | "J+J1+J2" | "full" | "med13";
+            /**
+             * Contribution
+             * @description What CAO learns from where landmarks are seen: the team's objective, or for each vehicle the difference that its last move made to it.
+             * @default vehicle
+             * @enum {string}
+             */
+            contribution: "team" | "vehicle";
+            /**
+             * Degree
+             * @description Highest power of a vehicle's position in polynomial regressors.
+             * @default 1
+             */
+            degree: number;
+            /**
              * Candidates
              * @description Candidates per vehicle that CAO weighs in a step (N).
              * @default 48
@@ -972,10 +992,9 @@ export interface components {
             candidates: number;
             /**
              * Window
-             * @description Past steps to which CAO fits its estimator (L + T_h).
-             * @default 30
+             * @description Past steps to which CAO fits its estimator (L + T_h); by default 30, with polynomials 15.
              */
-            window: number;
+            window?: number | null;
             /**
              * Alpha
              * @description First size of random moves, as a fraction of the largest step.
