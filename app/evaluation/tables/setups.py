@@ -19,7 +19,6 @@ HISTORY_EVERY = 5
 """Steps between the values of the history that is kept."""
 
 
-
 @dataclass(frozen=True)
 class Setup:
     """One way of running the scenario.

@@ -208,9 +208,7 @@ def _keep_links(at: FloatArray, chain: IntArray, com_range: float) -> None:
 
 
 @njit(cache=True, nogil=True)
-def fly_step(
-    at: FloatArray, plan: Plan, k: int, count: int, floor: Floor, rules: Rules, out: FloatArray
-) -> int:
+def fly_step(at: FloatArray, plan: Plan, k: int, count: int, floor: Floor, rules: Rules, out: FloatArray) -> int:
     """Fly one step from ``at`` (n_vehicles, 3) into ``out``; return the index of the next waypoint to be reached."""
     n = len(at)
     step = rules.step_m * (1.0 - 1e-9)
@@ -364,7 +362,7 @@ def fly_plan(
     if left > work.allowed:
         score += UNFINISHED + (horizon if t >= horizon else 0.0)
         score += leftover(at, work, rules, left_need)
-    return score
+    return float(score)
 
 
 @njit(cache=True, nogil=True)

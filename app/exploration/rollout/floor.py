@@ -23,7 +23,6 @@ ENVELOPE_SLOPE = 1.2
 """Steepest climb that plans rely on: rise over run."""
 
 
-
 MARGIN = 0.1
 """Clearance that plans add to the required one, in visibilities, because the floor is an estimate."""
 

@@ -254,9 +254,7 @@ def improve(
         if changed < 0:
             continue
         origin = min(first, count)
-        value = fly_plan(
-            course, origin, trial, changed, work, floor, rules, horizon, score, trial_need, trial_course
-        )
+        value = fly_plan(course, origin, trial, changed, work, floor, rules, horizon, score, trial_need, trial_course)
         if value < score:
             score = value
             count = changed
