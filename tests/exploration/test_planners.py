@@ -14,7 +14,7 @@ from app.exploration.planners import PLANNERS, create_planner
 from app.exploration.problem import Belief, Situation
 from app.exploration.regressors.survey import expected_variability
 
-QUICK = {"search": 30, "candidates": 24}
+QUICK = {"search": 30, "candidates": 24, "rollouts": 20}
 KINDS = [
     ("cao", "map"),
     ("cao", "polynomial"),
@@ -22,6 +22,7 @@ KINDS = [
     ("random", "map"),
     ("spsa", "map"),
     ("fdsa", "map"),
+    ("rollout", "map"),
 ]
 SENSORS = [SingleBeam(), RangeSensor(visibility_m=25.0)]
 

@@ -35,7 +35,8 @@ def create_planner(
     Parameters
     ----------
     name : str
-        One of ``PLANNERS``. A lawnmower with landmark sensors flies as one formation.
+        One of ``PLANNERS``. A lawnmower with landmark sensors flies as one formation. ``rollout`` with a bathymeter
+        is ``cao``: its survey regressors are a plan of the whole mission already.
     options : PlannerOptions
         Its settings.
     sensor : RangeSensor or SingleBeam
@@ -54,11 +55,13 @@ def create_planner(
         raise ValueError(f"planner: there is no {name!r}; choose one of {', '.join(sorted(PLANNERS))}") from None
     if planner is LawnmowerPlanner and isinstance(sensor, RangeSensor):
         return FormationLawnmower(options, sensor)
+    if planner is RolloutPlanner and not isinstance(sensor, RangeSensor):
+        return CaoPlanner(options, sensor)
     return planner(options, sensor)
 
 
-def warm_up() -> None:
-    """Compile everything the planners need (or load it from the cache), so that no mission step waits for it."""
+def warm_up(*sensors: Sensor) -> None:
+    """Compile what the planners need for these sensors (or load it from the cache), so that no step waits for it."""
     area = np.array([[0.0, 0.0], [20.0, 0.0], [20.0, 20.0], [0.0, 20.0]])
     east, north = np.meshgrid(np.arange(2.0, 20.0, 4.0), np.arange(2.0, 20.0, 4.0))
     xy = np.column_stack([east.ravel(), north.ravel()])
@@ -67,6 +70,6 @@ def warm_up() -> None:
     constraints = Constraints(area, (np.array([[12.0, 12.0], [14.0, 12.0], [14.0, 14.0]]),), max_step_m=4.0)
     positions = np.array([[2.0, 2.0, 1.0], [6.0, 2.0, 1.0]])
     situation = Situation(1, 10, ("a", "b"), positions, np.full(2, np.nan), belief, positions[:, :2], constraints)
-    for sensor in (SingleBeam(), RangeSensor(visibility_m=8.0)):
+    for sensor in sensors:
         for name in tuple(PLANNERS):
             create_planner(name, sensor=sensor).propose(situation, np.random.default_rng(0))
