@@ -15,7 +15,7 @@ DRAWS = 64
 """Random moves drawn at once; those that are not feasible do not count as tries."""
 
 MAX_DRAWS = 20_000
-SPREAD = 0.6
+SPREAD = 0.5
 """Standard deviation of a move per coordinate, as a fraction of the largest step; longer moves are shortened to it."""
 
 
