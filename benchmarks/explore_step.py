@@ -102,7 +102,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--json", type=Path, help="also write the figures to this file")
     file = parser.parse_args().json
-    warm_up()
+    warm_up(RangeSensor())
     plan_ms(2, 1000, 100)
     table = Table("curve", "vehicles", "landmarks", "configurations", "median ms", "numpy ms", "of numpy")
     rows = []

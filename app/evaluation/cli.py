@@ -12,6 +12,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
+from app.estimation import Sensor, SingleBeam
 from app.evaluation.cube_world import COM_RANGE, ExploreScenario
 from app.evaluation.explore import EXPLORERS, OSARSES, run_explore
 from app.evaluation.jobs import Job, run_jobs
@@ -59,6 +60,11 @@ class ExploreJob:
         """Its length."""
         return self.scenario.steps
 
+    @property
+    def sensor(self) -> Sensor:
+        """What its vehicles measure with."""
+        return self.scenario.sensor
+
     def run(self, progress: StepProgress) -> dict[str, Any]:
         """Run it."""
         return asdict(run_explore(self.scenario, self.planner, self.options, progress))
@@ -83,6 +89,11 @@ class SurveyJob:
         """Its length."""
         return self.scenario.steps
 
+    @property
+    def sensor(self) -> Sensor:
+        """What its vehicles measure with."""
+        return SingleBeam(self.scenario.relative_noise)
+
     def run(self, progress: StepProgress) -> dict[str, Any]:
         """Run it."""
         result = asdict(run_survey(self.scenario, self.planner, self.options, progress, self.recorded))
@@ -94,7 +105,9 @@ class SurveyJob:
 @evaluate_app.command()
 def explore(
     terrain: TerrainFile,
-    planner: Annotated[str, typer.Option(help=f"One or more of {', '.join(EXPLORERS)}, separated by commas.")] = "cao",
+    planner: Annotated[
+        str, typer.Option(help=f"One or more of {', '.join(EXPLORERS)}, separated by commas.")
+    ] = "rollout",
     robots: Annotated[int, typer.Option(min=1, max=100)] = 3,
     landmarks: Annotated[
         str, typer.Option(help="Number of landmarks, spread at random; all: one per cell of the terrain file.")

@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from typing import Any, Protocol
 
+from app.estimation import Sensor
 from app.exploration.planners import warm_up
 
 Progress = Callable[[int], None]
@@ -23,6 +24,11 @@ class Job(Protocol):
         """Its length."""
         ...
 
+    @property
+    def sensor(self) -> Sensor:
+        """What its vehicles measure with."""
+        ...
+
     def run(self, progress: Progress) -> dict[str, Any]:
         """Run it, telling every step, and return the object of the command's JSON."""
         ...
@@ -36,13 +42,14 @@ def run_jobs(
     With one process ``progress`` is told every step of the job that runs; with several, each job once it is done.
     Processes are spawned, so nothing depends on what this one has loaded.
     """
-    warm_up()  # the spawned processes then find everything compiled
+    sensors = tuple(dict.fromkeys(job.sensor for job in jobs))
+    warm_up(*sensors)  # the spawned processes then find everything compiled
     if processes == 1 or len(jobs) < 2:
         for job in jobs:
             yield job.run(lambda step, job=job: progress(job, step))  # type: ignore[misc]
         return
     context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(min(processes, len(jobs)), context, warm_up) as pool:
+    with ProcessPoolExecutor(min(processes, len(jobs)), context, warm_up, sensors) as pool:
         for job, result in zip(jobs, pool.map(_run, jobs), strict=True):
             progress(job, job.steps)
             yield result

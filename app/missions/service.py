@@ -13,6 +13,7 @@ from typing import Literal
 import orjson
 import structlog
 
+from app.estimation import SingleBeam
 from app.exploration.options import PlannerOptions
 from app.exploration.planners import ONLY_IN_SIMULATION, PLANNERS, REFUSAL
 from app.exploration.planners import warm_up as planning_warm_up
@@ -715,7 +716,7 @@ class MissionService:
 def _warm_up() -> None:
     try:
         mapping_warm_up()
-        planning_warm_up()
+        planning_warm_up(SingleBeam())
     except Exception:
         # Then the first steps compile what they need, and tell what is wrong with it.
         log.exception("compiling ahead of the first mission failed")

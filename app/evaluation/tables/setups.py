@@ -6,6 +6,7 @@ from typing import Any
 
 import orjson
 
+from app.estimation import Sensor
 from app.evaluation.cube_world import ExploreScenario
 from app.evaluation.explore import OSARSES, run_explore
 from app.evaluation.jobs import Progress
@@ -247,6 +248,11 @@ class TableJob:
     def key(self) -> str:
         """What makes the run what it is, as text: equal keys, equal results."""
         return run_key(self.setup, self.terrain.name, self.seed, self.steps)
+
+    @property
+    def sensor(self) -> Sensor:
+        """What its vehicles measure with."""
+        return self.setup.scenario(self.terrain, self.seed, self.steps).sensor
 
     def run(self, progress: Progress) -> dict[str, Any]:
         """Run it; the history is thinned."""
