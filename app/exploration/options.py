@@ -47,7 +47,7 @@ class PlannerOptions(BaseModel):
     cruise_depth_m: float | None = Field(
         None, ge=0, description="Depth at which vehicles survey; by default the depth at which each joined."
     )
-    rollouts: int = Field(200, ge=0, le=100_000, description="Changes to the team's plan that a rollout step tries.")
+    rollouts: int = Field(300, ge=0, le=100_000, description="Changes to the team's plan that a rollout step tries.")
     tries: int = Field(0, ge=0, le=10_000, description="Real tries per step of OSARSES (only in simulation).")
     accuracy_sd_m: float = Field(
         0.02, gt=0, description="Standard deviation below which a landmark counts as accurately estimated."

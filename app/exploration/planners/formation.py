@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from app.estimation import RangeSensor, Sensor
 from app.exploration.bottom import Bottom
 from app.exploration.constraints import Constraints
+from app.exploration.felt_bottom import FeltBottom
 from app.exploration.lattice import longer_axis_rad
 from app.exploration.options import PlannerOptions
 from app.exploration.planners.base import PlannerBase, at_depth, settle
@@ -38,7 +39,6 @@ STEEPEST = 1.2
 """Slope at which vehicles climb ahead of rising ground."""
 
 DESCENT_OF_STEP = 0.6
-FELT_OF_STEP = 0.01
 ESCAPE_OF_STEP = 0.9
 """Of a step: how much a vehicle climbs that has just been lifted by its altimeter."""
 
@@ -81,9 +81,8 @@ class FormationLawnmower(PlannerBase):
         self._looks = 0
         self._idle = 0
         self._later: list[int] = []
-        self._asked: dict[str, list[float]] = {}
         self._space: RowSpace | None = None
-        self._touched = np.zeros((0, 3))
+        self._felt = FeltBottom()
         r = np.arange(-5, 6) * RING
         ring = np.stack(np.meshgrid(r, r), axis=-1).reshape(-1, 2)
         self._ring = ring[np.hypot(*ring.T) <= LOOKOUT_OF_VISIBILITY] * self._reach
@@ -98,16 +97,14 @@ class FormationLawnmower(PlannerBase):
             "looks": self._looks,
             "idle": self._idle,
             "later": self._later,
-            "asked": self._asked,
-            "touched": self._touched,
+            "felt": self._felt.remember(),
         }
 
     def _recall(self, state: dict[str, Any]) -> None:
         self._names, self._row = tuple(state["names"]), np.array(state["row"], dtype=np.float64)
         self._route = np.array(state["route"], dtype=np.float64).reshape(-1, 3)
         self._order, self._later = ([int(k) for k in state[key]] for key in ("order", "later"))
-        self._asked = {str(k): [float(x) for x in v] for k, v in state["asked"].items()}
-        self._touched = np.array(state["touched"], dtype=np.float64).reshape(-1, 3)
+        self._felt.recall(state["felt"])
         self._target, self._looks, self._idle = (int(state[key]) for key in ("target", "looks", "idle"))
 
     def _decide(self, team: Situation, bottom: Bottom, seed: int) -> Proposal:
@@ -119,7 +116,7 @@ class FormationLawnmower(PlannerBase):
             self._form_up(team, space, gap)
         self._next_target(team, space, gap)
 
-        lifted = self._feel_bottom(team)
+        lifted = self._felt.feel(team)
         step = constraints.max_step_m * (1 - 1e-9)
         lag_now = self._lag(origin, space.slots(self._row))
         wishes, rows, passed, ranks = [], [], [], []
@@ -143,7 +140,7 @@ class FormationLawnmower(PlannerBase):
         if np.allclose(positions, wishes[taken]):
             self._row, self._route = rows[taken], self._route[passed[taken] :]
         moved = float(np.linalg.norm(positions - origin, axis=1).max())
-        self._asked = dict(zip(team.vehicles, positions.tolist(), strict=True))
+        self._felt.ask(team.vehicles, positions)
         self._idle = self._idle + 1 if moved < SLOT_TOLERANCE * step else 0
         return Proposal(positions, 0.0, {"left": float(len(self._route))})
 
@@ -155,17 +152,6 @@ class FormationLawnmower(PlannerBase):
 
     def _lag(self, positions: FloatArray, slots: FloatArray) -> float:
         return float(np.hypot(*(positions[:, :2] - slots[self._order]).T).max())
-
-    def _feel_bottom(self, team: Situation) -> BoolArray:
-        """Return which vehicles (n,) were lifted by their altimeters, and remember where the bottom is that near.
-
-        Ranges do not tell up from down: of a wall that rises above a vehicle the estimates are wrong.
-        """
-        asked = np.array([self._asked.get(name, at) for name, at in zip(team.vehicles, team.positions, strict=True)])
-        lifted = asked[:, 2] - team.positions[:, 2] > FELT_OF_STEP * team.constraints.max_step_m
-        felt = team.positions[lifted] + [0.0, 0.0, team.constraints.min_altitude_m]
-        self._touched = np.vstack([self._touched, felt])
-        return np.asarray(lifted, dtype=np.bool_)
 
     def _form_up(self, team: Situation, space: RowSpace, gap: float) -> None:
         """Begin a row where the vehicles are, and lay lines over what is unfinished."""
@@ -225,9 +211,9 @@ class FormationLawnmower(PlannerBase):
         wish = np.where(known, mean - HEIGHT_OF_VISIBILITY * self._reach, blind)
         safe = floor - CLEARANCE_FACTOR * constraints.min_altitude_m + STEEPEST * around
         wish = np.fmin(wish, np.fmin.reduce(safe, axis=1))
-        if len(self._touched):
-            away = np.hypot(*(slots[:, None] - self._touched[:, :2]).transpose(2, 0, 1))
-            above = self._touched[:, 2] - CLEARANCE_FACTOR * constraints.min_altitude_m + STEEPEST * away
+        if len(self._felt.points_m):
+            away = np.hypot(*(slots[:, None] - self._felt.points_m[:, :2]).transpose(2, 0, 1))
+            above = self._felt.points_m[:, 2] - CLEARANCE_FACTOR * constraints.min_altitude_m + STEEPEST * away
             wish = np.minimum(wish, above.min(axis=1))
             wish = np.where(lifted, np.minimum(wish, origin[:, 2] - ESCAPE_OF_STEP * step), wish)
         wish = np.minimum(wish, origin[:, 2] + DESCENT_OF_STEP * step)

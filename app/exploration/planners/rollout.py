@@ -15,6 +15,7 @@ from shapely import Polygon
 from app.estimation import RangeSensor, Sensor
 from app.exploration.bottom import Bottom
 from app.exploration.constraints import Constraints
+from app.exploration.felt_bottom import FeltBottom
 from app.exploration.options import PlannerOptions
 from app.exploration.planners.base import PlannerBase, settle
 from app.exploration.problem import Proposal, Situation
@@ -85,6 +86,7 @@ class RolloutPlanner(PlannerBase):
         self._heights: FloatArray = np.zeros(0)
         self._planned = 0
         self._free: tuple[Constraints, Free] | None = None
+        self._felt = FeltBottom()
 
     def _remember(self) -> dict[str, Any]:
         kept = self._kept
@@ -94,11 +96,13 @@ class RolloutPlanner(PlannerBase):
             "at_m": None if kept is None else kept.at_m,
             "chain": None if kept is None else kept.chain,
             "heights": self._heights,
+            "felt": self._felt.remember(),
         }
 
     def _recall(self, state: dict[str, Any]) -> None:
         self._names, self._planned = tuple(state["names"]), int(state["planned"])
         self._heights = np.array(state["heights"], dtype=np.float64)
+        self._felt.recall(state["felt"])
         self._kept = None
         if state["at_m"] is not None:
             at = np.array(state["at_m"], dtype=np.float64).reshape(-1, len(self._names), 2)
@@ -113,7 +117,10 @@ class RolloutPlanner(PlannerBase):
             self._names, self._planned = team.vehicles, 0
         if self._free is None or not _same(self._free[0], team.constraints):
             self._free = (team.constraints, free_space(team.constraints))
-        mission = _Mission(team, bottom, self._free[1], self._range, self.options, np.random.default_rng(seed))
+        self._felt.feel(team)
+        mission = _Mission(
+            team, bottom, self._felt.points_m, self._free[1], self._range, self.options, np.random.default_rng(seed)
+        )
         best = None
         if self._kept is not None and len(self._kept.at_m):
             best = mission.plan(self._kept, self._heights)
@@ -134,6 +141,7 @@ class RolloutPlanner(PlannerBase):
         self._kept = Backbone(best.plan.at_m[passed : best.count].copy(), best.plan.chain.copy())
         self._heights = best.plan.height_m[passed : best.count].copy()
         self._planned += 1
+        self._felt.ask(team.vehicles, positions)
         terms = {"finish": team.step - 1 + float(best.course.state[best.count, 0]), "waypoints": float(best.count)}
         return Proposal(positions, -best.score, terms)
 
@@ -160,6 +168,7 @@ class _Mission:
         self,
         team: Situation,
         bottom: Bottom,
+        felt_m: FloatArray,
         free: Free,
         sensor: RangeSensor,
         options: PlannerOptions,
@@ -176,7 +185,7 @@ class _Mission:
         self._horizon = float(max(1, team.steps_total - team.step + 1))
         unknown = min(constraints.max_depth_m, float(team.positions[:, 2].max()) + HEIGHT * visibility)
         self._floor: Floor = estimate_floor(
-            belief, bottom, constraints.area, visibility, constraints.min_altitude_m, unknown
+            belief, bottom, felt_m, constraints.area, visibility, constraints.min_altitude_m, unknown
         )
         self._free = free
         self._rules = Rules(

@@ -51,7 +51,13 @@ class Floor(NamedTuple):
 
 
 def estimate_floor(
-    belief: Belief, bottom: Bottom, area: FloatArray, visibility_m: float, clearance_m: float, unknown_m: float
+    belief: Belief,
+    bottom: Bottom,
+    felt_m: FloatArray,
+    area: FloatArray,
+    visibility_m: float,
+    clearance_m: float,
+    unknown_m: float,
 ) -> Floor:
     """Estimate the floor from a belief.
 
@@ -59,6 +65,8 @@ def estimate_floor(
     ----------
     bottom : Bottom
         What the constraints hold for the sea floor; vehicles must clear it as well.
+    felt_m : (k, 3)
+        Points of the bottom that altimeters have felt, where landmarks did not show it.
     area : (n, 2)
         Polygon whose bounding box the raster covers.
     visibility_m : float
@@ -75,9 +83,9 @@ def estimate_floor(
     known = np.isfinite(belief.depth_m)
     if known.any():
         depth = _from_neighbours(
-            belief.xy_m[known],
-            belief.depth_m[known],
-            belief.sd_m[known],
+            np.vstack([belief.xy_m[known], felt_m[:, :2]]),
+            np.concatenate([belief.depth_m[known], felt_m[:, 2]]),
+            np.concatenate([belief.sd_m[known], np.zeros(len(felt_m))]),
             np.column_stack([east.ravel(), north.ravel()]),
             visibility_m,
         ).reshape(rows, cols)
@@ -89,6 +97,9 @@ def estimate_floor(
     shifts = np.stack(np.meshgrid(*[np.linspace(-cell, cell, 5)] * 2), axis=-1).reshape(-1, 1, 1, 2)
     around = bottom.at(np.stack([east, north], axis=-1) + shifts)
     limit = np.minimum(limit, np.where(np.isnan(around), np.inf, around).min(axis=0) - clearance_m)
+    for x, y, z in felt_m:
+        away = np.hypot(east - x, north - y)
+        limit = np.minimum(limit, z - clearance_m - MARGIN * visibility_m + ENVELOPE_SLOPE * away)
     return Floor(float(low[0]), float(low[1]), float(cell), depth, smooth, _envelope(limit, cell))
 
 
