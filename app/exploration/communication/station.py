@@ -34,6 +34,11 @@ Steps with a full report do not count: there was no room to say so.
 """
 
 
+PRESUMED_TRUST = 0.4
+"""Part of the information of a presumed look that counts: depths are guesses, and what is wrongly presumed known is
+found out only when the team has gone on."""
+
+
 @dataclass
 class _Member:
     """A vehicle as the station knows it; arrays are (n_landmarks,).
@@ -205,7 +210,7 @@ class StationNode:
         for member, gain in zip(members, gained, strict=True):
             if member.heard_at == self._count:
                 gain[member.told] = 0.0  # the report included this step's look
-                member.presumed += gain
+                member.presumed += PRESUMED_TRUST * gain
                 member.looked_at[gain > 0.0] = member.clock
             member.clock += len(member.told) < self._capacity
             member.presumed[member.clock - member.looked_at > PRESUMED_FOR] = 0.0

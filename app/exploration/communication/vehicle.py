@@ -139,4 +139,4 @@ class VehicleNode:
         receivers = self._receivers if len(self._receivers) else position[None]
         distance = distance_to_receivers(self.own.xy_m[waiting], receivers[:, :2])
         group = np.where(finished[waiting], 0, np.where(self._in_sight[waiting], 2, 1))
-        return fill(waiting[np.lexsort((distance, group))], self.own.xy_m, self._capacity, self._apart_m)
+        return fill(waiting[np.lexsort((np.where(finished[waiting], distance, -information[waiting]), group))], self.own.xy_m, self._capacity, self._apart_m)

@@ -970,7 +970,7 @@ export interface components {
              * @default full
              * @enum {string}
              */
-            objective: "J" | "J+J1" | "J+J1+J2" | "full" | "med13";
+            objective: "J" | "J+J1" | "J+J2" | "J+J3" | "J+J1+J2" | "J+J1+J3" | "J+J2+J3" | "full" | "med13";
             /**
              * Contribution
              * @description What CAO learns from where landmarks are seen: the team's objective, or for each vehicle the difference that its last move made to it.
@@ -1030,6 +1030,12 @@ export interface components {
              * @description Depth at which vehicles survey; by default the depth at which each joined.
              */
             cruise_depth_m?: number | null;
+            /**
+             * Rollouts
+             * @description Changes to the team's plan that a rollout step tries.
+             * @default 300
+             */
+            rollouts: number;
             /**
              * Tries
              * @description Real tries per step of OSARSES (only in simulation).
