@@ -38,7 +38,16 @@ def test_remaining_landmarks_only_ever_decrease(smooth):
 
 @pytest.mark.parametrize(
     ("planner", "tries"),
-    [("cao", 0), ("lawnmower", 0), ("random", 0), ("spsa", 0), ("osarses", 2), ("spsa-tried", 2), ("fdsa-tried", 18)],
+    [
+        ("cao", 0),
+        ("lawnmower", 0),
+        ("random", 0),
+        ("rollout", 0),
+        ("spsa", 0),
+        ("osarses", 2),
+        ("spsa-tried", 2),
+        ("fdsa-tried", 18),
+    ],
 )
 def test_same_seed_same_run(smooth, planner, tries):
     first, second = (run(smooth, planner, steps=15, tries=2) for _ in range(2))
@@ -80,12 +89,13 @@ def test_vehicles_never_touch_the_true_bottom(smooth):
     np.testing.assert_array_equal(world.clear(world.positions), world.positions)
 
 
-@pytest.mark.parametrize("planner", ["cao", "lawnmower", "random", "osarses"])
+@pytest.mark.parametrize("planner", ["cao", "lawnmower", "random", "rollout", "osarses"])
 def test_a_lost_vehicle_does_not_stall_the_others(smooth, planner):
     result = run(smooth, planner, steps=40, changes=TeamChanges(lost=((2, 10),)), tries=2)
     assert result.history[-1] < result.history[10]
 
 
+@pytest.mark.parametrize("planner", ["lawnmower", "rollout"])
 @pytest.mark.parametrize(
     "happens",
     [
@@ -98,11 +108,17 @@ def test_a_lost_vehicle_does_not_stall_the_others(smooth, planner):
     ],
     ids=["nothing", "keep-out", "loss", "newcomer", "two", "many"],
 )
-def test_the_lawnmower_finishes_whatever_happens_and_hardly_breaks_a_limit(smooth, happens):
+def test_who_has_a_plan_finishes_whatever_happens_and_hardly_breaks_a_limit(smooth, planner, happens):
     scenario = ExploreScenario(smooth, landmarks=300, steps=280, **happens)
-    result = run_explore(scenario, "lawnmower", PlannerOptions())
+    result = run_explore(scenario, planner, PlannerOptions(rollouts=100))
     assert result.t99 is not None
     assert result.broken_constraints <= 0.04 * scenario.robots * scenario.steps
+
+
+def test_rollouts_finish_before_the_lawnmower(smooth):
+    first = {name: run(smooth, name, steps=250).t99 for name in ("rollout", "lawnmower")}
+    assert None not in first.values()
+    assert first["rollout"] < first["lawnmower"]
 
 
 def test_vehicles_keep_their_numbers_when_others_leave_and_join(smooth):

@@ -24,12 +24,13 @@ class VehicleNode:
     Each step: :meth:`sense`, then :meth:`report` goes out and, when something comes back, :meth:`receive`.
 
     Reported are the landmarks newly in ``A_j`` (index, estimate, flag) and those seen but not accurate (index, estimate
-    so far, flag), both sorted by distance to the vehicles in the reachable exploration area, at most ``capacity``.
+    so far, flag), at most ``capacity``; the former sorted by distance to vehicles in the reachable exploration area.
 
     Beyond the paper, what found no room stays queued until the station has confirmed it or it is superseded: by newer
     figures of the same landmark, or by the news that someone else has finished it. The order is: newly accurate ones,
     then unfinished ones out of sight (no look will add to them, and only the station can put them together with what
-    others know), then unfinished ones in sight; each by distance.
+    others know), then unfinished ones in sight. Finished ones are sorted by distance as in the paper, the others by
+    what is known of them: those nearly accurate are what the station most likely presumes accurate by mistake.
 
     Parameters
     ----------
@@ -139,4 +140,9 @@ class VehicleNode:
         receivers = self._receivers if len(self._receivers) else position[None]
         distance = distance_to_receivers(self.own.xy_m[waiting], receivers[:, :2])
         group = np.where(finished[waiting], 0, np.where(self._in_sight[waiting], 2, 1))
-        return fill(waiting[np.lexsort((np.where(finished[waiting], distance, -information[waiting]), group))], self.own.xy_m, self._capacity, self._apart_m)
+        return fill(
+            waiting[np.lexsort((np.where(finished[waiting], distance, -information[waiting]), group))],
+            self.own.xy_m,
+            self._capacity,
+            self._apart_m,
+        )

@@ -24,6 +24,7 @@ from app.exploration.rollout.flight import Course, Plan, Rules, Work, begin, fly
 from app.exploration.rollout.floor import Floor, estimate_floor, sample
 from app.exploration.rollout.free_space import Free, clear_ways, free_space, settle_waypoint
 from app.exploration.rollout.search import DRAWS, improve
+from app.exploration.routes import FreeSpace
 
 FloatArray = NDArray[np.float64]
 
@@ -36,6 +37,9 @@ HEDGE = 1.5
 
 PARTS = (1.0, 0.8, 0.5, 0.2)
 """Parts of a step to try when the whole one is not feasible."""
+
+CONVOY_MARGIN = 2.5
+"""Distance that a team on its way between zones keeps from them, in cells of the free space."""
 
 OUTLETS = 400
 """Random moves to choose from where the plan's next step is not feasible."""
@@ -110,7 +114,7 @@ class RolloutPlanner(PlannerBase):
 
     def _decide(self, team: Situation, bottom: Bottom, seed: int) -> Proposal:
         if team.belief.accurate.all():
-            return Proposal(team.positions.copy(), 0.0)
+            return Proposal(self._rest(team, bottom), 0.0)
         if self._names != team.vehicles:
             if self._kept is not None:
                 self._kept = with_team(self._kept, self._names, team.vehicles)
@@ -129,8 +133,9 @@ class RolloutPlanner(PlannerBase):
         if best is None or self._planned == 0:
             rivals = [mission.refine(start, FRESH_SEARCH) for start in mission.fresh_starts(FRESH_STARTS)]
             best = min([*rivals, *([] if best is None else [best])], key=lambda start: start.score, default=None)
+        best = mission.convoy(team.constraints) if best is None else best
         if best is None:
-            return Proposal(team.positions.copy(), 0.0)
+            return Proposal(mission.way_out(team, bottom, mission.towards_work(team.constraints)), 0.0)
         best = mission.refine(best, self._effort(mission))
         wishes, passed_by = mission.first_step(best)
         feasible = np.flatnonzero(team.constraints.feasible(team.positions, wishes, bottom))
@@ -144,6 +149,14 @@ class RolloutPlanner(PlannerBase):
         self._felt.ask(team.vehicles, positions)
         terms = {"finish": team.step - 1 + float(best.course.state[best.count, 0]), "waypoints": float(best.count)}
         return Proposal(positions, -best.score, terms)
+
+    def _rest(self, team: Situation, bottom: Bottom) -> FloatArray:
+        """Return where the vehicles wait, (n_vehicles, 3): here, or closer together when that breaks a limit."""
+        here = team.positions
+        leg = here.mean(axis=0) - here
+        length = np.maximum(np.linalg.norm(leg, axis=1, keepdims=True), 1e-12)
+        closer = here + leg * np.minimum(1.0, 0.99 * team.constraints.max_step_m / length)
+        return settle(team, bottom, np.array([here, closer]))[0]
 
     def _effort(self, mission: "_Mission") -> int:
         """Return how many changes to try now: many for the first plan, few for what little is left in the end."""
@@ -269,6 +282,29 @@ class _Mission:
         order = sorted(((best.score, k) for k, (best, _) in enumerate(flown) if best is not None))
         chosen = [self.plan(flown[k][1], heights) for _, k in order[:most]]
         return [best for best in chosen if best is not None]
+
+    def convoy(self, constraints: Constraints) -> _Best | None:
+        """Return a plan that brings the team, closed up, on the shortest way to the landmark nearest to its middle.
+
+        For when no sweep finds a way between the zones.
+        """
+        at = np.repeat(self._way_to_work(constraints)[:, None], len(self._start), axis=1)
+        return self.plan(Backbone(at, np.arange(len(self._start))), np.full(ROOM, HEIGHT * self._sight))
+
+    def towards_work(self, constraints: Constraints) -> FloatArray:
+        """Return a step (n_vehicles, 3) of the whole team in the direction of that way."""
+        way = self._way_to_work(constraints)
+        leg = way[1] - way[0]
+        wish = self._start.copy()
+        wish[:, :2] += leg * min(1.0, self._rules.step_m / max(float(np.hypot(*leg)), 1e-12))
+        return wish
+
+    def _way_to_work(self, constraints: Constraints) -> FloatArray:
+        """Return the vertices (k, 2) of the way from the middle vehicle to the landmark nearest to it."""
+        middle = self._start[np.argmin(np.linalg.norm(self._start - self._start.mean(axis=0), axis=1)), :2]
+        space = FreeSpace(constraints, CONVOY_MARGIN * self._free.cell_m)
+        nearest = np.argmin(np.linalg.norm(self._work.xyz[:, :2] - middle, axis=1))
+        return np.vstack([middle, space.way(middle, space.nearest(self._work.xyz[nearest, :2]))])
 
     def refine(self, best: _Best, changes: int) -> _Best:
         """Try so many changes; the plan is improved in place."""

@@ -17,6 +17,9 @@ CELLS_PER_SIDE = 160
 DETOURS = 6
 """Most waypoints inserted to bring the team round what lies in the way."""
 
+PUSH_CELLS = 2
+"""Cells by which places to be moved to lie within what is allowed."""
+
 CLOSED_UP = (1.0, 0.5, 0.2)
 """Sizes of the team, in those of the wish, that are tried where it does not fit."""
 
@@ -31,7 +34,7 @@ class Free(NamedTuple):
     allowed : (rows, cols)
         Cells whose surroundings are allowed too.
     nearest : (rows, cols, 2)
-        Row and column of the allowed cell closest to each.
+        Row and column of the closest cell that is well within what is allowed.
     everywhere : bool
         Whether straight legs between allowed places never leave them: a convex area without zones.
     """
@@ -59,7 +62,10 @@ def free_space(constraints: Constraints) -> Free:
         allowed = eroded if eroded.any() else allowed
     if not allowed.any():
         allowed = np.ones_like(allowed)
-    index = distance_transform_edt(~allowed, return_distances=False, return_indices=True)
+    # Who is moved is moved well clear of corners, so that the ways there and back are allowed too.
+    clear = binary_erosion(allowed, np.ones((3, 3), dtype=bool), iterations=PUSH_CELLS, border_value=1)
+    goal = clear if not everywhere and clear.any() else allowed
+    index = distance_transform_edt(~goal, return_distances=False, return_indices=True)
     return Free(
         float(low[0]), float(low[1]), cell, allowed, np.ascontiguousarray(np.moveaxis(index, 0, -1)).astype(np.int64),
         everywhere,

@@ -202,7 +202,7 @@ def test_the_order_in_which_reports_arrive_does_not_matter():
     np.testing.assert_allclose(first.station.sd_m, second.station.sd_m, rtol=1e-12)
 
 
-def test_finished_landmarks_go_first_and_the_closest_to_the_receivers_before_others():
+def test_finished_landmarks_go_first_and_then_those_that_are_nearly_finished():
     fleet = Fleet(6, vehicles=2, capacity=4)
     above = np.argmin(np.hypot(*(fleet.xy - [0.1, 0.0]).T))
     fleet.positions = {0: np.array([0.0, 0.0, 0.3]), 1: np.array([*fleet.xy[above], 0.3])}
@@ -219,9 +219,9 @@ def test_finished_landmarks_go_first_and_the_closest_to_the_receivers_before_oth
     sent = WIRE.decode_report(vehicle.report(2, fleet.positions[0])).entries
     assert done[sent.index[:2]].all()
     assert sent.accurate.tolist() == [True, True, False, False]
-    distance = np.hypot(*(fleet.xy - fleet.positions[1][:2]).T)
     open_ = vehicle.own.seen & ~done
-    assert sent.index[2:].tolist() == np.flatnonzero(open_)[np.argsort(distance[open_])[:2]].tolist()
+    best_known = np.argsort(vehicle.own.variance_m2[open_], kind="stable")
+    assert sent.index[2:].tolist() == np.flatnonzero(open_)[best_known[:2]].tolist()
 
 
 def test_a_vehicle_out_of_reach_is_no_neighbour():
