@@ -231,6 +231,7 @@ def tables(
     jobs: Jobs = 1,
     only: Annotated[str | None, typer.Option(help="One or more tables, separated by commas.")] = None,
     quick: Annotated[bool, typer.Option("--quick", help="A small version: few tries, few landmarks.")] = False,
+    no_run: Annotated[bool, typer.Option("--no-run", help="Only report the results that are there.")] = False,
 ) -> None:
     """Rerun the papers' tables and figures over many seeds, beside our planners and the lawnmower, and report."""
     from app.evaluation.tables.facts import made
@@ -257,6 +258,7 @@ def tables(
     out.mkdir(parents=True, exist_ok=True)
     results = Results(out / "exploration.jsonl")
     open_ = [job for job in jobs_of(chosen, sea_floors, seed_list, steps) if job.key not in results.runs]
+    open_ = [] if no_run else open_
     with _progress() as bar:
         task = bar.add_task("tables", total=len(open_))
         for run in run_jobs(open_, jobs, lambda job, step: bar.update(task, description=job.title)):

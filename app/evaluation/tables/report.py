@@ -61,8 +61,8 @@ def markdown(report: Report) -> str:
         *([f"- left out, because their files were not found: {', '.join(report.missing)}"] if report.missing else []),
         *([f"- **incomplete**: {lacking} runs are still missing"] if lacking else []),
         "",
-        f"Every figure is a mean over {len(report.seeds)} seeds, ± half its 95 % interval (Student). "
-        f"{report.steps} steps per run. *broken*: steps of single vehicles per run on which a limit was broken "
+        f"Figures are means over {len(report.seeds)} seeds unless a table says otherwise, ± half their 95 % interval "
+        f"(Student). {report.steps} steps per run. *broken*: steps of single vehicles per run on which a limit was broken "
         "that was kept before. Where not every run reached 1 % remaining, t99 is the mean of those that did, with "
         "their number. The papers' maps were never published: theirs and ours are different sea floors.",
         "",
@@ -74,7 +74,7 @@ def markdown(report: Report) -> str:
 
 def _section(report: Report, section: Section) -> list[str]:
     terrains = report.terrains_of(section)
-    lines = [f"## {section.title}", "", section.text, ""]
+    lines = [f"## {section.title}", "", section.text + _seeds_of(report, section), ""]
     if section.name in report.pictures:
         lines += [f"![{section.title}]({report.pictures[section.name]})", ""]
     timed = not any(setup.planner == OSARSES for _, setup in section.rows)
@@ -144,3 +144,12 @@ def _mean(values: Sequence[float], digits: int) -> str:
         return "–"
     s = spread(values)
     return f"{s.mean:.{digits}f}" + (f" ± {s.ci95:.{digits}f}" if len(values) > 1 else "")
+
+
+def _seeds_of(report: Report, section: Section) -> str:
+    """Say how many seeds stand behind a table where that is not the same everywhere."""
+    numbers = {len(report.of(setup, t)) for _, setup in section.rows for t in report.terrains_of(section)}
+    low, high = min(numbers), max(numbers)
+    if low == high == len(report.seeds):
+        return ""
+    return f" Means over {low} seeds." if low == high else f" Means over {low} to {high} seeds."
