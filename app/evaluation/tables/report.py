@@ -62,8 +62,8 @@ def markdown(report: Report) -> str:
         *([f"- **incomplete**: {lacking} runs are still missing"] if lacking else []),
         "",
         f"Figures are means over {len(report.seeds)} seeds unless a table says otherwise, ± half their 95 % interval "
-        f"(Student). {report.steps} steps per run. *broken*: steps of single vehicles per run on which a limit was broken "
-        "that was kept before. Where not every run reached 1 % remaining, t99 is the mean of those that did, with "
+        f"(Student). {report.steps} steps per run. *broken*: steps of single vehicles per run on which a limit was "
+        "broken that was kept before. Where not every run reached 1 % remaining, t99 is the mean of those that did, with "
         "their number. The papers' maps were never published: theirs and ours are different sea floors.",
         "",
     ]
