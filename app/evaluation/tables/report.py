@@ -63,8 +63,8 @@ def markdown(report: Report) -> str:
         "",
         f"Figures are means over {len(report.seeds)} seeds unless a table says otherwise, ± half their 95 % interval "
         f"(Student). {report.steps} steps per run. *broken*: steps of single vehicles per run on which a limit was "
-        "broken that was kept before. Where not every run reached 1 % remaining, t99 is the mean of those that did, with "
-        "their number. The papers' maps were never published: theirs and ours are different sea floors.",
+        "broken that was kept before. Where not every run reached 1 % remaining, t99 is the mean of those that did, "
+        "with their number. The papers' maps were never published: theirs and ours are different sea floors.",
         "",
     ]
     for section in report.sections:
