@@ -76,7 +76,10 @@ class _Best:
 
 
 class RolloutPlanner(PlannerBase):
-    """See the module's text; for sensors that see landmarks from afar."""
+    """Plans the team's whole mission on the current map and replans every step; with a bathymeter the same as cao.
+
+    For sensors that see landmarks from afar; see the module's text.
+    """
 
     name: ClassVar[str] = "rollout"
 
