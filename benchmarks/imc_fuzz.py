@@ -8,25 +8,29 @@ the first tenth and the end. A crash ends the command with a traceback.
 
 import argparse
 import asyncio
+import contextlib
+import dataclasses
 import gzip
 import json
+import math
 import resource
 import struct
 import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import imcpy
 import numpy as np
 
-from imc_bridge import Bridge, BridgeSettings, StateReport, Waypoint
+from imc_bridge import Bridge, BridgeSettings, RefusedError, Sounding, StateReport, Waypoint
 from imc_bridge.bridge import WANTED
+from imc_bridge.codec import message_ids
 
-CONSOLE = ("127.0.0.1", 6101)
 VEHICLE_ID, VEHICLE = 0x1E, ("127.0.0.1", 6002)
 EXTREMES = [0.0, -1.0, 1e9, -1e9, 1e38, 1e300, float("inf"), float("-inf"), float("nan")]
-SHIFTS = (16, 24)
+ANNOUNCE = imcpy.Announce().msg_id.to_bytes(2, "little")
 
 
 def crc_table() -> list[int]:
@@ -71,15 +75,24 @@ def seeds(captures: Path | None) -> list[tuple[bytes, tuple[str, int]]]:
     return list(found.values())
 
 
-def mutated(pool: list[tuple[bytes, tuple[str, int]]], rng: np.random.Generator) -> Iterator[tuple[bytes, object]]:
+def mutated(pool: list[tuple[bytes, tuple[str, int]]], rng: np.random.Generator) -> Iterator[tuple[bytes, tuple[str, int]]]:
     """Mutated packets without end."""
+    wanted = message_ids((*WANTED, "Announce"))
+    known = [item for item in pool if int.from_bytes(item[0][2:4], "little") in wanted]
+    clock = 1.8e9
     while True:
         draws = rng.random((4096, 8))
         for which, kind, at, value, other, fix, copies, where in draws:
-            packet, address = pool[int(which * len(pool))]
+            some = pool if fix < 0.1 else known
+            packet, address = some[int(which * len(some))]
             data = bytearray(packet)
+            clock += 0.01
+            struct.pack_into("<d", data, 6, clock)
+            if where > 0.7:
+                yield with_checksum(data), address
+                continue
             for _ in range(1 + int(3 * copies)):
-                spot = int(at * len(data))
+                spot = int(at * len(data)) if copies < 0.2 else 20 + int(at * (len(data) - 20))
                 if kind < 0.3:
                     data[spot] ^= 1 << int(8 * value)
                 elif kind < 0.5:
@@ -88,7 +101,7 @@ def mutated(pool: list[tuple[bytes, tuple[str, int]]], rng: np.random.Generator)
                     size = 8 if other < 0.5 else 4
                     spot = 20 + int(at * max(len(data) - 22 - size, 1))
                     number = EXTREMES[int(value * len(EXTREMES))]
-                    with_size = struct.pack("<d" if size == 8 else "<f", np.float32(number) if size == 4 else number)
+                    with_size = struct.pack("<d" if size == 8 else "<f", number if size == 8 or abs(number) < 1e38 else math.copysign(math.inf, number))
                     data[spot : spot + size] = with_size
                 elif kind < 0.8:
                     del data[spot : spot + int(16 * value) + 1]
@@ -98,7 +111,7 @@ def mutated(pool: list[tuple[bytes, tuple[str, int]]], rng: np.random.Generator)
                 else:
                     # A plausible packet of another time or system.
                     struct.pack_into("<d", data, 6, EXTREMES[int(value * len(EXTREMES))] if other < 0.5 else 2e9 * value)
-                    struct.pack_into("<H", data, SHIFTS[int(2 * copies) % 1], int(65536 * other))
+                    struct.pack_into("<H", data, 14, int(65536 * other))
                 at = (at * 7.3) % 1.0
                 if len(data) < 24:
                     data.extend(bytes(24 - len(data)))
@@ -117,37 +130,66 @@ def memory_mb() -> float:
         return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**10
 
 
-def run(packets: int, seed: int, captures: Path | None) -> dict[str, object]:
-    """Feed that many packets to a bridge whose vehicles are engaged, as far as they say so."""
-    now = 0.0
-    bridge = Bridge(BridgeSettings(loopback_only=True), clock=lambda: now)
-    events = bad_positions = 0
+class Target:
+    """A bridge whose vehicles are engaged as far as they say that they can be."""
 
-    def note(event: object) -> None:
-        nonlocal events, bad_positions
-        events += 1
-        if isinstance(event, StateReport) and not (abs(event.lat_deg) <= 90.0 and abs(event.depth_m) < 1e9):
-            bad_positions += 1
+    def __init__(self) -> None:
+        self.now = 0.0
+        self.events = self.impossible = 0
+        self.bridge = Bridge(BridgeSettings(loopback_only=True), clock=lambda: self.now)
+        self.bridge.listen(self._note)
+        self._engaging: dict[str, asyncio.Task[None]] = {}
 
-    bridge.listen(note)
+    def _note(self, event: object) -> None:
+        self.events += 1
+        if isinstance(event, StateReport | Sounding):
+            numbers = [value for value in dataclasses.astuple(event) if isinstance(value, float)]
+            self.impossible += not (all(map(math.isfinite, numbers)) and abs(event.lat_deg) <= 90.0)
+
+    def take(self, packet: bytes, address: tuple[str, int], *, announce: bool) -> None:
+        """One packet a millisecond after the last."""
+        self.now += 0.001
+        self.bridge.on_packet(packet, address)
+        if announce:
+            self.bridge.on_announce(packet, address)
+
+    async def live(self, step: int) -> None:
+        """Let time pass, and order every vehicle about."""
+        self.bridge.pass_time()
+        for node in self.bridge.nodes():
+            task = self._engaging.get(node.name)
+            if task is None or (task.done() and not node.engaged):
+                if task is not None and not task.cancelled():
+                    task.exception()
+                self._engaging[node.name] = asyncio.create_task(self.bridge.engage(node.name))
+            with contextlib.suppress(RefusedError):
+                self.bridge.goto(node.name, Waypoint("fuzz", step, 41.185, -8.706, 3.0))
+        await asyncio.sleep(0)
+
+    async def end(self) -> None:
+        """Leave no task behind."""
+        for task in self._engaging.values():
+            task.cancel()
+        await asyncio.gather(*self._engaging.values(), return_exceptions=True)
+
+
+async def fuzz(packets: int, seed: int, captures: Path | None = None) -> dict[str, Any]:
+    """Feed that many packets to a bridge; what became of them."""
+    target = Target()
+    bridge = target.bridge
     pool = seeds(captures)
     stream = mutated(pool, np.random.default_rng(seed))
     begun, early_mb = time.process_time(), 0.0
     for packet, address in pool:
-        (bridge.on_announce if packet[2:4] == b"\x97\x00" else bridge.on_packet)(packet, address)
+        target.take(packet, address, announce=True)
     for number in range(packets):
         packet, address = next(stream)
-        now += 0.001
-        bridge.on_packet(packet, address)
-        if packet[2:4] == b"\x97\x00" or number % 7 == 0:
-            bridge.on_announce(packet, address)
+        target.take(packet, address, announce=packet[2:4] == ANNOUNCE or number % 7 == 0)
         if number % 200 == 0:
-            bridge.pass_time()
-        if number % 5000 == 0:
-            for node in bridge.nodes():
-                bridge.offer(node.name, Waypoint("fuzz", number, 41.185, -8.706, 3.0))
+            await target.live(number // 5000)
         if number == packets // 10:
             early_mb = memory_mb()
+    await target.end()
     return {
         "packets": packets,
         "seed": seed,
@@ -155,17 +197,13 @@ def run(packets: int, seed: int, captures: Path | None) -> dict[str, object]:
         "decoded": bridge.decoder.decoded.total() + bridge.announces.decoded.total(),
         "unwanted": bridge.decoder.unwanted.total(),
         "faults": {fault.value: n for fault, n in (bridge.decoder.faults + bridge.announces.faults).items()},
-        "events": events,
+        "events": target.events,
+        "impossible_events": target.impossible,
         "handler_errors": dict(bridge.handler_errors),
-        "impossible_states_passed_on": bad_positions,
         "nodes": len(bridge.nodes()),
         "growth_mb": round(memory_mb() - early_mb, 2),
         "cpu_s": round(time.process_time() - begun, 1),
     }
-
-
-async def _run(packets: int, seed: int, captures: Path | None) -> dict[str, object]:
-    return run(packets, seed, captures)
 
 
 def main() -> None:
@@ -175,9 +213,9 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--captures", type=Path)
     options = parser.parse_args()
-    result = asyncio.run(_run(options.packets, options.seed, options.captures))
+    result = asyncio.run(fuzz(options.packets, options.seed, options.captures))
     print(json.dumps(result))
-    sys.exit(1 if result["handler_errors"] else 0)
+    sys.exit(1 if result["handler_errors"] or result["impossible_events"] else 0)
 
 
 if __name__ == "__main__":

@@ -53,9 +53,12 @@ class Header(NamedTuple):
     dst_ent: int
 
 
-def peek(packet: bytes) -> Header | PacketFault:
-    """Read a packet's header in its sender's byte order, without verifying the payload."""
-    if len(packet) < HEADER_SIZE + FOOTER_SIZE:
+def peek(packet: bytes, *, whole: bool = True) -> Header | PacketFault:
+    """Read a packet's header in its sender's byte order, without verifying the payload.
+
+    With ``whole`` false the header may stand alone, as at the beginning of a stream's next packet.
+    """
+    if len(packet) < HEADER_SIZE + (FOOTER_SIZE if whole else 0):
         return PacketFault.LENGTH
     sync = packet[:2]
     if sync == _SYNC_LITTLE:
@@ -64,9 +67,14 @@ def peek(packet: bytes) -> Header | PacketFault:
         header = Header._make(_BIG.unpack_from(packet)[1:])
     else:
         return PacketFault.SYNC
-    if len(packet) != HEADER_SIZE + header.size + FOOTER_SIZE:
+    if whole and len(packet) != HEADER_SIZE + header.size + FOOTER_SIZE:
         return PacketFault.LENGTH
     return header
+
+
+def sync_follows(data: bytes | bytearray, place: int) -> bool:
+    """Whether a packet may begin at ``place``: a synchronisation word in either byte order."""
+    return data[place : place + 2] in (_SYNC_LITTLE, _SYNC_BIG)
 
 
 @cache

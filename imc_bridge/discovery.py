@@ -13,7 +13,9 @@ from imc_bridge.codec import Message
 from imc_bridge.settings import BridgeSettings
 from imc_bridge.transport import Address
 
-_UDP_SERVICE = re.compile(r"imc\+udp://([0-9.]+):(\d{1,5})/?")
+_SERVICE = re.compile(r"imc\+(udp|tcp)://([0-9.]+):(\d{1,5})/?")
+MAX_ADDRESSES = 16
+"""A node has a handful; more would only fill our tables."""
 _VERSION_SERVICE = re.compile(r"imc\+info://[^/]*/version/([^/;]+)")
 _UID_SERVICE = re.compile(r"dune://[^/]*/uid/(\d+)")
 
@@ -30,6 +32,9 @@ class Announcement:
     name: str
     system_type: int
     addresses: tuple[Address, ...]
+    """Where it takes IMC by UDP."""
+    streams: tuple[Address, ...] = ()
+    """Where it takes IMC by TCP."""
     imc_version: str | None = None
     uid: str | None = None
     """Changes whenever DUNE restarts."""
@@ -43,13 +48,13 @@ class Announcement:
 def read_announce(message: Message) -> Announcement:
     """Take an Announce apart; addresses that cannot be are left out."""
     services = str(message.services)
-    addresses = []
-    for host, port_text in _UDP_SERVICE.findall(services):
+    found: dict[str, list[Address]] = {"udp": [], "tcp": []}
+    for kind, host, port_text in _SERVICE.findall(services):
         try:
             ip = ipaddress.IPv4Address(host)
         except ValueError:
             continue
-        port = int(port_text)
+        port, addresses = int(port_text), found[kind]
         if 0 < port <= 65535 and not ip.is_unspecified and (host, port) not in addresses:
             addresses.append((host, port))
     version = _VERSION_SERVICE.search(services)
@@ -58,15 +63,17 @@ def read_announce(message: Message) -> Announcement:
         imc_id=int(message.src),
         name=str(message.sys_name),
         system_type=int(message.sys_type),
-        addresses=tuple(addresses),
+        addresses=tuple(found["udp"][:MAX_ADDRESSES]),
+        streams=tuple(found["tcp"][:MAX_ADDRESSES]),
         imc_version=version.group(1) if version else None,
         uid=uid.group(1) if uid else None,
     )
 
 
-def reachable_first(announcement: Announcement, source_host: str) -> tuple[Address, ...]:
-    """The announced addresses, the one on the host that the announce came from first."""
-    return tuple(sorted(announcement.addresses, key=lambda address: address[0] != source_host))
+def reachable_first(announcement: Announcement, source_host: str, *, by_tcp: bool = False) -> tuple[Address, ...]:
+    """The announced addresses, the one on the host that the announce came from first; TCP's where wished and offered."""
+    offered = announcement.streams if by_tcp and announcement.streams else announcement.addresses
+    return tuple(sorted(offered, key=lambda address: address[0] != source_host))
 
 
 def own_announce(settings: BridgeSettings, addresses: Sequence[str]) -> Message:

@@ -118,6 +118,8 @@ class LinkChange:
     reason: str = ""
     ours: bool = False
     """Executes a plan of ours, perhaps of an earlier run."""
+    at_s: float = 0.0
+    """When, by our wall clock (Unix seconds)."""
 
 
 BridgeEvent = StateReport | Sounding | SoundingRefused | WaypointChange | LinkChange
@@ -162,7 +164,13 @@ class NodeView:
     echoes: int = 0
     relayed: int = 0
     foreign_address: int = 0
+    foreign_from: str | None = None
+    """Address that packets under its id came from last without being announced."""
     conflict: str | None = None
+    clock_rate: float | None = None
+    """Seconds of its clock per second of ours; None while it was not heard for long enough."""
+    history: tuple[LinkChange, ...] = ()
+    """The last changes of its link, oldest first."""
     rate_limiters: str = ""
 
 

@@ -106,8 +106,8 @@ class SentReference:
     def echoed_by(self, message: Message | None) -> bool:
         """Whether FollowRefState's reference is this one (floats of 32 bits on the wire)."""
         return (
-            message is not None
-            and message.z is not None
+            isinstance(message, imcpy.Reference)
+            and isinstance(message.z, imcpy.DesiredZ)
             and int(message.z.z_units) == Z_DEPTH
             and math.isclose(message.lat, self.lat_rad, abs_tol=1e-10)
             and math.isclose(message.lon, self.lon_rad, abs_tol=1e-10)

@@ -20,10 +20,8 @@ from imc_bridge.events import NodeState, StateReport
 from imc_bridge.settings import BridgeSettings
 from imc_bridge.soundings import SoundingGate, StateHistory, StateSample, beam_table
 from imc_bridge.transport import Address
+from imc_bridge.vehicle_clock import Tick, VehicleClock
 
-LATE_S = 5.0
-"""A timestamp further back than this is no late packet but a clock that was set back, once it repeats."""
-CLOCK_JUMP_CONFIRMATIONS = 3
 UNCERTAINTY_VALID_S = 10.0
 SUBMERGED_DEPTH_M = 0.3
 """Radio is gone that far below; the depth sensor's noise at the surface is about 0.1 m."""
@@ -120,12 +118,11 @@ class Node:
         self.echoes = 0
         self.relayed: Counter[int] = Counter()
         self.foreign_address = 0
+        self.last_foreign: Address | None = None
+        """Where packets under its id came from last that is not an address of its own."""
         self.rates = RateMeter()
 
-        self.clock_offset_s: float | None = None
-        self.clock_jumps = 0
-        self._time_s: float | None = None
-        self._backward: int = 0
+        self.clock = VehicleClock()
 
         self.entities: dict[int, str] | None = None
         self.operation_mode: int | None = None
@@ -147,11 +144,6 @@ class Node:
     def is_vehicle(self) -> bool:
         """Whether it announced itself as a vehicle, or has not said what it is."""
         return self.announcement is None or self.announcement.is_vehicle
-
-    @property
-    def time_s(self) -> float | None:
-        """The newest timestamp of the vehicle's own clock."""
-        return self._time_s
 
     # Discovery
 
@@ -199,25 +191,15 @@ class Node:
         self._latest[name] = timestamp
         return True
 
-    def follow_clock(self, timestamp: float, wall_time_s: float) -> bool:
-        """Keep up with the vehicle's clock; True when it was set back and all history was dropped."""
-        if self._time_s is None or timestamp >= self._time_s:
-            self._time_s = timestamp
-            self._backward = 0
-        elif timestamp < self._time_s - LATE_S:
-            self._backward += 1
-            if self._backward >= CLOCK_JUMP_CONFIRMATIONS:
-                self.clock_jumps += 1
-                self._backward = 0
-                self._time_s = timestamp
-                self._latest.clear()
-                self.history.clear()
-                self.gate.clear()
-                self._uncertainty = None
-                self.clock_offset_s = timestamp - wall_time_s
-                return True
-        self.clock_offset_s = timestamp - wall_time_s
-        return False
+    def take_time(self, timestamp: float, now: float, wall_time_s: float) -> Tick:
+        """Keep up with the vehicle's clock; after a jump everything that was ordered by it is forgotten."""
+        tick = self.clock.take(timestamp, now, wall_time_s)
+        if tick is Tick.JUMPED:
+            self._latest.clear()
+            self.history.clear()
+            self.gate.clear()
+            self._uncertainty = None
+        return tick
 
     # Telemetry
 
@@ -257,10 +239,10 @@ class Node:
 
     def position_sd_m(self) -> float | None:
         """Standard deviation of the position per axis, None when the vehicle has not told it lately."""
-        if self._uncertainty is None or self._time_s is None:
+        if self._uncertainty is None or self.clock.time_s is None:
             return None
         at_s, sd = self._uncertainty
-        return sd if self._time_s - at_s <= UNCERTAINTY_VALID_S else None
+        return sd if self.clock.time_s - at_s <= UNCERTAINTY_VALID_S else None
 
     def take_vehicle_state(self, message: Message, now: float) -> None:
         """VehicleState: the operation mode and the errors that explain it."""

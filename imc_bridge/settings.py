@@ -32,6 +32,8 @@ class BridgeSettings:
     """Reach only vehicles on this machine; nothing goes out on any network."""
     interfaces: tuple[str, ...] = ()
     """IPv4 addresses of the interfaces to announce on; empty means all of them."""
+    transport: Literal["udp", "tcp"] = "udp"
+    """``tcp``: speak by TCP with every vehicle that offers it (DUNE's Transports.TCP.Server), by UDP with the others."""
     announce_ports: tuple[int, ...] = STANDARD_ANNOUNCE_PORTS
     multicast_group: str = STANDARD_MULTICAST_GROUP
     vehicles: tuple[str, ...] = ()
@@ -103,6 +105,7 @@ class BridgeSettings:
         check("time_scale", 0.01 <= self.time_scale <= 1000.0, "between 0.01 and 1000 (1 = real time)")
         check("reference_period_s", 0.0 < self.reference_period_s < 5.0, "below 5 s, or vehicles give up")
         check("plan_id", bool(self.plan_id), "a name that no other console uses")
+        check("transport", self.transport in ("udp", "tcp"), "'udp' or 'tcp'")
         check("altimeter", self.altimeter in ("vertical", "body"), "'vertical' or 'body'")
         for field in (
             "announce_period_s",
