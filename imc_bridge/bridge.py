@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import itertools
 import logging
+import math
 import time
 from collections import Counter, deque
 from collections.abc import Callable
@@ -50,6 +51,7 @@ WANTED = (
     "VehicleMedium",
     "VehicleState",
 )
+SIMULATED_STATE = int(imcpy.SimulatedState().msg_id)
 TICK_S = 0.2
 MIN_TICK_WALL_S = 0.02
 ENTITY_QUERY_S = 2.0
@@ -137,6 +139,9 @@ class Bridge:
             raise RuntimeError("this bridge has been started already")
         self._on_event = on_event
         self.transport.open()
+        if self.settings.position_deg is None:
+            # The first vehicle heard tells where we are and is answered at once; see own_announce.
+            self._announce_due = self._now() + self.settings.announce_period_s
         self._task = asyncio.create_task(self._run(), name="imc-bridge")
 
     async def close(self) -> None:
@@ -320,9 +325,20 @@ class Bridge:
         self.transport.look_for_interfaces()
         self.transport.announce(
             lambda addresses: encode(
-                own_announce(self.settings, addresses), src=self.settings.imc_id, dst=0, time_s=self._wall_clock()
+                own_announce(self.settings, addresses, self._position_rad()), src=self.settings.imc_id, dst=0, time_s=self._wall_clock()
             )
         )
+
+    def _position_rad(self) -> tuple[float, float]:
+        if self.settings.position_deg is not None:
+            lat, lon = self.settings.position_deg
+            return math.radians(lat), math.radians(lon)
+        for node in self._roster:
+            if node.announcement is not None and node.announcement.is_vehicle:
+                place = node.announcement.lat_rad, node.announcement.lon_rad
+                if place != (0.0, 0.0):
+                    return place
+        return 0.0, 0.0
 
     # Packets
 
@@ -396,7 +412,9 @@ class Bridge:
         if sender is None:
             self._pass_on(header, packet, address, now)
             return
-        sender.heard(now, address)
+        if header.msg_id != SIMULATED_STATE:
+            # DUNE's simulation lets this one through where radio would not reach.
+            sender.heard(now, address)
         if not self.decoder.wants(header):
             return
         message = self.decoder.message(packet)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ipaddress
+import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -38,6 +39,9 @@ class Announcement:
     imc_version: str | None = None
     uid: str | None = None
     """Changes whenever DUNE restarts."""
+    lat_rad: float = 0.0
+    lon_rad: float = 0.0
+    """Where it is; both 0 when it does not know."""
 
     @property
     def is_vehicle(self) -> bool:
@@ -67,6 +71,8 @@ def read_announce(message: Message) -> Announcement:
         streams=tuple(found["tcp"][:MAX_ADDRESSES]),
         imc_version=version.group(1) if version else None,
         uid=uid.group(1) if uid else None,
+        lat_rad=_finite(message.lat),
+        lon_rad=_finite(message.lon),
     )
 
 
@@ -76,11 +82,22 @@ def reachable_first(announcement: Announcement, source_host: str, *, by_tcp: boo
     return tuple(sorted(offered, key=lambda address: address[0] != source_host))
 
 
-def own_announce(settings: BridgeSettings, addresses: Sequence[str]) -> Message:
-    """Our own Announce: a console reachable by UDP at each of ``addresses``."""
+def own_announce(
+    settings: BridgeSettings, addresses: Sequence[str], position_rad: tuple[float, float] = (0.0, 0.0)
+) -> Message:
+    """Our own Announce: a console reachable by UDP at each of ``addresses``.
+
+    DUNE's simulation of a limited radio range takes the position of the *first* announce as ours for good: at 0, 0
+    we would be out of range for ever.
+    """
     message = imcpy.Announce()
     message.sys_name = settings.name
     message.sys_type = imcpy.SystemType.CCU
     message.owner = 0xFFFF
+    message.lat, message.lon = position_rad
     message.services = ";".join(f"imc+udp://{address}:{settings.port}/" for address in addresses)
     return message
+
+
+def _finite(value: float) -> float:
+    return float(value) if math.isfinite(value) else 0.0
