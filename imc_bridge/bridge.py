@@ -261,6 +261,10 @@ class Bridge:
 
     # Time
 
+    def wall_time_s(self) -> float:
+        """Unix seconds of this machine."""
+        return self._wall_clock()
+
     def _now(self) -> float:
         """Seconds of the vehicles' clock rate: every period and timeout is measured in these."""
         return self._clock() * self.settings.time_scale
@@ -325,11 +329,12 @@ class Bridge:
         self.transport.look_for_interfaces()
         self.transport.announce(
             lambda addresses: encode(
-                own_announce(self.settings, addresses, self._position_rad()), src=self.settings.imc_id, dst=0, time_s=self._wall_clock()
+                own_announce(self.settings, addresses, self.position_rad()), src=self.settings.imc_id, dst=0, time_s=self._wall_clock()
             )
         )
 
-    def _position_rad(self) -> tuple[float, float]:
+    def position_rad(self) -> tuple[float, float]:
+        """The place that we announce as ours."""
         if self.settings.position_deg is not None:
             lat, lon = self.settings.position_deg
             return math.radians(lat), math.radians(lon)
@@ -350,7 +355,7 @@ class Bridge:
             self._note_error(error)
 
     def _take_announce(self, packet: bytes, address: Address) -> None:
-        header = self.announces.header(packet)
+        header = self.announces.header(packet, address[0])
         if header is None or not self.announces.wants(header):
             return
         message = self.announces.message(packet)
@@ -404,7 +409,7 @@ class Bridge:
             self._note_error(error)
 
     def _take_packet(self, packet: bytes, address: Address) -> None:
-        header = self.decoder.header(packet)
+        header = self.decoder.header(packet, address[0])
         if header is None:
             return
         now = self._now()
@@ -604,7 +609,9 @@ class Bridge:
             ours=node.executing(self.settings.plan_id),
             age_s=age(node.heard_at),
             announce_age_s=age(node.announced_at),
+            telemetry_overdue=node.telemetry_overdue(now),
             address=f"{node.address[0]}:{node.address[1]}" if node.address else None,
+            addresses=node.addresses,
             imc_version=node.announcement.imc_version if node.announcement else None,
             operation_mode=node.operation_mode_name,
             plan_id=node.plan_id or None,
@@ -612,6 +619,7 @@ class Bridge:
             report=node.report,
             clock_offset_s=node.clock.offset_s,
             entities=None if node.entities is None else len(node.entities),
+            controller=node.controller,
             bottom_sensors=tuple(sorted(node.gate.heard)),
             rates_hz=node.rates.rates_hz(now),
             soundings=node.gate.accepted,

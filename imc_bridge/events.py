@@ -149,7 +149,11 @@ class NodeView:
     """Executes a plan of ours, perhaps of an earlier run."""
     age_s: float | None = None
     announce_age_s: float | None = None
+    telemetry_overdue: bool = False
+    """Announced for longer than telemetry needs to begin, and none came."""
     address: str | None = None
+    addresses: tuple[tuple[str, int], ...] = ()
+    """Every address that it announced."""
     imc_version: str | None = None
     operation_mode: str | None = None
     plan_id: str | None = None
@@ -157,6 +161,8 @@ class NodeView:
     report: StateReport | None = None
     clock_offset_s: float | None = None
     entities: int | None = None
+    controller: int | None = None
+    """IMC id that its FollowReference maneuver takes references from, while it says so."""
     bottom_sensors: tuple[str, ...] = ()
     rates_hz: Mapping[str, float] = field(default_factory=dict)
     soundings: int = 0

@@ -141,6 +141,7 @@ class Evidence:
     completed: bool = False
     aborted_by: int | None = None
     stopped_by: int | None = None
+    taken_by: int | None = None
     error: str | None = None
     blocked: bool = False
     rebooted: bool = False
@@ -267,11 +268,17 @@ class Follower:
         status = self.node.status(now)
         if status.state in (NodeState.LOST, NodeState.HEARD, NodeState.EXPECTED_OFFLINE):
             self.refusal = Refusal(status.reason, "Bring its link up first; `bathyfleet doctor` says what is missing")
-        elif status.state is NodeState.IN_PLAN and self.node.plan_id != self._settings.plan_id:
+        elif self.node.conflict is not None:
+            self.refusal = Refusal(self.node.conflict, "A command could reach the wrong vehicle")
+        elif status.state is NodeState.IN_PLAN and not self._ours_or_none():
             self.refusal = Refusal(status.reason, "Stop that plan on its console, then engage again")
         else:
             self._enter(Phase.WAITING, now)
         return self.engaged
+
+    def _ours_or_none(self) -> bool:
+        """Whether the plan in execution is ours; one that is still nameless may become ours."""
+        return self.node.plan_id in ("", self._settings.plan_id) and self.node.foreign_controller is None
 
     def order(self, waypoint: Waypoint, now: float) -> None:
         """Replace the current waypoint. Repeating one is harmless unless it had been refused."""
@@ -389,6 +396,11 @@ class Follower:
 
     def follow_state(self, message: Message, now: float) -> None:
         """FollowRefState: the echo of a reference is its acknowledgement."""
+        self.node.controller = int(message.control_src)
+        if self.node.foreign_controller is not None and self.phase in (Phase.FOLLOWING, Phase.ENDED):
+            # Its plan goes by our name, but it takes no reference of ours.
+            self._evidence.taken_by = self.node.controller
+            self._plan_ended(now)
         if int(message.control_src) != self._settings.imc_id:
             return
         if int(message.state) == STATE_TIMEOUT:
@@ -515,7 +527,7 @@ class Follower:
             self._tick_starting(now)
             return
         status = node.status(now)
-        if status.state is NodeState.IN_PLAN and node.plan_id not in ("", settings.plan_id):
+        if status.state is NodeState.IN_PLAN and not self._ours_or_none():
             self._release(status.reason, "Stop that plan on its console, then engage again", now)
         elif now - self._since > (settings.engage_timeout_s if self._restarts == 0 else settings.release_after_s):
             reason = status.reason or "does not report being in service and ready"
@@ -658,6 +670,12 @@ class Follower:
             self._release(
                 f"another console took over with plan {node.plan_id!r}",
                 "Engage it again when that is done",
+                now,
+            )
+        elif seen.taken_by is not None:
+            self._release(
+                f"console 0x{seen.taken_by:04X} took over with a plan of the same name",
+                "Engage it again when that is done; two consoles need different plan ids",
                 now,
             )
         elif seen.rebooted:

@@ -51,6 +51,7 @@ class PlanState(IntEnum):
 
 
 MEDIUM_UNDERWATER = 3
+ANY_CONSOLE = 0xFFFF
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,6 +132,8 @@ class Node:
         self.plan_state: int | None = None
         self.plan_state_at: float | None = None
         self.plan_id = ""
+        self.controller: int | None = None
+        """Whose references its FollowReference maneuver takes, by its own account."""
         self.medium: int | None = None
         self.battery_pct: float | None = None
         self.history = StateHistory()
@@ -174,6 +177,7 @@ class Node:
         self.operation_mode_at = self.plan_state_at = None
         self.telemetry_at = None
         self.plan_id = ""
+        self.controller = None
         self._latest.clear()
 
     # Packets and the vehicle's clock
@@ -255,6 +259,13 @@ class Node:
         self.plan_state = int(message.state)
         self.plan_state_at = now
         self.plan_id = str(message.plan_id)
+        if self.plan_state not in (PlanState.EXECUTING, PlanState.INITIALIZING):
+            self.controller = None
+
+    @property
+    def foreign_controller(self) -> int | None:
+        """The console that its maneuver listens to when that is not us."""
+        return None if self.controller in (None, ANY_CONSOLE, self._settings.imc_id) else self.controller
 
     def take_entities(self, message: Message) -> None:
         """EntityList report: ``Name=id;…``."""
@@ -287,8 +298,9 @@ class Node:
         )
 
     def executing(self, plan_id: str) -> bool:
-        """Whether its last plan state says that it executes a plan of this name."""
-        return self.plan_state in (PlanState.EXECUTING, PlanState.INITIALIZING) and self.plan_id == plan_id
+        """Whether it executes a plan of this name, as far as it says, and not at another console's behest."""
+        running = self.plan_state in (PlanState.EXECUTING, PlanState.INITIALIZING)
+        return running and self.plan_id == plan_id and self.foreign_controller is None
 
     def status(self, now: float) -> Status:
         """The link's state and the reason for it."""
@@ -312,11 +324,21 @@ class Node:
         if self.plan_state in (PlanState.EXECUTING, PlanState.INITIALIZING):
             if self.plan_state == PlanState.INITIALIZING:
                 return Status(NodeState.IN_PLAN, "starts a plan")
-            whose = "our plan" if self.plan_id == settings.plan_id else f"plan {self.plan_id!r} of another console"
+            if self.foreign_controller is not None:
+                whose = f"plan {self.plan_id!r} under the control of console 0x{self.foreign_controller:04X}"
+            elif self.plan_id == settings.plan_id:
+                whose = "our plan"
+            else:
+                whose = f"plan {self.plan_id!r} of another console"
             return Status(NodeState.IN_PLAN, f"executes {whose}")
         if self.operation_mode == OperationMode.SERVICE and self.plan_state == PlanState.READY:
             return Status(NodeState.READY)
         return Status(NodeState.ACTIVE, self._why_not_ready())
+
+    def telemetry_overdue(self, now: float) -> bool:
+        """Whether it announced itself long ago and nothing else came."""
+        since = self.first_announced_at
+        return self.heard_at is None and since is not None and now - since > self._settings.telemetry_timeout_s
 
     def _without_telemetry(self, now: float, announced_at: float, first_announced_at: float) -> Status:
         if now - announced_at > ANNOUNCES_MISSED * self._settings.announce_period_s:

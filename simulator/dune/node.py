@@ -70,6 +70,8 @@ class DuneOptions:
         Also send servo positions and attitude at full rate, as a real vehicle does.
     boot_s
         Vehicle time from start to service.
+    static_destinations
+        Addresses that get everything, known or not.
     imc_version
         As told in the announce.
     tcp
@@ -84,6 +86,7 @@ class DuneOptions:
     faults: NetworkFaults = field(default_factory=NetworkFaults)
     chatter: bool = False
     boot_s: float = BOOT_S
+    static_destinations: tuple[Address, ...] = ()
     imc_version: str = IMC_VERSION
     tcp: bool = False
     radio_range_m: float = 0.0
@@ -259,7 +262,9 @@ class FakeDune:
 
     @property
     def _has_listeners(self) -> bool:
-        return bool(self.contacts.destinations) or (self._tcp is not None and self._tcp.connected)
+        return bool(self.contacts.destinations or self._options.static_destinations) or (
+            self._tcp is not None and self._tcp.connected
+        )
 
     def _put(self, data: bytes, message_id: int) -> None:
         """Send a packet to every active system within reach."""
@@ -267,6 +272,8 @@ class FakeDune:
             for imc_id, destination in self.contacts.destinations:
                 if self._radio.reaches(imc_id, message_id):
                     self._endpoint.send(data, destination)
+            for destination in self._options.static_destinations:
+                self._endpoint.send(data, destination)
         if self._tcp is not None:
             self._tcp.send(data)
 
