@@ -111,6 +111,7 @@ class Bridge:
         self._state_reported: dict[int, float] = {}
         self._entities_asked: dict[int, float] = {}
         self._task: asyncio.Task[None] | None = None
+        self._started_at: float | None = None
         self._turn = asyncio.Event()
         self._announce_due = 0.0
         self._announced_at = float("-inf")
@@ -139,10 +140,16 @@ class Bridge:
             raise RuntimeError("this bridge has been started already")
         self._on_event = on_event
         self.transport.open()
+        self._started_at = self._clock()
         if self.settings.position_deg is None:
             # The first vehicle heard tells where we are and is answered at once; see own_announce.
             self._announce_due = self._now() + self.settings.announce_period_s
         self._task = asyncio.create_task(self._run(), name="imc-bridge")
+
+    @property
+    def listening_s(self) -> float:
+        """For how long it has been started, seconds of the wall clock."""
+        return 0.0 if self._started_at is None else self._clock() - self._started_at
 
     async def close(self) -> None:
         """Stop every engaged vehicle, restore rates, release the ports; safe to repeat."""

@@ -21,6 +21,7 @@ class Cause(StrEnum):
 
     SOUND = "sound"
     """Nothing is wrong here."""
+    SWITCHED_OFF = "switched_off"
     PORT_IN_USE = "port_in_use"
     NO_INTERFACE = "no_interface"
     NO_VEHICLE = "no_vehicle"

@@ -31,6 +31,7 @@ from imc_bridge import (
     Waypoint,
     WaypointChange,
 )
+from imc_bridge.doctor import Diagnosis, judge
 
 _UNENGAGED = {
     NodeState.HEARD: LinkState.HEARD,
@@ -58,6 +59,12 @@ def bridge_settings(settings: ImcSettings, time_scale: float) -> BridgeSettings:
         loopback_only=settings.loopback_only,
         announce_ports=settings.announce_ports,
         altimeter=settings.altimeter,
+        interfaces=settings.interfaces,
+        transport=settings.transport,
+        position_deg=settings.position,
+        vehicles=settings.vehicles,
+        rate_limiters=settings.rate_limiters,
+        unknown_bottom_depth_m=settings.unknown_bottom_depth_m,
         time_scale=time_scale,
     )
 
@@ -126,6 +133,10 @@ class ImcFleetLink:
         """Stop the vehicle; a plan of another console is left alone."""
         result = await self._bridge.stop(vehicle, timeout_s=timeout_s)
         return StopReceipt(result.vehicle, result.acknowledged, result.detail)
+
+    def diagnosis(self) -> Diagnosis:
+        """What keeps vehicles from working with us, as heard so far."""
+        return judge(self._bridge, self._bridge.listening_s)
 
     def _forward(self, event: BridgeEvent) -> None:
         translated = _translate(event)
