@@ -363,7 +363,8 @@ def _show_diagnosis(diagnosis: "Diagnosis") -> None:
             Console().print(Text(f"\n{node.name}'s link:", style="bold"))
         for change in node.history if len(node.history) > 1 else ():
             at = datetime.fromtimestamp(change.at_s, UTC)
-            Console().print(Text(f"  {at:%H:%M:%S}Z {change.state.value}{f': {change.reason}' if change.reason else ''}"))
+            words = f"{change.state.value}: {change.reason}" if change.reason else change.state.value
+            Console().print(Text(f"  {at:%H:%M:%S}Z {words}"))
 
 
 @app.command()

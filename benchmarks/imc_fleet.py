@@ -126,7 +126,7 @@ async def measure(vehicles: int, seconds: float, sent: Any) -> dict[str, Any]:
     await bridge.start(note)
     try:
         async with asyncio.timeout(60.0):
-            while sum(node.state is NodeState.READY for node in bridge.nodes()) < vehicles:
+            while sum(node.state is NodeState.READY for node in bridge.nodes()) < vehicles:  # noqa: ASYNC110
                 await asyncio.sleep(0.2)
             names = [node.name for node in bridge.nodes()]
             await asyncio.gather(*(bridge.engage(name) for name in names))

@@ -1,4 +1,4 @@
-"""Throws mutated packets at the bridge: ``python benchmarks/imc_fuzz.py [--packets 1000000] [--seed 0] [--captures DIR]``.
+"""Mutated packets for the bridge: ``python benchmarks/imc_fuzz.py [--packets 1000000] [--seed 0] [--captures DIR]``.
 
 Packets of recorded sessions (or, without any, of every message the bridge takes in) are flipped, cut, spliced and
 filled with extreme numbers; most get a right checksum afterwards, so that they reach the parsers and gates. Printed
@@ -27,9 +27,11 @@ import numpy as np
 from imc_bridge import Bridge, BridgeSettings, RefusedError, Sounding, StateReport, Waypoint
 from imc_bridge.bridge import WANTED
 from imc_bridge.codec import message_ids
+from imc_bridge.transport import Address
 
 VEHICLE_ID, VEHICLE = 0x1E, ("127.0.0.1", 6002)
-EXTREMES = [0.0, -1.0, 1e9, -1e9, 1e38, 1e300, float("inf"), float("-inf"), float("nan")]
+EXTREMES = [0.0, -1.0, 1e9, -1e9, 1e38, float("inf"), float("-inf"), float("nan")]
+Packet = tuple[bytes, Address]
 ANNOUNCE = imcpy.Announce().msg_id.to_bytes(2, "little")
 
 
@@ -56,9 +58,9 @@ def with_checksum(packet: bytearray) -> bytes:
     return bytes(packet)
 
 
-def seeds(captures: Path | None) -> list[tuple[bytes, tuple[str, int]]]:
+def seeds(captures: Path | None) -> list[Packet]:
     """Good packets with the address they came from."""
-    found: dict[tuple[object, ...], tuple[bytes, tuple[str, int]]] = {}
+    found: dict[tuple[object, ...], Packet] = {}
     for path in sorted(captures.glob("*.jsonl.gz")) if captures else []:
         with gzip.open(path, "rt") as lines:
             for line in lines:
@@ -71,54 +73,56 @@ def seeds(captures: Path | None) -> list[tuple[bytes, tuple[str, int]]]:
         for name in (*WANTED, "Announce", "ServoPosition", "GpsFix"):
             message = getattr(imcpy, name)()
             message.src, message.timestamp = VEHICLE_ID, 1.7e9
+            if name == "Announce":
+                message.sys_name, message.sys_type = "lauv-fuzz", imcpy.SystemType.UUV
+                message.services = f"imc+udp://{VEHICLE[0]}:{VEHICLE[1]}/"
             found[(name,)] = (bytes(message.serialize()), VEHICLE)
     return list(found.values())
 
 
-def mutated(pool: list[tuple[bytes, tuple[str, int]]], rng: np.random.Generator) -> Iterator[tuple[bytes, tuple[str, int]]]:
-    """Mutated packets without end."""
+def mutated(pool: list[Packet], rng: np.random.Generator) -> Iterator[Packet]:
+    """Mutated packets without end, most of them of messages that are taken in, by a clock that goes on."""
     wanted = message_ids((*WANTED, "Announce"))
     known = [item for item in pool if int.from_bytes(item[0][2:4], "little") in wanted]
     clock = 1.8e9
     while True:
-        draws = rng.random((4096, 8))
-        for which, kind, at, value, other, fix, copies, where in draws:
-            some = pool if fix < 0.1 else known
+        for which, stranger, whole, checked in rng.random((4096, 4)):
+            some = pool if stranger > 0.9 else known
             packet, address = some[int(which * len(some))]
             data = bytearray(packet)
             clock += 0.01
             struct.pack_into("<d", data, 6, clock)
-            if where > 0.7:
-                yield with_checksum(data), address
-                continue
-            for _ in range(1 + int(3 * copies)):
-                spot = int(at * len(data)) if copies < 0.2 else 20 + int(at * (len(data) - 20))
-                if kind < 0.3:
-                    data[spot] ^= 1 << int(8 * value)
-                elif kind < 0.5:
-                    data[spot] = int(256 * value)
-                elif kind < 0.7 and len(data) > 30:
-                    size = 8 if other < 0.5 else 4
-                    spot = 20 + int(at * max(len(data) - 22 - size, 1))
-                    number = EXTREMES[int(value * len(EXTREMES))]
-                    with_size = struct.pack("<d" if size == 8 else "<f", number if size == 8 or abs(number) < 1e38 else math.copysign(math.inf, number))
-                    data[spot : spot + size] = with_size
-                elif kind < 0.8:
-                    del data[spot : spot + int(16 * value) + 1]
-                elif kind < 0.9:
-                    donor = pool[int(other * len(pool))][0]
-                    data[spot:spot] = donor[int(value * len(donor)) :][:64]
-                else:
-                    # A plausible packet of another time or system.
-                    struct.pack_into("<d", data, 6, EXTREMES[int(value * len(EXTREMES))] if other < 0.5 else 2e9 * value)
-                    struct.pack_into("<H", data, 14, int(65536 * other))
-                at = (at * 7.3) % 1.0
-                if len(data) < 24:
-                    data.extend(bytes(24 - len(data)))
-            if len(data) > 65_000:
-                del data[65_000:]
-            packet = with_checksum(data) if fix < 0.9 else bytes(data)
-            yield packet, (("10.0.0.1", 1 + int(65534 * other)) if where < 0.02 else address)
+            if whole < 0.7:
+                for _ in range(rng.integers(1, 4)):
+                    mutate(data, some[rng.integers(len(some))][0], rng)
+                    data.extend(bytes(max(24 - len(data), 0)))
+            if stranger < 0.02:
+                address = ("10.0.0.1", int(rng.integers(1, 65536)))
+            yield (with_checksum(data) if checked < 0.9 else bytes(data)), address
+
+
+def mutate(data: bytearray, donor: bytes, rng: np.random.Generator) -> None:
+    """Change one thing about a packet of at least 24 bytes."""
+    begin = 0 if rng.random() < 0.2 else 20
+    spot = begin + int(rng.random() * (len(data) - begin))
+    match int(10 * rng.random()):
+        case 0 | 1 | 2:
+            data[spot] ^= 1 << int(rng.integers(8))
+        case 3 | 4:
+            data[spot] = int(rng.integers(256))
+        case 5 | 6:
+            number = EXTREMES[rng.integers(len(EXTREMES))]
+            packed = struct.pack("<d", number) if rng.random() < 0.5 else np.float32(number).tobytes()
+            data[spot : spot + len(packed)] = packed
+        case 7:
+            del data[spot : spot + int(rng.integers(1, 17))]
+        case 8:
+            data[spot:spot] = donor[int(rng.integers(len(donor))) :][:64]
+        case _:
+            # Another time, another sender.
+            time_s = EXTREMES[rng.integers(len(EXTREMES))] if rng.random() < 0.5 else 2e9 * rng.random()
+            struct.pack_into("<d", data, 6, time_s)
+            struct.pack_into("<H", data, 14, int(rng.integers(65536)))
 
 
 def memory_mb() -> float:
@@ -146,7 +150,7 @@ class Target:
             numbers = [value for value in dataclasses.astuple(event) if isinstance(value, float)]
             self.impossible += not (all(map(math.isfinite, numbers)) and abs(event.lat_deg) <= 90.0)
 
-    def take(self, packet: bytes, address: tuple[str, int], *, announce: bool) -> None:
+    def take(self, packet: bytes, address: Address, *, announce: bool) -> None:
         """One packet a millisecond after the last."""
         self.now += 0.001
         self.bridge.on_packet(packet, address)

@@ -30,6 +30,7 @@ from imc_bridge.follow import Follower, Phase
 from imc_bridge.nodes import Node
 from imc_bridge.rates import RateRequest
 from imc_bridge.roster import Roster
+from imc_bridge.seabed import Seabed
 from imc_bridge.settings import BridgeSettings
 from imc_bridge.transport import Address, Transport
 from imc_bridge.vehicle_clock import Tick
@@ -105,6 +106,7 @@ class Bridge:
         self._wall_clock = wall_clock
         self._on_event: EventCallback = lambda _event: None
         self._roster = Roster(settings)
+        self._seabed = Seabed()
         self._followers: dict[int, Follower] = {}
         self._rates: dict[int, RateRequest] = {}
         self._links: dict[int, deque[LinkChange]] = {}
@@ -310,7 +312,7 @@ class Bridge:
             self._send(node, imcpy.Heartbeat())
             return
         # Which of its addresses leads to it from here shows only once it answers.
-        packet = encode(imcpy.Heartbeat(), src=self.settings.imc_id, dst=node.imc_id, time_s=self._wall_clock())
+        packet = self._encoded(imcpy.Heartbeat(), node.imc_id)
         for address in node.addresses:
             self.transport.send(packet, address)
 
@@ -334,11 +336,13 @@ class Bridge:
         self._announce_due = now + self.settings.announce_period_s
         self._announced_at = now
         self.transport.look_for_interfaces()
+        position = self.position_rad()
         self.transport.announce(
-            lambda addresses: encode(
-                own_announce(self.settings, addresses, self.position_rad()), src=self.settings.imc_id, dst=0, time_s=self._wall_clock()
-            )
+            lambda addresses: self._encoded(own_announce(self.settings, addresses, position), dst=0)
         )
+
+    def _encoded(self, message: Message, dst: int) -> bytes:
+        return encode(message, src=self.settings.imc_id, dst=dst, time_s=self._wall_clock())
 
     def position_rad(self) -> tuple[float, float]:
         """The place that we announce as ours."""
@@ -515,7 +519,7 @@ class Bridge:
                 self._tell(report)
         for result in node.gate.resolve(node.history, node.position_sd_m()):
             if follower is not None and isinstance(result, Sounding):
-                follower.guard.add(result.time_s, result.lat_deg, result.lon_deg, result.bottom_depth_m)
+                follower.guard.add(result.time_s, result.lat_deg, result.lon_deg, result.bottom_depth_m, now)
             self._tell(result)
 
     def _take_distance(self, node: Node, message: Message) -> None:
@@ -548,7 +552,12 @@ class Bridge:
         follower = self._followers.get(node.imc_id)
         if follower is None:
             follower = self._followers[node.imc_id] = Follower(
-                node, self.settings, lambda message: self._send(node, message), self._tell, self._request_ids
+                node,
+                self.settings,
+                lambda message: self._send(node, message),
+                self._tell,
+                self._request_ids,
+                self._seabed,
             )
         return follower
 
@@ -562,8 +571,7 @@ class Bridge:
 
     def _send(self, node: Node, message: Message) -> None:
         if node.address is not None:
-            packet = encode(message, src=self.settings.imc_id, dst=node.imc_id, time_s=self._wall_clock())
-            self.transport.send(packet, node.address)
+            self.transport.send(self._encoded(message, node.imc_id), node.address)
 
     # Telling the user
 

@@ -77,7 +77,7 @@ def read_announce(message: Message) -> Announcement:
 
 
 def reachable_first(announcement: Announcement, source_host: str, *, by_tcp: bool = False) -> tuple[Address, ...]:
-    """The announced addresses, the one on the host that the announce came from first; TCP's where wished and offered."""
+    """The announced addresses, TCP's where wished and offered; the one on the announce's own host comes first."""
     offered = announcement.streams if by_tcp and announcement.streams else announcement.addresses
     return tuple(sorted(offered, key=lambda address: address[0] != source_host))
 

@@ -89,14 +89,18 @@ def judge(
     wanted = bridge.settings.vehicles
     nodes = tuple(
         NodeDiagnosis(
-            node.name, node.imc_id, node.state, tuple(_node_findings(node, bridge, answers or {}, live=live)), node.history
+            name=node.name,
+            imc_id=node.imc_id,
+            state=node.state,
+            findings=tuple(_node_findings(node, bridge, answers or {}, live=live)),
+            history=node.history,
         )
         for node in vehicles
         if not wanted or node.name in wanted or node.state is NodeState.HEARD
     )
     missing = [name for name in wanted if name not in {node.name for node in vehicles}]
     own = _socket_findings(bridge) if live else []
-    return Diagnosis(seconds, tuple([*own, *_network_findings(bridge, nodes, missing)]), nodes)
+    return Diagnosis(seconds, (*own, *_network_findings(bridge, nodes, missing)), nodes)
 
 
 def _port_in_use(error: PortInUseError, settings: BridgeSettings) -> Finding:
@@ -155,7 +159,10 @@ def _network_findings(bridge: Bridge, nodes: tuple[NodeDiagnosis, ...], missing:
                 f"{settings.announce_ports[0]}-{settings.announce_ports[-1]} and {settings.port}",
             )
         )
-    findings += [problem(Cause.NOT_HEARD, f"{name} was not heard", "Check its name, power, network") for name in missing]
+    findings += [
+        problem(Cause.NOT_HEARD, f"{name} was not heard", "Check its name, its power and its network")
+        for name in missing
+    ]
     return findings + _packet_findings(bridge)
 
 
@@ -171,15 +178,15 @@ def _packet_findings(bridge: Bridge) -> list[Finding]:
                 "Nothing of it can be read: use DUNE of the same IMC minor version",
             )
         )
-    for fault in (PacketFault.SYNC, PacketFault.LENGTH, PacketFault.CHECKSUM):
-        if faults[fault] > (versions.total() if fault is PacketFault.SYNC else 0):
-            findings.append(
-                note(
-                    Cause.BAD_PACKETS,
-                    f"{faults[fault]} packets dropped: {fault.value}",
-                    "Another program sends to our ports, or a sender's IMC definitions differ from ours",
-                )
-            )
+    findings += [
+        note(
+            Cause.BAD_PACKETS,
+            f"{faults[fault]} packets dropped: {fault.value}",
+            "Another program sends to our ports, or a sender's IMC definitions differ from ours",
+        )
+        for fault in (PacketFault.SYNC, PacketFault.LENGTH, PacketFault.CHECKSUM)
+        if faults[fault] > (versions.total() if fault is PacketFault.SYNC else 0)
+    ]
     if faults[PacketFault.UNKNOWN]:
         ids = ", ".join(map(str, sorted(bridge.decoder.unknown_ids)[:8]))
         text = f"{faults[PacketFault.UNKNOWN]} packets of unknown ids skipped: {ids}"
@@ -213,9 +220,10 @@ def _node_findings(node: NodeView, bridge: Bridge, answers: Mapping[int, Answer]
 
 def _announce_finding(node: NodeView, settings: BridgeSettings) -> Finding:
     if node.announce_age_s is None:
+        source = f" from {node.foreign_from}" if node.foreign_from else ""
         return problem(
             Cause.NO_ANNOUNCE,
-            f"{node.foreign_address} packets{f' from {node.foreign_from}' if node.foreign_from else ''}, but no announce",
+            f"{node.foreign_address} packets{source}, but no announce",
             f"{node.reason}; without it nothing of it counts. A switch or access point that drops multicast and "
             "broadcast, or a firewall on those ports, has this effect",
         )
@@ -342,7 +350,8 @@ def _clock_findings(node: NodeView, settings: BridgeSettings) -> list[Finding]:
     side = "ahead of" if offset > 0 else "behind"
     text = f"its clock is {_duration(abs(offset))} {side} ours"
     remedy = "Synchronise both by NTP or GPS: tides and times in products are taken from it"
-    return [problem(Cause.CLOCK_OFF, text, remedy) if abs(offset) > CLOCK_WRONG_S else note(Cause.CLOCK_OFF, text, remedy)]
+    say = problem if abs(offset) > CLOCK_WRONG_S else note
+    return [say(Cause.CLOCK_OFF, text, remedy)]
 
 
 def _duration(seconds: float) -> str:

@@ -35,6 +35,15 @@ class WaypointStatus(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
+class BottomPoint:
+    """Depth of the bottom at a place as a map knows it, below the surface as it is now, on the safe side."""
+
+    lat_deg: float
+    lon_deg: float
+    depth_m: float
+
+
+@dataclass(frozen=True, slots=True)
 class Waypoint:
     """Where a vehicle shall go. Equal ``mission_id`` and ``step`` make two waypoints the same order.
 
@@ -53,6 +62,8 @@ class Waypoint:
     min_altitude_m: float = 3.0
     lead_lat_deg: float | None = None
     lead_lon_deg: float | None = None
+    bottom: tuple[BottomPoint, ...] = ()
+    """What is mapped of the bottom on the way there; no reference goes deeper than the clearance above it."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,6 +21,7 @@ from imc_bridge.codec import ANY_ENTITY, Message
 from imc_bridge.events import NodeState, StateReport, Waypoint, WaypointChange, WaypointStatus
 from imc_bridge.guard import AltitudeGuard
 from imc_bridge.nodes import Node, OperationMode, PlanState
+from imc_bridge.seabed import Seabed
 from imc_bridge.settings import BridgeSettings
 
 MANEUVER_ID = "follow"
@@ -211,6 +212,8 @@ class Follower:
         Receives :class:`WaypointChange` events.
     request_ids
         Numbers for requests, shared by all vehicles and not repeated across restarts of the service.
+    seabed
+        What all vehicles have measured of the bottom.
     """
 
     def __init__(
@@ -220,9 +223,12 @@ class Follower:
         send: Callable[[Message], None],
         emit: Callable[[WaypointChange], None],
         request_ids: itertools.count[int],
+        seabed: Seabed | None = None,
     ) -> None:
         self.node = node
-        self.guard = AltitudeGuard(settings.guard_radius_m, settings.guard_window_s, settings.unknown_bottom_depth_m)
+        self.guard = AltitudeGuard(
+            settings.guard_radius_m, settings.guard_window_s, settings.unknown_bottom_depth_m, seabed
+        )
         self.phase = Phase.IDLE
         self.refusal: Refusal | None = None
         self.stop_detail = ""
@@ -606,7 +612,14 @@ class Follower:
         depth, order.limited = waypoint.depth_m, ""
         if report is not None:
             limit = self.guard.limit(
-                waypoint.depth_m, waypoint.min_altitude_m, report.time_s, report.lat_deg, report.lon_deg
+                waypoint.depth_m,
+                waypoint.min_altitude_m,
+                report.time_s,
+                report.lat_deg,
+                report.lon_deg,
+                now=now,
+                towards=_way(order),
+                mapped=waypoint.bottom,
             )
             depth, order.limited = limit.depth_m, limit.reason
         if order.limited and order.sent and 0.0 <= depth - order.sent[-1].depth_m < GUARD_STEP_M:
@@ -733,6 +746,15 @@ class Follower:
         order = self._order
         if order is not None and order.status not in (WaypointStatus.REACHED, WaypointStatus.REFUSED):
             self._advance(order, WaypointStatus.REFUSED, f"{reason}. {remedy}")
+
+
+def _way(order: Order) -> list[tuple[float, float]]:
+    """Where the vehicle flies from where it is: the waypoint, then the lead where it is sent there."""
+    waypoint = order.waypoint
+    way = [(waypoint.lat_deg, waypoint.lon_deg)]
+    if order.leading and waypoint.lead_lat_deg is not None and waypoint.lead_lon_deg is not None:
+        way.append((waypoint.lead_lat_deg, waypoint.lead_lon_deg))
+    return way
 
 
 def _distance_m(lat1_deg: float, lon1_deg: float, lat2_deg: float, lon2_deg: float) -> float:

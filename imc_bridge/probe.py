@@ -76,7 +76,7 @@ async def probe(bridge: Bridge) -> dict[int, Answer]:
     if not silent:
         return {}
     taken = {node.imc_id for node in bridge.nodes()} | {bridge.settings.imc_id}
-    first_id, second_id = random.sample([i for i in CONSOLE_IDS if i not in taken], 2)  # noqa: S311 - no secret
+    first_id, second_id = random.sample([i for i in CONSOLE_IDS if i not in taken], 2)
     host = LOOPBACK if bridge.settings.loopback_only else "0.0.0.0"  # noqa: S104 - vehicles come from anywhere
     loop = asyncio.get_running_loop()
     other, ear = await loop.create_datagram_endpoint(_Ear, local_addr=(host, 0))

@@ -33,7 +33,7 @@ class BridgeSettings:
     interfaces: tuple[str, ...] = ()
     """IPv4 addresses of the interfaces to announce on; empty means all of them."""
     transport: Literal["udp", "tcp"] = "udp"
-    """``tcp``: speak by TCP with every vehicle that offers it (DUNE's Transports.TCP.Server), by UDP with the others."""
+    """``tcp``: by TCP with every vehicle that offers it (DUNE's Transports.TCP.Server), by UDP with the others."""
     announce_ports: tuple[int, ...] = STANDARD_ANNOUNCE_PORTS
     multicast_group: str = STANDARD_MULTICAST_GROUP
     position_deg: tuple[float, float] | None = None

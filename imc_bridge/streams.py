@@ -77,7 +77,7 @@ class TcpStreams:
     def want(self, address: Address) -> None:
         """Keep a connection to this address from now on."""
         if address not in self._tasks:
-            self._tasks[address] = asyncio.get_running_loop().create_task(self._keep(address), name=f"imc-tcp-{address}")
+            self._tasks[address] = asyncio.create_task(self._keep(address), name=f"imc-tcp-{address}")
 
     def drop(self, address: Address) -> None:
         """Give a connection up."""

@@ -222,7 +222,7 @@ class Transport:
             self.unreachable[address] = reason
 
     def send(self, packet: bytes, address: Address) -> bool:
-        """Send without waiting, by TCP where a stream leads there; False, and a count by its reason, when that fails."""
+        """Send without waiting, by TCP where a stream leads there; False when that fails, which is counted."""
         if self.streams.wants(address):
             return self.streams.send(packet, address)
         if self._traffic is None:

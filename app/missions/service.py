@@ -22,6 +22,7 @@ from app.mapping.gp import warm_up as mapping_warm_up
 from app.missions import states
 from app.missions.broadcast import Subscription
 from app.missions.clock import now
+from app.missions.doctoring import DoctorView, Examine, doctor_view, switched_off
 from app.missions.errors import (
     ConflictError,
     InvalidRequestError,
@@ -29,7 +30,6 @@ from app.missions.errors import (
     MissionNotFoundError,
     VehicleNotFoundError,
 )
-from app.missions.doctoring import DoctorView, Examine, doctor_view, switched_off
 from app.missions.fleet import (
     FleetLink,
     LinkState,

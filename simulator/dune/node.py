@@ -16,8 +16,8 @@ from simulator.clock import SimulationClock
 from simulator.dune.contacts import REFRESH_PERIOD_S, Contacts
 from simulator.dune.entities import ANY, HARDWARE_DVL, HARDWARE_MULTIBEAM, SIMULATION, entity_list
 from simulator.dune.plan import PLAN_ENGINE, SUPERVISOR, PlanEngine
-from simulator.dune.rates import DEFAULT_LIMITS_HZ, Periodic, RateLimiter, RateLimiterError, parse_limits
 from simulator.dune.radio import Radio
+from simulator.dune.rates import DEFAULT_LIMITS_HZ, Periodic, RateLimiter, RateLimiterError, parse_limits
 from simulator.dune.tcp import FIRST_PORT, TcpServer
 from simulator.dune.telemetry import Telemetry
 from simulator.network import Address, Endpoint, NetworkFaults, UdpEndpoint

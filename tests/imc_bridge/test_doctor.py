@@ -33,7 +33,7 @@ async def test_healthy_vehicles_pass():
         assert diagnosis.causes == ()
         assert "bottom measured by Altimeter" in diagnosis.text()
         assert "in service and ready" in diagnosis.text()
-        assert [change.state for change in diagnosis.nodes[0].history][0] == "announced"
+        assert diagnosis.nodes[0].history[0].state == "announced"
 
 
 async def test_nothing_heard_is_a_problem_with_ports_to_check():
@@ -149,7 +149,9 @@ async def test_vehicle_that_comes_back_on_another_port_is_followed_there():
         sea.base_port = free_ports(1)[0]
         await sea.launch()
         await until(
-            lambda: sea.bridge.nodes()[0].address == f"127.0.0.1:{sea.base_port}" and sea.state("lauv-sim-1") == "ready",
+            lambda: (
+                sea.bridge.nodes()[0].address == f"127.0.0.1:{sea.base_port}" and sea.state("lauv-sim-1") == "ready"
+            ),
             "it is ready at its new port",
         )
 
@@ -187,7 +189,9 @@ async def test_our_own_id_in_use_elsewhere(harbour):
 
 
 async def test_clock_that_is_off_by_hours():
-    async with open_sea(speed=1.0, clock_offset_s=3 * 3600.0, boot_s=0.1, bridge={"position_deg": (41.18, -8.7)}) as sea:
+    async with open_sea(
+        speed=1.0, clock_offset_s=3 * 3600.0, boot_s=0.1, bridge={"position_deg": (41.18, -8.7)}
+    ) as sea:
         await sea.ready()
         await until(lambda: all(node.bottom_sensors for node in sea.bridge.nodes()), "it has measured the bottom")
         diagnosis = judge(sea.bridge, 1.0)

@@ -19,6 +19,7 @@ from app.missions.fleet import (
 )
 from app.missions.settings import ImcSettings
 from imc_bridge import (
+    BottomPoint,
     Bridge,
     BridgeEvent,
     BridgeSettings,
@@ -123,6 +124,7 @@ class ImcFleetLink:
             min_altitude_m=order.min_altitude_m,
             lead_lat_deg=order.lead.lat_deg if order.lead else None,
             lead_lon_deg=order.lead.lon_deg if order.lead else None,
+            bottom=tuple(BottomPoint(place.lat_deg, place.lon_deg, place.depth_m) for place in order.bottom),
         )
         try:
             self._bridge.goto(order.vehicle, waypoint)
