@@ -130,9 +130,7 @@ async def test_vehicle_that_announces_two_addresses_is_reached_at_the_one_that_w
     bridge, peer = harbour
     dead = free_ports(1)[0]
     port = peer.sock.getsockname()[1]
-    peer.announce(
-        bridge.transport.announce_port, services=f"imc+udp://127.0.0.1:{dead}/;imc+udp://127.0.0.1:{port}/"
-    )
+    peer.announce(bridge.transport.announce_port, services=f"imc+udp://127.0.0.1:{dead}/;imc+udp://127.0.0.1:{port}/")
     await until(lambda: bool(peer.take("Heartbeat")), "a heartbeat came to the second address")
     peer.send(imcpy.Heartbeat())
     await until(lambda: bridge.nodes()[0].address == f"127.0.0.1:{port}", "commands go to where it answers from")
