@@ -101,9 +101,7 @@ async def fly(options: argparse.Namespace) -> dict[str, Any]:
         imc = ImcSettings(port=PORT, announce_ports=ANNOUNCE_PORTS, loopback_only=True)
         await prepare_database(url, may_upgrade=True)
         database = Database(url)
-        service = MissionService(
-            ServiceSettings(database_url=url, imc=imc, time_scale=options.speed), database
-        )
+        service = MissionService(ServiceSettings(database_url=url, imc=imc, time_scale=options.speed), database)
         begun = time.monotonic()
         for vehicle in vehicles:
             await vehicle.start()

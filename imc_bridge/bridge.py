@@ -65,6 +65,13 @@ CLOSE_TIMEOUT_WALL_S = 3.0
 MAX_PLAUSIBLE_VEHICLE_TIME_S = 4e9
 
 
+def entity_query() -> Message:
+    """The question for the names of a node's entities."""
+    query = imcpy.EntityList()
+    query.op = imcpy.EntityList.OperationEnum.QUERY
+    return query
+
+
 class Bridge:
     """A console on the IMC network that can make vehicles follow waypoints.
 
@@ -321,9 +328,7 @@ class Bridge:
             asked = self._entities_asked.get(node.imc_id, float("-inf"))
             if now - asked >= ENTITY_QUERY_S:
                 self._entities_asked[node.imc_id] = now
-                query = imcpy.EntityList()
-                query.op = imcpy.EntityList.OperationEnum.QUERY
-                self._send(node, query)
+                self._send(node, entity_query())
         follower = self._followers.get(node.imc_id)
         if follower is not None:
             follower.tick(now)
@@ -338,7 +343,13 @@ class Bridge:
         self.transport.look_for_interfaces()
         position = self.position_rad()
         self.transport.announce(
-            lambda addresses: self._encoded(own_announce(self.settings, addresses, position), dst=0)
+            lambda addresses: encode(
+                own_announce(self.settings, addresses, position),
+                src=self.settings.imc_id,
+                dst=0,
+                dst_ent=0,
+                time_s=self._wall_clock(),
+            )
         )
 
     def _encoded(self, message: Message, dst: int) -> bytes:

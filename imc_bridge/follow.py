@@ -178,7 +178,7 @@ def follow_plan(settings: BridgeSettings) -> Message:
     maneuver.control_ent = ANY_ENTITY
     maneuver.timeout = settings.follow_timeout_s
     maneuver.loiter_radius = settings.loiter_radius_m
-    maneuver.altitude_interval = 0.0
+    maneuver.altitude_interval = settings.altitude_interval_m
     step = imcpy.PlanManeuver()
     step.maneuver_id = MANEUVER_ID
     step.data = maneuver
