@@ -1,4 +1,4 @@
-"""A whole mission over IMC: ``python benchmarks/imc_mission.py [--steps 100] [--speed 10] [--loss 0.05] [--kill-at 50]``.
+"""A whole mission over IMC: ``python benchmarks/imc_mission.py [--steps 100] [--loss 0.05] [--kill-at 50]``.
 
 The mission service, its database and planner run as they do for real vehicles; two fake DUNE nodes on real sockets are
 the vehicles. ``--radio-range 5000`` ends their radio at the surface, as in the recorded session ``wifi_gap_x5``;

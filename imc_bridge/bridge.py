@@ -169,7 +169,7 @@ class Bridge:
         ]
         await asyncio.gather(*(self.stop(name, timeout_s=CLOSE_TIMEOUT_WALL_S) for name in busy))
         for rates in self._rates.values():
-            rates.restore()
+            rates.restore_now()
         self._task.cancel()
         with contextlib.suppress(asyncio.CancelledError):
             await self._task
@@ -333,7 +333,9 @@ class Bridge:
         if follower is not None:
             follower.tick(now)
         rates = self._rates.get(node.imc_id)
-        if rates is not None and rates.pending and follower is not None and follower.engaged:
+        if rates is not None and rates.restoring:
+            rates.tick(now)
+        elif rates is not None and rates.pending and follower is not None and follower.engaged:
             rates.observed(node.rates.rates_hz(now).get("EstimatedState", 0.0))
             rates.tick(now)
 
