@@ -715,6 +715,28 @@ export interface components {
             min_vertical_separation_m: number;
         };
         /**
+         * LinkRecord
+         * @description One change of a vehicle's link.
+         */
+        LinkRecord: {
+            /**
+             * At
+             * Format: date-time
+             */
+            at: string;
+            state: components["schemas"]["NodeState"];
+            /**
+             * Engaged
+             * @description Whether the vehicle followed us
+             */
+            engaged: boolean;
+            /**
+             * Reason
+             * @default
+             */
+            reason: string;
+        };
+        /**
          * LinkState
          * @description How well a vehicle can be reached, worst to best.
          * @enum {string}
@@ -1402,7 +1424,7 @@ export interface components {
              * History
              * @description The last changes of its link, oldest first
              */
-            history: components["schemas"]["app__missions__doctoring__LinkState"][];
+            history: components["schemas"]["LinkRecord"][];
         };
         /**
          * VehicleKind
@@ -1462,7 +1484,7 @@ export interface components {
              * @default true
              */
             active: boolean;
-            link: components["schemas"]["app__missions__fleet__LinkState"];
+            link: components["schemas"]["LinkState"];
             /**
              * Reason
              * @description What is missing or wrong, and what to do; empty when all is well
@@ -1576,34 +1598,6 @@ export interface components {
             /** Waypoints */
             waypoints: components["schemas"]["WaypointView"][];
         };
-        /**
-         * LinkState
-         * @description One change of a vehicle's link.
-         */
-        app__missions__doctoring__LinkState: {
-            /**
-             * At
-             * Format: date-time
-             */
-            at: string;
-            state: components["schemas"]["NodeState"];
-            /**
-             * Engaged
-             * @description Whether the vehicle followed us
-             */
-            engaged: boolean;
-            /**
-             * Reason
-             * @default
-             */
-            reason: string;
-        };
-        /**
-         * LinkState
-         * @description How well a vehicle can be reached, worst to best.
-         * @enum {string}
-         */
-        app__missions__fleet__LinkState: "unknown" | "lost" | "expected_offline" | "heard" | "ready" | "engaged";
     };
     responses: never;
     parameters: never;
