@@ -21,6 +21,7 @@ from imc_bridge.codec import ANY_ENTITY, Message
 from imc_bridge.events import NodeState, StateReport, Waypoint, WaypointChange, WaypointStatus
 from imc_bridge.guard import AltitudeGuard
 from imc_bridge.nodes import Node, OperationMode, PlanState
+from imc_bridge.seabed import Seabed
 from imc_bridge.settings import BridgeSettings
 
 MANEUVER_ID = "follow"
@@ -35,6 +36,8 @@ STARVED_TEXT = "path control reference"
 GUARD_STEP_M = 0.2
 """A guarded depth that changes by less than this is not worth a new reference of its own."""
 MIN_UNANSWERED = 5
+ALIVE_S = 3.0
+"""A vehicle heard this lately hears us, too, unless something is wrong."""
 STATE_LOITER = 3
 STATE_HOVER = 4
 STATE_TIMEOUT = 6
@@ -106,8 +109,8 @@ class SentReference:
     def echoed_by(self, message: Message | None) -> bool:
         """Whether FollowRefState's reference is this one (floats of 32 bits on the wire)."""
         return (
-            message is not None
-            and message.z is not None
+            isinstance(message, imcpy.Reference)
+            and isinstance(message.z, imcpy.DesiredZ)
             and int(message.z.z_units) == Z_DEPTH
             and math.isclose(message.lat, self.lat_rad, abs_tol=1e-10)
             and math.isclose(message.lon, self.lon_rad, abs_tol=1e-10)
@@ -141,6 +144,7 @@ class Evidence:
     completed: bool = False
     aborted_by: int | None = None
     stopped_by: int | None = None
+    taken_by: int | None = None
     error: str | None = None
     blocked: bool = False
     rebooted: bool = False
@@ -162,6 +166,8 @@ class Order:
     leading: bool = False
     """Whether it is sent to the waypoint's lead, to pass the waypoint on the way."""
     radius_m: float = 0.0
+    unseen: bool = False
+    """Whether the vehicle went on to it where no radio reached."""
     sent: deque[SentReference] = field(default_factory=lambda: deque(maxlen=8))
 
 
@@ -172,7 +178,7 @@ def follow_plan(settings: BridgeSettings) -> Message:
     maneuver.control_ent = ANY_ENTITY
     maneuver.timeout = settings.follow_timeout_s
     maneuver.loiter_radius = settings.loiter_radius_m
-    maneuver.altitude_interval = 0.0
+    maneuver.altitude_interval = settings.altitude_interval_m
     step = imcpy.PlanManeuver()
     step.maneuver_id = MANEUVER_ID
     step.data = maneuver
@@ -210,6 +216,8 @@ class Follower:
         Receives :class:`WaypointChange` events.
     request_ids
         Numbers for requests, shared by all vehicles and not repeated across restarts of the service.
+    seabed
+        What all vehicles have measured of the bottom.
     """
 
     def __init__(
@@ -219,9 +227,12 @@ class Follower:
         send: Callable[[Message], None],
         emit: Callable[[WaypointChange], None],
         request_ids: itertools.count[int],
+        seabed: Seabed | None = None,
     ) -> None:
         self.node = node
-        self.guard = AltitudeGuard(settings.guard_radius_m, settings.guard_window_s, settings.unknown_bottom_depth_m)
+        self.guard = AltitudeGuard(
+            settings.guard_radius_m, settings.guard_window_s, settings.unknown_bottom_depth_m, seabed
+        )
         self.phase = Phase.IDLE
         self.refusal: Refusal | None = None
         self.stop_detail = ""
@@ -246,6 +257,8 @@ class Follower:
         self._evidence = Evidence()
         self._abandoned = False
         self._abort = False
+        self._gap = False
+        self._again = False
 
     @property
     def engaged(self) -> bool:
@@ -261,17 +274,24 @@ class Follower:
         """
         self.refusal = None
         self._restarts = 0
+        self._again = False
         self._order = None
         self._hold = None
         self._abandoned = False
         status = self.node.status(now)
         if status.state in (NodeState.LOST, NodeState.HEARD, NodeState.EXPECTED_OFFLINE):
             self.refusal = Refusal(status.reason, "Bring its link up first; `bathyfleet doctor` says what is missing")
-        elif status.state is NodeState.IN_PLAN and self.node.plan_id != self._settings.plan_id:
+        elif self.node.conflict is not None:
+            self.refusal = Refusal(self.node.conflict, "A command could reach the wrong vehicle")
+        elif status.state is NodeState.IN_PLAN and not self._ours_or_none():
             self.refusal = Refusal(status.reason, "Stop that plan on its console, then engage again")
         else:
             self._enter(Phase.WAITING, now)
         return self.engaged
+
+    def _ours_or_none(self) -> bool:
+        """Whether the plan in execution is ours; one that is still nameless may become ours."""
+        return self.node.plan_id in ("", self._settings.plan_id) and self.node.foreign_controller is None
 
     def order(self, waypoint: Waypoint, now: float) -> None:
         """Replace the current waypoint. Repeating one is harmless unless it had been refused."""
@@ -389,6 +409,11 @@ class Follower:
 
     def follow_state(self, message: Message, now: float) -> None:
         """FollowRefState: the echo of a reference is its acknowledgement."""
+        self.node.controller = int(message.control_src)
+        if self.node.foreign_controller is not None and self.phase in (Phase.FOLLOWING, Phase.ENDED):
+            # Its plan goes by our name, but it takes no reference of ours.
+            self._evidence.taken_by = self.node.controller
+            self._plan_ended(now)
         if int(message.control_src) != self._settings.imc_id:
             return
         if int(message.state) == STATE_TIMEOUT:
@@ -435,6 +460,10 @@ class Follower:
             return
         waypoint = order.waypoint
         distance = _distance_m(report.lat_deg, report.lon_deg, waypoint.lat_deg, waypoint.lon_deg)
+        if order.unseen and distance <= max(waypoint.arrival_radius_m, NEAR_TOLERANCE_M):
+            came_up = f"came up {distance:.0f} m from it after it was out of reach under water"
+            self._advance(order, WaypointStatus.REACHED, "; ".join(filter(None, (came_up, order.limited))))
+            return
         asked_depth = order.sent[-1].depth_m
         if abs(report.depth_m - asked_depth) > self._settings.depth_tolerance_m:
             return
@@ -515,15 +544,21 @@ class Follower:
             self._tick_starting(now)
             return
         status = node.status(now)
-        if status.state is NodeState.IN_PLAN and node.plan_id not in ("", settings.plan_id):
+        if status.state is NodeState.IN_PLAN and not self._ours_or_none():
             self._release(status.reason, "Stop that plan on its console, then engage again", now)
-        elif now - self._since > (settings.engage_timeout_s if self._restarts == 0 else settings.release_after_s):
+        elif now - self._since > self._waiting_limit_s():
             reason = status.reason or "does not report being in service and ready"
             self._release(f"not ready within {now - self._since:.0f} s: {reason}", "Clear that, then engage again", now)
         elif node.executing(settings.plan_id) and now >= self._request_due:
             # Our plan of an earlier run: its references have ceased, so it is ended before a new one starts.
             self._request_due = now + ABANDONED_STOP_RETRY_S
             self._send(plan_control(OPERATION_STOP, self._next_request_id(), settings))
+
+    def _waiting_limit_s(self) -> float:
+        """How long to wait for service: longer for one that was following, which may have to come up first."""
+        if not self._again:
+            return self._settings.engage_timeout_s
+        return max(self._settings.release_after_s, self.node.patience_s if self.node.references_needed else 0.0)
 
     def _tick_starting(self, now: float) -> None:
         if now - self._since > self._settings.start_timeout_s:
@@ -540,7 +575,9 @@ class Follower:
         settings = self._settings
         heard_at = self.node.heard_at
         silence = math.inf if heard_at is None else now - heard_at
-        if silence > max(settings.release_after_s, settings.lost_after_wall_s * settings.time_scale):
+        if silence > STARVED_S and self.node.submerged:
+            self._note_gap()
+        if silence > max(self.node.patience_s, settings.lost_after_wall_s * settings.time_scale):
             self._release(
                 f"silent for {silence / settings.time_scale:.0f} s: its plan has ended by itself",
                 "Engage it again when it is heard",
@@ -557,12 +594,18 @@ class Follower:
         if (
             self._unanswered >= MIN_UNANSWERED
             and now - self._answered_at > settings.answer_timeout_s
-            and silence <= settings.lost_after_s
+            and silence <= ALIVE_S
         ):
             self._evidence.unanswered = True
             self._plan_ended(now)
         if now - self._following_since > settings.restart_forgiven_after_s:
             self._restarts = 0
+
+    def _note_gap(self) -> None:
+        """The radio ended under water, so its plan ends for want of references, which is nobody's fault."""
+        self._gap = True
+        if self._order is not None and self._order.status is WaypointStatus.ACKNOWLEDGED:
+            self._order.unseen = True
 
     def _tick_stopping(self, now: float) -> None:
         if now >= self._request_due:
@@ -592,9 +635,19 @@ class Follower:
             return self._hold
         waypoint = order.waypoint
         depth, order.limited = waypoint.depth_m, ""
+        if order.unseen and order.status is WaypointStatus.REACHED:
+            # It waits for the next order where that can reach it.
+            depth = 0.0
         if report is not None:
             limit = self.guard.limit(
-                waypoint.depth_m, waypoint.min_altitude_m, report.time_s, report.lat_deg, report.lon_deg
+                depth,
+                waypoint.min_altitude_m,
+                report.time_s,
+                report.lat_deg,
+                report.lon_deg,
+                now=now,
+                towards=_way(order),
+                mapped=waypoint.bottom,
             )
             depth, order.limited = limit.depth_m, limit.reason
         if order.limited and order.sent and 0.0 <= depth - order.sent[-1].depth_m < GUARD_STEP_M:
@@ -660,6 +713,12 @@ class Follower:
                 "Engage it again when that is done",
                 now,
             )
+        elif seen.taken_by is not None:
+            self._release(
+                f"console 0x{seen.taken_by:04X} took over with a plan of the same name",
+                "Engage it again when that is done; two consoles need different plan ids",
+                now,
+            )
         elif seen.rebooted:
             self._restart("the vehicle has rebooted", now)
         elif seen.aborted_by is not None:
@@ -695,7 +754,11 @@ class Follower:
         return STARVED_TEXT in text or self._since - self._answered_at > STARVED_S
 
     def _restart(self, cause: str, now: float) -> None:
-        self._restarts += 1
+        self._again = True
+        if self._gap:
+            self._gap = False
+        else:
+            self._restarts += 1
         if self._restarts > self._settings.max_restarts:
             self._release(
                 f"plan failed {self._restarts} times, last: {cause}",
@@ -715,6 +778,15 @@ class Follower:
         order = self._order
         if order is not None and order.status not in (WaypointStatus.REACHED, WaypointStatus.REFUSED):
             self._advance(order, WaypointStatus.REFUSED, f"{reason}. {remedy}")
+
+
+def _way(order: Order) -> list[tuple[float, float]]:
+    """Where the vehicle flies from where it is: the waypoint, then the lead where it is sent there."""
+    waypoint = order.waypoint
+    way = [(waypoint.lat_deg, waypoint.lon_deg)]
+    if order.leading and waypoint.lead_lat_deg is not None and waypoint.lead_lon_deg is not None:
+        way.append((waypoint.lead_lat_deg, waypoint.lead_lon_deg))
+    return way
 
 
 def _distance_m(lat1_deg: float, lon1_deg: float, lat2_deg: float, lon2_deg: float) -> float:
