@@ -134,30 +134,29 @@ class RestrictedLikelihood:
         except linalg.LinAlgError:
             return 1e25, np.zeros(3)
         n = len(k)
-        inverse, _ = linalg.lapack.dpotri(lower, lower=1)
-        inverse = np.tril(inverse) + np.tril(inverse, -1).T
-        ki_f = inverse @ self._basis
+        ki_f = linalg.cho_solve((lower, True), self._basis, check_finite=False)
         a = self._basis.T @ ki_f + self._prior_precision
         a_factor = linalg.cho_factor(a, lower=True)
         beta = linalg.cho_solve(a_factor, ki_f.T @ self._depth)
         # P = K^-1 - K^-1 F A^-1 F' K^-1 takes the trend out
-        alpha = inverse @ self._depth - ki_f @ beta
-        p = inverse - ki_f @ linalg.cho_solve(a_factor, ki_f.T)
+        alpha = linalg.cho_solve((lower, True), self._depth - self._basis @ beta, check_finite=False)
+        trend_part = linalg.cho_solve(a_factor, ki_f.T).T
         nll = (
             0.5 * float(self._depth @ alpha)
             + float(np.log(np.diag(lower)).sum())
             + float(np.log(np.diag(a_factor[0])).sum())
             + 0.5 * n * math.log(2.0 * math.pi)
         )
-        outer_minus = p - np.outer(alpha, alpha)
+        inverse, _ = linalg.lapack.dpotri(lower, lower=1, overwrite_c=1)  # its upper triangle is zero
+
+        def trace(s: FloatArray) -> float:
+            """Trace of (P - alpha alpha') S for a symmetric matrix."""
+            whole = 2.0 * float(np.vdot(inverse, s)) - float(np.diag(inverse) @ np.diag(s))
+            return whole - float(np.vdot(s @ ki_f, trend_part)) - float(alpha @ (s @ alpha))
+
         noise = math.exp(theta[2]) * self._noise
-        gradient = 0.5 * np.array(
-            [
-                float(np.vdot(outer_minus, slope)),
-                2.0 * float(np.vdot(outer_minus, value)),
-                float(np.diag(outer_minus) @ noise),
-            ]
-        )
+        diagonal = np.diag(inverse) - (ki_f * trend_part).sum(axis=1) - alpha**2
+        gradient = 0.5 * np.array([trace(slope), 2.0 * trace(value), float(diagonal @ noise)])
         z = (theta - self._prior_mean) / self._prior_sd
         return nll + 0.5 * float(z @ z), gradient + z / self._prior_sd
 
