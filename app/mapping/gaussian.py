@@ -266,7 +266,7 @@ def _scatter(
 ) -> None:
     """Add the soundings' weights to the rows from ``first_row`` up to before ``past_row``.
 
-    ``moments`` is (rows * (cols + PADDING) * 3,), ``squares`` (rows * (cols + PADDING),). The kernel is a product of one
+    ``moments`` is (rows * (cols + PADDING) * 3,), ``squares`` (rows * (cols + PADDING),). The kernel is a product of a
     factor per axis, so a sounding costs an exponential per row and per column of its stencil, not one per cell; what
     is left is adding multiples of one short line to others. The line is filled up with zeros to whole groups of
     ``PADDING`` cells, which vector instructions add without a remainder.

@@ -34,9 +34,9 @@ CHECK_POINTS = 800
 
 SMALL_GRID_CELLS = 60_000
 NEIGHBOURS_OF_SMALL_GRIDS = (32, 64)
-NEIGHBOURS_OF_LARGE_GRIDS = (16, 32)
-SOUNDINGS_PER_TILE = 16
-TILE_RANGE = (2, 16)
+NEIGHBOURS_OF_LARGE_GRIDS = (24, 40)
+SOUNDINGS_PER_TILE = 6
+TILE_RANGE = (4, 16)
 
 KERNEL_LADDER: tuple[KernelName, ...] = ("matern32", "matern52", "gaussian")
 KERNEL_GAIN = 0.05  # of log likelihood per sounding, to prefer a smoother kernel

@@ -26,6 +26,9 @@ SLOPE_SD = 0.1
 
 MAX_ITERATIONS = 25
 
+MANY_TO_CHOOSE_FROM = 4000
+CLUSTER = 16  # neighbours taken with each of some points, where there are many to choose from
+
 
 @dataclass(frozen=True)
 class Hyperparameters:
@@ -191,13 +194,17 @@ def spread_subset(points: FloatArray, size: int) -> IntArray:
     """Choose at most ``size`` rows of ``points`` (n, 2), deterministically.
 
     Two thirds are every so-manieth in the given order (spatial order gives an even spread), one third the
-    nearest neighbours of those: short distances tell noise and fine detail, long ones the large scales.
+    nearest neighbours of those: short distances tell noise and fine detail, long ones the large scales. Of very many
+    points neighbours are too far from each other in such a choice to tell one from the other; then two thirds are
+    clusters of neighbours.
     """
     n = len(points)
     if n <= size:
         return np.arange(n)
-    n_spread = (2 * size) // 3
+    many = n > MANY_TO_CHOOSE_FROM
+    n_spread = size // 3 if many else (2 * size) // 3
+    together = CLUSTER if many else 1
     spread = ((np.arange(n_spread) + 0.5) * (n / n_spread)).astype(np.int64)
-    anchors = spread[:: max(1, n_spread // (size - n_spread))]
-    _, near = nearest(cKDTree(points), points[anchors], 2)
-    return np.union1d(spread, near[:, 1])[:size]
+    anchors = spread[:: max(1, -(-n_spread * together // (size - n_spread)))]
+    _, near = nearest(cKDTree(points), points[anchors], together + 1)
+    return np.union1d(spread, near[:, 1:])[:size]
