@@ -21,7 +21,8 @@ from app.evaluation.survey_world import (
 from app.exploration.options import PlannerOptions
 from app.exploration.planners.lawnmower import lawnmower_routes
 from app.exploration.problem import Belief
-from app.exploration.survey_backbone import Nodes, backbone
+from app.exploration.survey_backbone import backbone
+from app.exploration.survey_value import make_nodes
 from app.mapping.types import FloatArray, Soundings
 
 TVU_A_M, TVU_B = 0.25, 0.0075
@@ -140,7 +141,7 @@ def even_coverage(scenario: SurveyScenario, distance_m: float) -> list[FloatArra
     """Return routes of equal area per vehicle, in the direction and order that come closest to every place."""
     belief = unknown_belief(scenario.belief_grid)
     steps = max(1, int(distance_m / scenario.max_step_m))
-    nodes = Nodes(belief.xy_m, belief.weight)
+    nodes = make_nodes(belief.xy_m, belief.weight)
     spacing = scenario.terrain.width_m * scenario.terrain.height_m / (scenario.vehicles * distance_m)
     shares = backbone(
         scenario.constraints,

@@ -25,6 +25,8 @@ SOUNDING_RATE_HZ = 5.0
 FIRST_DEPTH_M = 2.0
 MIN_ALTITUDE_M = 0.5
 BELIEF_NODES_PER_SIDE = 50
+MAPS = 25
+"""How often the belief is brought up to date in a mission."""
 LEARN_AT = (0.05, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8)
 """Parts of the mission after which the map's hyperparameters are learned anew; between them they are kept."""
 
@@ -183,7 +185,7 @@ def fly_planner(
     headings = np.full(scenario.vehicles, np.nan)
     history, times = [positions], []
     belief = unknown_belief(grid) if known is None else known
-    every = max(1, scenario.steps // 100)
+    every = max(1, scenario.steps // MAPS)
     for step in range(1, scenario.steps + 1):
         if known is None and ((step > 2 and step % every == 0) or step in learn_at):
             estimate = gp.fit(log.soundings, learn=step in learn_at).predict(grid)
