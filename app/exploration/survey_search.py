@@ -218,7 +218,7 @@ def improve(
                     _remove(plan[j], plan_counts[j], k)
                     plan_counts[j] -= 1
             changed[j] = True
-        keep = changed.any()
+        keep = bool(changed.any())
         for v in range(n):
             if changed[v] and not _free(starts[v], plan[v], plan_counts[v], area, keep_out, zones, convex, margin):
                 keep = False

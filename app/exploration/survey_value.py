@@ -66,7 +66,8 @@ class Objective(NamedTuple):
 def make_nodes(en_m: FloatArray, weight: FloatArray) -> Nodes:
     """Sort nodes at ``en_m`` (m, 2) with their ``weight`` (m,) into buckets."""
     if len(en_m) == 0:
-        return Nodes(*(np.zeros(0) for _ in range(3)), np.zeros(2, dtype=np.int64), 0.0, 0.0, 1.0, 1, 1)
+        none = np.zeros(0)
+        return Nodes(none, none, none, np.zeros(2, dtype=np.int64), 0.0, 0.0, 1.0, 1, 1)
     low, high = en_m.min(axis=0), en_m.max(axis=0)
     side = max(float((high - low).max()) / BUCKETS_PER_SIDE, 1e-6)
     cols, rows = (int(k) + 1 for k in (high - low) / side)
