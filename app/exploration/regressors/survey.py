@@ -12,15 +12,15 @@ objective measured after a step is the improvement of the predicted final map th
 """
 
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
+from shapely import Polygon, unary_union
 
 from app.exploration.bottom import Bottom
-from app.exploration.constraints import inside_area
+from app.exploration.constraints import Constraints, inside_area
 from app.exploration.geometry import convex
 from app.exploration.options import PlannerOptions
 from app.exploration.planners.base import vehicle_rng
@@ -28,6 +28,7 @@ from app.exploration.planners.handover import hand_over
 from app.exploration.problem import Belief, Situation
 from app.exploration.routes import next_waypoint
 from app.exploration.survey_backbone import MARGIN_M, backbone
+from app.exploration.survey_error import expected_roughness
 from app.exploration.survey_search import DRAWS, improve
 from app.exploration.survey_value import Nodes, Objective, make_nodes, plan_value, values_after_first_leg
 
@@ -42,8 +43,6 @@ REPLANS = 20
 HEAT = 0.01
 """Part by which changes to a plan may worsen it while the search begins."""
 POWER = 2.0
-SLOPE_SHARE = 0.5
-STEEPEST = 10.0
 LEAVE_BACKBONE = 0.93
 """The freer plan must promise at most this part of the squared error that the backbone promises."""
 LEAVE_PLAN = 0.02
@@ -76,14 +75,13 @@ class SurveyRegressors:
         self._en = np.ascontiguousarray(team.positions[:, :2])
         self._steps = max(1, team.steps_total - team.step + 1)
         self._step_m = constraints.max_step_m * (1 - 1e-9)
-        self._nodes = thin_nodes(team, expected_variability(team.belief, bottom))
-        area = float(len(self._nodes.x)) * _cell(self._nodes.en_m) ** 2
-        self._spacing = area / max(1.0, len(self._en) * team.steps_total * constraints.max_step_m)
+        self._spacing = _free_area(constraints) / (len(self._en) * team.steps_total * constraints.max_step_m)
+        tree = cKDTree(np.vstack([team.soundings_en_m, self._en]), balanced_tree=False)
+        distance = np.asarray(tree.query(team.belief.xy_m)[0])
+        self._nodes = thin_nodes(team, expected_roughness(team.belief, distance, self._spacing))
         self._scale = max(team.belief.correlation_length_m, self._spacing)
         self._objective = Objective(self._step_m, self._steps, self._scale, POWER, TURN_PENALTY)
-        soundings = np.vstack([team.soundings_en_m, self._en])
-        distance, _ = cKDTree(soundings, balanced_tree=False).query(self._nodes.en_m)
-        self._d2 = np.asarray(distance**2)
+        self._d2 = np.asarray(tree.query(self._nodes.en_m)[0]) ** 2
         self._reference = max(1e-12, float(self._nodes.weight.sum()))
         changed = self._adopt()
         plan, lattice = self._packed(self._plan), self._packed(self._backbone)
@@ -200,7 +198,8 @@ class SurveyRegressors:
         assert best is not None  # noqa: S101 - two beginnings
         value, vias, counts = best
         self._plan = {v: vias[i, : counts[i]].copy() for i, v in enumerate(team.vehicles)}
-        self._free = value < (1.0 if self._free else LEAVE_BACKBONE) * values[1]
+        knows = bool((np.isfinite(team.belief.depth_m) & np.isfinite(team.belief.sd_m)).any())
+        self._free = knows and value < (1.0 if self._free else LEAVE_BACKBONE) * values[1]
         self._planned = team.step
         return (vias, counts), (value, values[1])
 
@@ -289,27 +288,6 @@ class SurveyRegressors:
         )
 
 
-def expected_variability(belief: Belief, bottom: Bottom) -> FloatArray:
-    """Return how large squared errors between soundings are expected to be at the landmarks, (n,), mean about 1.
-
-    Half of it is the map's roughness, half the slope's squared deviation from its mean: an edge that runs along between
-    two survey lines shows in no sounding as roughness, only as a steep interpolation between the lines.
-    """
-    roughness = np.where(np.isfinite(belief.weight), belief.weight, 1.0)
-    roughness = roughness / max(1e-12, float(roughness.mean()))
-    depth = bottom.depth_m
-    if min(depth.shape) < 3 or not np.isfinite(depth).any():
-        return roughness
-    filled = np.where(np.isfinite(depth), depth, np.nanmean(depth))
-    squared = sum((g - g.mean()) ** 2 for g in np.gradient(filled, bottom.cell_m))
-    steepness = replace(bottom, depth_m=np.asarray(squared, dtype=np.float64)).at(belief.xy_m)
-    mean = float(np.nanmean(steepness))
-    if not mean > 0.0:
-        return roughness
-    relative = np.clip(np.nan_to_num(steepness / mean, nan=1.0), 0.0, STEEPEST)
-    return np.asarray((1.0 - SLOPE_SHARE) * roughness + SLOPE_SHARE * relative)
-
-
 def thin_nodes(team: Situation, variability: FloatArray) -> Nodes:
     """Return at most about ``MAX_NODES`` nodes of the area; nodes of one square are merged, their weights averaged.
 
@@ -330,6 +308,11 @@ def thin_nodes(team: Situation, variability: FloatArray) -> Nodes:
         k = np.arange(len(xy))[:, None]
         xy = xy + JITTER * _cell(xy) * ((k * np.array([0.7548776662, 0.5698402910])) % 1.0 - 0.5)
     return make_nodes(xy, weight)
+
+
+def _free_area(constraints: Constraints) -> float:
+    zones = unary_union([Polygon(zone) for zone in constraints.keep_out])
+    return max(1.0, float(Polygon(constraints.area).difference(zones).area))
 
 
 def _cell(xy: FloatArray) -> float:
