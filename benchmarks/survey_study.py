@@ -117,9 +117,9 @@ def report(runs: Sequence[Run], facts: Mapping[str, str]) -> str:
         "",
         f"{VEHICLES} vehicles, {STEPS} steps, noise 1 % of the range to the bottom. RMSE in metres of the default map,"
         " mean over the symmetries of the square that were run. *ratio*: over the RMSE of the better of lawnmower and"
-        " equal-area coverage, each with the better of the default map and a stationary Matern 3/2 process; with its 95 %"
-        " interval, and the worst run. *map*: default over stationary map on our own soundings. The oracle places as many"
-        " soundings anywhere, knowing the truth; *gap* is how far we came from the better pattern to it.",
+        " equal-area coverage, each with the better of the default map and a stationary Matern 3/2 process; with its"
+        " 95 % interval, and the worst run. *map*: default over stationary map on our own soundings. The oracle places"
+        " as many soundings anywhere, knowing the truth; *gap* is how far we came from the better pattern to it.",
     ]
     setups = dict.fromkeys((r["sounder"], r["sampling"], r["max_step_m"]) for r in runs)
     for sounder, sampling, budget in sorted(setups):

@@ -28,7 +28,7 @@ SOUNDING_RATE_HZ = 5.0
 FIRST_DEPTH_M = 2.0
 MIN_ALTITUDE_M = 0.5
 BELIEF_NODES_PER_SIDE = 50
-MAPS = 25
+MAPS = 20
 """How often the belief is brought up to date in a mission."""
 LEARN_AT = (0.05, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8)
 """Parts of the mission after which the map's hyperparameters are learned anew; between them they are kept."""

@@ -14,6 +14,8 @@ from app.exploration.survey_value import Nodes, Objective, make_nodes, plan_valu
 FloatArray = NDArray[np.float64]
 
 MARGIN_M = 0.5
+ACROSS_PENALTY = 1.05
+"""How much worse lines across the longer axis count: of equally good ones those along it are flown."""
 TRANSIT_PENALTY = 0.5
 """How much worse a share counts whose first line would only be reached with the whole budget."""
 
@@ -56,6 +58,8 @@ def backbone(
                 )
                 shares.append(share)
                 value += left
+            if direction != axis:
+                value *= ACROSS_PENALTY
             if best is None or value < best[0] * (1 - 1e-9):
                 best = value, shares
     assert best is not None  # noqa: S101 - two directions, at least one order

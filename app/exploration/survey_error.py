@@ -31,6 +31,8 @@ FEATURE_FLOOR = 0.1
 NEAR_PART = 0.3
 """Distances are not taken as smaller than this part of the spacing of the survey lines."""
 WEIGHT_RANGE = (0.02, 50.0)
+HEDGE = 0.25
+"""Part of the roughness that is spread evenly: what no sounding has met may be anywhere."""
 
 
 @dataclass(frozen=True)
@@ -93,7 +95,8 @@ def expected_roughness(belief: Belief, distance_m: FloatArray, spacing_m: float)
     blur = max(1.0, 0.25 * spacing_m / raster.cell_m)
     roughness = gaussian_filter(error, blur, mode="nearest") / gaussian_filter(squared_distance, blur, mode="nearest")
     roughness = roughness.ravel()[raster.cell]
-    return np.asarray(np.clip(roughness / roughness.mean(), *WEIGHT_RANGE))
+    roughness = np.clip(roughness / roughness.mean(), *WEIGHT_RANGE)
+    return np.asarray((1.0 - HEDGE) * roughness / roughness.mean() + HEDGE)
 
 
 def _averaged(squared: FloatArray, smoothing: float) -> FloatArray:

@@ -243,5 +243,5 @@ def test_an_edge_between_two_lines_counts_although_no_sounding_shows_it():
     distance = np.full(len(east), 5.0)
     roughness = expected_roughness(step, distance, 10.0)
     on_edge = (east > 50.0) & (east < 60.0)
-    assert roughness[on_edge].min() > 1.8 * roughness[~on_edge & (np.abs(east - 55.0) > 20.0)].max()
+    assert roughness[on_edge].min() > 1.5 * roughness[~on_edge & (np.abs(east - 55.0) > 20.0)].max()
     assert np.allclose(expected_roughness(belief, distance, 10.0), 1.0)

@@ -57,24 +57,58 @@ TURNS_RAD = np.deg2rad([-120.0, -90.0, -60.0, -30.0, 0.0, 30.0, 60.0, 90.0, 120.
 class SurveyRegressors:
     """See the module's text."""
 
-    def __init__(self, options: PlannerOptions, at_cruise: AtCruise) -> None:
-        """Vehicles move at their cruise depths by ``at_cruise``."""
+    def __init__(self, options: PlannerOptions, at_cruise: AtCruise, *, every_step: bool = False) -> None:
+        """Vehicles move at their cruise depths by ``at_cruise``.
+
+        ``every_step``: the regressors are asked for other legs than :meth:`candidates` in every step; costs time.
+        """
         self._options = options
         self._at_cruise = at_cruise
+        self._every_step = every_step
         self._backbone: dict[str, FloatArray] = {}
         self._coarse: dict[str, int] = {}
         self._plan: dict[str, FloatArray] = {}
         self._expected: float | None = None
         self._planned = 0
         self._free = False
+        self._row = [0.0, 0.0]
 
     def begin(self, team: Situation, bottom: Bottom, seed: int) -> float:
-        """See :class:`app.exploration.planners.cao.Regressors`."""
+        """See :class:`app.exploration.planners.cao.Regressors`.
+
+        What came of a plan is only measured when the next is made, for the leg chosen when that one was made.
+        """
         self._team, self._bottom, self._seed = team, bottom, seed
-        constraints = team.constraints
         self._en = np.ascontiguousarray(team.positions[:, :2])
         self._steps = max(1, team.steps_total - team.step + 1)
-        self._step_m = constraints.max_step_m * (1 - 1e-9)
+        self._step_m = team.constraints.max_step_m * (1 - 1e-9)
+        begins = not self._plan.keys() & set(team.vehicles)
+        changed = not begins and self._plan.keys() != set(team.vehicles)
+        every = max(1, round(team.steps_total / REPLANS))
+        explores = not begins and any(self._coarse.get(v, 0) == 0 for v in team.vehicles)
+        self._replans = changed or (explores and team.step - self._planned >= every)
+        self._looks = begins or self._replans or self._every_step
+        if not self._looks:
+            self._followed = self._packed(self._plan if self._free else self._backbone)
+            return np.nan
+        self._look()
+        if begins:
+            self._adopt_backbone()
+        elif changed:
+            self._hand_over()
+        plan, lattice = self._packed(self._plan), self._packed(self._backbone)
+        values = self._value(*plan), self._value(*lattice)
+        expected = min(values) / self._reference
+        before, self._expected = self._expected, expected
+        if self._replans:
+            plan, values = self._improve_plan(plan, lattice, values)
+        self._followed = plan if self._free else lattice
+        self._expected_value = values[0] if self._free else values[1]
+        return np.nan if before is None else before - expected
+
+    def _look(self) -> None:
+        """See what is known and where it is far to the next sounding."""
+        team, constraints = self._team, self._team.constraints
         self._spacing = _free_area(constraints) / (len(self._en) * team.steps_total * constraints.max_step_m)
         tree = cKDTree(np.vstack([team.soundings_en_m, self._en]), balanced_tree=False)
         distance = np.asarray(tree.query(team.belief.xy_m)[0])
@@ -83,20 +117,6 @@ class SurveyRegressors:
         self._objective = Objective(self._step_m, self._steps, self._scale, POWER, TURN_PENALTY)
         self._d2 = np.asarray(tree.query(self._nodes.en_m)[0]) ** 2
         self._reference = max(1e-12, float(self._nodes.weight.sum()))
-        changed = self._adopt()
-        plan, lattice = self._packed(self._plan), self._packed(self._backbone)
-        values = self._value(*plan), self._value(*lattice)
-        expected = min(values) / self._reference
-        before, self._expected = self._expected, expected
-        every = max(1, round(team.steps_total / REPLANS))
-        explores = any(self._coarse[v] == 0 for v in team.vehicles)
-        self._replans = changed or (explores and not team.step - self._planned < every)
-        if self._replans:
-            plan, values = self._improve_plan(plan, lattice, values)
-        both = plan, lattice
-        self._followed, self._other = both if self._free else both[::-1]
-        self._expected_value = values[0] if self._free else values[1]
-        return np.nan if before is None else before - expected
 
     def prior(self, team: Situation) -> tuple[FloatArray, float]:
         """The final map counts fully, what is gained at once a little."""
@@ -108,7 +128,7 @@ class SurveyRegressors:
         return np.array([final, float(np.clip(theta[1], 0.0, 0.1 * final))])
 
     def candidates(self, alpha: float) -> FloatArray:
-        """Per vehicle: the legs described above, the others following the plan; and both plans for the whole team."""
+        """The next legs of the plan; when it was made anew also, per vehicle, others as described above."""
         team, n = self._team, len(self._en)
         along = self._first_legs(self._followed)
         targets = [along]
@@ -126,15 +146,22 @@ class SurveyRegressors:
 
     def regressors(self, candidates: FloatArray) -> FloatArray:
         """See the module's text."""
+        if not self._looks:
+            return np.tile(self._row, (len(candidates), 1))
         values = self._after_legs(candidates)
         now = self._uncertainty_now()
         kept = self._expected_value
         off_plan = ~self._on_plan(candidates).all(axis=1)
         final = values[:, 1] + LEAVE_PLAN * kept * off_plan
-        return np.column_stack([(kept - final) / self._reference, (now - values[:, 0]) / self._reference])
+        phi = np.column_stack([kept - final, now - values[:, 0]]) / self._reference
+        self._asked = candidates, phi
+        return phi
 
     def chosen(self, positions: FloatArray) -> None:
         """Drop the via points that the legs reach."""
+        if self._looks:
+            candidates, phi = self._asked
+            self._row = phi[int(np.argmin(np.abs(candidates - positions).sum(axis=(1, 2))))].tolist()
         for i, name in enumerate(self._team.vehicles):
             x, y = self._en[i]
             for routes in (self._plan, self._backbone):
@@ -154,6 +181,7 @@ class SurveyRegressors:
             "expected": self._expected,
             "planned": self._planned,
             "free": self._free,
+            "row": self._row,
         }
 
     def recall(self, state: dict[str, Any]) -> None:
@@ -166,23 +194,23 @@ class SurveyRegressors:
         self._expected = state["expected"]
         self._planned = int(state["planned"])
         self._free = bool(state["free"])
+        self._row = [float(x) for x in state["row"]]
 
-    def _adopt(self) -> bool:
-        """Give every vehicle of the team both plans; return whether the team has changed."""
+    def _adopt_backbone(self) -> None:
+        """Give every vehicle of the team its share of the backbone."""
         team = self._team
-        if not self._plan.keys() & set(team.vehicles):
-            shares = backbone(team.constraints, self._en, self._steps, self._nodes, self._scale, POWER)
-            self._backbone = {name: share.stops for name, share in zip(team.vehicles, shares, strict=True)}
-            self._coarse = {name: share.coarse for name, share in zip(team.vehicles, shares, strict=True)}
-            self._plan = dict(self._backbone)
-            self._free, self._planned = False, team.step
-            return False
-        if self._plan.keys() == set(team.vehicles):
-            return False
+        shares = backbone(team.constraints, self._en, self._steps, self._nodes, self._scale, POWER)
+        self._backbone = {name: share.stops for name, share in zip(team.vehicles, shares, strict=True)}
+        self._coarse = {name: share.coarse for name, share in zip(team.vehicles, shares, strict=True)}
+        self._plan = dict(self._backbone)
+        self._free, self._planned = False, team.step
+
+    def _hand_over(self) -> None:
+        """Give both plans to a team that has changed."""
+        team = self._team
         self._backbone = hand_over(self._backbone, team.vehicles, self._en)
         self._plan = hand_over(self._plan, team.vehicles, self._en)
         self._coarse = dict.fromkeys(team.vehicles, 0)
-        return True
 
     def _improve_plan(
         self, plan: tuple[FloatArray, IntArray], lattice: tuple[FloatArray, IntArray], values: tuple[float, float]
