@@ -84,10 +84,17 @@ def fly(
     used = 0
     i = 0
     while used < steps and i < count:
-        nx, ny, i = next_waypoint(x, y, route, i, count, step)
-        if np.hypot(nx - x, ny - y) < 1e-9:
-            break
-        used += 1
+        d = np.hypot(route[i, 0] - x, route[i, 1] - y)
+        if d > 3.0 * step:  # far from the next corner all legs are the same: take them at once
+            legs = min(int(d / step) - 1, steps - used)
+            f = legs * step / d
+            nx, ny = x + f * (route[i, 0] - x), y + f * (route[i, 1] - y)
+            used += legs
+        else:
+            nx, ny, i = next_waypoint(x, y, route, i, count, step)
+            if np.hypot(nx - x, ny - y) < 1e-9:
+                break
+            used += 1
         if n >= 2:
             ux = vertices[n - 1, 0] - vertices[n - 2, 0]
             uy = vertices[n - 1, 1] - vertices[n - 2, 1]
