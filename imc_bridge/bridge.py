@@ -29,6 +29,7 @@ from imc_bridge.follow import Follower, Phase
 from imc_bridge.nodes import Node
 from imc_bridge.rates import RateRequest
 from imc_bridge.settings import BridgeSettings
+from imc_bridge.soundings import offer_distance
 from imc_bridge.transport import Address, UdpTransport
 
 log = logging.getLogger(__name__)
@@ -465,14 +466,7 @@ class Bridge:
             self._tell(result)
 
     def _take_distance(self, node: Node, message: Message) -> None:
-        lever_arm = (0.0, 0.0, 0.0)
-        for device in message.location:
-            lever_arm = (float(device.x), float(device.y), float(device.z))
-            break
-        valid = message.validity == imcpy.Distance.ValidityEnum.VALID
-        refused = node.gate.offer(
-            message.timestamp, node.entity_name(int(message.src_ent)), valid, float(message.value), lever_arm
-        )
+        refused = offer_distance(node.gate, node.entity_name(int(message.src_ent)), message)
         if refused is not None:
             self._tell(refused)
 

@@ -276,13 +276,7 @@ class Node:
 
     def take_entities(self, message: Message) -> None:
         """EntityList report: ``Name=id;…``."""
-        entities = {}
-        for item in str(message.list).split(";"):
-            name, separator, number = item.rpartition("=")
-            if separator and number.isdigit():
-                entities[int(number)] = name
-        if entities:
-            self.entities = entities
+        self.entities = listed_entities(message) or self.entities
 
     def entity_name(self, entity: int) -> str | None:
         """Name of an entity, None while names are unknown; an id the list lacks has the name ``entity N``."""
@@ -376,6 +370,16 @@ class Node:
     def plan_state_name(self) -> str | None:
         """The state of plan control in words."""
         return None if self.plan_state is None else _enum_name(PlanState, self.plan_state)
+
+
+def listed_entities(message: Message) -> dict[int, str]:
+    """Names by id of an EntityList report; empty when it lists none."""
+    entities = {}
+    for item in str(message.list).split(";"):
+        name, separator, number = item.rpartition("=")
+        if separator and number.isdigit():
+            entities[int(number)] = name
+    return entities
 
 
 def _fresh(at: float | None, now: float) -> bool:

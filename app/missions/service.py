@@ -8,6 +8,7 @@ import uuid
 from collections.abc import AsyncIterator, Awaitable, Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import asynccontextmanager
+from pathlib import Path
 from typing import Literal
 
 import orjson
@@ -55,6 +56,7 @@ from app.missions.views import (
     ItemVerdict,
     Level,
     LiveMessage,
+    LogImportView,
     Measurement,
     MissionSummary,
     MissionView,
@@ -332,6 +334,28 @@ class MissionService:
         await live.journal.flush()
         return answer
 
+    async def import_log(
+        self,
+        mission_id: str,
+        path: Path,
+        *,
+        vehicle: str | None = None,
+        actor: str,
+        progress: Callable[[int, int], None] | None = None,
+    ) -> LogImportView:
+        """Take in a vehicle's own log; importing it again, also after a crash, stores nothing twice.
+
+        Raises
+        ------
+        InvalidRequestError
+            When the file is no log of a vehicle, or does not tell which one's.
+        """
+        from app.missions.importing import LogImport
+
+        live = await self._get(mission_id)
+        work = await asyncio.to_thread(LogImport, live, self._database, self._settings, path, vehicle)
+        return await work.run(actor=actor, progress=progress)
+
     def _hear(self, live: LiveMission, items: Sequence[Measurement], *, only_unknown: bool = False) -> None:
         """Tell the link where vehicles are; ``only_unknown``: of those only whose place it does not know."""
         places = {name: self._hub.info((VehicleKind.REST, name)).report for name in {item.vehicle for item in items}}
@@ -390,6 +414,7 @@ class MissionService:
     async def map(self, mission_id: str) -> MapSnapshot:
         """Return the newest map. Raises MapNotReadyError when there is no sounding yet."""
         live = await self._get(mission_id)
+        await live.notice_imports()
         built = live.builder.newest
         if built is None or (live.builder.stale and mission_id not in self._runs):
             built = await live.build_map()

@@ -90,11 +90,11 @@ async def add_positions(session: AsyncSession, rows: Sequence[dict[str, Any]]) -
 
 
 async def tracks(session: AsyncSession, mission_id: str) -> dict[str, list[tuple[float, float]]]:
-    """Return each vehicle's track as (longitude, latitude), in the order it was heard."""
+    """Return each vehicle's track as (longitude, latitude), in the order of the vehicle's clock."""
     query = (
         select(PositionRow.vehicle, PositionRow.lon_deg, PositionRow.lat_deg)
         .where(PositionRow.mission_id == mission_id)
-        .order_by(PositionRow.vehicle, PositionRow.id)
+        .order_by(PositionRow.vehicle, PositionRow.time_s, PositionRow.id)
     )
     result: dict[str, list[tuple[float, float]]] = {}
     for vehicle, lon, lat in await session.execute(query):
@@ -103,7 +103,16 @@ async def tracks(session: AsyncSession, mission_id: str) -> dict[str, list[tuple
 
 
 async def last_positions(session: AsyncSession, mission_id: str) -> dict[str, PositionRow]:
-    """Return the last recorded position of each vehicle."""
-    newest = select(func.max(PositionRow.id)).where(PositionRow.mission_id == mission_id).group_by(PositionRow.vehicle)
-    rows = await session.scalars(select(PositionRow).where(PositionRow.id.in_(newest)))
-    return {row.vehicle: row for row in rows}
+    """Return each vehicle's newest position by its own clock; what a log brought later may be older."""
+    newest = (
+        select(PositionRow.vehicle, func.max(PositionRow.time_s).label("time_s"))
+        .where(PositionRow.mission_id == mission_id)
+        .group_by(PositionRow.vehicle)
+        .subquery()
+    )
+    query = (
+        select(PositionRow)
+        .join(newest, (PositionRow.vehicle == newest.c.vehicle) & (PositionRow.time_s == newest.c.time_s))
+        .where(PositionRow.mission_id == mission_id)
+    )
+    return {row.vehicle: row for row in await session.scalars(query)}

@@ -136,18 +136,9 @@ class ImcFleetLink:
 def _translate(event: BridgeEvent) -> FleetEvent | None:
     match event:
         case StateReport():
-            return _report(event)
+            return vehicle_report(event)
         case Sounding():
-            return SoundingReport(
-                vehicle=event.vehicle,
-                time_s=event.time_s,
-                footprint=Position(event.lat_deg, event.lon_deg, event.bottom_depth_m),
-                vehicle_depth_m=event.vehicle_depth_m,
-                range_m=event.range_m,
-                source=event.source,
-                beam=event.beam,
-                position_sd_m=event.position_sd_m,
-            )
+            return sounding_report(event)
         case WaypointChange():
             return WaypointReport(
                 vehicle=event.vehicle,
@@ -172,7 +163,22 @@ def _link_state(state: NodeState, engaged: bool, ours: bool) -> LinkState:
     return _UNENGAGED[state]
 
 
-def _report(state: StateReport) -> VehicleReport:
+def sounding_report(event: Sounding) -> SoundingReport:
+    """What the bridge measured, as missions know it."""
+    return SoundingReport(
+        vehicle=event.vehicle,
+        time_s=event.time_s,
+        footprint=Position(event.lat_deg, event.lon_deg, event.bottom_depth_m),
+        vehicle_depth_m=event.vehicle_depth_m,
+        range_m=event.range_m,
+        source=event.source,
+        beam=event.beam,
+        position_sd_m=event.position_sd_m,
+    )
+
+
+def vehicle_report(state: StateReport) -> VehicleReport:
+    """What the bridge heard of a vehicle, as missions know it."""
     return VehicleReport(
         vehicle=state.vehicle,
         time_s=state.time_s,
@@ -206,6 +212,6 @@ def _info(node: NodeView) -> VehicleInfo:
         age_s=node.age_s,
         address=node.address,
         imc_id=node.imc_id,
-        report=None if node.report is None else _report(node.report),
+        report=None if node.report is None else vehicle_report(node.report),
         details={key: value for key, value in details.items() if value is not None},
     )
