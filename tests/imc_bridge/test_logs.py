@@ -3,6 +3,7 @@
 import gzip
 import math
 import statistics
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -151,4 +152,4 @@ def test_a_real_log_of_dune_is_read_as_a_whole(captures: Path) -> None:
     assert sum(isinstance(event, StateReport) for event in events) == 3834
     depths = [sounding.bottom_depth_m for sounding in found]
     assert 20.0 < statistics.fmean(depths) < 30.0
-    assert max(abs(a - b) for a, b in zip(depths, depths[1:], strict=False)) < 1.5
+    assert max(abs(a - b) for a, b in pairwise(depths)) < 1.5
