@@ -93,9 +93,16 @@ class MissionService:
         See :class:`ServiceSettings`.
     database
         Migrated and open; the caller closes it after ``shutdown``.
+    log_in
+        Who may use the Neptus gateway with a password from a host; without it nobody.
     """
 
-    def __init__(self, settings: ServiceSettings, database: Database) -> None:
+    def __init__(
+        self,
+        settings: ServiceSettings,
+        database: Database,
+        log_in: Callable[[str, str], Awaitable[str | None]] | None = None,
+    ) -> None:
         self._settings = settings
         self._database = database
         self._rest = RestFleetLink()
@@ -105,6 +112,10 @@ class MissionService:
             from app.missions.links.imc import make_imc_link
 
             links.append(make_imc_link(settings.imc, settings.time_scale))
+        if settings.neptus.enabled:
+            from app.missions.neptus import NeptusSessions
+
+            links.append(NeptusSessions(self, database, settings.neptus, log_in or _nobody).link)
         self._hub = FleetHub(links)
         self._executor = ThreadPoolExecutor(WORKERS, thread_name_prefix="planning")
         self._live: dict[str, LiveMission] = {}
@@ -283,6 +294,10 @@ class MissionService:
                 await self._set_state(live, move, "no vehicle left", actor)
             await live.journal.log(Level.INFO, "vehicle", f"{name} left", vehicle=name, actor=actor)
         return self._view(live)
+
+    async def note(self, mission_id: str, level: Level, kind: str, message: str, **data: str | float) -> None:
+        """Write a line of a mission's log."""
+        await (await self._get(mission_id)).journal.log(level, kind, message, **data)
 
     # Measurements and waypoints
 
@@ -736,6 +751,10 @@ class MissionService:
                 f"vehicle: {item.vehicle!r} is of kind {member.spec.kind}; only vehicles of kind rest post measurements"
             )
         return _impossible_place(item, live.frame)
+
+
+async def _nobody(_password: str, _host: str) -> str | None:
+    return None
 
 
 def _warm_up() -> None:

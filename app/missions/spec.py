@@ -73,6 +73,8 @@ class VehicleKind(StrEnum):
     IMC = "imc"
     REST = "rest"
     SIM = "sim"
+    NEPTUS = "neptus"
+    """Commanded by a Neptus console that asks this service where to, through the gateway."""
 
 
 class VehicleSpec(Model):
@@ -81,7 +83,8 @@ class VehicleSpec(Model):
     name: Name = Field(description="Its name; for IMC the name it announces", examples=["lauv-xplore-1"])
     kind: VehicleKind = Field(
         default=VehicleKind.IMC,
-        description="imc: DUNE over UDP; rest: polls and posts by itself; sim: simulated inside the service",
+        description="imc: DUNE over UDP; rest: polls and posts by itself; sim: simulated inside the service; "
+        "neptus: of a session of Neptus' ConvCAO panel, which makes its mission itself",
     )
     sensor: Sensor = Sensor.SINGLE_BEAM
     depth_m: float | None = Field(

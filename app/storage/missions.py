@@ -21,6 +21,12 @@ async def missions_in(session: AsyncSession, states: Sequence[str]) -> Sequence[
     return (await session.scalars(query)).all()
 
 
+async def newest_named(session: AsyncSession, name: str) -> MissionRow | None:
+    """Return the newest mission of this name."""
+    query = select(MissionRow).where(MissionRow.name == name).order_by(MissionRow.created_at.desc()).limit(1)
+    return (await session.scalars(query)).first()
+
+
 async def set_state(session: AsyncSession, mission_id: str, state: str, reason: str, now: datetime) -> None:
     """Record a mission's new state."""
     await session.execute(
