@@ -8,6 +8,7 @@ import uuid
 from collections.abc import AsyncIterator, Awaitable, Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import asynccontextmanager
+from functools import cache
 from pathlib import Path
 from typing import Literal
 
@@ -757,7 +758,9 @@ async def _nobody(_password: str, _host: str) -> str | None:
     return None
 
 
+@cache
 def _warm_up() -> None:
+    """Compile what planning needs; once in a process is enough."""
     try:
         mapping_warm_up()
         planning_warm_up(SingleBeam())

@@ -38,8 +38,8 @@ class NeptusSettings(Section):
     host: str = Field(default="127.0.0.1", description="Address on which the panel is answered")
     ftp_port: int = Field(default=21, ge=0, le=65535, description="TCP port for its uploads; the panel uses 21")
     http_port: int = Field(default=80, ge=0, le=65535, description="TCP port for its polls; the panel uses 80")
-    passive_ports: tuple[int, int] | None = Field(
-        default=None, description="First and last TCP port of FTP data connections; default: any"
+    passive_ports: tuple[int, ...] = Field(
+        default=(), description="First and last TCP port of FTP data connections; empty: any"
     )
     public_address: str | None = Field(
         default=None, description="Address told for FTP data connections where a router stands between"
@@ -77,8 +77,9 @@ class NeptusSettings(Section):
             raise ValueError(
                 "the gateway needs centre_lat_deg and centre_lon_deg: the Area Center of conf/noptcoords.properties"
             )
-        if self.passive_ports is not None and not 0 < self.passive_ports[0] <= self.passive_ports[1] <= 65535:
-            raise ValueError(f"passive_ports {self.passive_ports} must be a first and a last port, 1 to 65535")
+        ports = self.passive_ports
+        if ports and not (len(ports) == 2 and 0 < ports[0] <= ports[1] <= 65535):
+            raise ValueError(f"passive_ports {list(ports)} must be a first and a last port, 1 to 65535, or empty")
         return self
 
 

@@ -62,7 +62,7 @@ def gateway_settings(settings: NeptusSettings) -> GatewaySettings:
         settings.host,
         settings.ftp_port,
         settings.http_port,
-        settings.passive_ports,
+        (settings.passive_ports[0], settings.passive_ports[1]) if settings.passive_ports else None,
         settings.public_address,
     )
 
