@@ -5,6 +5,7 @@ import json
 import sys
 from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager
+from datetime import UTC, datetime
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -373,33 +374,50 @@ async def _meant(service: "MissionService", begin: str) -> str:
 @app.command()
 def doctor(
     seconds: Annotated[float, typer.Option(min=0.1, max=3600, help="How long to listen.")] = 15.0,
+    replay: Annotated[
+        Path | None,
+        typer.Option(
+            exists=True, dir_okay=False, readable=True, help="Judge a recorded session (.jsonl or .jsonl.gz) instead."
+        ),
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
     """Listen for IMC vehicles and say what is missing. Nothing is commanded. Exit code 1 when something is wrong."""
     settings = _settings()
-    import dataclasses
-
+    from app.missions.doctoring import doctor_view
     from app.missions.links.imc import bridge_settings
-    from imc_bridge.doctor import Diagnosis, diagnose
-
-    async def run() -> Diagnosis:
-        return await diagnose(bridge_settings(settings.imc, settings.time_scale), seconds)
+    from imc_bridge.doctor import Diagnosis, diagnose, diagnose_recording
+    from imc_bridge.replay import RecordingError
 
     try:
-        if as_json:
+        bridge = bridge_settings(settings.imc, settings.time_scale)
+    except ValueError as error:
+        raise CommandError(str(error), "See docs/settings.md") from None
+
+    async def run() -> Diagnosis:
+        return await diagnose(bridge, seconds)
+
+    try:
+        if replay is not None:
+            diagnosis = diagnose_recording(str(replay), bridge)
+        elif as_json:
             diagnosis = asyncio.run(run())
         else:
             from rich.console import Console
 
             with Console(stderr=True).status(f"Listening for {seconds:g} s …"):
                 diagnosis = asyncio.run(run())
+    except RecordingError as error:
+        raise CommandError(str(error)) from None
+    except ValueError as error:
+        raise CommandError(str(error), "See docs/settings.md") from None
     except OSError as error:
         raise CommandError(
             f"cannot listen on UDP port {settings.imc.port}: {error.strerror or error}",
-            "Stop the service first, or ask it: GET /api/v1/vehicles",
+            "Stop the service first, or ask it: GET /api/v1/doctor",
         ) from None
     if as_json:
-        typer.echo(json.dumps(dataclasses.asdict(diagnosis) | {"healthy": diagnosis.healthy}, indent=2))
+        typer.echo(doctor_view(diagnosis).model_dump_json(indent=2))
     else:
         _show_diagnosis(diagnosis)
     raise typer.Exit(0 if diagnosis.healthy else FAILURE)
@@ -423,6 +441,13 @@ def _show_diagnosis(diagnosis: "Diagnosis") -> None:
             table.add_row("" if index else Text(name), Text(words, style), Text(finding.text), Text(finding.remedy))
         table.add_section()
     Console().print(table)
+    for node in diagnosis.nodes:
+        if len(node.history) > 1:
+            Console().print(Text(f"\n{node.name}'s link:", style="bold"))
+        for change in node.history if len(node.history) > 1 else ():
+            at = datetime.fromtimestamp(change.at_s, UTC)
+            words = f"{change.state.value}: {change.reason}" if change.reason else change.state.value
+            Console().print(Text(f"  {at:%H:%M:%S}Z {words}"))
 
 
 @app.command()

@@ -2,6 +2,7 @@
 
 from imc_bridge.bridge import Bridge
 from imc_bridge.events import (
+    BottomPoint,
     BridgeEvent,
     LinkChange,
     NodeState,
@@ -19,6 +20,7 @@ from imc_bridge.settings import BridgeSettings
 from imc_bridge.transport import PortInUseError
 
 __all__ = [
+    "BottomPoint",
     "Bridge",
     "BridgeEvent",
     "BridgeSettings",

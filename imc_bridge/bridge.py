@@ -6,14 +6,15 @@ import asyncio
 import contextlib
 import itertools
 import logging
+import math
 import time
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Callable
 
 import imcpy
 
-from imc_bridge.codec import BROADCAST_ID, Decoder, Message, encode
-from imc_bridge.discovery import Announcement, own_announce, reachable_first, read_announce
+from imc_bridge.codec import BROADCAST_ID, Decoder, Header, Message, encode
+from imc_bridge.discovery import Announcement, own_announce, read_announce
 from imc_bridge.events import (
     BridgeEvent,
     EventCallback,
@@ -28,9 +29,12 @@ from imc_bridge.events import (
 from imc_bridge.follow import Follower, Phase
 from imc_bridge.nodes import Node
 from imc_bridge.rates import RateRequest
+from imc_bridge.roster import Roster
+from imc_bridge.seabed import Seabed
 from imc_bridge.settings import BridgeSettings
 from imc_bridge.soundings import offer_distance
-from imc_bridge.transport import Address, UdpTransport
+from imc_bridge.transport import Address, Transport
+from imc_bridge.vehicle_clock import Tick
 
 log = logging.getLogger(__name__)
 
@@ -49,15 +53,16 @@ WANTED = (
     "VehicleMedium",
     "VehicleState",
 )
+SIMULATED_STATE = int(imcpy.SimulatedState().msg_id)
 TICK_S = 0.2
 MIN_TICK_WALL_S = 0.02
 ENTITY_QUERY_S = 2.0
 ANNOUNCE_AGAIN_S = 1.0
+LINK_HISTORY = 32
+"""Changes of a link that are kept, with their times and reasons."""
 STOP_ESCALATION = 0.5
 """Share of a stop's patience after which Abort is sent too."""
 CLOSE_TIMEOUT_WALL_S = 3.0
-MAX_NODES = 256
-"""Nodes beyond this many are not taken up: no amount of forged packets may fill the memory."""
 MAX_PLAUSIBLE_VEHICLE_TIME_S = 4e9
 
 
@@ -71,6 +76,8 @@ class Bridge:
         False for a listener that announces itself and sends heartbeats but never commands a vehicle.
     clock
         Seconds of the wall clock that never step back; a replay gives the recording's.
+    wall_clock
+        Unix seconds, for our messages' times and by which the vehicles' clocks are judged.
 
     Examples
     --------
@@ -86,23 +93,28 @@ class Bridge:
         *,
         commanding: bool = True,
         clock: Callable[[], float] = time.monotonic,
+        wall_clock: Callable[[], float] = time.time,
     ) -> None:
         self.settings = settings
         self.decoder = Decoder(WANTED)
         self.announces = Decoder(("Announce",))
-        self.transport = UdpTransport(settings, self.on_packet, self.on_announce)
+        self.transport = Transport(settings, self.on_packet, self.on_announce)
         self.handler_errors: Counter[str] = Counter()
+        self.double = ""
+        """Who else announces our own id, empty when nobody does."""
         self._commanding = commanding
         self._clock = clock
+        self._wall_clock = wall_clock
         self._on_event: EventCallback = lambda _event: None
-        self._nodes: dict[int, Node] = {}
+        self._roster = Roster(settings)
+        self._seabed = Seabed()
         self._followers: dict[int, Follower] = {}
         self._rates: dict[int, RateRequest] = {}
-        self._by_address: dict[Address, Node] = {}
-        self._links: dict[int, LinkChange] = {}
+        self._links: dict[int, deque[LinkChange]] = {}
         self._state_reported: dict[int, float] = {}
         self._entities_asked: dict[int, float] = {}
         self._task: asyncio.Task[None] | None = None
+        self._started_at: float | None = None
         self._turn = asyncio.Event()
         self._announce_due = 0.0
         self._announced_at = float("-inf")
@@ -131,7 +143,16 @@ class Bridge:
             raise RuntimeError("this bridge has been started already")
         self._on_event = on_event
         self.transport.open()
+        self._started_at = self._clock()
+        if self.settings.position_deg is None:
+            # The first vehicle heard tells where we are and is answered at once; see own_announce.
+            self._announce_due = self._now() + self.settings.announce_period_s
         self._task = asyncio.create_task(self._run(), name="imc-bridge")
+
+    @property
+    def listening_s(self) -> float:
+        """For how long it has been started, seconds of the wall clock."""
+        return 0.0 if self._started_at is None else self._clock() - self._started_at
 
     async def close(self) -> None:
         """Stop every engaged vehicle, restore rates, release the ports; safe to repeat."""
@@ -147,6 +168,7 @@ class Bridge:
         with contextlib.suppress(asyncio.CancelledError):
             await self._task
         self._task = None
+        await self.transport.close_streams()
         self.transport.close()
 
     async def __aenter__(self) -> Bridge:
@@ -161,7 +183,7 @@ class Bridge:
     def nodes(self) -> tuple[NodeView, ...]:
         """Every node heard of, by id."""
         now = self._now()
-        return tuple(self._view(self._nodes[imc_id], now) for imc_id in sorted(self._nodes))
+        return tuple(self._view(node, now) for node in self._roster)
 
     async def engage(self, vehicle: str) -> None:
         """Start our plan on the vehicle and wait until it follows; it then holds its place at the surface.
@@ -173,9 +195,9 @@ class Bridge:
         """
         if not self._commanding:
             raise RefusedError(vehicle, "this bridge only listens", "Use one that may command")
-        node = self._node_named(vehicle)
+        node = self._roster.named(vehicle)
         if node is None:
-            known = ", ".join(n.name for n in self._nodes.values() if n.is_vehicle) or "none"
+            known = ", ".join(n.name for n in self._roster if n.is_vehicle) or "none"
             raise RefusedError(vehicle, f"never heard of (known: {known})", "Switch it on; see `bathyfleet doctor`")
         follower = self._follower(node)
         if not follower.engaged and follower.engage(self._now()):
@@ -189,7 +211,7 @@ class Bridge:
 
     def intervention(self, vehicle: str) -> str:
         """Return why a vehicle left us of its own or another console's will, until :meth:`stop` is called; else ''."""
-        node = self._node_named(vehicle)
+        node = self._roster.named(vehicle)
         return self._follower(node).intervention if node is not None and self._commanding else ""
 
     def goto(self, vehicle: str, waypoint: Waypoint) -> None:
@@ -200,7 +222,7 @@ class Bridge:
         RefusedError
             When the vehicle is not engaged.
         """
-        node = self._node_named(vehicle)
+        node = self._roster.named(vehicle)
         follower = self._followers.get(node.imc_id) if node is not None else None
         if follower is None or not follower.engaged:
             refusal = follower.refusal if follower is not None else None
@@ -218,7 +240,7 @@ class Bridge:
         acknowledged the references have ceased all the same, which ends the plan on board within seconds, and STOP
         goes on being sent whenever the vehicle shows up in our plan.
         """
-        node = self._node_named(vehicle)
+        node = self._roster.named(vehicle)
         if node is None:
             return StopResult(vehicle, False, "never heard of")
         if not self._commanding:
@@ -249,39 +271,51 @@ class Bridge:
 
     # Time
 
+    def wall_time_s(self) -> float:
+        """Unix seconds of this machine."""
+        return self._wall_clock()
+
     def _now(self) -> float:
         """Seconds of the vehicles' clock rate: every period and timeout is measured in these."""
         return self._clock() * self.settings.time_scale
 
     async def _run(self) -> None:
         while True:
-            now = self._now()
-            try:
-                self._tick(now)
-            except Exception as error:
-                self._note_error(error)
+            self.pass_time()
             turn, self._turn = self._turn, asyncio.Event()
             turn.set()
             await asyncio.sleep(self._tick_wall_s)
+
+    def pass_time(self) -> None:
+        """Do whatever is due by now; runs by itself in a started bridge, a replay calls it after every packet."""
+        try:
+            self._tick(self._now())
+        except Exception as error:
+            self._note_error(error)
 
     def _tick(self, now: float) -> None:
         if now >= self._announce_due:
             self._announce(now)
         if now >= self._heartbeat_due:
             self._heartbeat_due = now + self.settings.heartbeat_period_s
-            for node in self._nodes.values():
+            for node in self._roster:
                 if self._talks_to(node):
-                    self._send(node, imcpy.Heartbeat())
-        for node in list(self._nodes.values()):
+                    self._beat(node)
+        for node in self._roster:
             if node.is_vehicle and self._talks_to(node):
                 self._tick_vehicle(node, now)
-        self.review()
-
-    def review(self) -> None:
-        """Judge every link by the time that has passed; runs by itself in a started bridge."""
-        now = self._now()
-        for node in list(self._nodes.values()):
+        self._roster.pass_time(now)
+        for node in self._roster:
             self._check_link(node, now)
+
+    def _beat(self, node: Node) -> None:
+        if node.heard_at is not None or not node.addresses:
+            self._send(node, imcpy.Heartbeat())
+            return
+        # Which of its addresses leads to it from here shows only once it answers.
+        packet = self._encoded(imcpy.Heartbeat(), node.imc_id)
+        for address in node.addresses:
+            self.transport.send(packet, address)
 
     def _tick_vehicle(self, node: Node, now: float) -> None:
         if node.entities is None and node.heard_at is not None:
@@ -302,11 +336,26 @@ class Bridge:
     def _announce(self, now: float) -> None:
         self._announce_due = now + self.settings.announce_period_s
         self._announced_at = now
+        self.transport.look_for_interfaces()
+        position = self.position_rad()
         self.transport.announce(
-            lambda addresses: encode(
-                own_announce(self.settings, addresses), src=self.settings.imc_id, dst=0, time_s=time.time()
-            )
+            lambda addresses: self._encoded(own_announce(self.settings, addresses, position), dst=0)
         )
+
+    def _encoded(self, message: Message, dst: int) -> bytes:
+        return encode(message, src=self.settings.imc_id, dst=dst, time_s=self._wall_clock())
+
+    def position_rad(self) -> tuple[float, float]:
+        """The place that we announce as ours."""
+        if self.settings.position_deg is not None:
+            lat, lon = self.settings.position_deg
+            return math.radians(lat), math.radians(lon)
+        for node in self._roster:
+            if node.announcement is not None and node.announcement.is_vehicle:
+                place = node.announcement.lat_rad, node.announcement.lon_rad
+                if place != (0.0, 0.0):
+                    return place
+        return 0.0, 0.0
 
     # Packets
 
@@ -318,44 +367,43 @@ class Bridge:
             self._note_error(error)
 
     def _take_announce(self, packet: bytes, address: Address) -> None:
-        header = self.announces.header(packet)
-        if header is None or not self.announces.wants(header) or header.src == self.settings.imc_id:
+        header = self.announces.header(packet, address[0])
+        if header is None or not self.announces.wants(header):
             return
         message = self.announces.message(packet)
         if message is None:
             return
         announcement = read_announce(message)
-        now = self._now()
-        node = self._node_of(announcement.imc_id, announcement.name, now)
-        if node is None:
+        if announcement.imc_id == self.settings.imc_id:
+            self._look_for_double(announcement, address)
             return
-        known = node.announcement
-        if known is not None:
-            node.conflict = self._conflict(node, known, announcement, now) or node.conflict
-        first = known is None
-        if first:
-            self._name(node, announcement.name)
-            if announcement.is_vehicle:
-                # Its guard learns the bottom from the first sounding on.
-                self._follower(node)
-        rebooted = node.announced(announcement, reachable_first(announcement, address[0]), now)
-        for reachable in announcement.addresses:
-            self._by_address[reachable] = node
-        if rebooted:
+        now = self._now()
+        arrival = self._roster.announced(announcement, address[0], now)
+        if arrival is None:
+            return
+        node = arrival.node
+        if announcement.is_vehicle:
+            # Its guard learns the bottom from the first sounding on.
+            self._follower(node)
+        for stale in arrival.stale:
+            self.transport.streams.drop(stale)
+        if node.address is not None and node.address in announcement.streams:
+            self.transport.streams.want(node.address)
+        if arrival.rebooted:
             self._reboot(node, now)
-        if (first or rebooted) and now - self._announced_at > ANNOUNCE_AGAIN_S:
+        if (arrival.first or arrival.rebooted) and now - self._announced_at > ANNOUNCE_AGAIN_S:
             # So that a newcomer need not wait for our next announce.
             self._announce(now)
         self._check_link(node, now)
 
-    def _conflict(self, node: Node, known: Announcement, new: Announcement, now: float) -> str | None:
-        """Why two announces under one id cannot come from one node, None when they can."""
-        if known.name != new.name:
-            return f"id 0x{node.imc_id:04X} is announced by {known.name!r} and by {new.name!r}: give one another id"
-        quick = node.announced_at is not None and now - node.announced_at < 0.5 * self.settings.announce_period_s
-        if quick and known.uid != new.uid and set(known.addresses) != set(new.addresses):
-            return f"two nodes named {known.name!r} announce id 0x{node.imc_id:04X}: stop one of them"
-        return None
+    def _look_for_double(self, announcement: Announcement, address: Address) -> None:
+        """Our own announces come back to us; those of another system under our id are trouble."""
+        ours = (*self.transport.own_addresses(), address[0])
+        if announcement.name == self.settings.name and any(
+            host in ours and port == self.settings.port for host, port in announcement.addresses
+        ):
+            return
+        self.double = f"{announcement.name!r} at {address[0]}"
 
     def _reboot(self, node: Node, now: float) -> None:
         self._entities_asked.pop(node.imc_id, None)
@@ -373,36 +421,43 @@ class Bridge:
             self._note_error(error)
 
     def _take_packet(self, packet: bytes, address: Address) -> None:
-        header = self.decoder.header(packet)
+        header = self.decoder.header(packet, address[0])
         if header is None:
             return
         now = self._now()
-        sender = self._by_address.get(address)
+        sender = self._roster.speaker(header.src, address)
         if sender is None:
-            self._from_unknown_address(header.src, now)
-            self.decoder.wants(header)
+            self._pass_on(header, packet, address, now)
             return
-        if header.src == self.settings.imc_id:
-            sender.echoes += 1
-            return
-        if header.src != sender.imc_id:
-            sender.relayed[header.src] += 1
-            if header.dst in (sender.imc_id, BROADCAST_ID) and self.decoder.wants(header):
-                self._relayed(sender, packet, now)
-            return
-        sender.heard(now, address)
+        if header.msg_id != SIMULATED_STATE:
+            # DUNE's simulation lets this one through where radio would not reach.
+            sender.heard(now, address)
         if not self.decoder.wants(header):
             return
         message = self.decoder.message(packet)
         if message is not None and 0.0 < message.timestamp < MAX_PLAUSIBLE_VEHICLE_TIME_S:
             self._take_message(sender, message, now)
 
-    def _from_unknown_address(self, imc_id: int, now: float) -> None:
+    def _pass_on(self, header: Header, packet: bytes, address: Address, now: float) -> None:
+        """Take a packet that is not its sender's own word: an echo of ours, one relayed by a node, a stranger's."""
+        via = self._roster.at(address)
+        if via is None:
+            self._from_unknown_address(header.src, address, now)
+            self.decoder.wants(header)
+        elif header.src == self.settings.imc_id:
+            via.echoes += 1
+        else:
+            via.relayed[header.src] += 1
+            if header.dst in (via.imc_id, BROADCAST_ID) and self.decoder.wants(header):
+                self._relayed(via, packet, now)
+
+    def _from_unknown_address(self, imc_id: int, address: Address, now: float) -> None:
         if imc_id in (self.settings.imc_id, 0, BROADCAST_ID):
             return
-        node = self._node_of(imc_id, f"0x{imc_id:04X}", now)
+        node = self._roster.take_up(imc_id, f"0x{imc_id:04X}", now)
         if node is not None:
             node.foreign_address += 1
+            node.last_foreign = address
             if node.announcement is None:
                 node.heard_at = now
 
@@ -421,7 +476,10 @@ class Bridge:
         follower = self._followers.get(node.imc_id)
         node.telemetry_at = now
         node.rates.count(name, now)
-        if node.follow_clock(message.timestamp, time.time()) and follower is not None:
+        tick = node.take_time(message.timestamp, now, self._wall_clock())
+        if tick is Tick.DOUBTFUL:
+            return
+        if tick is Tick.JUMPED and follower is not None:
             follower.guard.clear()
         match name:
             case "EstimatedState":
@@ -462,7 +520,7 @@ class Bridge:
                 self._tell(report)
         for result in node.gate.resolve(node.history, node.position_sd_m()):
             if follower is not None and isinstance(result, Sounding):
-                follower.guard.add(result.time_s, result.lat_deg, result.lon_deg, result.bottom_depth_m)
+                follower.guard.add(result.time_s, result.lat_deg, result.lon_deg, result.bottom_depth_m, now)
             self._tell(result)
 
     def _take_distance(self, node: Node, message: Message) -> None:
@@ -472,22 +530,6 @@ class Bridge:
 
     # Nodes
 
-    def _node_of(self, imc_id: int, name: str, now: float) -> Node | None:
-        node = self._nodes.get(imc_id)
-        if node is None and len(self._nodes) < MAX_NODES:
-            node = self._nodes[imc_id] = Node(imc_id, name, self.settings, now)
-            self._name(node, name)
-        return node
-
-    def _name(self, node: Node, name: str) -> None:
-        """Give a node its announced name, made unique."""
-        taken = {other.name for other in self._nodes.values() if other is not node}
-        node.name = name if name and name not in taken else f"{name} (0x{node.imc_id:04X})".strip()
-        node.gate.vehicle = node.name
-
-    def _node_named(self, name: str) -> Node | None:
-        return next((node for node in self._nodes.values() if node.name == name), None)
-
     def _talks_to(self, node: Node) -> bool:
         wanted = self.settings.vehicles
         if node.address is None or node.announcement is None:
@@ -496,13 +538,18 @@ class Bridge:
         return node.name in wanted if wanted else node.announcement.system_type != int(imcpy.SystemType.CCU)
 
     def _controlled(self) -> list[tuple[Node, Follower]]:
-        return [(self._nodes[imc_id], follower) for imc_id, follower in self._followers.items()]
+        return [(self._roster[imc_id], follower) for imc_id, follower in self._followers.items()]
 
     def _follower(self, node: Node) -> Follower:
         follower = self._followers.get(node.imc_id)
         if follower is None:
             follower = self._followers[node.imc_id] = Follower(
-                node, self.settings, lambda message: self._send(node, message), self._tell, self._request_ids
+                node,
+                self.settings,
+                lambda message: self._send(node, message),
+                self._tell,
+                self._request_ids,
+                self._seabed,
             )
         return follower
 
@@ -516,8 +563,7 @@ class Bridge:
 
     def _send(self, node: Node, message: Message) -> None:
         if node.address is not None:
-            packet = encode(message, src=self.settings.imc_id, dst=node.imc_id, time_s=time.time())
-            self.transport.send(packet, node.address)
+            self.transport.send(self._encoded(message, node.imc_id), node.address)
 
     # Telling the user
 
@@ -529,7 +575,8 @@ class Bridge:
         status = node.status(now)
         follower = self._followers.get(node.imc_id)
         engaged = follower is not None and follower.engaged
-        known = self._links.get(node.imc_id)
+        past = self._links.setdefault(node.imc_id, deque(maxlen=LINK_HISTORY))
+        known = past[-1] if past else None
         reason = status.reason
         if follower is not None and not engaged and follower.refusal is not None and not reason:
             reason = f"not ours: {follower.refusal.reason}"
@@ -538,9 +585,10 @@ class Bridge:
         silent = status.state in (NodeState.LOST, NodeState.EXPECTED_OFFLINE)
         if same and (silent or (known is not None and known.reason == reason)):
             return
-        change = self._links[node.imc_id] = LinkChange(
-            node.name, status.state, engaged, reason, node.executing(self.settings.plan_id)
+        change = LinkChange(
+            node.name, status.state, engaged, reason, node.executing(self.settings.plan_id), self._wall_clock()
         )
+        past.append(change)
         self._tell(change)
 
     def _tell(self, event: BridgeEvent) -> None:
@@ -568,14 +616,17 @@ class Bridge:
             ours=node.executing(self.settings.plan_id),
             age_s=age(node.heard_at),
             announce_age_s=age(node.announced_at),
+            telemetry_overdue=node.telemetry_overdue(now),
             address=f"{node.address[0]}:{node.address[1]}" if node.address else None,
+            addresses=node.addresses,
             imc_version=node.announcement.imc_version if node.announcement else None,
             operation_mode=node.operation_mode_name,
             plan_id=node.plan_id or None,
             plan_state=node.plan_state_name,
             report=node.report,
-            clock_offset_s=node.clock_offset_s,
+            clock_offset_s=node.clock.offset_s,
             entities=None if node.entities is None else len(node.entities),
+            controller=node.controller,
             bottom_sensors=tuple(sorted(node.gate.heard)),
             rates_hz=node.rates.rates_hz(now),
             soundings=node.gate.accepted,
@@ -583,6 +634,9 @@ class Bridge:
             echoes=node.echoes,
             relayed=sum(node.relayed.values()),
             foreign_address=node.foreign_address,
+            foreign_from=f"{node.last_foreign[0]}:{node.last_foreign[1]}" if node.last_foreign else None,
             conflict=node.conflict,
+            clock_rate=node.clock.rate(scale),
+            history=tuple(self._links.get(node.imc_id, ())),
             rate_limiters=rates.text if rates is not None else "as the vehicle has them",
         )

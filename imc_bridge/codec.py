@@ -26,6 +26,8 @@ MAX_PACKET_SIZE = 65535
 BROADCAST_ID = 0xFFFF
 ANY_ENTITY = 0xFF
 
+MAX_FOREIGN = 32
+_SYNC_HIGH = SYNC >> 8
 _LITTLE = struct.Struct("<HHHdHBHB")
 _BIG = struct.Struct(">HHHdHBHB")
 _SYNC_LITTLE = struct.pack("<H", SYNC)
@@ -53,9 +55,12 @@ class Header(NamedTuple):
     dst_ent: int
 
 
-def peek(packet: bytes) -> Header | PacketFault:
-    """Read a packet's header in its sender's byte order, without verifying the payload."""
-    if len(packet) < HEADER_SIZE + FOOTER_SIZE:
+def peek(packet: bytes, *, whole: bool = True) -> Header | PacketFault:
+    """Read a packet's header in its sender's byte order, without verifying the payload.
+
+    With ``whole`` false the header may stand alone, as at the beginning of a stream's next packet.
+    """
+    if len(packet) < HEADER_SIZE + (FOOTER_SIZE if whole else 0):
         return PacketFault.LENGTH
     sync = packet[:2]
     if sync == _SYNC_LITTLE:
@@ -64,9 +69,23 @@ def peek(packet: bytes) -> Header | PacketFault:
         header = Header._make(_BIG.unpack_from(packet)[1:])
     else:
         return PacketFault.SYNC
-    if len(packet) != HEADER_SIZE + header.size + FOOTER_SIZE:
+    if whole and len(packet) != HEADER_SIZE + header.size + FOOTER_SIZE:
         return PacketFault.LENGTH
     return header
+
+
+def sync_follows(data: bytes | bytearray, place: int) -> bool:
+    """Whether a packet may begin at ``place``: a synchronisation word in either byte order."""
+    return data[place : place + 2] in (_SYNC_LITTLE, _SYNC_BIG)
+
+
+def foreign_version(packet: bytes) -> str:
+    """IMC version of a packet whose synchronisation word is another version's: FE54 is 5.4; empty for no packet."""
+    if len(packet) < HEADER_SIZE + FOOTER_SIZE or _SYNC_HIGH not in packet[:2]:
+        return ""
+    low = packet[0] if packet[1] == _SYNC_HIGH else packet[1]
+    sized = _LITTLE if packet[1] == _SYNC_HIGH else _BIG
+    return f"{low >> 4}.{low & 15}" if sized.unpack_from(packet)[2] + HEADER_SIZE + FOOTER_SIZE == len(packet) else ""
 
 
 @cache
@@ -97,6 +116,8 @@ class Decoder:
         Packets by message name.
     faults : Counter[PacketFault]
     unknown_ids : Counter[int]
+    foreign_versions : Counter[tuple[str, str]]
+        Packets of another IMC version (the synchronisation word tells it), by host and version.
     """
 
     def __init__(self, wanted: Iterable[str]) -> None:
@@ -105,13 +126,17 @@ class Decoder:
         self.unwanted: Counter[str] = Counter()
         self.faults: Counter[PacketFault] = Counter()
         self.unknown_ids: Counter[int] = Counter()
+        self.foreign_versions: Counter[tuple[str, str]] = Counter()
 
-    def header(self, packet: bytes) -> Header | None:
+    def header(self, packet: bytes, host: str = "") -> Header | None:
         """The header of a sound packet, None (and a count) otherwise."""
         header = peek(packet)
         if isinstance(header, Header):
             return header
         self.faults[header] += 1
+        version = foreign_version(packet) if header is PacketFault.SYNC else ""
+        if version and (len(self.foreign_versions) < MAX_FOREIGN or (host, version) in self.foreign_versions):
+            self.foreign_versions[(host, version)] += 1
         return None
 
     def wants(self, header: Header) -> bool:

@@ -35,6 +35,15 @@ class WaypointStatus(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
+class BottomPoint:
+    """Depth of the bottom at a place as a map knows it, below the surface as it is now, on the safe side."""
+
+    lat_deg: float
+    lon_deg: float
+    depth_m: float
+
+
+@dataclass(frozen=True, slots=True)
 class Waypoint:
     """Where a vehicle shall go. Equal ``mission_id`` and ``step`` make two waypoints the same order.
 
@@ -53,6 +62,8 @@ class Waypoint:
     min_altitude_m: float = 3.0
     lead_lat_deg: float | None = None
     lead_lon_deg: float | None = None
+    bottom: tuple[BottomPoint, ...] = ()
+    """What is mapped of the bottom on the way there; no reference goes deeper than the clearance above it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,6 +129,8 @@ class LinkChange:
     reason: str = ""
     ours: bool = False
     """Executes a plan of ours, perhaps of an earlier run."""
+    at_s: float = 0.0
+    """When, by our wall clock (Unix seconds)."""
 
 
 BridgeEvent = StateReport | Sounding | SoundingRefused | WaypointChange | LinkChange
@@ -147,7 +160,11 @@ class NodeView:
     """Executes a plan of ours, perhaps of an earlier run."""
     age_s: float | None = None
     announce_age_s: float | None = None
+    telemetry_overdue: bool = False
+    """Announced for longer than telemetry needs to begin, and none came."""
     address: str | None = None
+    addresses: tuple[tuple[str, int], ...] = ()
+    """Every address that it announced."""
     imc_version: str | None = None
     operation_mode: str | None = None
     plan_id: str | None = None
@@ -155,6 +172,8 @@ class NodeView:
     report: StateReport | None = None
     clock_offset_s: float | None = None
     entities: int | None = None
+    controller: int | None = None
+    """IMC id that its FollowReference maneuver takes references from, while it says so."""
     bottom_sensors: tuple[str, ...] = ()
     rates_hz: Mapping[str, float] = field(default_factory=dict)
     soundings: int = 0
@@ -162,7 +181,13 @@ class NodeView:
     echoes: int = 0
     relayed: int = 0
     foreign_address: int = 0
+    foreign_from: str | None = None
+    """Address that packets under its id came from last without being announced."""
     conflict: str | None = None
+    clock_rate: float | None = None
+    """Seconds of its clock per second of ours; None while it was not heard for long enough."""
+    history: tuple[LinkChange, ...] = ()
+    """The last changes of its link, oldest first."""
     rate_limiters: str = ""
 
 

@@ -21,6 +21,7 @@ from imc_bridge.codec import ANY_ENTITY, Message
 from imc_bridge.events import NodeState, StateReport, Waypoint, WaypointChange, WaypointStatus
 from imc_bridge.guard import AltitudeGuard
 from imc_bridge.nodes import Node, OperationMode, PlanState
+from imc_bridge.seabed import Seabed
 from imc_bridge.settings import BridgeSettings
 
 MANEUVER_ID = "follow"
@@ -106,8 +107,8 @@ class SentReference:
     def echoed_by(self, message: Message | None) -> bool:
         """Whether FollowRefState's reference is this one (floats of 32 bits on the wire)."""
         return (
-            message is not None
-            and message.z is not None
+            isinstance(message, imcpy.Reference)
+            and isinstance(message.z, imcpy.DesiredZ)
             and int(message.z.z_units) == Z_DEPTH
             and math.isclose(message.lat, self.lat_rad, abs_tol=1e-10)
             and math.isclose(message.lon, self.lon_rad, abs_tol=1e-10)
@@ -141,6 +142,7 @@ class Evidence:
     completed: bool = False
     aborted_by: int | None = None
     stopped_by: int | None = None
+    taken_by: int | None = None
     error: str | None = None
     blocked: bool = False
     rebooted: bool = False
@@ -210,6 +212,8 @@ class Follower:
         Receives :class:`WaypointChange` events.
     request_ids
         Numbers for requests, shared by all vehicles and not repeated across restarts of the service.
+    seabed
+        What all vehicles have measured of the bottom.
     """
 
     def __init__(
@@ -219,9 +223,12 @@ class Follower:
         send: Callable[[Message], None],
         emit: Callable[[WaypointChange], None],
         request_ids: itertools.count[int],
+        seabed: Seabed | None = None,
     ) -> None:
         self.node = node
-        self.guard = AltitudeGuard(settings.guard_radius_m, settings.guard_window_s, settings.unknown_bottom_depth_m)
+        self.guard = AltitudeGuard(
+            settings.guard_radius_m, settings.guard_window_s, settings.unknown_bottom_depth_m, seabed
+        )
         self.phase = Phase.IDLE
         self.refusal: Refusal | None = None
         self.stop_detail = ""
@@ -267,11 +274,17 @@ class Follower:
         status = self.node.status(now)
         if status.state in (NodeState.LOST, NodeState.HEARD, NodeState.EXPECTED_OFFLINE):
             self.refusal = Refusal(status.reason, "Bring its link up first; `bathyfleet doctor` says what is missing")
-        elif status.state is NodeState.IN_PLAN and self.node.plan_id != self._settings.plan_id:
+        elif self.node.conflict is not None:
+            self.refusal = Refusal(self.node.conflict, "A command could reach the wrong vehicle")
+        elif status.state is NodeState.IN_PLAN and not self._ours_or_none():
             self.refusal = Refusal(status.reason, "Stop that plan on its console, then engage again")
         else:
             self._enter(Phase.WAITING, now)
         return self.engaged
+
+    def _ours_or_none(self) -> bool:
+        """Whether the plan in execution is ours; one that is still nameless may become ours."""
+        return self.node.plan_id in ("", self._settings.plan_id) and self.node.foreign_controller is None
 
     def order(self, waypoint: Waypoint, now: float) -> None:
         """Replace the current waypoint. Repeating one is harmless unless it had been refused."""
@@ -389,6 +402,11 @@ class Follower:
 
     def follow_state(self, message: Message, now: float) -> None:
         """FollowRefState: the echo of a reference is its acknowledgement."""
+        self.node.controller = int(message.control_src)
+        if self.node.foreign_controller is not None and self.phase in (Phase.FOLLOWING, Phase.ENDED):
+            # Its plan goes by our name, but it takes no reference of ours.
+            self._evidence.taken_by = self.node.controller
+            self._plan_ended(now)
         if int(message.control_src) != self._settings.imc_id:
             return
         if int(message.state) == STATE_TIMEOUT:
@@ -515,7 +533,7 @@ class Follower:
             self._tick_starting(now)
             return
         status = node.status(now)
-        if status.state is NodeState.IN_PLAN and node.plan_id not in ("", settings.plan_id):
+        if status.state is NodeState.IN_PLAN and not self._ours_or_none():
             self._release(status.reason, "Stop that plan on its console, then engage again", now)
         elif now - self._since > (settings.engage_timeout_s if self._restarts == 0 else settings.release_after_s):
             reason = status.reason or "does not report being in service and ready"
@@ -594,7 +612,14 @@ class Follower:
         depth, order.limited = waypoint.depth_m, ""
         if report is not None:
             limit = self.guard.limit(
-                waypoint.depth_m, waypoint.min_altitude_m, report.time_s, report.lat_deg, report.lon_deg
+                waypoint.depth_m,
+                waypoint.min_altitude_m,
+                report.time_s,
+                report.lat_deg,
+                report.lon_deg,
+                now=now,
+                towards=_way(order),
+                mapped=waypoint.bottom,
             )
             depth, order.limited = limit.depth_m, limit.reason
         if order.limited and order.sent and 0.0 <= depth - order.sent[-1].depth_m < GUARD_STEP_M:
@@ -660,6 +685,12 @@ class Follower:
                 "Engage it again when that is done",
                 now,
             )
+        elif seen.taken_by is not None:
+            self._release(
+                f"console 0x{seen.taken_by:04X} took over with a plan of the same name",
+                "Engage it again when that is done; two consoles need different plan ids",
+                now,
+            )
         elif seen.rebooted:
             self._restart("the vehicle has rebooted", now)
         elif seen.aborted_by is not None:
@@ -715,6 +746,15 @@ class Follower:
         order = self._order
         if order is not None and order.status not in (WaypointStatus.REACHED, WaypointStatus.REFUSED):
             self._advance(order, WaypointStatus.REFUSED, f"{reason}. {remedy}")
+
+
+def _way(order: Order) -> list[tuple[float, float]]:
+    """Where the vehicle flies from where it is: the waypoint, then the lead where it is sent there."""
+    waypoint = order.waypoint
+    way = [(waypoint.lat_deg, waypoint.lon_deg)]
+    if order.leading and waypoint.lead_lat_deg is not None and waypoint.lead_lon_deg is not None:
+        way.append((waypoint.lead_lat_deg, waypoint.lead_lon_deg))
+    return way
 
 
 def _distance_m(lat1_deg: float, lon1_deg: float, lat2_deg: float, lon2_deg: float) -> float:

@@ -32,6 +32,7 @@ from imc_bridge.events import Sounding, SoundingRefused, StateReport
 from imc_bridge.nodes import Node, listed_entities
 from imc_bridge.settings import BridgeSettings
 from imc_bridge.soundings import offer_distance
+from imc_bridge.vehicle_clock import Tick
 
 BLOCK_BYTES = 1 << 20
 GZIP_MAGIC = b"\x1f\x8b"
@@ -229,7 +230,9 @@ class VehicleLog:
 
 
 def _take(node: Node, header: Header, message: Message) -> Iterator[LogEvent]:
-    node.follow_clock(message.timestamp, message.timestamp)
+    # A log tells no arrival times: a leap of the clock counts once it repeats.
+    if node.take_time(message.timestamp, 0.0, message.timestamp) is Tick.DOUBTFUL:
+        return
     match type(message).__name__:
         case "EstimatedState":
             report = node.take_state(message)

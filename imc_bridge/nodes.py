@@ -20,10 +20,8 @@ from imc_bridge.events import NodeState, StateReport
 from imc_bridge.settings import BridgeSettings
 from imc_bridge.soundings import SoundingGate, StateHistory, StateSample, beam_table
 from imc_bridge.transport import Address
+from imc_bridge.vehicle_clock import Tick, VehicleClock
 
-LATE_S = 5.0
-"""A timestamp further back than this is no late packet but a clock that was set back, once it repeats."""
-CLOCK_JUMP_CONFIRMATIONS = 3
 UNCERTAINTY_VALID_S = 10.0
 SUBMERGED_DEPTH_M = 0.3
 """Radio is gone that far below; the depth sensor's noise at the surface is about 0.1 m."""
@@ -53,6 +51,7 @@ class PlanState(IntEnum):
 
 
 MEDIUM_UNDERWATER = 3
+ANY_CONSOLE = 0xFFFF
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,12 +119,11 @@ class Node:
         self.echoes = 0
         self.relayed: Counter[int] = Counter()
         self.foreign_address = 0
+        self.last_foreign: Address | None = None
+        """Where packets under its id came from last that is not an address of its own."""
         self.rates = RateMeter()
 
-        self.clock_offset_s: float | None = None
-        self.clock_jumps = 0
-        self._time_s: float | None = None
-        self._backward: int = 0
+        self.clock = VehicleClock()
 
         self.entities: dict[int, str] | None = None
         self.operation_mode: int | None = None
@@ -134,6 +132,8 @@ class Node:
         self.plan_state: int | None = None
         self.plan_state_at: float | None = None
         self.plan_id = ""
+        self.controller: int | None = None
+        """Whose references its FollowReference maneuver takes, by its own account."""
         self.medium: int | None = None
         self.battery_pct: float | None = None
         self.history = StateHistory()
@@ -147,11 +147,6 @@ class Node:
     def is_vehicle(self) -> bool:
         """Whether it announced itself as a vehicle, or has not said what it is."""
         return self.announcement is None or self.announcement.is_vehicle
-
-    @property
-    def time_s(self) -> float | None:
-        """The newest timestamp of the vehicle's own clock."""
-        return self._time_s
 
     # Discovery
 
@@ -182,6 +177,7 @@ class Node:
         self.operation_mode_at = self.plan_state_at = None
         self.telemetry_at = None
         self.plan_id = ""
+        self.controller = None
         self._latest.clear()
 
     # Packets and the vehicle's clock
@@ -199,25 +195,15 @@ class Node:
         self._latest[name] = timestamp
         return True
 
-    def follow_clock(self, timestamp: float, wall_time_s: float) -> bool:
-        """Keep up with the vehicle's clock; True when it was set back and all history was dropped."""
-        if self._time_s is None or timestamp >= self._time_s:
-            self._time_s = timestamp
-            self._backward = 0
-        elif timestamp < self._time_s - LATE_S:
-            self._backward += 1
-            if self._backward >= CLOCK_JUMP_CONFIRMATIONS:
-                self.clock_jumps += 1
-                self._backward = 0
-                self._time_s = timestamp
-                self._latest.clear()
-                self.history.clear()
-                self.gate.clear()
-                self._uncertainty = None
-                self.clock_offset_s = timestamp - wall_time_s
-                return True
-        self.clock_offset_s = timestamp - wall_time_s
-        return False
+    def take_time(self, timestamp: float, now: float, wall_time_s: float) -> Tick:
+        """Keep up with the vehicle's clock; after a jump everything that was ordered by it is forgotten."""
+        tick = self.clock.take(timestamp, now, wall_time_s)
+        if tick is Tick.JUMPED:
+            self._latest.clear()
+            self.history.clear()
+            self.gate.clear()
+            self._uncertainty = None
+        return tick
 
     # Telemetry
 
@@ -257,10 +243,10 @@ class Node:
 
     def position_sd_m(self) -> float | None:
         """Standard deviation of the position per axis, None when the vehicle has not told it lately."""
-        if self._uncertainty is None or self._time_s is None:
+        if self._uncertainty is None or self.clock.time_s is None:
             return None
         at_s, sd = self._uncertainty
-        return sd if self._time_s - at_s <= UNCERTAINTY_VALID_S else None
+        return sd if self.clock.time_s - at_s <= UNCERTAINTY_VALID_S else None
 
     def take_vehicle_state(self, message: Message, now: float) -> None:
         """VehicleState: the operation mode and the errors that explain it."""
@@ -273,6 +259,13 @@ class Node:
         self.plan_state = int(message.state)
         self.plan_state_at = now
         self.plan_id = str(message.plan_id)
+        if self.plan_state not in (PlanState.EXECUTING, PlanState.INITIALIZING):
+            self.controller = None
+
+    @property
+    def foreign_controller(self) -> int | None:
+        """The console that its maneuver listens to when that is not us."""
+        return None if self.controller in (None, ANY_CONSOLE, self._settings.imc_id) else self.controller
 
     def take_entities(self, message: Message) -> None:
         """EntityList report: ``Name=id;…``."""
@@ -299,8 +292,9 @@ class Node:
         )
 
     def executing(self, plan_id: str) -> bool:
-        """Whether its last plan state says that it executes a plan of this name."""
-        return self.plan_state in (PlanState.EXECUTING, PlanState.INITIALIZING) and self.plan_id == plan_id
+        """Whether it executes a plan of this name, as far as it says, and not at another console's behest."""
+        running = self.plan_state in (PlanState.EXECUTING, PlanState.INITIALIZING)
+        return running and self.plan_id == plan_id and self.foreign_controller is None
 
     def status(self, now: float) -> Status:
         """The link's state and the reason for it."""
@@ -324,11 +318,21 @@ class Node:
         if self.plan_state in (PlanState.EXECUTING, PlanState.INITIALIZING):
             if self.plan_state == PlanState.INITIALIZING:
                 return Status(NodeState.IN_PLAN, "starts a plan")
-            whose = "our plan" if self.plan_id == settings.plan_id else f"plan {self.plan_id!r} of another console"
+            if self.foreign_controller is not None:
+                whose = f"plan {self.plan_id!r} under the control of console 0x{self.foreign_controller:04X}"
+            elif self.plan_id == settings.plan_id:
+                whose = "our plan"
+            else:
+                whose = f"plan {self.plan_id!r} of another console"
             return Status(NodeState.IN_PLAN, f"executes {whose}")
         if self.operation_mode == OperationMode.SERVICE and self.plan_state == PlanState.READY:
             return Status(NodeState.READY)
         return Status(NodeState.ACTIVE, self._why_not_ready())
+
+    def telemetry_overdue(self, now: float) -> bool:
+        """Whether it announced itself long ago and nothing else came."""
+        since = self.first_announced_at
+        return self.heard_at is None and since is not None and now - since > self._settings.telemetry_timeout_s
 
     def _without_telemetry(self, now: float, announced_at: float, first_announced_at: float) -> Status:
         if now - announced_at > ANNOUNCES_MISSED * self._settings.announce_period_s:

@@ -91,7 +91,7 @@ class RateRequest:
         if str(message.name) != ENTITY:
             return
         for parameter in message.params:
-            if str(parameter.name) == PARAMETER:
+            if isinstance(parameter, imcpy.EntityParameter) and str(parameter.name) == PARAMETER:
                 value = str(parameter.value)
                 if self._set is not None and _same(value, self._set):
                     self._confirmed = True

@@ -32,8 +32,12 @@ class BridgeSettings:
     """Reach only vehicles on this machine; nothing goes out on any network."""
     interfaces: tuple[str, ...] = ()
     """IPv4 addresses of the interfaces to announce on; empty means all of them."""
+    transport: Literal["udp", "tcp"] = "udp"
+    """``tcp``: by TCP with every vehicle that offers it (DUNE's Transports.TCP.Server), by UDP with the others."""
     announce_ports: tuple[int, ...] = STANDARD_ANNOUNCE_PORTS
     multicast_group: str = STANDARD_MULTICAST_GROUP
+    position_deg: tuple[float, float] | None = None
+    """Where this console is, latitude and longitude; without it the place of the first vehicle heard is announced."""
     vehicles: tuple[str, ...] = ()
     """Names of the vehicles to talk to; empty means every vehicle that announces itself."""
     time_scale: float = 1.0
@@ -103,6 +107,13 @@ class BridgeSettings:
         check("time_scale", 0.01 <= self.time_scale <= 1000.0, "between 0.01 and 1000 (1 = real time)")
         check("reference_period_s", 0.0 < self.reference_period_s < 5.0, "below 5 s, or vehicles give up")
         check("plan_id", bool(self.plan_id), "a name that no other console uses")
+        place = self.position_deg
+        check(
+            "position_deg",
+            place is None or (len(place) == 2 and abs(place[0]) <= 90.0 and abs(place[1]) <= 180.0),
+            "latitude and longitude in degrees",
+        )
+        check("transport", self.transport in ("udp", "tcp"), "'udp' or 'tcp'")
         check("altimeter", self.altimeter in ("vertical", "body"), "'vertical' or 'body'")
         for field in (
             "announce_period_s",

@@ -26,6 +26,9 @@ DVL_FILTERED_INDEX = 4
 """A number of its own: it comes at the same instant as the beams 0 to 3, and a time and a beam make one sounding."""
 MAX_STATE_GAP_S = 2.0
 """States further apart than this are not interpolated (they come every 0.5 s by default)."""
+MAX_EDGE_S = 0.6
+"""A Distance this close to the last state before a gap, or to the first after it, is placed by carrying on."""
+MAX_IGNORED = 256
 MAX_WAIT_S = 3.0
 """How far the vehicle's clock may run on before a Distance without a following state is given up."""
 MAX_PENDING = 256
@@ -174,6 +177,23 @@ class StateHistory:
         self._times.clear()
         self._samples.clear()
 
+    def at(self, time_s: float) -> StateSample | None:
+        """The state at an instant: between two samples, or carried on a little from the edge of a gap; else None."""
+        before, after = self.around(time_s)
+        if before is not None and after is not None and after.time_s - before.time_s <= MAX_STATE_GAP_S:
+            return interpolate(before, after, time_s)
+        edges = []
+        if before is not None:
+            edges.append((time_s - before.time_s, bisect_right(self._times, time_s) - 2))
+        if after is not None:
+            edges.append((after.time_s - time_s, bisect_left(self._times, time_s)))
+        for away_s, first in sorted(edges):
+            if away_s <= MAX_EDGE_S and 0 <= first < len(self._samples) - 1:
+                a, b = self._samples[first], self._samples[first + 1]
+                if b.time_s - a.time_s <= MAX_STATE_GAP_S:
+                    return interpolate(a, b, time_s)
+        return None
+
     def around(self, time_s: float) -> tuple[StateSample | None, StateSample | None]:
         """The samples at or before and at or after an instant."""
         after = bisect_left(self._times, time_s)
@@ -238,7 +258,8 @@ class SoundingGate:
             return self._refuse(time_s, "?", range_m, "entity names not known yet")
         beam = self._beams.get(source)
         if beam is None:
-            self.ignored[source] += 1
+            if source in self.ignored or len(self.ignored) < MAX_IGNORED:
+                self.ignored[source] += 1
             return None
         self.heard[source] += 1
         times = self._times.setdefault(source, deque(maxlen=REMEMBERED_TIMES))
@@ -270,14 +291,13 @@ class SoundingGate:
             return
         for _ in range(len(self._pending)):
             ping = self._pending.popleft()
-            before, after = history.around(ping.time_s)
-            if after is None and latest.time_s + MAX_WAIT_S > ping.time_s:
+            if latest.time_s < ping.time_s < latest.time_s + MAX_WAIT_S:
                 self._pending.append(ping)
                 continue
-            if before is None or after is None or after.time_s - before.time_s > MAX_STATE_GAP_S:
+            state = history.at(ping.time_s)
+            if state is None:
                 yield self._refuse(ping.time_s, ping.source, ping.range_m, "no state of the vehicle around its time")
                 continue
-            state = interpolate(before, after, ping.time_s)
             lat, lon, depth = footprint(state, ping.beam, ping.range_m, ping.lever_arm_m)
             self.accepted += 1
             yield Sounding(
@@ -308,7 +328,9 @@ def offer_distance(gate: SoundingGate, source: str | None, message: Message) -> 
     """Hand a Distance of the entity named ``source`` to its vehicle's gate."""
     lever_arm = (0.0, 0.0, 0.0)
     for device in message.location:
-        lever_arm = (float(device.x), float(device.y), float(device.z))
+        # The wire lets any message stand where a DeviceState belongs.
+        if isinstance(device, imcpy.DeviceState):
+            lever_arm = (float(device.x), float(device.y), float(device.z))
         break
     valid = message.validity == imcpy.Distance.ValidityEnum.VALID
     return gate.offer(message.timestamp, source, valid, float(message.value), lever_arm)

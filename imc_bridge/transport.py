@@ -1,4 +1,4 @@
-"""UDP for IMC: one socket for traffic, one for announces, drained in bulk by the event loop.
+"""UDP for IMC: one socket for traffic, one for announces, drained in bulk by the event loop; TCP where it is wished.
 
 asyncio's datagram protocol takes one packet per turn of the loop; a vehicle sends hundreds per second, so the
 sockets are read directly until they are empty.
@@ -9,13 +9,16 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import ipaddress
+import os
 import socket
+import struct
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import ifaddr
 
 from imc_bridge.settings import BridgeSettings
+from imc_bridge.streams import TcpStreams
 
 Address = tuple[str, int]
 PacketHandler = Callable[[bytes, Address], None]
@@ -24,6 +27,11 @@ LOOPBACK = "127.0.0.1"
 _RECEIVE_BUFFER_BYTES = 4 << 20
 _PACKETS_PER_TURN = 512
 """Then other tasks get their turn, however fast packets come."""
+_MAX_UNREACHABLE = 64
+_IP_RECVERR = 11
+"""Linux: tell the ICMP errors that our packets cause; the socket module does not name it."""
+_MSG_ERRQUEUE = getattr(socket, "MSG_ERRQUEUE", 0)
+_EXTENDED_ERROR = struct.Struct("=IBBBBII")
 
 
 class PortInUseError(OSError):
@@ -70,7 +78,7 @@ def choose_interfaces(settings: BridgeSettings) -> list[Interface]:
     return [by_address[address] for address in settings.interfaces if address in by_address]
 
 
-class UdpTransport:
+class Transport:
     """The sockets of one console.
 
     Parameters
@@ -92,6 +100,10 @@ class UdpTransport:
         self.interfaces: list[Interface] = []
         self.announce_port: int | None = None
         self.send_errors: dict[str, int] = {}
+        self.unreachable: dict[Address, str] = {}
+        """Addresses that answered our packets by an ICMP error, or that no route leads to, with the error's text."""
+        self.streams = TcpStreams(on_packet)
+        self._joined: set[str] = set()
 
     def open(self) -> None:
         """Bind the sockets and read them from the running event loop.
@@ -116,6 +128,9 @@ class UdpTransport:
             ) from error
         self._traffic.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
         self._traffic.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL, 1)
+        if _MSG_ERRQUEUE:
+            with contextlib.suppress(OSError):
+                self._traffic.setsockopt(socket.IPPROTO_IP, _IP_RECVERR, 1)
         self._announces = self._bind_announces(host)
         self._loop.add_reader(self._traffic, self._drain, self._traffic, self._on_packet)
         self._loop.add_reader(self._announces, self._drain, self._announces, self._on_announce)
@@ -128,18 +143,43 @@ class UdpTransport:
             except OSError:
                 continue
             self.announce_port = port
-            group = socket.inet_aton(self._settings.multicast_group)
-            for interface in self.interfaces:
-                # An interface without multicast still has broadcast.
-                with contextlib.suppress(OSError):
-                    membership = group + socket.inet_aton(interface.address)
-                    sock.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, membership)
+            self._join_groups(sock)
             return sock
         self.close()
         raise PortInUseError(
             f"all announce ports ({', '.join(map(str, ports))}) are taken on this machine: stop one of the "
             "programs that listen for IMC announces (at most five vehicles and consoles fit on one host)"
         )
+
+    def _join_groups(self, sock: socket.socket) -> None:
+        """Hear multicasts on every interface that is there now; one whose address went away is forgotten."""
+        group = socket.inet_aton(self._settings.multicast_group)
+        present = {interface.address for interface in self.interfaces}
+        self._joined &= present
+        for address in sorted(present - self._joined):
+            # An interface without multicast still has broadcast.
+            with contextlib.suppress(OSError):
+                sock.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, group + socket.inet_aton(address))
+                self._joined.add(address)
+
+    def look_for_interfaces(self) -> bool:
+        """Take up interfaces that came (a Wi-Fi that connected late) and drop those that went; True when any did."""
+        if self._announces is None:
+            return False
+        try:
+            found = choose_interfaces(self._settings)
+        except ValueError:
+            # A configured one is away for the moment: the others go on.
+            found = [i for i in list_interfaces() if i.address in self._settings.interfaces]
+        if found == self.interfaces:
+            return False
+        self.interfaces = found
+        self._join_groups(self._announces)
+        return True
+
+    async def close_streams(self) -> None:
+        """Close the TCP connections."""
+        await self.streams.close()
 
     def close(self) -> None:
         """Release the sockets; safe to repeat."""
@@ -151,28 +191,55 @@ class UdpTransport:
         self._traffic = self._announces = None
 
     def _drain(self, sock: socket.socket, handler: PacketHandler) -> None:
-        for _ in range(_PACKETS_PER_TURN):
+        for taken in range(_PACKETS_PER_TURN):
             try:
                 packet, address = sock.recvfrom(65536)
             except (BlockingIOError, InterruptedError):
+                if taken == 0:
+                    self._take_errors(sock)
                 return
             except OSError:
+                self._take_errors(sock)
                 return
+            self.unreachable.pop(address, None)
             handler(packet, address)
             if sock.fileno() < 0:
                 return
 
+    def _take_errors(self, sock: socket.socket) -> None:
+        """Empty the queue of ICMP errors, each of which names the address that our packet did not reach."""
+        while _MSG_ERRQUEUE and sock.fileno() >= 0:
+            try:
+                _, ancillary, _, address = sock.recvmsg(0, 512, _MSG_ERRQUEUE)
+            except OSError:
+                return
+            for level, kind, data in ancillary:
+                if (level, kind) == (socket.IPPROTO_IP, _IP_RECVERR) and len(data) >= _EXTENDED_ERROR.size:
+                    self._note_unreachable(address, os.strerror(_EXTENDED_ERROR.unpack_from(data)[0]))
+
+    def _note_unreachable(self, address: Address, reason: str) -> None:
+        if len(self.unreachable) < _MAX_UNREACHABLE or address in self.unreachable:
+            self.unreachable[address] = reason
+
     def send(self, packet: bytes, address: Address) -> bool:
-        """Send without waiting; a failure is counted by its reason and told by False."""
+        """Send without waiting, by TCP where a stream leads there; False when that fails, which is counted."""
+        if self.streams.wants(address):
+            return self.streams.send(packet, address)
         if self._traffic is None:
             return False
-        try:
-            self._traffic.sendto(packet, address)
-        except OSError as error:
-            reason = error.strerror or type(error).__name__
-            self.send_errors[reason] = self.send_errors.get(reason, 0) + 1
-            return False
-        return True
+        for last in (False, True):
+            try:
+                self._traffic.sendto(packet, address)
+            except OSError as error:
+                # The error may be an earlier packet's to another address, told late.
+                self._take_errors(self._traffic)
+                if last:
+                    reason = error.strerror or type(error).__name__
+                    self.send_errors[reason] = self.send_errors.get(reason, 0) + 1
+                    self._note_unreachable(address, reason)
+            else:
+                return True
+        return False
 
     def own_addresses(self) -> Sequence[str]:
         """Addresses under which vehicles may reach us, loopback last."""

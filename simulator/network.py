@@ -28,6 +28,8 @@ class NetworkFaults:
         Every packet takes ``delay_s`` plus a uniform share of ``jitter_s``.
     hold_s
         How long a reordered packet is held back.
+    blocked_ports
+        Ports of others that a firewall lets nothing to or from.
     """
 
     loss: float = 0.0
@@ -36,6 +38,7 @@ class NetworkFaults:
     duplicate: float = 0.0
     reorder: float = 0.0
     hold_s: float = 0.05
+    blocked_ports: frozenset[int] = frozenset()
 
     def __post_init__(self) -> None:
         for name in ("loss", "duplicate", "reorder"):
@@ -135,6 +138,9 @@ class UdpEndpoint(asyncio.DatagramProtocol):
     def send(self, data: bytes, to: Address) -> None:
         """Send a packet; silently nothing once closed."""
         self.counts.sent += 1
+        if to[1] in self._faults.blocked_ports:
+            self.counts.lost += 1
+            return
         if self._perfect:
             self._put(data, to)
             return
@@ -161,6 +167,9 @@ class UdpEndpoint(asyncio.DatagramProtocol):
 
     def datagram_received(self, data: bytes, addr: tuple[str, int]) -> None:
         """Hand a packet to the user, through the faults."""
+        if addr[1] in self._faults.blocked_ports:
+            self.counts.lost += 1
+            return
         if self._perfect:
             self._deliver(data, addr)
             return

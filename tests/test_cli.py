@@ -226,6 +226,16 @@ def test_the_doctor_says_what_is_missing(bathyfleet: Run) -> None:
     assert (shown.code, "no vehicle" in shown.stdout) == (1, True)
 
 
+def test_the_doctor_judges_a_recording(bathyfleet: Run, tmp_path: Path) -> None:
+    path = tmp_path / "session.jsonl"
+    path.write_text('{"t": 1.0, "src": "127.0.0.1:6002", "dst": "127.0.0.1:6101", "hex": "00"}\n')
+    ended = bathyfleet("doctor", "--replay", str(path), "--json")
+    assert ended.code == 1
+    assert "no_vehicle" in json.loads(ended.stdout)["causes"]
+    path.write_text("rubbish")
+    assert "line 1" in bathyfleet("doctor", "--replay", str(path)).stderr
+
+
 def test_the_doctor_says_when_the_service_holds_the_port(bathyfleet: Run) -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as holder:
         holder.bind(("0.0.0.0", 0))
@@ -237,5 +247,6 @@ def test_the_doctor_says_when_the_service_holds_the_port(bathyfleet: Run) -> Non
             BATHYFLEET_IMC__LOOPBACK_ONLY="true",
         )
     assert ended.code == 1
-    assert "Stop the service first" in ended.stderr
+    assert "is held by" in " ".join(ended.stdout.split())
+    assert "/api/v1/doctor" in " ".join(ended.stdout.split())
     assert "Traceback" not in ended.stderr

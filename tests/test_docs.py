@@ -193,6 +193,8 @@ def values_of(schema: dict[str, Any]) -> str:
         return values_of(next(option for option in schema["anyOf"] if option["type"] != "null"))
     if "enum" in schema:
         return ", ".join(f"`{value}`" for value in schema["enum"])
+    if "prefixItems" in schema:
+        return "list of " + " and ".join(values_of(item) for item in schema["prefixItems"])
     if schema["type"] == "array":
         return "list of " + {"integer": "whole numbers", "string": "texts"}[schema["items"]["type"]]
     words = {"boolean": "`true`, `false`", "integer": "whole number", "number": "number", "string": "text"}

@@ -6,6 +6,7 @@ from app.api.auth import Reader
 from app.api.problems import problems
 from app.api.schemas import API
 from app.api.state import Service
+from app.missions.doctoring import DoctorView
 from app.missions.views import PlannerView, VehicleView
 
 router = APIRouter(prefix=API, responses=problems("unauthenticated", "forbidden"))
@@ -15,6 +16,12 @@ router = APIRouter(prefix=API, responses=problems("unauthenticated", "forbidden"
 async def list_vehicles(service: Service, reader: Reader) -> list[VehicleView]:
     """Return every vehicle that was heard or takes part in a mission: its link and what is missing, its position."""
     return await service.vehicles()
+
+
+@router.get("/doctor", operation_id="examineLinks", summary="Say what is missing", tags=["vehicles"])
+async def examine_links(service: Service, reader: Reader) -> DoctorView:
+    """Return what keeps IMC vehicles from working with this service, each finding with its cause and what to do."""
+    return service.doctor()
 
 
 @router.get("/planners", operation_id="listPlanners", summary="List the planners", tags=["planners"])

@@ -47,13 +47,17 @@ class Leg:
 
 @dataclass(frozen=True)
 class Decision:
-    """A step's waypoints, the planner's figures, and what the operator has to know."""
+    """A step's waypoints, the planner's figures, and what the operator has to know.
+
+    ``bottom`` is the pessimistic sea floor that the depths of travel were chosen by.
+    """
 
     legs: list[Leg]
     objective: float | None
     terms: dict[str, float]
     memory: bytes
     notes: list[str] = field(default_factory=list)
+    bottom: Bottom = field(default_factory=Bottom.unknown)
 
 
 def make_constraints(spec: MissionSpec) -> Constraints:
@@ -139,7 +143,7 @@ def decide(
     for i, place in enumerate(team):
         refusal = checked.refusals.get(place.vehicle, "")
         legs.append(Leg(place.vehicle, checked.positions[i], refusal))
-    return Decision(legs, proposal.objective, dict(proposal.terms), planner.snapshot(), notes)
+    return Decision(legs, proposal.objective, dict(proposal.terms), planner.snapshot(), notes, cautious)
 
 
 def _come_in(place: Place, constraints: Constraints, taken: list[FloatArray]) -> Leg:

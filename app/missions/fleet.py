@@ -89,6 +89,8 @@ class WaypointOrder:
     ``lead`` lies on the leg's line beyond the waypoint, as far as the area and the keep-out zones allow. Vehicles that
     leave off flying straight well before their target (DUNE circles from 15 m on) are sent there to pass the waypoint
     itself; the waypoint stays the place where they arrive.
+
+    ``bottom`` is what the map knows of the sea floor on that way, below the surface as it is now and on the safe side.
     """
 
     mission_id: str
@@ -99,6 +101,7 @@ class WaypointOrder:
     arrival_radius_m: float
     min_altitude_m: float
     lead: Position | None = None
+    bottom: tuple[Position, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,6 +14,7 @@ import numpy as np
 import structlog
 from numpy.typing import NDArray
 
+from app.exploration.bottom import Bottom
 from app.exploration.planners import create_planner
 from app.exploration.problem import Planner
 from app.missions import metrics, safety
@@ -76,6 +77,7 @@ class Runner:
         self._spec = live.spec
         self._constraints = make_constraints(live.spec)
         self._decision_s = EXPECTED_DECISION_S
+        self._bottom = Bottom.unknown()
 
     async def run(self) -> None:
         """Fly all remaining steps. Returns when the last one is done; raises whatever went wrong."""
@@ -294,6 +296,7 @@ class Runner:
         await to_the_end(self._store(step, rows))
         metrics.STEPS.inc()
         live.set_step(number, decision.objective, decision.terms)
+        self._bottom = decision.bottom
         for member in live.team:
             member.order = None
             member.status = None
@@ -336,12 +339,15 @@ class Runner:
         )
 
     def _order(self, row: WaypointRow, member: Member) -> WaypointOrder:
-        lead = None
+        lead: Position | None = None
+        bottom: tuple[Position, ...] = ()
         if member.report is not None:
             start, target = member.place_m(self._live.frame), np.array([row.east_m, row.north_m])
-            east, north = safety.lead_point(self._constraints, start, target, LEAD_M)
-            lat, lon = self._live.frame.to_geographic(np.array(east), np.array(north))
-            lead = Position(float(lat), float(lon), row.depth_m)
+            beyond = safety.lead_point(self._constraints, start, target, LEAD_M)
+            lead = self._position(beyond[0], beyond[1], row.depth_m)
+            tide_m = self._spec.tide.level_m
+            known = safety.bottom_on_way(np.array([start, target, beyond]), self._bottom)
+            bottom = tuple(self._position(east, north, depth + tide_m) for east, north, depth in known)
         return WaypointOrder(
             mission_id=self._live.id,
             step=row.step,
@@ -351,7 +357,12 @@ class Runner:
             arrival_radius_m=self._spec.arrival_radius_m,
             min_altitude_m=self._spec.limits.min_altitude_m,
             lead=lead,
+            bottom=bottom,
         )
+
+    def _position(self, east_m: float, north_m: float, depth_m: float) -> Position:
+        lat, lon = self._live.frame.to_geographic(np.array(east_m), np.array(north_m))
+        return Position(float(lat), float(lon), float(depth_m))
 
     async def _send(self) -> None:
         await asyncio.gather(*(self._send_to(member) for member in self._live.team if member.engaged and member.busy))

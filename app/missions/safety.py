@@ -1,7 +1,9 @@
 """The last check before anything is sent to a vehicle: depth of travel, and every limit of the mission."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import shapely
@@ -16,6 +18,7 @@ from app.exploration.constraints import Constraints
 FloatArray = NDArray[np.float64]
 
 LEG_SAMPLES = 9
+WAY_SPACING_M = 5.0
 LEAST_LEG_M = 0.5
 ENTRY_POINTS = 400
 LEAD_CLEARANCE_M = 0.5
@@ -60,6 +63,26 @@ def travel_depth_m(
     if len(known) == 0:
         return wanted_m
     return float(min(wanted_m, max(known.min() - min_altitude_m, 0.0)))
+
+
+def bottom_on_way(way: FloatArray, bottom: Bottom) -> FloatArray:
+    """Return what is known of the bottom on a way: rows of east, north, depth.
+
+    Parameters
+    ----------
+    way : (n, 2)
+        Its corners.
+    bottom : Bottom
+        Pessimistic sea floor.
+    """
+    legs = []
+    for a, b in pairwise(way):
+        pieces = max(math.ceil(float(np.linalg.norm(b - a)) / WAY_SPACING_M), 1)
+        legs.append(a + np.linspace(0.0, 1.0, pieces + 1)[:, None] * (b - a))
+    places = np.concatenate(legs)
+    depths = bottom.at(places)
+    known = np.isfinite(depths)
+    return np.column_stack([places[known], depths[known]])
 
 
 def check_step(

@@ -24,6 +24,7 @@ from app.mapping.gp import warm_up as mapping_warm_up
 from app.missions import states
 from app.missions.broadcast import Subscription
 from app.missions.clock import now
+from app.missions.doctoring import DoctorView, Examine, doctor_view, switched_off
 from app.missions.errors import (
     ConflictError,
     InvalidRequestError,
@@ -109,10 +110,13 @@ class MissionService:
         self._rest = RestFleetLink()
         self._sim = SimFleetLink(settings.simulation, settings.time_scale)
         links: list[FleetLink] = [self._rest, self._sim]
+        self._examine: Examine = switched_off
         if settings.imc.enabled:
             from app.missions.links.imc import make_imc_link
 
-            links.append(make_imc_link(settings.imc, settings.time_scale))
+            imc = make_imc_link(settings.imc, settings.time_scale)
+            self._examine = imc.diagnosis
+            links.append(imc)
         if settings.neptus.enabled:
             from app.missions.neptus import NeptusSessions
 
@@ -479,6 +483,10 @@ class MissionService:
             live.start_ticker()
             snapshot = await self._snapshot(live)
             yield _after(snapshot, subscription)
+
+    def doctor(self) -> DoctorView:
+        """Return what keeps IMC vehicles from working with us, as far as listening tells."""
+        return doctor_view(self._examine())
 
     async def vehicles(self) -> list[VehicleView]:
         """Return every vehicle that is known, whether it takes part in a mission or not."""

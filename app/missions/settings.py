@@ -1,7 +1,7 @@
 """Settings of the mission service. ``app.settings`` composes them with those of the HTTP edge."""
 
 from pathlib import Path
-from typing import Literal, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
@@ -29,6 +29,25 @@ class ImcSettings(Section):
         "body: it is fixed to the hull and leans with it",
     )
     loopback_only: bool = Field(default=False, description="Speak only to vehicles on this machine")
+    interfaces: tuple[str, ...] = Field(
+        default=(), description="IPv4 addresses of the interfaces to speak on; empty: all, also those that come later"
+    )
+    transport: Literal["udp", "tcp"] = Field(
+        default="udp", description="tcp: by TCP with vehicles that offer it, by UDP with the others"
+    )
+    position: tuple[Annotated[float, Field(ge=-90, le=90)], Annotated[float, Field(ge=-180, le=180)]] | None = Field(
+        default=None,
+        description="Latitude and longitude that are announced as ours; without them the first vehicle's. "
+        "DUNE's simulated radio range counts from there",
+    )
+    vehicles: tuple[str, ...] = Field(default=(), description="Names of the vehicles to talk to; empty: all")
+    rate_limiters: str = Field(
+        default="Distance:5, EstimatedState:10",
+        description="Rates in Hz asked of every engaged vehicle and taken back at the end; empty: as they are",
+    )
+    unknown_bottom_depth_m: float = Field(
+        default=2.0, ge=0, le=100, description="Deepest reference where no bottom is known"
+    )
 
 
 class NeptusSettings(Section):

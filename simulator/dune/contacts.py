@@ -43,8 +43,8 @@ class Contacts:
 
     def __init__(self) -> None:
         self._known: dict[int, Contact] = {}
-        self.destinations: list[Address] = []
-        """Where telemetry goes now."""
+        self.destinations: list[tuple[int, Address]] = []
+        """To whom telemetry goes now: ids and addresses."""
 
     def announced(self, imc_id: int, name: str, services: str) -> None:
         """Learn a system from its Announce; only the first counts."""
@@ -69,7 +69,9 @@ class Contacts:
             if active != contact.active:
                 contact.active = active
                 changed.append((contact, active))
-        self.destinations = [c.heard_at for c in self._known.values() if c.active and c.heard_at is not None]
+        self.destinations = [
+            (c.imc_id, c.heard_at) for c in self._known.values() if c.active and c.heard_at is not None
+        ]
         return changed
 
     def name_of(self, imc_id: int) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from types import TracebackType
@@ -97,6 +98,8 @@ class DuneFleet:
         As for :class:`simulator.world.SimulatedVehicle`.
     options
         Network side of the nodes.
+    clock_offset_s
+        How far the vehicles' clocks are ahead of this machine's.
     seed
         Of all randomness.
     """
@@ -114,11 +117,12 @@ class DuneFleet:
         limits: VehicleLimits | None = None,
         ping_period_s: float = 0.1,
         options: DuneOptions | None = None,
+        clock_offset_s: float = 0.0,
         seed: int = 0,
     ) -> None:
         self.terrain = terrain
         self.options = options or DuneOptions()
-        self.clock = SimulationClock(speed)
+        self.clock = SimulationClock(speed, start_s=time.time() + clock_offset_s)
         self._simulated_s = self.clock.now()
         rngs = np.random.default_rng(seed).spawn(2 * len(specs))
         self.nodes = [

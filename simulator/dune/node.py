@@ -16,7 +16,9 @@ from simulator.clock import SimulationClock
 from simulator.dune.contacts import REFRESH_PERIOD_S, Contacts
 from simulator.dune.entities import ANY, HARDWARE_DVL, HARDWARE_MULTIBEAM, SIMULATION, entity_list
 from simulator.dune.plan import PLAN_ENGINE, SUPERVISOR, PlanEngine
+from simulator.dune.radio import Radio
 from simulator.dune.rates import DEFAULT_LIMITS_HZ, Periodic, RateLimiter, RateLimiterError, parse_limits
+from simulator.dune.tcp import FIRST_PORT, TcpServer
 from simulator.dune.telemetry import Telemetry
 from simulator.network import Address, Endpoint, NetworkFaults, UdpEndpoint
 from simulator.sensors import SensorKind, cast_rays, to_local_frame
@@ -27,12 +29,17 @@ log = logging.getLogger(__name__)
 
 PORT_TRIES = 5
 """DUNE takes the first free one of this many ports."""
+TCP_PORT_TRIES = 50
+"""As many nodes may share this host."""
 DEFAULT_ANNOUNCE_PORTS = (30100, 30101, 30102, 30103, 30104)
 ANNOUNCE_PERIOD_S = 10.0
 BOOT_S = 5.0
+IMC_VERSION = "5.4.31"
 UDP_ENTITY = "UDP"
 RATE_LIMITERS = "Rate Limiters"
 FORWARD_RANGE_M = 30.0
+
+Handler = Callable[[imcpy.Message, float], None]
 
 _BROADCAST = 0xFFFF
 _HEADER = struct.Struct("<HHHdHBHB")
@@ -63,6 +70,14 @@ class DuneOptions:
         Also send servo positions and attitude at full rate, as a real vehicle does.
     boot_s
         Vehicle time from start to service.
+    static_destinations
+        Addresses that get everything, known or not.
+    imc_version
+        As told in the announce.
+    tcp
+        Also serve consoles by TCP.
+    radio_range_m
+        Above 0 the radio ends there, and at the surface.
     """
 
     bind_address: str = "127.0.0.1"
@@ -71,6 +86,10 @@ class DuneOptions:
     faults: NetworkFaults = field(default_factory=NetworkFaults)
     chatter: bool = False
     boot_s: float = BOOT_S
+    static_destinations: tuple[Address, ...] = ()
+    imc_version: str = IMC_VERSION
+    tcp: bool = False
+    radio_range_m: float = 0.0
 
     def __post_init__(self) -> None:
         try:
@@ -141,6 +160,8 @@ class FakeDune:
         elif vehicle.sonar.kind is SensorKind.MULTIBEAM:
             self._extra = HARDWARE_MULTIBEAM
         self._entities |= self._extra
+        self._radio = Radio(options.radio_range_m)
+        self._tcp = TcpServer(self._receive_by_tcp) if options.tcp else None
         self._endpoint: Endpoint | None = None
         self._announcer: Endpoint | None = None
         self._telemetry: Telemetry | None = None
@@ -150,7 +171,7 @@ class FakeDune:
         self._chatter_owed = 0.0
         self._rate_text = ", ".join(f"{name}:{rate:g}" for name, rate in DEFAULT_LIMITS_HZ.items())
         self._schedule: list[tuple[Periodic, Callable[[], None]]] = []
-        self._handlers: dict[int, Callable[[imcpy.Message, float], None]] = {
+        self._handlers: dict[int, Handler] = {
             _HEARTBEAT: lambda message, now_s: None,
             _PLAN_CONTROL: self._on_plan_control,
             _ENTITY_LIST: self._on_entity_list,
@@ -194,15 +215,20 @@ class FakeDune:
             rng=self._rng,
             broadcast=True,
         )
-        self.attach(endpoint, announcer)
+        offered = ""
+        if self._tcp is not None:
+            address = await self._tcp.open(host, FIRST_PORT, TCP_PORT_TRIES)
+            offered = f"imc+tcp://{address[0]}:{address[1]}/"
+        self.attach(endpoint, announcer, offered)
 
-    def attach(self, endpoint: Endpoint, announcer: Endpoint) -> None:
+    def attach(self, endpoint: Endpoint, announcer: Endpoint, offered: str = "") -> None:
         """Use these sockets, which :meth:`start` opens: for telemetry and commands, and for announces."""
         self._endpoint, self._announcer = endpoint, announcer
         host, port = endpoint.address
         services = (
-            f"dune://0.0.0.0/uid/{1000 + self.imc_id};dune://0.0.0.0/version/2026.01.0;"
-            f"imc+info://0.0.0.0/version/5.4.31;imc+udp://{host}:{port}/"
+            f"dune://0.0.0.0/uid/{round(1000.0 * self._now_s)};dune://0.0.0.0/version/2026.01.0;"
+            f"imc+info://0.0.0.0/version/{self._options.imc_version};imc+udp://{host}:{port}/"
+            + (f";{offered}" if offered else "")
         )
         self._telemetry = Telemetry(self.vehicle, self.vehicle.terrain.frame, self.name, services)
         self._schedule = self._periodic_messages(self._telemetry)
@@ -213,6 +239,8 @@ class FakeDune:
             if endpoint is not None:
                 endpoint.close()
         self._endpoint = self._announcer = None
+        if self._tcp is not None:
+            self._tcp.close()
 
     def send(
         self,
@@ -223,36 +251,54 @@ class FakeDune:
         src: int | None = None,
     ) -> None:
         """Send a message of this node to every active system."""
-        endpoint, destinations = self._endpoint, self.contacts.destinations
-        if endpoint is None or not destinations:
+        if not self._has_listeners:
             return
         message.timestamp = self._now_s
         message.src = self.imc_id if src is None else src
         message.src_ent = entity
         message.dst = dst
         message.dst_ent = dst_ent
-        data = message.serialize()
-        for destination in destinations:
-            endpoint.send(data, destination)
+        self._put(message.serialize(), message.msg_id)
+
+    @property
+    def _has_listeners(self) -> bool:
+        return bool(self.contacts.destinations or self._options.static_destinations) or (
+            self._tcp is not None and self._tcp.connected
+        )
+
+    def _put(self, data: bytes, message_id: int) -> None:
+        """Send a packet to every active system within reach."""
+        if self._endpoint is not None:
+            for imc_id, destination in self.contacts.destinations:
+                if self._radio.reaches(imc_id, message_id):
+                    self._endpoint.send(data, destination)
+            for destination in self._options.static_destinations:
+                self._endpoint.send(data, destination)
+        if self._tcp is not None:
+            self._tcp.send(data)
 
     def on_announce(self, data: bytes, sender: Address) -> None:
         """Learn a system from a packet on an announce port."""
         message = self._decode(data)
         if isinstance(message, imcpy.Announce) and message.src != self.imc_id:
             self.contacts.announced(message.src, message.sys_name, message.services)
+            self._radio.announced(message.src, message.lat, message.lon)
 
     def step(self, now_s: float) -> None:
         """Advance by one step of vehicle time, to ``now_s``, and send what is due."""
         self._now_s = now_s
         ping = self.vehicle.step()
         self.plan.tick(now_s)
+        here = self.vehicle.position
+        lat, lon = self.vehicle.terrain.frame.to_geodetic(here.east_m, here.north_m)
+        self._radio.moved(math.radians(lat), math.radians(lon), here.depth_m, now_s)
         if self._announce.due(now_s):
             self._send_announce()
         if self._refresh.due(now_s):
             for contact, active in self.contacts.refresh(now_s):
                 doing = "activating" if active else "deactivating"
                 self._log_book(f"{doing} transmission to node '{contact.name}'")
-        if not self.contacts.destinations:
+        if not self._has_listeners:
             return
         for periodic, emit in self._schedule:
             if periodic.due(now_s):
@@ -363,9 +409,21 @@ class FakeDune:
             return
         # Commands may come between two steps of the simulation.
         now_s = max(self._now_s, self._clock.now())
+        if not self._radio.reaches(source, message_id):
+            return
         if self.contacts.heard(source, sender, now_s) is None:
             self.counts.strangers += 1
             return
+        self._obey(data, message_id, handler, now_s)
+
+    def _receive_by_tcp(self, data: bytes, sender: Address) -> None:
+        header = _read_header(data)
+        if header is None:
+            self.counts.malformed += 1
+            return
+        self._obey(data, header[0], self._handlers.get(header[0]), max(self._now_s, self._clock.now()))
+
+    def _obey(self, data: bytes, message_id: int, handler: Handler | None, now_s: float) -> None:
         if handler is None:
             return
         message = self._decode(data)
@@ -373,9 +431,8 @@ class FakeDune:
             return
         self.counts.accepted += 1
         self._now_s = now_s
-        if message_id in _TRANSPORTED and self._endpoint is not None:
-            for destination in self.contacts.destinations:
-                self._endpoint.send(data, destination)
+        if message_id in _TRANSPORTED:
+            self._put(data, message_id)
         handler(message, now_s)
 
     def _decode(self, data: bytes) -> imcpy.Message | None:

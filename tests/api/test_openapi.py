@@ -42,6 +42,7 @@ CONTRACT = {
     "GET /missions/{mission_id}/map.overlay.png": "getMapOverlay",
     "GET /missions/{mission_id}/events": "getEvents",
     "GET /vehicles": "listVehicles",
+    "GET /doctor": "examineLinks",
     "GET /planners": "listPlanners",
     "GET /health": "getHealth",
     "GET /health/live": "getLiveness",

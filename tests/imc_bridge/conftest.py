@@ -57,6 +57,8 @@ class Sea:
     vehicles: int
     faults: NetworkFaults = field(default_factory=NetworkFaults)
     sensor: str = "single"
+    options: dict[str, Any] = field(default_factory=dict)
+    clock_offset_s: float = 0.0
     bridge: Bridge = field(init=False)
     fleet: DuneFleet | None = None
     events: list[BridgeEvent] = field(default_factory=list)
@@ -64,8 +66,15 @@ class Sea:
     async def launch(self) -> None:
         """Start (or restart) the vehicles' DUNEs."""
         specs = default_specs(self.vehicles, self.floor, base_port=self.base_port)
-        options = DuneOptions(announce_ports=self.settings.announce_ports, faults=self.faults)
-        self.fleet = DuneFleet(self.floor, specs, speed=self.settings.time_scale, options=options, sensor=self.sensor)
+        options = DuneOptions(announce_ports=self.settings.announce_ports, faults=self.faults, **self.options)
+        self.fleet = DuneFleet(
+            self.floor,
+            specs,
+            speed=self.settings.time_scale,
+            options=options,
+            sensor=self.sensor,
+            clock_offset_s=self.clock_offset_s,
+        )
         await self.fleet.start()
 
     async def vanish(self) -> None:
@@ -113,15 +122,30 @@ class Sea:
 
 @asynccontextmanager
 async def open_sea(
-    vehicles: int = 1, loss: float = 0.0, sensor: str = "single", speed: float = SPEED, family: str = "harbour"
+    vehicles: int = 1,
+    loss: float = 0.0,
+    sensor: str = "single",
+    speed: float = SPEED,
+    family: str = "harbour",
+    clock_offset_s: float = 0.0,
+    connected: bool = True,
+    bridge: dict[str, Any] | None = None,
+    **options: Any,
 ) -> AsyncIterator[Sea]:
-    """A sea with its vehicles ready to be engaged."""
+    """A sea with its vehicles ready to be engaged; ``options`` are those of the fake DUNEs.
+
+    With ``connected`` false nobody listens on the bridge's ports yet.
+    """
     *announce_ports, port, base_port = free_ports(7)
-    settings = BridgeSettings(port=port, loopback_only=True, announce_ports=tuple(announce_ports), time_scale=speed)
+    settings = BridgeSettings(
+        port=port, loopback_only=True, announce_ports=tuple(announce_ports), time_scale=speed, **(bridge or {})
+    )
     floor = seafloors.generate(family, 0, width_m=100.0, height_m=100.0)
-    sea = Sea(floor, settings, base_port, vehicles, NetworkFaults(loss=loss), sensor)
-    await sea.launch()
-    await sea.connect()
+    sea = Sea(floor, settings, base_port, vehicles, NetworkFaults(loss=loss), sensor, options, clock_offset_s)
+    sea.bridge = Bridge(settings)
+    if connected:
+        await sea.launch()
+        await sea.connect()
     try:
         yield sea
     finally:

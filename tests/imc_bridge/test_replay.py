@@ -42,7 +42,7 @@ def replay(path, **settings) -> Replay:
             result.from_vehicles += 1
             result.echoes += imcpy.Packet.deserialize(record.packet).src == 0x3F01
             bridge.on_packet(record.packet, record.src)
-        bridge.review()
+        bridge.pass_time()
     return result
 
 

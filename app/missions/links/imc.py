@@ -19,6 +19,7 @@ from app.missions.fleet import (
 )
 from app.missions.settings import ImcSettings
 from imc_bridge import (
+    BottomPoint,
     Bridge,
     BridgeEvent,
     BridgeSettings,
@@ -31,6 +32,7 @@ from imc_bridge import (
     Waypoint,
     WaypointChange,
 )
+from imc_bridge.doctor import Diagnosis, judge
 
 _UNENGAGED = {
     NodeState.HEARD: LinkState.HEARD,
@@ -58,6 +60,12 @@ def bridge_settings(settings: ImcSettings, time_scale: float) -> BridgeSettings:
         loopback_only=settings.loopback_only,
         announce_ports=settings.announce_ports,
         altimeter=settings.altimeter,
+        interfaces=settings.interfaces,
+        transport=settings.transport,
+        position_deg=settings.position,
+        vehicles=settings.vehicles,
+        rate_limiters=settings.rate_limiters,
+        unknown_bottom_depth_m=settings.unknown_bottom_depth_m,
         time_scale=time_scale,
     )
 
@@ -116,6 +124,7 @@ class ImcFleetLink:
             min_altitude_m=order.min_altitude_m,
             lead_lat_deg=order.lead.lat_deg if order.lead else None,
             lead_lon_deg=order.lead.lon_deg if order.lead else None,
+            bottom=tuple(BottomPoint(place.lat_deg, place.lon_deg, place.depth_m) for place in order.bottom),
         )
         try:
             self._bridge.goto(order.vehicle, waypoint)
@@ -126,6 +135,10 @@ class ImcFleetLink:
         """Stop the vehicle; a plan of another console is left alone."""
         result = await self._bridge.stop(vehicle, timeout_s=timeout_s)
         return StopReceipt(result.vehicle, result.acknowledged, result.detail)
+
+    def diagnosis(self) -> Diagnosis:
+        """What keeps vehicles from working with us, as heard so far."""
+        return judge(self._bridge, self._bridge.listening_s)
 
     def _forward(self, event: BridgeEvent) -> None:
         translated = _translate(event)

@@ -333,6 +333,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/doctor": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Say what is missing
+         * @description Return what keeps IMC vehicles from working with this service, each finding with its cause and what to do.
+         */
+        get: operations["examineLinks"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/planners": {
         parameters: {
             query?: never;
@@ -482,6 +502,12 @@ export interface components {
             replayed: boolean;
         };
         /**
+         * Cause
+         * @description What a finding is about; the first of a node's problems is the one to look at.
+         * @enum {string}
+         */
+        Cause: "sound" | "switched_off" | "port_in_use" | "no_interface" | "no_vehicle" | "not_heard" | "no_announce" | "no_service" | "announces_ceased" | "no_traffic" | "unreachable" | "blocked_port" | "stale_port" | "foreign_address" | "wrong_version" | "same_id_twice" | "our_id_taken" | "clock_off" | "clock_rate" | "silent" | "low_rate" | "no_entities" | "no_soundings" | "soundings_refused" | "foreign_control" | "not_ready" | "send_errors" | "bad_packets" | "unknown_messages";
+        /**
          * ComponentHealth
          * @description Whether the service can do its work.
          */
@@ -508,6 +534,31 @@ export interface components {
             components: {
                 [key: string]: string;
             };
+        };
+        /**
+         * DoctorView
+         * @description What keeps vehicles on the IMC network from working with this service.
+         */
+        DoctorView: {
+            /**
+             * Healthy
+             * @description At least one vehicle is there, and nothing stands in any one's way
+             */
+            healthy: boolean;
+            /**
+             * Seconds
+             * @description For how long was listened
+             */
+            seconds: number;
+            /** Causes */
+            causes: components["schemas"]["Cause"][];
+            /**
+             * Own
+             * @description On this machine's side
+             */
+            own: components["schemas"]["Finding"][];
+            /** Vehicles */
+            vehicles: components["schemas"]["VehicleDiagnosis"][];
         };
         /**
          * EventMessage
@@ -579,6 +630,22 @@ export interface components {
              * @description What would be right
              */
             expected: string;
+        };
+        /**
+         * Finding
+         * @description One observation, and what to do about it.
+         */
+        Finding: {
+            severity: components["schemas"]["Severity"];
+            /** @description For programs; the texts may change */
+            cause: components["schemas"]["Cause"];
+            /** Text */
+            text: string;
+            /**
+             * Remedy
+             * @default
+             */
+            remedy: string;
         };
         /**
          * ItemVerdict
@@ -953,6 +1020,12 @@ export interface components {
             waypoints: components["schemas"]["WaypointView"][];
         };
         /**
+         * NodeState
+         * @description How far the acquaintance with a node has come.
+         * @enum {string}
+         */
+        NodeState: "heard" | "announced" | "active" | "ready" | "in_plan" | "lost" | "expected_offline";
+        /**
          * PlannerOptions
          * @description Settings of the planners. Every planner reads those that concern it.
          */
@@ -1231,6 +1304,12 @@ export interface components {
          */
         Sensor: "single_beam" | "dvl" | "multibeam";
         /**
+         * Severity
+         * @description How much a finding matters.
+         * @enum {string}
+         */
+        Severity: "ok" | "note" | "problem";
+        /**
          * SnapshotMessage
          * @description First message on the live socket: everything needed to draw the picture.
          */
@@ -1301,6 +1380,31 @@ export interface components {
             source: string;
         };
         /**
+         * VehicleDiagnosis
+         * @description What was found of one vehicle.
+         */
+        VehicleDiagnosis: {
+            /** Name */
+            name: string;
+            /** Imc Id */
+            imc_id: number;
+            state: components["schemas"]["NodeState"];
+            /** Healthy */
+            healthy: boolean;
+            /**
+             * Causes
+             * @description Of its problems, the one to look at first in front
+             */
+            causes: components["schemas"]["Cause"][];
+            /** Findings */
+            findings: components["schemas"]["Finding"][];
+            /**
+             * History
+             * @description The last changes of its link, oldest first
+             */
+            history: components["schemas"]["app__missions__doctoring__LinkState"][];
+        };
+        /**
          * VehicleKind
          * @description Which link reaches a vehicle.
          * @enum {string}
@@ -1358,7 +1462,7 @@ export interface components {
              * @default true
              */
             active: boolean;
-            link: components["schemas"]["LinkState"];
+            link: components["schemas"]["app__missions__fleet__LinkState"];
             /**
              * Reason
              * @description What is missing or wrong, and what to do; empty when all is well
@@ -1472,6 +1576,34 @@ export interface components {
             /** Waypoints */
             waypoints: components["schemas"]["WaypointView"][];
         };
+        /**
+         * LinkState
+         * @description One change of a vehicle's link.
+         */
+        app__missions__doctoring__LinkState: {
+            /**
+             * At
+             * Format: date-time
+             */
+            at: string;
+            state: components["schemas"]["NodeState"];
+            /**
+             * Engaged
+             * @description Whether the vehicle followed us
+             */
+            engaged: boolean;
+            /**
+             * Reason
+             * @default
+             */
+            reason: string;
+        };
+        /**
+         * LinkState
+         * @description How well a vehicle can be reached, worst to best.
+         * @enum {string}
+         */
+        app__missions__fleet__LinkState: "unknown" | "lost" | "expected_offline" | "heard" | "ready" | "engaged";
     };
     responses: never;
     parameters: never;
@@ -2836,6 +2968,44 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["VehicleView"][];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    examineLinks: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["DoctorView"];
                 };
             };
             /** @description An access token is needed */

@@ -1,0 +1,97 @@
+"""What the doctor found, as REST and the dashboard show it."""
+
+from collections.abc import Callable
+from datetime import UTC, datetime
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from imc_bridge.diagnosis import Cause, Diagnosis, NodeDiagnosis, Severity, problem
+from imc_bridge.diagnosis import Finding as BridgeFinding
+from imc_bridge.events import NodeState
+
+Examine = Callable[[], Diagnosis]
+
+
+class _View(BaseModel):
+    model_config = ConfigDict(frozen=True, json_schema_serialization_defaults_required=True)
+
+
+class Finding(_View):
+    """One observation, and what to do about it."""
+
+    severity: Severity
+    cause: Cause = Field(description="For programs; the texts may change")
+    text: str
+    remedy: str = ""
+
+
+class LinkState(_View):
+    """One change of a vehicle's link."""
+
+    at: datetime
+    state: NodeState
+    engaged: bool = Field(description="Whether the vehicle followed us")
+    reason: str = ""
+
+
+class VehicleDiagnosis(_View):
+    """What was found of one vehicle."""
+
+    name: str
+    imc_id: int
+    state: NodeState
+    healthy: bool
+    causes: list[Cause] = Field(description="Of its problems, the one to look at first in front")
+    findings: list[Finding]
+    history: list[LinkState] = Field(description="The last changes of its link, oldest first")
+
+
+class DoctorView(_View):
+    """What keeps vehicles on the IMC network from working with this service."""
+
+    healthy: bool = Field(description="At least one vehicle is there, and nothing stands in any one's way")
+    seconds: float = Field(description="For how long was listened")
+    causes: list[Cause]
+    own: list[Finding] = Field(description="On this machine's side")
+    vehicles: list[VehicleDiagnosis]
+
+
+def doctor_view(diagnosis: Diagnosis) -> DoctorView:
+    """Put a diagnosis into the form that goes out."""
+    return DoctorView(
+        healthy=diagnosis.healthy,
+        seconds=diagnosis.seconds,
+        causes=list(diagnosis.causes),
+        own=[_finding(finding) for finding in diagnosis.own],
+        vehicles=[_vehicle(node) for node in diagnosis.nodes],
+    )
+
+
+def switched_off() -> Diagnosis:
+    """Return the diagnosis of a service that does not listen for IMC vehicles at all."""
+    text = "this service does not listen for IMC vehicles"
+    return Diagnosis(0.0, (problem(Cause.SWITCHED_OFF, text, "Set imc.enabled = true in the settings"),), ())
+
+
+def _finding(finding: BridgeFinding) -> Finding:
+    return Finding(severity=finding.severity, cause=finding.cause, text=finding.text, remedy=finding.remedy)
+
+
+def _vehicle(node: NodeDiagnosis) -> VehicleDiagnosis:
+    return VehicleDiagnosis(
+        name=node.name,
+        imc_id=node.imc_id,
+        state=node.state,
+        healthy=node.healthy,
+        causes=list(node.causes),
+        findings=[_finding(finding) for finding in node.findings],
+        history=[
+            LinkState(
+                at=datetime.fromtimestamp(change.at_s, UTC),
+                state=change.state,
+                engaged=change.engaged,
+                reason=change.reason,
+            )
+            for change in node.history
+        ],
+    )

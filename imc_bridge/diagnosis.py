@@ -1,0 +1,140 @@
+"""What the doctor says: findings with a cause that programs can read and words that people can."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+from imc_bridge.events import LinkChange, NodeState
+
+
+class Severity(StrEnum):
+    """How much a finding matters."""
+
+    OK = "ok"
+    NOTE = "note"
+    PROBLEM = "problem"
+
+
+class Cause(StrEnum):
+    """What a finding is about; the first of a node's problems is the one to look at."""
+
+    SOUND = "sound"
+    """Nothing is wrong here."""
+    SWITCHED_OFF = "switched_off"
+    PORT_IN_USE = "port_in_use"
+    NO_INTERFACE = "no_interface"
+    NO_VEHICLE = "no_vehicle"
+    NOT_HEARD = "not_heard"
+    """A vehicle named in the settings is missing."""
+    NO_ANNOUNCE = "no_announce"
+    NO_SERVICE = "no_service"
+    """Announced without an address that takes IMC."""
+    ANNOUNCES_CEASED = "announces_ceased"
+    NO_TRAFFIC = "no_traffic"
+    """Announced, and nothing else comes."""
+    UNREACHABLE = "unreachable"
+    BLOCKED_PORT = "blocked_port"
+    STALE_PORT = "stale_port"
+    """The vehicle remembers our id at another port."""
+    FOREIGN_ADDRESS = "foreign_address"
+    """Its packets come from an address that it does not announce."""
+    WRONG_VERSION = "wrong_version"
+    SAME_ID_TWICE = "same_id_twice"
+    OUR_ID_TAKEN = "our_id_taken"
+    CLOCK_OFF = "clock_off"
+    CLOCK_RATE = "clock_rate"
+    """Its clock runs faster or slower than the settings say: a simulation."""
+    SILENT = "silent"
+    LOW_RATE = "low_rate"
+    NO_ENTITIES = "no_entities"
+    NO_SOUNDINGS = "no_soundings"
+    SOUNDINGS_REFUSED = "soundings_refused"
+    FOREIGN_CONTROL = "foreign_control"
+    NOT_READY = "not_ready"
+    SEND_ERRORS = "send_errors"
+    BAD_PACKETS = "bad_packets"
+    UNKNOWN_MESSAGES = "unknown_messages"
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One observation, and what to do about it when it is none to rejoice in."""
+
+    severity: Severity
+    text: str
+    remedy: str = ""
+    cause: Cause = Cause.SOUND
+
+
+@dataclass(frozen=True, slots=True)
+class NodeDiagnosis:
+    """The findings on one node, and how its link changed."""
+
+    name: str
+    imc_id: int
+    state: NodeState
+    findings: tuple[Finding, ...]
+    history: tuple[LinkChange, ...] = ()
+
+    @property
+    def healthy(self) -> bool:
+        """Whether nothing keeps it from working with us."""
+        return not self.causes
+
+    @property
+    def causes(self) -> tuple[Cause, ...]:
+        """Causes of its problems, the one to look at first in front."""
+        return _causes(self.findings)
+
+
+@dataclass(frozen=True, slots=True)
+class Diagnosis:
+    """The findings on this machine's side (``own``) and on every node."""
+
+    seconds: float
+    own: tuple[Finding, ...]
+    nodes: tuple[NodeDiagnosis, ...]
+
+    @property
+    def healthy(self) -> bool:
+        """Whether at least one vehicle is there and nothing stands in any one's way."""
+        return not self.causes and bool(self.nodes)
+
+    @property
+    def causes(self) -> tuple[Cause, ...]:
+        """Causes of all problems, ours first."""
+        return _causes([*self.own, *(finding for node in self.nodes for finding in node.findings)])
+
+    def text(self) -> str:
+        """The whole as plain lines for a terminal."""
+        lines = [f"Listened for {self.seconds:g} s."]
+        lines += [_line(finding) for finding in self.own]
+        for node in self.nodes:
+            lines.append(f"{node.name} (0x{node.imc_id:04X}): {node.state.value}")
+            lines += [f"  {_line(finding)}" for finding in node.findings]
+        return "\n".join(lines)
+
+
+def ok(text: str) -> Finding:
+    """All is well with this."""
+    return Finding(Severity.OK, text)
+
+
+def note(cause: Cause, text: str, remedy: str = "") -> Finding:
+    """Worth knowing, in nobody's way."""
+    return Finding(Severity.NOTE, text, remedy, cause)
+
+
+def problem(cause: Cause, text: str, remedy: str) -> Finding:
+    """Something that keeps a vehicle from working with us."""
+    return Finding(Severity.PROBLEM, text, remedy, cause)
+
+
+def _causes(findings: list[Finding] | tuple[Finding, ...]) -> tuple[Cause, ...]:
+    return tuple(dict.fromkeys(finding.cause for finding in findings if finding.severity is Severity.PROBLEM))
+
+
+def _line(finding: Finding) -> str:
+    remedy = f" -> {finding.remedy}" if finding.remedy else ""
+    return f"[{finding.severity.value}] {finding.text}{remedy}"

@@ -1,0 +1,141 @@
+"""Who is on the network: nodes by id, by name and by address, and what their announces change."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from imc_bridge.discovery import Announcement, reachable_first
+from imc_bridge.nodes import ANNOUNCES_MISSED, Node
+from imc_bridge.settings import BridgeSettings
+from imc_bridge.transport import Address
+
+MAX_NODES = 256
+"""Nodes beyond this many are not taken up: no amount of forged packets may fill the memory."""
+MAX_CLAIMS = 8
+
+Claim = tuple[str, str]
+"""Name and uid (or addresses) by which one node is told from another of the same id."""
+
+
+@dataclass(frozen=True, slots=True)
+class Arrival:
+    """What an announce has changed.
+
+    ``stale`` are addresses at which the node was reached before and is not any more.
+    """
+
+    node: Node
+    first: bool = False
+    rebooted: bool = False
+    stale: tuple[Address, ...] = ()
+
+
+class Roster:
+    """The nodes of the network.
+
+    Parameters
+    ----------
+    settings
+    """
+
+    def __init__(self, settings: BridgeSettings) -> None:
+        self._settings = settings
+        self._nodes: dict[int, Node] = {}
+        self._by_address: dict[Address, Node] = {}
+        self._claims: dict[int, dict[Claim, float]] = {}
+        self._conflict_until: dict[int, float] = {}
+
+    def __iter__(self) -> Iterator[Node]:
+        """Every node by id; nodes may be added meanwhile."""
+        return iter([self._nodes[imc_id] for imc_id in sorted(self._nodes)])
+
+    def __getitem__(self, imc_id: int) -> Node:
+        return self._nodes[imc_id]
+
+    def named(self, name: str) -> Node | None:
+        """The node of this name."""
+        return next((node for node in self._nodes.values() if node.name == name), None)
+
+    def take_up(self, imc_id: int, name: str, now: float) -> Node | None:
+        """The node of this id, made when it is new; None when there are too many."""
+        node = self._nodes.get(imc_id)
+        if node is None and len(self._nodes) < MAX_NODES:
+            node = self._nodes[imc_id] = Node(imc_id, name, self._settings, now)
+            self._name(node, name)
+        return node
+
+    def speaker(self, imc_id: int, address: Address) -> Node | None:
+        """The node of this id if it announced this address as its own: only then a packet is the node's own word."""
+        node = self._nodes.get(imc_id)
+        return node if node is not None and address in node.addresses else None
+
+    def at(self, address: Address) -> Node | None:
+        """The node that announced this address, whoever's packets it passes on."""
+        return self._by_address.get(address)
+
+    def announced(self, announcement: Announcement, source_host: str, now: float) -> Arrival | None:
+        """Take an announce in; None when it does not count: too many nodes, or a second node of the same id."""
+        node = self.take_up(announcement.imc_id, announcement.name, now)
+        if node is None:
+            return None
+        first = node.announcement is None
+        if self._contested(node, announcement, now):
+            return None
+        if node.announcement is None or node.announcement.name != announcement.name:
+            self._name(node, announcement.name)
+        addresses = reachable_first(announcement, source_host, by_tcp=self._settings.transport == "tcp")
+        stale = tuple(address for address in node.addresses if address not in addresses)
+        rebooted = node.announced(announcement, addresses, now)
+        for address in stale:
+            if self._by_address.get(address) is node:
+                del self._by_address[address]
+        for address in addresses:
+            self._by_address[address] = node
+        return Arrival(node, first, rebooted, stale)
+
+    def pass_time(self, now: float) -> None:
+        """Forget conflicts that have not shown for a while."""
+        for imc_id, until in list(self._conflict_until.items()):
+            if now > until:
+                del self._conflict_until[imc_id]
+                self._nodes[imc_id].conflict = None
+
+    def _contested(self, node: Node, new: Announcement, now: float) -> bool:
+        """Note who claims the id; whether a second node does, whose announce must not count.
+
+        A node that restarts comes back under its name with a new uid, once. Two nodes come in turns.
+        """
+        patience = ANNOUNCES_MISSED * self._settings.announce_period_s
+        claims = self._claims.setdefault(node.imc_id, {})
+        for claim, seen in list(claims.items()):
+            if now - seen > patience:
+                del claims[claim]
+        mine = _claim(new)
+        rivals = [claim for claim in claims if claim != mine]
+        known = node.announcement
+        returned = mine in claims and known is not None and _claim(known) != mine
+        renamed = any(name != new.name for name, _ in rivals)
+        if len(claims) < MAX_CLAIMS or mine in claims:
+            claims[mine] = now
+        if known is None or not (returned or renamed or (rivals and node.conflict)):
+            return False
+        self._conflict_until[node.imc_id] = now + patience
+        names = sorted({known.name, new.name, *(name for name, _ in rivals)})
+        others = ", ".join(f"{host}:{port}" for host, port in (*known.addresses[:2], *new.addresses[:2]))
+        node.conflict = (
+            f"id 0x{node.imc_id:04X} is announced by {' and by '.join(map(repr, names))}: give one another id"
+            if len(names) > 1
+            else f"two nodes named {names[0]!r} announce id 0x{node.imc_id:04X} ({others}): stop one of them"
+        )
+        return _claim(known) != mine
+
+    def _name(self, node: Node, name: str) -> None:
+        """Give a node its announced name, made unique."""
+        taken = {other.name for other in self._nodes.values() if other is not node}
+        node.name = name if name and name not in taken else f"{name} (0x{node.imc_id:04X})".strip()
+        node.gate.vehicle = node.name
+
+
+def _claim(announcement: Announcement) -> Claim:
+    return announcement.name, announcement.uid or repr(sorted((*announcement.addresses, *announcement.streams)))

@@ -1,0 +1,90 @@
+"""A vehicle's own clock, as its packets show it: it may run ahead of ours, run faster (a simulation) or be set anew."""
+
+from __future__ import annotations
+
+from collections import deque
+from enum import Enum
+
+LATE_S = 5.0
+"""A timestamp further back than this is no late packet but a clock that was set back, once it repeats."""
+LEAP_S = 60.0
+"""A timestamp further ahead than this, and than what passed meanwhile explains, is a clock set forward, if repeated."""
+FASTEST = 50.0
+"""No simulation runs this many times faster than the bridge was told."""
+CONFIRMATIONS = 3
+SAMPLE_S = 1.0
+SAMPLES = 32
+MIN_SPAN_S = 4.0
+
+
+class Tick(Enum):
+    """What a timestamp tells."""
+
+    GOOD = "good"
+    DOUBTFUL = "doubtful"
+    """Far ahead of everything before and not confirmed: its message is to be dropped."""
+    JUMPED = "jumped"
+    """The clock was set; whatever was ordered by it before is void."""
+
+
+class VehicleClock:
+    """Keeps up with one vehicle's clock.
+
+    Attributes
+    ----------
+    time_s : float or None
+        The newest time of the vehicle, Unix seconds.
+    offset_s : float or None
+        How far it is ahead of our wall clock.
+    jumps : int
+        How often it was set.
+    """
+
+    def __init__(self) -> None:
+        self.time_s: float | None = None
+        self.offset_s: float | None = None
+        self.jumps = 0
+        self._arrived = 0.0
+        self._odd: list[float] = []
+        self._samples: deque[tuple[float, float]] = deque(maxlen=SAMPLES)
+
+    def take(self, timestamp: float, now: float, wall_time_s: float) -> Tick:
+        """Take a message's timestamp in; ``now`` is its arrival by the bridge's clock."""
+        if self.time_s is not None:
+            ahead = timestamp - self.time_s
+            if ahead > LEAP_S + FASTEST * max(now - self._arrived, 0.0) or ahead < -LATE_S:
+                tick = self._odd_time(timestamp, ahead)
+                if tick is not Tick.JUMPED:
+                    return tick
+                self._adopt(timestamp, now, wall_time_s)
+                return tick
+        self._odd.clear()
+        if self.time_s is None or timestamp >= self.time_s:
+            self._adopt(timestamp, now, wall_time_s)
+        return Tick.GOOD
+
+    def rate(self, time_scale: float) -> float | None:
+        """Seconds of the vehicle per second of the wall clock, None while it was not heard for long enough."""
+        if len(self._samples) < 2:
+            return None
+        (first_now, first), (last_now, last) = self._samples[0], self._samples[-1]
+        span = last_now - first_now
+        return (last - first) / span * time_scale if span >= MIN_SPAN_S else None
+
+    def _odd_time(self, timestamp: float, ahead: float) -> Tick:
+        """Whether an odd timestamp is confirmed by those before it, which must lie close by."""
+        if self._odd and abs(timestamp - self._odd[-1]) > LEAP_S:
+            self._odd.clear()
+        self._odd.append(timestamp)
+        if len(self._odd) >= CONFIRMATIONS:
+            self.jumps += 1
+            self._odd.clear()
+            self._samples.clear()
+            return Tick.JUMPED
+        return Tick.DOUBTFUL if ahead > 0.0 else Tick.GOOD
+
+    def _adopt(self, timestamp: float, now: float, wall_time_s: float) -> None:
+        self.time_s, self._arrived = timestamp, now
+        self.offset_s = timestamp - wall_time_s
+        if not self._samples or now - self._samples[-1][0] >= SAMPLE_S:
+            self._samples.append((now, timestamp))
