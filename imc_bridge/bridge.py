@@ -18,6 +18,7 @@ from imc_bridge.discovery import Announcement, own_announce, read_announce
 from imc_bridge.events import (
     BridgeEvent,
     EventCallback,
+    Guidance,
     LinkChange,
     NodeState,
     NodeView,
@@ -27,6 +28,7 @@ from imc_bridge.events import (
     Waypoint,
 )
 from imc_bridge.follow import Follower, Phase
+from imc_bridge.legs import LegFollower
 from imc_bridge.nodes import Node
 from imc_bridge.rates import RateRequest
 from imc_bridge.roster import Roster
@@ -109,6 +111,7 @@ class Bridge:
         self._roster = Roster(settings)
         self._seabed = Seabed()
         self._followers: dict[int, Follower] = {}
+        self._guidance: dict[int, Guidance] = {}
         self._rates: dict[int, RateRequest] = {}
         self._links: dict[int, deque[LinkChange]] = {}
         self._state_reported: dict[int, float] = {}
@@ -185,8 +188,8 @@ class Bridge:
         now = self._now()
         return tuple(self._view(node, now) for node in self._roster)
 
-    async def engage(self, vehicle: str) -> None:
-        """Start our plan on the vehicle and wait until it follows; it then holds its place at the surface.
+    async def engage(self, vehicle: str, guidance: Guidance = Guidance.FOLLOW) -> None:
+        """Make the vehicle ours: with references it then holds its place at the surface, with legs it floats.
 
         Raises
         ------
@@ -199,6 +202,7 @@ class Bridge:
         if node is None:
             known = ", ".join(n.name for n in self._roster if n.is_vehicle) or "none"
             raise RefusedError(vehicle, f"never heard of (known: {known})", "Switch it on; see `bathyfleet doctor`")
+        self._guide(node, guidance)
         follower = self._follower(node)
         if not follower.engaged and follower.engage(self._now()):
             self._rate_request(node).begin()
@@ -257,7 +261,7 @@ class Bridge:
                     vehicle,
                     False,
                     f"no acknowledgement within {timeout_s:g} s{f' ({reason})' if reason else ''}; "
-                    "references have ceased, so its plan ends by itself",
+                    f"{follower.unheard_stop}",
                 )
             if waited >= STOP_ESCALATION * timeout_s:
                 follower.escalate_stop()
@@ -540,10 +544,20 @@ class Bridge:
     def _controlled(self) -> list[tuple[Node, Follower]]:
         return [(self._roster[imc_id], follower) for imc_id, follower in self._followers.items()]
 
+    def _guide(self, node: Node, guidance: Guidance) -> None:
+        """Change how a vehicle is led, unless it is being led or stopped now."""
+        follower = self._followers.get(node.imc_id)
+        if self._guidance.get(node.imc_id, Guidance.FOLLOW) is guidance:
+            return
+        if follower is None or not (follower.engaged or follower.phase is Phase.STOPPING):
+            self._guidance[node.imc_id] = guidance
+            self._followers.pop(node.imc_id, None)
+
     def _follower(self, node: Node) -> Follower:
         follower = self._followers.get(node.imc_id)
         if follower is None:
-            follower = self._followers[node.imc_id] = Follower(
+            kind = LegFollower if self._guidance.get(node.imc_id) is Guidance.LEGS else Follower
+            follower = self._followers[node.imc_id] = kind(
                 node,
                 self.settings,
                 lambda message: self._send(node, message),

@@ -132,6 +132,9 @@ class Node:
         self.plan_state: int | None = None
         self.plan_state_at: float | None = None
         self.plan_id = ""
+        self.plan_outcome: int | None = None
+        self.expected_back: float | None = None
+        """Until when its silence is part of a plan of ours, seconds of the bridge's clock."""
         self.controller: int | None = None
         """Whose references its FollowReference maneuver takes, by its own account."""
         self.medium: int | None = None
@@ -259,6 +262,7 @@ class Node:
         self.plan_state = int(message.state)
         self.plan_state_at = now
         self.plan_id = str(message.plan_id)
+        self.plan_outcome = int(message.last_outcome)
         if self.plan_state not in (PlanState.EXECUTING, PlanState.INITIALIZING):
             self.controller = None
 
@@ -312,7 +316,7 @@ class Node:
             return self._without_telemetry(now, self.announced_at, self.first_announced_at)
         silence = math.inf if self.heard_at is None else now - self.heard_at
         if silence > lost_after:
-            return self._silent(silence)
+            return self._silent(silence, now)
         if self.operation_mode is None or self.plan_state is None:
             return Status(NodeState.ACTIVE, "waiting for its VehicleState and PlanControlState")
         if self.plan_state in (PlanState.EXECUTING, PlanState.INITIALIZING):
@@ -346,8 +350,14 @@ class Node:
             f"or a firewall blocks UDP port {self._settings.port}",
         )
 
-    def _silent(self, silence: float) -> Status:
+    def _silent(self, silence: float, now: float) -> Status:
         seconds = silence / self._settings.time_scale
+        if self.expected_back is not None and now <= self.expected_back:
+            left = (self.expected_back - now) / self._settings.time_scale
+            return Status(
+                NodeState.EXPECTED_OFFLINE,
+                f"silent for {seconds:.0f} s on a leg of ours, expected back within {left:.0f} s",
+            )
         foreign_plan = self.plan_state == PlanState.EXECUTING and self.plan_id != self._settings.plan_id
         if self.submerged and foreign_plan:
             return Status(
