@@ -9,10 +9,11 @@ import logging
 import math
 import time
 from collections import Counter, deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import imcpy
 
+from imc_bridge.acoustics import SoundPath
 from imc_bridge.codec import BROADCAST_ID, Decoder, Header, Message, encode
 from imc_bridge.discovery import Announcement, own_announce, read_announce
 from imc_bridge.events import (
@@ -52,6 +53,7 @@ WANTED = (
     "NavigationUncertainty",
     "PlanControl",
     "PlanControlState",
+    "TransmissionStatus",
     "VehicleMedium",
     "VehicleState",
 )
@@ -188,8 +190,15 @@ class Bridge:
         now = self._now()
         return tuple(self._view(node, now) for node in self._roster)
 
-    async def engage(self, vehicle: str, guidance: Guidance = Guidance.FOLLOW) -> None:
+    async def engage(self, vehicle: str, guidance: Guidance = Guidance.FOLLOW, gateway: str = "") -> None:
         """Make the vehicle ours: with references it then holds its place at the surface, with legs it floats.
+
+        Parameters
+        ----------
+        vehicle
+        guidance
+        gateway
+            Name of the node with the modem, for guidance ``acoustic``.
 
         Raises
         ------
@@ -204,6 +213,8 @@ class Bridge:
             raise RefusedError(vehicle, f"never heard of (known: {known})", "Switch it on; see `bathyfleet doctor`")
         self._guide(node, guidance)
         follower = self._follower(node)
+        if guidance is Guidance.ACOUSTIC:
+            self._attach_sound(node, follower, gateway)
         if not follower.engaged and follower.engage(self._now()):
             self._rate_request(node).begin()
         while follower.engaged and follower.phase is not Phase.FOLLOWING:
@@ -468,6 +479,8 @@ class Bridge:
     def _relayed(self, via: Node, packet: bytes, now: float) -> None:
         follower = self._followers.get(via.imc_id)
         message = self.decoder.message(packet)
+        if isinstance(message, imcpy.EstimatedState):
+            self._heard_by_sound(via, message, now)
         if follower is None or message is None:
             return
         if isinstance(message, imcpy.Abort):
@@ -506,6 +519,10 @@ class Bridge:
                 follower.plan_control_reply(message, now)
             case "VehicleMedium":
                 node.medium = int(message.medium)
+            case "TransmissionStatus":
+                for other in self._by_sound_through(node):
+                    if other.sound is not None:
+                        other.left_by_sound(other.sound.status(message), now)
             case "FuelLevel":
                 node.battery_pct = float(message.value)
             case "EntityList" if message.op == imcpy.EntityList.OperationEnum.REPORT:
@@ -553,10 +570,47 @@ class Bridge:
             self._guidance[node.imc_id] = guidance
             self._followers.pop(node.imc_id, None)
 
+    def _attach_sound(self, node: Node, follower: Follower, gateway: str) -> None:
+        via = self._roster.named(gateway)
+        if via is None or via.address is None:
+            known = ", ".join(other.name for other in self._roster if not other.is_vehicle) or "none"
+            raise RefusedError(
+                node.name,
+                f"its acoustic gateway {gateway!r} was never heard of (other nodes: {known})",
+                "Switch the gateway on, or name another one",
+            )
+        if isinstance(follower, LegFollower) and (follower.sound is None or follower.sound.gateway != gateway):
+            follower.attach(
+                SoundPath(
+                    node.name,
+                    gateway,
+                    lambda message: self._send(via, message),
+                    lambda: next(self._request_ids) & 0xFFFF,
+                    self._wall_clock,
+                    self.settings.time_scale,
+                ),
+                lambda message: self._send(node, message),
+                self._now,
+            )
+
+    def _by_sound_through(self, gateway: Node) -> Iterator[LegFollower]:
+        """The vehicles that are spoken to through a gateway."""
+        for follower in self._followers.values():
+            if isinstance(follower, LegFollower) and follower.sound and follower.sound.gateway == gateway.name:
+                yield follower
+
+    def _heard_by_sound(self, gateway: Node, message: Message, now: float) -> None:
+        """Take a vehicle's report that its gateway has made an EstimatedState of."""
+        for follower in self._by_sound_through(gateway):
+            if follower.node.imc_id == int(message.src) and follower.sound is not None:
+                report = follower.sound.take_report(message)
+                if report is not None:
+                    follower.reported_by_sound(report, now)
+
     def _follower(self, node: Node) -> Follower:
         follower = self._followers.get(node.imc_id)
         if follower is None:
-            kind = LegFollower if self._guidance.get(node.imc_id) is Guidance.LEGS else Follower
+            kind = Follower if self._guidance.get(node.imc_id, Guidance.FOLLOW) is Guidance.FOLLOW else LegFollower
             follower = self._followers[node.imc_id] = kind(
                 node,
                 self.settings,

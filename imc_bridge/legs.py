@@ -8,10 +8,12 @@ no plan and floats. Everything else, engaging, stopping and what ended a plan, i
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import imcpy
 
+from imc_bridge.acoustics import SoundPath, SoundReport
 from imc_bridge.codec import Message
 from imc_bridge.events import StateReport, Waypoint, WaypointStatus
 from imc_bridge.follow import (
@@ -43,6 +45,11 @@ MANEUVER_TIMEOUT_S = 0xFFFF
 END_WITHIN_M = 25.0
 """A leg that ended farther from its waypoint did not lead there: Goto ends some 7 m before, and the vehicle floats."""
 OUTCOME_FAILURE = 2
+RADIO_SILENT_S = 3.0
+"""After this long without a packet sound is tried."""
+SOUND_START_TIMEOUT_S = 90.0
+REPORT_KEEPS_S = 90.0
+"""A vehicle that was heard by sound is expected for at least this much longer."""
 
 
 @dataclass(slots=True)
@@ -99,7 +106,41 @@ class LegFollower(Follower):
 
     unheard_stop = "it flies its leg to the end and is told to stop when it is heard"
 
+    sound: SoundPath | None = None
+    """The way to it when radio is silent, where it has one."""
     _leg: Leg | None = None
+
+    def attach(self, sound: SoundPath, by_radio: Callable[[Message], None], now: Callable[[], float]) -> None:
+        """Speak by sound while radio is silent."""
+        self.sound = sound
+
+        def send(message: Message) -> None:
+            if self._by_sound(now()):
+                sound.send(message, now())
+            else:
+                by_radio(message)
+
+        self._send = send
+
+    def _by_sound(self, now: float) -> bool:
+        return self.sound is not None and self._silence(now) > RADIO_SILENT_S
+
+    def left_by_sound(self, what: str, now: float) -> None:
+        """Note that the gateway has sent a message: nothing more is heard of a plan that was received."""
+        if what == "PlanControl" and self.phase is Phase.FOLLOWING:
+            self._acknowledged(now)
+
+    def reported_by_sound(self, report: SoundReport, now: float) -> None:
+        """Take a place that was reported by sound: it tells of arrival where radio does not."""
+        leg, order = self._leg, self._order
+        if self.phase is not Phase.FOLLOWING or leg is None or not leg.acknowledged or order is None:
+            return
+        distance = distance_m((report.lat_deg, report.lon_deg), (order.waypoint.lat_deg, order.waypoint.lon_deg))
+        self.node.expected_back = max(self.node.expected_back or 0.0, now + REPORT_KEEPS_S)
+        if distance <= END_WITHIN_M:
+            self._forget_leg()
+            words = f"reported by sound {distance:.0f} m from it"
+            self._advance(order, WaypointStatus.REACHED, "; ".join(filter(None, (words, order.limited))))
 
     def engage(self, now: float) -> bool:
         """Take the vehicle over when it is in service; it gets no plan before the first waypoint."""
@@ -196,10 +237,13 @@ class LegFollower(Follower):
             leg = self._begin_leg(order, now)
         if leg.ended:
             return
+        if self.sound is not None and leg.acknowledged and self._by_sound(now):
+            self.sound.ask(now)
         if not leg.acknowledged:
-            if now - leg.sent_at > self._settings.start_timeout_s:
+            if now - leg.sent_at > (SOUND_START_TIMEOUT_S if self.sound else self._settings.start_timeout_s):
                 self._release(
-                    f"no answer to its leg within {self._settings.start_timeout_s:g} s",
+                    f"no answer to its leg within {now - leg.sent_at:.0f} s"
+                    + (f"; {self.sound.last_problem}" if self.sound and self.sound.last_problem else ""),
                     "It may be under water or out of reach; engage it again when it is heard",
                     now,
                     abandoned=True,
@@ -215,6 +259,9 @@ class LegFollower(Follower):
             )
 
     def _watch_idle(self, now: float) -> None:
+        if self.sound is not None and self._by_sound(now):
+            self.sound.ask(now)
+            return
         silence = self._silence(now)
         if silence > max(self._settings.release_after_s, self._settings.lost_after_wall_s * self._settings.time_scale):
             self._release(
@@ -262,7 +309,12 @@ class LegFollower(Follower):
         request.request_id = self._request_id
         request.plan_id = self._settings.plan_id
         request.flags = 0
-        request.arg = leg_plan(self._settings, order.waypoint, leg.depth_m)
+        # A single maneuver is the shortest plan there is.
+        request.arg = (
+            goto_maneuver(order.waypoint, leg.depth_m)
+            if self._by_sound(now)
+            else leg_plan(self._settings, order.waypoint, leg.depth_m)
+        )
         self._send(request)
         if order.status is None:
             self._advance(order, WaypointStatus.SENT, order.limited)
