@@ -45,9 +45,12 @@ MANEUVER_TIMEOUT_S = 0xFFFF
 END_WITHIN_M = 25.0
 """A leg that ended farther from its waypoint did not lead there: Goto ends some 7 m before, and the vehicle floats."""
 OUTCOME_FAILURE = 2
+PLAN_SETTLES_S = 5.0
 RADIO_SILENT_S = 3.0
 """After this long without a packet sound is tried."""
 SOUND_START_TIMEOUT_S = 90.0
+START_TIMEOUT_WALLS = 3.0
+"""In units of the silence on the wall clock that is never a loss, however fast the vehicles live."""
 REPORT_KEEPS_S = 90.0
 """A vehicle that was heard by sound is expected for at least this much longer."""
 
@@ -59,6 +62,8 @@ class Leg:
     depth_m: float
     expected_s: float
     acknowledged: bool = False
+    running: bool = False
+    """Seen in execution."""
     ended: bool = False
     sent_at: float = 0.0
 
@@ -186,14 +191,23 @@ class LegFollower(Follower):
     def plan_state_changed(self, now: float) -> None:
         """PlanControlState has been taken in by the node."""
         leg, node = self._leg, self.node
-        if self.phase is not Phase.FOLLOWING or leg is None:
+        if self.phase is not Phase.FOLLOWING:
             if self.phase is not Phase.ENDED or not node.executing(self._settings.plan_id):
                 super().plan_state_changed(now)
             return
+        if leg is None:
+            # Between two legs it is idle, unless someone else gave it a plan.
+            if node.plan_state == PlanState.EXECUTING and not self._ours_or_none():
+                self._plan_ended(now)
+            return
         if node.executing(self._settings.plan_id):
             if node.plan_state == PlanState.EXECUTING:
+                leg.running = True
                 self._acknowledged(now)
-        elif leg.acknowledged and not leg.ended:
+        elif node.plan_state != PlanState.INITIALIZING and leg.acknowledged and not leg.ended:
+            if not leg.running and now - leg.sent_at < PLAN_SETTLES_S:
+                # A state from before the plan that overtook its acknowledgement.
+                return
             if node.plan_state == PlanState.READY and node.plan_outcome != OUTCOME_FAILURE:
                 self._leg_over()
             else:
@@ -240,7 +254,7 @@ class LegFollower(Follower):
         if self.sound is not None and leg.acknowledged and self._by_sound(now):
             self.sound.ask(now)
         if not leg.acknowledged:
-            if now - leg.sent_at > (SOUND_START_TIMEOUT_S if self.sound else self._settings.start_timeout_s):
+            if now - leg.sent_at > self._start_timeout_s:
                 self._release(
                     f"no answer to its leg within {now - leg.sent_at:.0f} s"
                     + (f"; {self.sound.last_problem}" if self.sound and self.sound.last_problem else ""),
@@ -270,6 +284,12 @@ class LegFollower(Follower):
                 now,
                 abandoned=True,
             )
+
+    @property
+    def _start_timeout_s(self) -> float:
+        settings = self._settings
+        shortest = SOUND_START_TIMEOUT_S if self.sound is not None else settings.start_timeout_s
+        return max(shortest, START_TIMEOUT_WALLS * settings.lost_after_wall_s * settings.time_scale)
 
     def _silence(self, now: float) -> float:
         return math.inf if self.node.heard_at is None else now - self.node.heard_at

@@ -111,11 +111,13 @@ class MissionService:
         self._sim = SimFleetLink(settings.simulation, settings.time_scale)
         links: list[FleetLink] = [self._rest, self._sim]
         self._examine: Examine = switched_off
+        self._lead: Callable[[str, str, str | None], None] = lambda _vehicle, _guidance, _gateway: None
         if settings.imc.enabled:
             from app.missions.links.imc import make_imc_link
 
             imc = make_imc_link(settings.imc, settings.time_scale)
             self._examine = imc.diagnosis
+            self._lead = imc.lead
             links.append(imc)
         if settings.neptus.enabled:
             from app.missions.neptus import NeptusSessions
@@ -719,6 +721,8 @@ class MissionService:
     def _claim(self, live: LiveMission, vehicle: VehicleSpec) -> None:
         key = (vehicle.kind, vehicle.name)
         self._hub.claim(key, live.id, live.receive)
+        if vehicle.kind is VehicleKind.IMC:
+            self._lead(vehicle.name, vehicle.guidance, vehicle.gateway)
         if vehicle.kind is VehicleKind.SIM:
             try:
                 self._launch(live, vehicle)

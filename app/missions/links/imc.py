@@ -23,6 +23,7 @@ from imc_bridge import (
     Bridge,
     BridgeEvent,
     BridgeSettings,
+    Guidance,
     LinkChange,
     NodeState,
     NodeView,
@@ -76,6 +77,7 @@ class ImcFleetLink:
     def __init__(self, settings: BridgeSettings) -> None:
         self._bridge = Bridge(settings)
         self._sink: EventSink = lambda _event: None
+        self._led: dict[str, tuple[Guidance, str]] = {}
 
     @property
     def kind(self) -> str:
@@ -96,8 +98,12 @@ class ImcFleetLink:
         wanted = self._bridge.settings.vehicles
         return [_info(node) for node in self._bridge.nodes() if node.is_vehicle and (not wanted or node.name in wanted)]
 
+    def lead(self, vehicle: str, guidance: str, gateway: str | None) -> None:
+        """Say how a vehicle shall be led from its next engagement on, as its mission describes it."""
+        self._led[vehicle] = Guidance(guidance), gateway or ""
+
     async def engage(self, vehicle: str) -> None:
-        """Start the FollowReference plan; raises VehicleRefusedError.
+        """Make the vehicle ours; raises VehicleRefusedError.
 
         A vehicle that someone else aborted or took over is left alone until it was stopped from here, which pausing a
         mission does: only an operator may decide that it goes on.
@@ -107,7 +113,7 @@ class ImcFleetLink:
             remedy = "It is left alone; when it may go on, pause and resume the mission"
             raise VehicleRefusedError(vehicle, intervention, remedy)
         try:
-            await self._bridge.engage(vehicle)
+            await self._bridge.engage(vehicle, *self._led.get(vehicle, (Guidance.FOLLOW, "")))
         except RefusedError as error:
             raise VehicleRefusedError(vehicle, error.reason, error.remedy) from error
 
