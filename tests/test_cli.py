@@ -107,7 +107,18 @@ def test_help_lists_every_command_without_loading_the_service(bathyfleet: Run) -
 
 @pytest.mark.parametrize(
     "command",
-    ["serve", "demo", "evaluate", "evaluate explore", "export", "import-log", "doctor", "migrate", "token", "token create"],
+    [
+        "serve",
+        "demo",
+        "evaluate",
+        "evaluate explore",
+        "export",
+        "import-log",
+        "doctor",
+        "migrate",
+        "token",
+        "token create",
+    ],
 )
 def test_every_command_explains_its_options(bathyfleet: Run, command: str) -> None:
     shown = bathyfleet(*command.split(), "--help")
