@@ -276,7 +276,7 @@ def export(
     typer.echo(f"{path}: {len(product.content)} bytes")
 
 
-@app.command("import")
+@app.command("import-log")
 def import_logs(
     mission: Annotated[str, typer.Argument(metavar="MISSION", help="Its id, or the begin of it.")],
     logs: Annotated[list[Path], typer.Argument(metavar="LOG...", help="DUNE logs: Data.lsf or Data.lsf.gz.")],

@@ -71,6 +71,13 @@ CLOSE_TIMEOUT_WALL_S = 3.0
 MAX_PLAUSIBLE_VEHICLE_TIME_S = 4e9
 
 
+def entity_query() -> Message:
+    """The question for the names of a node's entities."""
+    query = imcpy.EntityList()
+    query.op = imcpy.EntityList.OperationEnum.QUERY
+    return query
+
+
 class Bridge:
     """A console on the IMC network that can make vehicles follow waypoints.
 
@@ -171,7 +178,7 @@ class Bridge:
         ]
         await asyncio.gather(*(self.stop(name, timeout_s=CLOSE_TIMEOUT_WALL_S) for name in busy))
         for rates in self._rates.values():
-            rates.restore()
+            rates.restore_now()
         self._task.cancel()
         with contextlib.suppress(asyncio.CancelledError):
             await self._task
@@ -344,14 +351,14 @@ class Bridge:
             asked = self._entities_asked.get(node.imc_id, float("-inf"))
             if now - asked >= ENTITY_QUERY_S:
                 self._entities_asked[node.imc_id] = now
-                query = imcpy.EntityList()
-                query.op = imcpy.EntityList.OperationEnum.QUERY
-                self._send(node, query)
+                self._send(node, entity_query())
         follower = self._followers.get(node.imc_id)
         if follower is not None:
             follower.tick(now)
         rates = self._rates.get(node.imc_id)
-        if rates is not None and rates.pending and follower is not None and follower.engaged:
+        if rates is not None and rates.restoring:
+            rates.tick(now)
+        elif rates is not None and rates.pending and follower is not None and follower.engaged:
             rates.observed(node.rates.rates_hz(now).get("EstimatedState", 0.0))
             rates.tick(now)
 
@@ -361,7 +368,13 @@ class Bridge:
         self.transport.look_for_interfaces()
         position = self.position_rad()
         self.transport.announce(
-            lambda addresses: self._encoded(own_announce(self.settings, addresses, position), dst=0)
+            lambda addresses: encode(
+                own_announce(self.settings, addresses, position),
+                src=self.settings.imc_id,
+                dst=0,
+                dst_ent=0,
+                time_s=self._wall_clock(),
+            )
         )
 
     def _encoded(self, message: Message, dst: int) -> bytes:

@@ -165,11 +165,11 @@ class Decoder:
         return message
 
 
-def encode(message: Message, *, src: int, dst: int, time_s: float) -> bytes:
+def encode(message: Message, *, src: int, dst: int, time_s: float, dst_ent: int = ANY_ENTITY) -> bytes:
     """Serialise a message as sent by ``src`` to ``dst`` at ``time_s`` (Unix seconds)."""
     message.src = src
     message.src_ent = 0
     message.dst = dst
-    message.dst_ent = ANY_ENTITY
+    message.dst_ent = dst_ent
     message.timestamp = time_s
     return bytes(imcpy.Packet.serialize(message))

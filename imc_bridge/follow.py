@@ -36,6 +36,8 @@ STARVED_TEXT = "path control reference"
 GUARD_STEP_M = 0.2
 """A guarded depth that changes by less than this is not worth a new reference of its own."""
 MIN_UNANSWERED = 5
+ALIVE_S = 3.0
+"""A vehicle heard this lately hears us, too, unless something is wrong."""
 STATE_LOITER = 3
 STATE_HOVER = 4
 STATE_TIMEOUT = 6
@@ -164,6 +166,8 @@ class Order:
     leading: bool = False
     """Whether it is sent to the waypoint's lead, to pass the waypoint on the way."""
     radius_m: float = 0.0
+    unseen: bool = False
+    """Whether the vehicle went on to it where no radio reached."""
     sent: deque[SentReference] = field(default_factory=lambda: deque(maxlen=8))
 
 
@@ -174,7 +178,7 @@ def follow_plan(settings: BridgeSettings) -> Message:
     maneuver.control_ent = ANY_ENTITY
     maneuver.timeout = settings.follow_timeout_s
     maneuver.loiter_radius = settings.loiter_radius_m
-    maneuver.altitude_interval = 0.0
+    maneuver.altitude_interval = settings.altitude_interval_m
     step = imcpy.PlanManeuver()
     step.maneuver_id = MANEUVER_ID
     step.data = maneuver
@@ -256,6 +260,8 @@ class Follower:
         self._evidence = Evidence()
         self._abandoned = False
         self._abort = False
+        self._gap = False
+        self._again = False
 
     @property
     def engaged(self) -> bool:
@@ -271,6 +277,7 @@ class Follower:
         """
         self.refusal = None
         self._restarts = 0
+        self._again = False
         self._order = None
         self._hold = None
         self._abandoned = False
@@ -456,6 +463,10 @@ class Follower:
             return
         waypoint = order.waypoint
         distance = _distance_m(report.lat_deg, report.lon_deg, waypoint.lat_deg, waypoint.lon_deg)
+        if order.unseen and distance <= max(waypoint.arrival_radius_m, NEAR_TOLERANCE_M):
+            came_up = f"came up {distance:.0f} m from it after it was out of reach under water"
+            self._advance(order, WaypointStatus.REACHED, "; ".join(filter(None, (came_up, order.limited))))
+            return
         asked_depth = order.sent[-1].depth_m
         if abs(report.depth_m - asked_depth) > self._settings.depth_tolerance_m:
             return
@@ -538,13 +549,19 @@ class Follower:
         status = node.status(now)
         if status.state is NodeState.IN_PLAN and not self._ours_or_none():
             self._release(status.reason, "Stop that plan on its console, then engage again", now)
-        elif now - self._since > (settings.engage_timeout_s if self._restarts == 0 else settings.release_after_s):
+        elif now - self._since > self._waiting_limit_s():
             reason = status.reason or "does not report being in service and ready"
             self._release(f"not ready within {now - self._since:.0f} s: {reason}", "Clear that, then engage again", now)
         elif node.executing(settings.plan_id) and now >= self._request_due:
             # Our plan of an earlier run: its references have ceased, so it is ended before a new one starts.
             self._request_due = now + ABANDONED_STOP_RETRY_S
             self._send(plan_control(OPERATION_STOP, self._next_request_id(), settings))
+
+    def _waiting_limit_s(self) -> float:
+        """How long to wait for service: longer for one that was following, which may have to come up first."""
+        if not self._again:
+            return self._settings.engage_timeout_s
+        return max(self._settings.release_after_s, self.node.patience_s if self.node.references_needed else 0.0)
 
     def _tick_starting(self, now: float) -> None:
         if now - self._since > self._settings.start_timeout_s:
@@ -561,7 +578,9 @@ class Follower:
         settings = self._settings
         heard_at = self.node.heard_at
         silence = math.inf if heard_at is None else now - heard_at
-        if silence > max(settings.release_after_s, settings.lost_after_wall_s * settings.time_scale):
+        if silence > STARVED_S and self.node.submerged:
+            self._note_gap()
+        if silence > max(self.node.patience_s, settings.lost_after_wall_s * settings.time_scale):
             self._release(
                 f"silent for {silence / settings.time_scale:.0f} s: its plan has ended by itself",
                 "Engage it again when it is heard",
@@ -578,12 +597,18 @@ class Follower:
         if (
             self._unanswered >= MIN_UNANSWERED
             and now - self._answered_at > settings.answer_timeout_s
-            and silence <= settings.lost_after_s
+            and silence <= ALIVE_S
         ):
             self._evidence.unanswered = True
             self._plan_ended(now)
         if now - self._following_since > settings.restart_forgiven_after_s:
             self._restarts = 0
+
+    def _note_gap(self) -> None:
+        """The radio ended under water, so its plan ends for want of references, which is nobody's fault."""
+        self._gap = True
+        if self._order is not None and self._order.status is WaypointStatus.ACKNOWLEDGED:
+            self._order.unseen = True
 
     def _tick_stopping(self, now: float) -> None:
         if now >= self._request_due:
@@ -613,9 +638,12 @@ class Follower:
             return self._hold
         waypoint = order.waypoint
         depth, order.limited = waypoint.depth_m, ""
+        if order.unseen and order.status is WaypointStatus.REACHED:
+            # It waits for the next order where that can reach it.
+            depth = 0.0
         if report is not None:
             limit = self.guard.limit(
-                waypoint.depth_m,
+                depth,
                 waypoint.min_altitude_m,
                 report.time_s,
                 report.lat_deg,
@@ -729,7 +757,11 @@ class Follower:
         return STARVED_TEXT in text or self._since - self._answered_at > STARVED_S
 
     def _restart(self, cause: str, now: float) -> None:
-        self._restarts += 1
+        self._again = True
+        if self._gap:
+            self._gap = False
+        else:
+            self._restarts += 1
         if self._restarts > self._settings.max_restarts:
             self._release(
                 f"plan failed {self._restarts} times, last: {cause}",

@@ -26,6 +26,10 @@ UNCERTAINTY_VALID_S = 10.0
 SUBMERGED_DEPTH_M = 0.3
 """Radio is gone that far below; the depth sensor's noise at the surface is about 0.1 m."""
 ANNOUNCES_MISSED = 3
+SLOWEST_ASCENT_MPS = 0.1
+"""How fast a vehicle without motor floats up, at least."""
+CONTACT_AGAIN_S = 20.0
+"""DUNE looks for contacts every 5 s; a few of our heartbeats may be lost."""
 RATE_WINDOW_S = 10.0
 STATE_MESSAGES_FRESH_S = 3.0
 
@@ -286,6 +290,21 @@ class Node:
         """Whether it was under water when last heard."""
         return self.medium == MEDIUM_UNDERWATER or (self.report is not None and self.report.depth_m > SUBMERGED_DEPTH_M)
 
+    @property
+    def references_needed(self) -> bool:
+        """Whether what it executes is our FollowReference plan, which ends by itself when references cease."""
+        return self.executing(self._settings.plan_id)
+
+    @property
+    def patience_s(self) -> float:
+        """How long it may be silent before its silence means a loss."""
+        if not self.submerged:
+            return self._settings.release_after_s
+        if not self.references_needed:
+            return math.inf
+        depth = self.report.depth_m if self.report is not None else 0.0
+        return self._settings.follow_timeout_s + max(depth, 0.0) / SLOWEST_ASCENT_MPS + CONTACT_AGAIN_S
+
     def can_start(self, now: float) -> bool:
         """In service and ready for a plan, by messages that are not old."""
         return (
@@ -322,12 +341,10 @@ class Node:
         if self.plan_state in (PlanState.EXECUTING, PlanState.INITIALIZING):
             if self.plan_state == PlanState.INITIALIZING:
                 return Status(NodeState.IN_PLAN, "starts a plan")
-            if self.foreign_controller is not None:
-                whose = f"plan {self.plan_id!r} under the control of console 0x{self.foreign_controller:04X}"
-            elif self.plan_id == settings.plan_id:
-                whose = "our plan"
-            else:
-                whose = f"plan {self.plan_id!r} of another console"
+            whose = "our plan"
+            if self.plan_id != settings.plan_id or self.foreign_controller is not None:
+                controller = f" (0x{self.foreign_controller:04X})" if self.foreign_controller is not None else ""
+                whose = f"plan {self.plan_id!r} of another console{controller}"
             return Status(NodeState.IN_PLAN, f"executes {whose}")
         if self.operation_mode == OperationMode.SERVICE and self.plan_state == PlanState.READY:
             return Status(NodeState.READY)
@@ -358,11 +375,12 @@ class Node:
                 NodeState.EXPECTED_OFFLINE,
                 f"silent for {seconds:.0f} s on a leg of ours, expected back within {left:.0f} s",
             )
-        foreign_plan = self.plan_state == PlanState.EXECUTING and self.plan_id != self._settings.plan_id
-        if self.submerged and foreign_plan:
+        if self.submerged and self.plan_state == PlanState.EXECUTING and silence <= self.patience_s:
+            whose = "our plan" if self.executing(self._settings.plan_id) else f"plan {self.plan_id!r}"
+            comes_up = "; without references that ends and it comes up" if self.references_needed else ""
             return Status(
                 NodeState.EXPECTED_OFFLINE,
-                f"silent for {seconds:.0f} s, under water in plan {self.plan_id!r}: radio ends at the surface",
+                f"silent for {seconds:.0f} s, under water in {whose}: radio ends at the surface{comes_up}",
             )
         where = "under water" if self.submerged else "at the surface"
         return Status(NodeState.LOST, f"silent for {seconds:.0f} s, last heard {where}")

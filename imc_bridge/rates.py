@@ -10,9 +10,14 @@ from imc_bridge.codec import Message
 
 ENTITY = "UDP"
 PARAMETER = "Rate Limiters"
-RETRY_S = 3.0
+RETRY_S = 2.0
 MAX_TRIES = 5
-QUERY_TRIES = 2
+QUERY_TRIES = 5
+"""Without the former list ours would stand alone, and servo positions come unlimited: worth some patience."""
+DUNE_DEFAULTS = "Distance:0.2, EstimatedState:2"
+"""What a vehicle that never told its rates most likely had."""
+RESTORE_TRIES = 3
+RESTORE_RETRY_S = 1.0
 
 
 def merge_limiters(former: str, wanted: str) -> str:
@@ -46,6 +51,12 @@ class RateRequest:
         self._confirmed = False
         self._tries = 0
         self._due = 0.0
+        self._restores = 0
+
+    @property
+    def restoring(self) -> bool:
+        """Whether the former rates are still to be said again."""
+        return self._restores > 0
 
     @property
     def pending(self) -> bool:
@@ -63,6 +74,7 @@ class RateRequest:
 
     def begin(self) -> None:
         """Start asking; also after a restart of the vehicle, which forgets."""
+        self._restores = 0
         if self._wanted:
             self._active = True
             self._confirmed = False
@@ -70,7 +82,11 @@ class RateRequest:
             self._due = 0.0
 
     def tick(self, now: float) -> None:
-        """Send what is due: first the query of the former value, then the request."""
+        """Send what is due: first the query of the former value, then the request; in the end the former value."""
+        if self._restores and self._former is not None and now >= self._due:
+            self._restores -= 1
+            self._due = now + RESTORE_RETRY_S
+            self._send(_set_message(self._former))
         if not self._active or self._confirmed or now < self._due or self._tries >= MAX_TRIES + QUERY_TRIES:
             return
         self._due = now + RETRY_S
@@ -110,11 +126,21 @@ class RateRequest:
                     return
 
     def restore(self) -> None:
-        """Give the vehicle its former rates back, when they are known."""
-        if self._active and self._set is not None and self._former is not None:
+        """Give the vehicle its former rates back; said again later, for a packet can be lost."""
+        if self._active and self._set is not None:
+            self._former = self._former or merge_limiters(self._set, DUNE_DEFAULTS)
             self._send(_set_message(self._former))
+            self._restores = RESTORE_TRIES - 1
+            self._due = 0.0
         self._active = False
         self._set = None
+
+    def restore_now(self) -> None:
+        """Give the former rates back as the last thing that is said."""
+        self.restore()
+        while self._restores and self._former is not None:
+            self._restores -= 1
+            self._send(_set_message(self._former))
 
 
 def _same(a: str, b: str) -> bool:

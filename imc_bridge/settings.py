@@ -58,6 +58,8 @@ class BridgeSettings:
     plan_id: str = "bathyfleet"
     follow_timeout_s: float = 30.0
     loiter_radius_m: float = 7.5
+    altitude_interval_m: float = 0.0
+    """Part of the maneuver's specification, of which DUNE takes no notice."""
     engage_timeout_s: float = 15.0
     start_timeout_s: float = 10.0
     answer_timeout_s: float = 10.0

@@ -116,6 +116,20 @@ def reef(east: FloatArray, north: FloatArray, extent: float, rng: np.random.Gene
     return np.asarray(sand - rock * (1.0 + 0.3 * roughness), dtype=float)
 
 
+def reef_field(east: FloatArray, north: FloatArray, extent: float, rng: np.random.Generator) -> FloatArray:
+    """Many small rocks 1 to 3 m high, gathered on one part of smooth sand."""
+    sand = 11.0 + 0.4 * _smooth_field(east, north, 0.4 * extent, rng)
+    rock = np.zeros(east.shape)
+    middle = rng.uniform(0.25, 0.75, 2)
+    for _ in range(40):
+        e, n = np.clip(middle + rng.normal(0.0, 0.22, 2), 0.0, 1.0) * (east.max(), north.max())
+        radius = rng.uniform(0.015, 0.04) * extent
+        edge = (radius - np.hypot(east - e, north - n)) / (0.01 * extent)
+        rock = np.maximum(rock, rng.uniform(1.0, 3.0) / (1.0 + np.exp(-np.clip(edge, -50.0, 50.0))))
+    roughness = _fractal(east.shape, 1.2, rng)
+    return np.asarray(sand - rock * (1.0 + 0.1 * roughness), dtype=float)
+
+
 def canyon(east: FloatArray, north: FloatArray, extent: float, rng: np.random.Generator) -> FloatArray:
     """A meandering valley 7 to 10 m deep with steep walls and one tributary, cut into a tilted shelf."""
     angle = rng.uniform(0.0, 2.0 * math.pi)
@@ -185,6 +199,7 @@ FAMILIES: dict[str, Family] = {
     "flat": flat,
     "harbour": harbour,
     "reef": reef,
+    "reef_field": reef_field,
     "ridge": ridge,
     "rugged": rugged,
     "slope": slope,

@@ -86,12 +86,12 @@ class Terrain:
         """Extent from south to north, metres."""
         return self.rows * self.cell_m
 
-    @property
+    @cached_property
     def min_depth_m(self) -> float:
         """The shallowest known depth."""
         return float(np.nanmin(self.z_m))
 
-    @property
+    @cached_property
     def max_depth_m(self) -> float:
         """The deepest known depth."""
         return float(np.nanmax(self.z_m))

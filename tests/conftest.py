@@ -1,9 +1,41 @@
 import os
+from collections.abc import Iterator
 from pathlib import Path
 
+import numba
 import pytest
 
 PROJECT = Path(__file__).resolve().parents[1]
+
+if "PYTEST_XDIST_WORKER" in os.environ:
+    # Workers (and the processes that their tests start) that compile the same function at once would write over each
+    # other's machine code: numba numbers the files of its cache without a lock. So each worker has a cache of its own.
+    folder = str(PROJECT / ".pytest_cache" / f"numba-{os.environ['PYTEST_XDIST_WORKER']}")
+    os.environ["NUMBA_CACHE_DIR"] = folder  # for the processes
+    numba.config.CACHE_DIR = folder  # here numba may have been imported already
+
+
+def _children() -> dict[int, str]:
+    """Processes that this one started and that still run, with their command lines."""
+    found = {}
+    for listed in Path("/proc/self/task").glob("*/children"):
+        for number in listed.read_text().split():
+            try:
+                command = Path(f"/proc/{number}/cmdline").read_bytes().replace(b"\0", b" ").decode(errors="replace")
+            except OSError:
+                continue  # just ended
+            if command and "multiprocessing.resource_tracker" not in command:  # lives as long as its interpreter
+                found[int(number)] = command
+    return found
+
+
+@pytest.fixture(scope="session", autouse=True)
+def no_process_is_left_behind() -> Iterator[None]:
+    """Every service, simulator and browser that a test started has ended when the last test has."""
+    before = set(_children())
+    yield
+    left = {number: command for number, command in _children().items() if number not in before}
+    assert not left, f"tests left processes behind: {left}"
 
 
 @pytest.fixture(scope="session")

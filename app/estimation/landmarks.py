@@ -3,6 +3,7 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from app.estimation.sensors import RangeSensor, Sensor
@@ -46,7 +47,7 @@ class Landmarks:
         """Return landmarks at ``xy_m`` (n, 2) that nobody has seen."""
         n = len(xy_m)
         return cls(
-            np.asarray(xy_m, dtype=np.float64),
+            np.ascontiguousarray(xy_m, dtype=np.float64),
             np.full(n, np.nan),
             np.full(n, np.inf),
             np.zeros(n, dtype=np.int64),
@@ -98,24 +99,15 @@ class LandmarkEstimator:
         ranges : (k,)
             The noisy ranges.
         """
-        prior, prior_variance = landmarks.depth_m[index], landmarks.variance_m2[index]
-        information = np.where(np.isfinite(prior_variance), 1.0 / prior_variance, 0.0)
-        h2 = ((landmarks.xy_m[index] - position[:2]) ** 2).sum(axis=1)
-        # A range shorter than the horizontal distance is noise: the floor keeps the first estimate below the vehicle.
-        below = np.sqrt(np.maximum(ranges**2 - h2, (0.05 * ranges) ** 2))
-        depth = np.where(information > 0.0, prior, position[2] + below)
-        anchor = np.where(information > 0.0, prior, 0.0)
-        gained = np.zeros_like(depth)
-        for _ in range(ITERATIONS):
-            drop = np.maximum(depth - position[2], 0.05 * ranges)
-            r = np.sqrt(h2 + drop**2)
-            slope = drop / r
-            gained = (slope / (self.sensor.relative_noise * r)) ** 2
-            pseudo = depth + (ranges - r) / slope
-            depth = (information * anchor + gained * pseudo) / (information + gained)
-            depth = np.maximum(depth, position[2] + 0.05 * ranges)
-        variance = 1.0 / (information + gained)
-
+        depth, variance = _fit(
+            landmarks.xy_m,
+            landmarks.depth_m,
+            landmarks.variance_m2,
+            np.asarray(position, dtype=np.float64),
+            index,
+            ranges,
+            self.sensor.relative_noise,
+        )
         depth_m, variance_m2 = landmarks.depth_m.copy(), landmarks.variance_m2.copy()
         looks, accurate, credited = (
             landmarks.looks.copy(),
@@ -136,6 +128,40 @@ class LandmarkEstimator:
             accurate=accurate,
             credited=credited,
         )
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _fit(
+    xy: FloatArray,
+    prior: FloatArray,
+    prior_variance: FloatArray,
+    position: FloatArray,
+    index: IntArray,
+    ranges: FloatArray,
+    noise: float,
+) -> tuple[FloatArray, FloatArray]:
+    """Return depths and variances (k,) of the landmarks ``index`` after one range to each, by Gauss-Newton."""
+    depths, variances = np.empty(len(index)), np.empty(len(index))
+    for k in range(len(index)):
+        m = index[k]
+        information = 1.0 / prior_variance[m] if np.isfinite(prior_variance[m]) else 0.0
+        h2 = (xy[m, 0] - position[0]) ** 2 + (xy[m, 1] - position[1]) ** 2
+        # A range shorter than the horizontal distance is noise: the floor keeps the first estimate below the vehicle.
+        least = 0.05 * ranges[k]
+        anchor, depth = prior[m], prior[m]
+        if information <= 0.0:
+            anchor = 0.0
+            depth = position[2] + np.sqrt(max(ranges[k] ** 2 - h2, least**2))
+        gained = 0.0
+        for _ in range(ITERATIONS):
+            drop = max(depth - position[2], least)
+            r = np.sqrt(h2 + drop**2)
+            slope = drop / r
+            gained = (slope / (noise * r)) ** 2
+            pseudo = depth + (ranges[k] - r) / slope
+            depth = max((information * anchor + gained * pseudo) / (information + gained), position[2] + least)
+        depths[k], variances[k] = depth, 1.0 / (information + gained)
+    return depths, variances
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from app.estimation.beams import BeamSonar
@@ -31,11 +32,7 @@ class RangeSensor:
 
         Landmarks of unknown depth (NaN) are not visible.
         """
-        # Axis by axis: a sum over a last axis of length 3 is several times slower.
-        dx, dy, dz = (positions[:, k, None] - landmarks[None, :, k] for k in range(3))
-        squared = dx * dx + dy * dy + dz * dz
-        with np.errstate(invalid="ignore"):
-            return np.asarray(squared < self.visibility_m**2, dtype=np.bool_)
+        return _closer(positions, landmarks, self.visibility_m)
 
     def measure(self, position: FloatArray, landmarks: FloatArray, rng: np.random.Generator) -> FloatArray:
         """Return noisy ranges (n_landmarks,) from ``position`` (3,) to ``landmarks`` (n_landmarks, 3)."""
@@ -64,6 +61,19 @@ class SingleBeam:
     def sd_m(self, vehicle_depth_m: FloatArray, bottom_depth_m: FloatArray) -> FloatArray:
         """Return the standard deviation of such a sounding, at least a millimetre."""
         return np.maximum(1e-3, self.relative_noise * np.abs(bottom_depth_m - vehicle_depth_m))
+
+
+@njit(cache=True, nogil=True)
+def _closer(positions: FloatArray, landmarks: FloatArray, reach: float) -> BoolArray:
+    """Return which of the positions (n, 3) is closer than ``reach`` to which landmark (m, 3), (n, m)."""
+    closer = np.zeros((len(positions), len(landmarks)), dtype=np.bool_)
+    for i in range(len(positions)):
+        for m in range(len(landmarks)):
+            squared = 0.0
+            for k in range(3):
+                squared += (positions[i, k] - landmarks[m, k]) ** 2
+            closer[i, m] = squared < reach * reach  # never with an unknown depth
+    return closer
 
 
 Sensor = RangeSensor | SingleBeam | BeamSonar

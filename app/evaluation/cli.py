@@ -12,21 +12,21 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
-from app.estimation import Sensor, SingleBeam
+from app.estimation import Sensor
 from app.evaluation.cube_world import COM_RANGE, ExploreScenario
 from app.evaluation.explore import EXPLORERS, OSARSES, run_explore
 from app.evaluation.jobs import Job, run_jobs
 from app.evaluation.jobs import Progress as StepProgress
 from app.evaluation.recorded import recorded_soundings
 from app.evaluation.summary import summarise
-from app.evaluation.survey import run_survey
-from app.evaluation.survey_world import Sampling, SurveyScenario
+from app.evaluation.survey_job import SurveyJob
+from app.evaluation.survey_world import Sampling, Sounder, SurveyScenario
+from app.evaluation.symmetry import SYMMETRIES, turned, turned_soundings
 from app.evaluation.team_changes import TeamChanges, parse_changes
 from app.exploration.communication.messages import MAX_ENTRIES
 from app.exploration.objective import TERMS
 from app.exploration.options import PlannerOptions
 from app.exploration.planners import PLANNERS
-from app.mapping.types import Soundings
 from simulator.terrain import Terrain, TerrainError
 from simulator.terrain_files import load_terrain
 
@@ -68,38 +68,6 @@ class ExploreJob:
     def run(self, progress: StepProgress) -> dict[str, Any]:
         """Run it."""
         return asdict(run_explore(self.scenario, self.planner, self.options, progress))
-
-
-@dataclass(frozen=True)
-class SurveyJob:
-    """One run of ``survey``."""
-
-    scenario: SurveyScenario
-    planner: str
-    options: PlannerOptions
-    recorded: Soundings | None
-
-    @property
-    def title(self) -> str:
-        """What it is, for the progress bar."""
-        return f"{self.planner}, seed {self.scenario.seed}"
-
-    @property
-    def steps(self) -> int:
-        """Its length."""
-        return self.scenario.steps
-
-    @property
-    def sensor(self) -> Sensor:
-        """What its vehicles measure with."""
-        return SingleBeam(self.scenario.relative_noise)
-
-    def run(self, progress: StepProgress) -> dict[str, Any]:
-        """Run it."""
-        result = asdict(run_survey(self.scenario, self.planner, self.options, progress, self.recorded))
-        if self.recorded is None:
-            del result["recorded_track"], result["ratio_recorded"]
-        return result
 
 
 @evaluate_app.command()
@@ -194,6 +162,13 @@ def survey(
     steps: Annotated[int, typer.Option(min=1)] = 500,
     max_step: Annotated[float, typer.Option(min=0.1, help="Largest leg in metres.")] = 2.5,
     sampling: Annotated[str, typer.Option(help="step: one sounding per leg; continuous: 5 Hz along it.")] = "step",
+    sounder: Annotated[
+        str, typer.Option(help="single: a beam down; dvl: two more to the sides; swath: five across the way.")
+    ] = "single",
+    symmetries: Annotated[
+        str,
+        typer.Option(help="Turned and mirrored terrain as further runs: FIRST:END or a list out of 0 to 7; 0:8 all."),
+    ] = "0",
     seed: Seed = 0,
     seeds: Seeds = None,
     candidates: Annotated[int | None, typer.Option(min=4, help="Candidates per vehicle.")] = None,
@@ -206,15 +181,29 @@ def survey(
     if sampling not in ("step", "continuous"):
         raise typer.BadParameter(f"{sampling!r} is neither step nor continuous", param_hint="--sampling")
     how: Sampling = "step" if sampling == "step" else "continuous"
+    if sounder not in ("single", "dvl", "swath"):
+        raise typer.BadParameter(f"{sounder!r} is none of single, dvl, swath", param_hint="--sounder")
+    beams: Sounder = "single" if sounder == "single" else "dvl" if sounder == "dvl" else "swath"
+    turns = _seed_list(0, symmetries, "--symmetries")
+    if max(turns) >= SYMMETRIES:
+        raise typer.BadParameter(f"{symmetries!r} goes beyond {SYMMETRIES - 1}, the last", param_hint="--symmetries")
     sea_floor = _terrain(terrain)
     recorded = recorded_soundings(terrain)
     options = _options(regressors, candidates)
     runs = [
-        SurveyJob(SurveyScenario(sea_floor, vehicles, steps, max_step, how, seed=which), name, options, recorded)
+        SurveyJob(
+            SurveyScenario(
+                turned(sea_floor, turn), vehicles, steps, max_step, how, seed=which, sounder=beams, symmetry=turn
+            ),
+            name,
+            options,
+            None if recorded is None else turned_soundings(recorded, sea_floor, turn),
+        )
         for name in names
         for which in _seed_list(seed, seeds)
+        for turn in turns
     ]
-    columns = ("planner", "seed", "rmse_m", "ratio", "samples", "distance_m", "plan_ms_median")
+    columns = ("planner", "seed", "symmetry", "rmse_m", "ratio", "gap_closed", "samples", "distance_m", "plan_ms_p99")
     _compare(runs, columns, jobs, as_json=as_json)
 
 
@@ -328,18 +317,16 @@ def _planners(text: str, known: tuple[str, ...]) -> list[str]:
     return names
 
 
-def _seed_list(seed: int, seeds: str | None) -> list[int]:
+def _seed_list(seed: int, seeds: str | None, option: str = "--seeds") -> list[int]:
     if seeds is None:
         return [seed]
     try:
         first, colon, end = seeds.partition(":")
         chosen = list(range(int(first), int(end))) if colon else [int(part) for part in seeds.split(",")]
     except ValueError:
-        raise typer.BadParameter(
-            f"{seeds!r} is neither FIRST:END nor a list like 1,5,9", param_hint="--seeds"
-        ) from None
+        raise typer.BadParameter(f"{seeds!r} is neither FIRST:END nor a list like 1,5,9", param_hint=option) from None
     if not chosen or min(chosen) < 0:
-        raise typer.BadParameter(f"{seeds!r} holds no seed, or a negative one", param_hint="--seeds")
+        raise typer.BadParameter(f"{seeds!r} holds no number, or a negative one", param_hint=option)
     return chosen
 
 

@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from app.estimation import SingleBeam
+from app.estimation import Attitude, Multibeam, SingleBeam
 from app.exploration.constraints import Constraints
 from app.exploration.options import PlannerOptions
 from app.exploration.planners import create_planner
@@ -19,12 +19,17 @@ from simulator.terrain import Terrain
 
 FloatArray = NDArray[np.float64]
 Sampling = Literal["step", "continuous"]
+Sounder = Literal["single", "dvl", "swath"]
+SIDE_BEAM_RAD = float(np.radians(22.5))
+SWATH_RAD, SWATH_BEAMS = float(np.radians(90.0)), 5
 
 SPEED_MPS = 1.3
 SOUNDING_RATE_HZ = 5.0
 FIRST_DEPTH_M = 2.0
 MIN_ALTITUDE_M = 0.5
 BELIEF_NODES_PER_SIDE = 50
+MAPS = 20
+"""How often the belief is brought up to date in a mission."""
 LEARN_AT = (0.05, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8)
 """Parts of the mission after which the map's hyperparameters are learned anew; between them they are kept."""
 
@@ -49,6 +54,10 @@ class SurveyScenario:
         Of a sounding's range to the bottom.
     seed : int
         Of everything random.
+    sounder : "single", "dvl" or "swath"
+        One beam down; that and two DVL beams to the sides; five beams across the way.
+    symmetry : int
+        By which symmetry of the square ``terrain`` was turned from how its file has it; for the report.
     """
 
     terrain: Terrain
@@ -58,6 +67,17 @@ class SurveyScenario:
     sampling: Sampling = "continuous"
     relative_noise: float = 0.01
     seed: int = 0
+    sounder: Sounder = "single"
+    symmetry: int = 0
+
+    def log(self, stream: int) -> "Log":
+        """Return an empty log; ``stream`` tells apart the random numbers of surveys under one seed."""
+        beams = None
+        if self.sounder == "dvl":
+            beams = Multibeam(self.relative_noise, count=3, swath_rad=2 * SIDE_BEAM_RAD)
+        elif self.sounder == "swath":
+            beams = Multibeam(self.relative_noise, count=SWATH_BEAMS, swath_rad=SWATH_RAD)
+        return Log(SingleBeam(self.relative_noise), self.terrain, np.random.default_rng([self.seed, stream]), beams)
 
     @property
     def area_m(self) -> FloatArray:
@@ -83,9 +103,7 @@ class SurveyScenario:
     @property
     def grid(self) -> Grid:
         """The grid of the map that is judged: about 1 m."""
-        t = self.terrain
-        cell = max(1.0, max(t.width_m, t.height_m) / 200.0)
-        return Grid(0.0, 0.0, cell, max(1, int(t.height_m / cell)), max(1, int(t.width_m / cell)))
+        return terrain_grid(self.terrain)
 
     @property
     def belief_grid(self) -> Grid:
@@ -95,28 +113,54 @@ class SurveyScenario:
         return Grid(0.0, 0.0, cell, max(1, int(np.ceil(t.height_m / cell))), max(1, int(np.ceil(t.width_m / cell))))
 
 
+def terrain_grid(terrain: Terrain) -> Grid:
+    """Return the grid over a terrain on which maps are judged: cells of about 1 m."""
+    cell = max(1.0, max(terrain.width_m, terrain.height_m) / 200.0)
+    return Grid(0.0, 0.0, cell, max(1, int(terrain.height_m / cell)), max(1, int(terrain.width_m / cell)))
+
+
 @dataclass
 class Log:
-    """Soundings taken and where the vehicles went, growing."""
+    """Soundings taken, growing; with ``beams`` every sounding is a ping of several."""
 
     sensor: SingleBeam
     terrain: Terrain
     rng: np.random.Generator
+    beams: Multibeam | None = None
     east_m: list[FloatArray] = field(default_factory=list)
     north_m: list[FloatArray] = field(default_factory=list)
     depth_m: list[FloatArray] = field(default_factory=list)
     sd_m: list[FloatArray] = field(default_factory=list)
 
-    def sound(self, points: FloatArray) -> None:
-        """Sound from vehicle positions (n, 3); nothing is heard where the terrain is unknown."""
+    def sound(self, points: FloatArray, headings_rad: FloatArray | None = None) -> None:
+        """Sound from vehicle positions (n, 3); nothing is heard where the terrain is unknown.
+
+        ``headings_rad`` (n,), clockwise from north, say where beams to the sides point; without them, or where they are
+        NaN, only the beam down is heard.
+        """
         bottom = self.terrain.depth_at(points[:, 0], points[:, 1])
-        heard = np.isfinite(bottom)
+        aside = np.zeros(len(points), dtype=np.bool_)
+        if self.beams is not None and headings_rad is not None:
+            aside = np.isfinite(headings_rad)
+            for point, heading in zip(points[aside], headings_rad[aside], strict=True):
+                self._ping(self.beams, point, float(heading))
+        heard = np.isfinite(bottom) & ~aside
         points, bottom = points[heard], bottom[heard]
         depth = self.sensor.measure(points[:, 2], bottom, self.rng)
         self.east_m.append(points[:, 0])
         self.north_m.append(points[:, 1])
         self.depth_m.append(depth)
         self.sd_m.append(self.sensor.sd_m(points[:, 2], depth))
+
+    def _ping(self, beams: Multibeam, point: FloatArray, heading_rad: float) -> None:
+        def floor(en_m: FloatArray) -> FloatArray:
+            return self.terrain.depth_at(en_m[..., 0], en_m[..., 1])
+
+        echoes = beams.sound(point, Attitude(heading_rad), floor, self.terrain.cell_m, self.rng)
+        self.east_m.append(echoes.east_m)
+        self.north_m.append(echoes.north_m)
+        self.depth_m.append(echoes.depth_m)
+        self.sd_m.append(echoes.sd_m)
 
     @property
     def soundings(self) -> Soundings:
@@ -136,6 +180,11 @@ def along(start: FloatArray, end: FloatArray, sampling: Sampling) -> FloatArray:
 def default_map(soundings: Soundings, grid: Grid) -> BathymetricMap:
     """Return the map that the service makes by default."""
     return GaussianProcessMap().fit(soundings).predict(grid)
+
+
+def stationary_map(soundings: Soundings, grid: Grid) -> BathymetricMap:
+    """Return what a Gaussian process with a Matern 3/2 kernel and learned hyperparameters makes of the soundings."""
+    return GaussianProcessMap(nonstationary=False).fit(soundings).predict(grid)
 
 
 def rmse_m(estimate: BathymetricMap, terrain: Terrain) -> tuple[float, float]:
@@ -173,8 +222,7 @@ def fly_planner(
     """
     sensor = SingleBeam(scenario.relative_noise)
     chooser = create_planner(planner, options, sensor)
-    rng, world = (np.random.default_rng([scenario.seed, k]) for k in (0, 1))
-    log = Log(sensor, scenario.terrain, world)
+    rng, log = np.random.default_rng([scenario.seed, 0]), scenario.log(1)
     positions = scenario.starts_m
     log.sound(positions)
     grid, gp = scenario.belief_grid, GaussianProcessMap()
@@ -183,7 +231,7 @@ def fly_planner(
     headings = np.full(scenario.vehicles, np.nan)
     history, times = [positions], []
     belief = unknown_belief(grid) if known is None else known
-    every = max(1, scenario.steps // 100)
+    every = max(1, scenario.steps // MAPS)
     for step in range(1, scenario.steps + 1):
         if known is None and ((step > 2 and step % every == 0) or step in learn_at):
             estimate = gp.fit(log.soundings, learn=step in learn_at).predict(grid)
@@ -202,11 +250,12 @@ def fly_planner(
         begun = time.perf_counter()
         proposal = chooser.propose(situation, rng)
         times.append(time.perf_counter() - begun)
-        for start, end in zip(positions, proposal.positions, strict=True):
-            log.sound(along(start, end, scenario.sampling))
         leg = proposal.positions - positions
         moved = np.hypot(leg[:, 0], leg[:, 1]) > 1e-6
         headings = np.where(moved, np.arctan2(leg[:, 0], leg[:, 1]), headings)
+        for start, end, heading in zip(positions, proposal.positions, headings, strict=True):
+            points = along(start, end, scenario.sampling)
+            log.sound(points, np.full(len(points), heading))
         positions = proposal.positions
         history.append(positions)
         progress(step)
@@ -227,7 +276,10 @@ def fly_routes(
         flown[i] = min(distance_m, float(at[-1]))
         stops = np.arange(0.0, flown[i] + 1e-9, spacing_m)
         points = np.column_stack([np.interp(stops, at, corners[:, k]) for k in (0, 1)])
-        log.sound(np.column_stack([points, np.full(len(points), start[2])]))
+        part = np.clip(np.searchsorted(at, stops, side="left") - 1, 0, max(0, len(corners) - 2))
+        leg = np.diff(corners, axis=0)[part] if len(corners) > 1 else np.full((len(stops), 2), np.nan)
+        headings = np.where(np.hypot(leg[:, 0], leg[:, 1]) > 1e-9, np.arctan2(leg[:, 0], leg[:, 1]), np.nan)
+        log.sound(np.column_stack([points, np.full(len(points), start[2])]), headings)
     return flown
 
 

@@ -42,7 +42,7 @@ class PlannerOptions(BaseModel):
         description="Exponent of the decay of alpha; above 0.5 the squares have a finite sum.",
     )
     alpha_floor: float = Field(0.2, ge=0, le=1, description="Least alpha, so that random moves never die out.")
-    search: int = Field(1500, ge=0, le=100_000, description="Most changes to the survey plan tried in a step.")
+    search: int = Field(4000, ge=0, le=100_000, description="Changes tried when a survey plan is made anew.")
     turn_radius_m: float = Field(6.0, ge=0, description="Tightest turn the vehicles fly; sharper ones are penalised.")
     cruise_depth_m: float | None = Field(
         None, ge=0, description="Depth at which vehicles survey; by default the depth at which each joined."

@@ -1,18 +1,19 @@
 """Routes: polylines that a vehicle follows in straight legs of at most one step, round keep-out zones."""
 
 import numpy as np
+import shapely
 from numba import njit
 from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
-from shapely import LineString, Point, Polygon
+from shapely import Point, Polygon
 from shapely.geometry.base import BaseGeometry
 from shapely.ops import nearest_points
-from shapely.prepared import prep
 
 from app.exploration.constraints import Constraints
 
 FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
 
 CORNER_TOLERANCE = 0.15
 """A corner may be cut when the leg passes it within this fraction of a step."""
@@ -83,10 +84,17 @@ def fly(
     used = 0
     i = 0
     while used < steps and i < count:
-        nx, ny, i = next_waypoint(x, y, route, i, count, step)
-        if np.hypot(nx - x, ny - y) < 1e-9:
-            break
-        used += 1
+        d = np.hypot(route[i, 0] - x, route[i, 1] - y)
+        if d > 3.0 * step:  # far from the next corner all legs are the same: take them at once
+            legs = min(int(d / step) - 1, steps - used)
+            f = legs * step / d
+            nx, ny = x + f * (route[i, 0] - x), y + f * (route[i, 1] - y)
+            used += legs
+        else:
+            nx, ny, i = next_waypoint(x, y, route, i, count, step)
+            if np.hypot(nx - x, ny - y) < 1e-9:
+                break
+            used += 1
         if n >= 2:
             ux = vertices[n - 1, 0] - vertices[n - 2, 0]
             uy = vertices[n - 1, 1] - vertices[n - 2, 1]
@@ -112,28 +120,35 @@ class FreeSpace:
             area = area.difference(Polygon(zone).buffer(margin_m, join_style="mitre"))
         inner = area.buffer(-margin_m) if margin_m > 0 else area
         self.region: BaseGeometry = area if inner.is_empty else inner
-        loose = self.region.buffer(1e-6)
-        self._prepared = prep(loose)
+        self._loose: BaseGeometry = self.region.buffer(1e-6)
+        shapely.prepare(self._loose)
         self._open = not constraints.keep_out and bool(np.isclose(area.area, area.convex_hull.area))
         self._corners = np.zeros((0, 2)) if self._open else _corners(self.region)
         self._links = self._visibility(self._corners)
 
-    def _sees(self, a: FloatArray, b: FloatArray) -> bool:
-        return self._open or bool(self._prepared.covers(LineString([a, b])))
+    def _sees(self, place: FloatArray, others: FloatArray) -> BoolArray:
+        """Return which of ``others`` (n, 2) a straight leg from ``place`` (2,) reaches."""
+        if self._open:
+            return np.ones(len(others), dtype=np.bool_)
+        legs = np.stack([np.broadcast_to(place, others.shape), others], axis=1)
+        return np.asarray(shapely.covers(self._loose, shapely.linestrings(legs)), dtype=np.bool_)
 
     def _visibility(self, corners: FloatArray) -> FloatArray:
         n = len(corners)
         links = np.zeros((n, n))
-        for i in range(n):
-            for j in range(i):
-                if self._sees(corners[i], corners[j]):
-                    links[i, j] = links[j, i] = np.hypot(*(corners[i] - corners[j]))
-        return links
+        for i in range(1, n):
+            links[i, :i] = self._links_to(corners[i], corners[:i])
+        return links + links.T
+
+    def _links_to(self, place: FloatArray, others: FloatArray) -> FloatArray:
+        """Return the distance to each of ``others`` (n, 2), 0 where no straight leg leads there."""
+        east, north = (others - place).T
+        return np.where(self._sees(place, others), np.maximum(np.hypot(east, north), 1e-9), 0.0)
 
     def nearest(self, en_m: FloatArray) -> FloatArray:
         """Return the point of the free space closest to ``en_m`` (2,)."""
         point = Point(*en_m)
-        if self._prepared.covers(point):
+        if self._loose.covers(point):
             return np.asarray(en_m, dtype=np.float64)
         closest, _ = nearest_points(self.region, point)
         return np.array([closest.x, closest.y])
@@ -143,7 +158,7 @@ class FreeSpace:
 
         Where no way exists the straight line is returned: whoever flies it is stopped by the constraints.
         """
-        if self._sees(start, goal):
+        if self._sees(start, np.asarray(goal)[None])[0]:
             return np.asarray(goal, dtype=np.float64)[None]
         start_inside, goal_inside = self.nearest(start), self.nearest(goal)
         nodes = np.vstack([self._corners, start_inside, goal_inside])
@@ -151,9 +166,7 @@ class FreeSpace:
         links = np.zeros((n, n))
         links[: n - 2, : n - 2] = self._links
         for k in (n - 2, n - 1):
-            for i in range(k):
-                if self._sees(nodes[k], nodes[i]):
-                    links[i, k] = links[k, i] = max(1e-9, np.hypot(*(nodes[k] - nodes[i])))
+            links[:k, k] = links[k, :k] = self._links_to(nodes[k], nodes[:k])
         distance, previous = dijkstra(csr_matrix(links), return_predecessors=True)
         if not np.isfinite(distance[n - 2, n - 1]):
             return np.asarray(goal, dtype=np.float64)[None]

@@ -9,11 +9,13 @@ from numpy.typing import NDArray
 from app.exploration.constraints import Constraints
 from app.exploration.lattice import Sweep, even_lines, longer_axis_rad, most_lines
 from app.exploration.routes import FreeSpace, fly
-from app.exploration.survey_value import plan_value
+from app.exploration.survey_value import Nodes, Objective, make_nodes, plan_value
 
 FloatArray = NDArray[np.float64]
 
 MARGIN_M = 0.5
+ACROSS_PENALTY = 1.05
+"""How much worse lines across the longer axis count: of equally good ones those along it are flown."""
 TRANSIT_PENALTY = 0.5
 """How much worse a share counts whose first line would only be reached with the whole budget."""
 
@@ -24,14 +26,6 @@ class Share:
 
     stops: FloatArray
     coarse: int
-
-
-@dataclass(frozen=True)
-class Nodes:
-    """Where uncertainty is summed up: positions (m, 2) and roughness (m,)."""
-
-    en_m: FloatArray
-    weight: FloatArray
 
 
 def backbone(
@@ -64,6 +58,8 @@ def backbone(
                 )
                 shares.append(share)
                 value += left
+            if direction != axis:
+                value *= ACROSS_PENALTY
             if best is None or value < best[0] * (1 - 1e-9):
                 best = value, shares
     assert best is not None  # noqa: S101 - two directions, at least one order
@@ -91,10 +87,10 @@ def _best_share(
     power: float,
 ) -> tuple[Share, float]:
     u = sweep.to_uv(nodes.en_m)[:, 0]
-    mine = (u >= low_u) & (u <= high_u)
-    px, py = (np.ascontiguousarray(nodes.en_m[mine, k]) for k in (0, 1))
-    weight = np.ascontiguousarray(nodes.weight[mine])
-    unknown = np.full(len(px), np.inf)
+    inside = (u >= low_u) & (u <= high_u)
+    mine = make_nodes(nodes.en_m[inside], nodes.weight[inside])
+    unknown = np.full(len(mine.x), np.inf)
+    objective = Objective(step_m, steps, scale_m, power, 0.0)
     affordable = most_lines(lambda n: _steps(sweep, start, low_u, high_u, n, step_m) <= steps)
     best: tuple[float, Share] | None = None
     for n in {max(1, affordable - 1), affordable, affordable + 1}:
@@ -102,9 +98,8 @@ def _best_share(
             share = _there_and_back(sweep, start, low_u, high_u, n, forward=forward, upwards=upwards)
             route = share.stops
             left = plan_value(
-                unknown, px, py, weight, start[None], np.array([np.nan]), route[None], np.array([len(route)]),
-                step_m, steps, scale_m, power, 0.0,
-            )  # fmt: skip
+                unknown, mine, objective, start[None], np.array([np.nan]), route[None], np.array([len(route)])
+            )
             left *= 1.0 + TRANSIT_PENALTY * float(np.hypot(*(route[0] - start))) / (step_m * steps)
             if best is None or left < best[0] * (1 - 1e-9):
                 best = left, share

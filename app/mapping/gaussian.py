@@ -1,5 +1,6 @@
 """The papers' Gaussian interpolation (AURO15 eq. 1-3), incremental."""
 
+import itertools
 import math
 
 import numpy as np
@@ -7,13 +8,23 @@ from numba import njit
 from scipy.spatial import cKDTree
 
 from app.mapping.counting import cell_numbers
+from app.mapping.kernels import exp_minus
 from app.mapping.neighbours import nearest
-from app.mapping.types import BathymetricMap, BoolArray, FloatArray, Grid, Soundings
+from app.mapping.threads import each
+from app.mapping.types import BathymetricMap, BoolArray, FloatArray, Grid, IntArray, Soundings
 
 REACH = 4.0
 """Kernel widths beyond which a sounding says nothing (its weight there is 1e-7)."""
 
+MANY_SOUNDINGS = 20_000
+"""From so many on, threads share the rows of the grid."""
+
+BANDS = 8
+BLOCK_CELLS = 16
+PADDING = 8
+
 GAP_LIMIT = 0.1
+GAP_CELLS = 20_000
 CV_SOUNDINGS = 1000
 CV_NEIGHBOURS = 64
 ROUGHNESS_PRIOR_WEIGHT = 4.0
@@ -41,8 +52,12 @@ class GaussianInterpolator:
         self.grid = grid
         self.width_m = width_m
         shape = (grid.rows, grid.cols)
-        # sums of phi, phi z, phi z^2 and phi^2; depths are counted from the first sounding for precision
-        self._sums = np.zeros((4, *shape))
+        # Sums of phi, phi z, phi z^2 (side by side in memory) and of phi^2; depths are counted from the first sounding
+        # for precision.
+        self._padded_moments = np.zeros((grid.rows, grid.cols + PADDING, 3))
+        self._padded_squares = np.zeros((grid.rows, grid.cols + PADDING))
+        self._moments = self._padded_moments[:, : grid.cols]
+        self._squares = self._padded_squares[:, : grid.cols]
         self._count = np.zeros(shape, np.int64)
         self._reference: float | None = None
 
@@ -59,23 +74,41 @@ class GaussianInterpolator:
         soundings.check()
         if self._reference is None:
             self._reference = float(soundings.depth_m[0])
-        _scatter(
-            self._sums,
-            (soundings.east_m - self.grid.west_m) / self.grid.cell_m - 0.5,
-            (soundings.north_m - self.grid.south_m) / self.grid.cell_m - 0.5,
-            soundings.depth_m - self._reference,
-            1.0 / soundings.sd_m**2,
-            self.width_m / self.grid.cell_m,
-        )
+        col = (soundings.east_m - self.grid.west_m) / self.grid.cell_m - 0.5
+        row = (soundings.north_m - self.grid.south_m) / self.grid.cell_m - 0.5
+        depth = soundings.depth_m - self._reference
+        precision = 1.0 / soundings.sd_m**2
+        width = self.width_m / self.grid.cell_m
+        # one block after the other: their cells are still in the processor's cache
+        order = _block_order(row, col, self.grid.rows, self.grid.cols)
+        row, col, depth, precision = row[order], col[order], depth[order], precision[order]
+        bands = [slice(0, self.grid.rows)] if len(soundings) < MANY_SOUNDINGS else _bands(row, self.grid.rows)
+        moments, squares = self._padded_moments.reshape(-1), self._padded_squares.reshape(-1)
+
+        def scatter(band: slice) -> None:
+            _scatter(
+                moments,
+                squares,
+                self.grid.cols,
+                col,
+                row,
+                depth,
+                precision,
+                width,
+                band.start,
+                band.stop,
+            )
+
+        each(scatter, bands)
         cells = cell_numbers(self.grid, soundings)
-        np.add.at(self._count.reshape(-1), cells[cells >= 0], 1)
+        _count(self._count.reshape(-1), cells)
 
     @property
     def depth_m(self) -> FloatArray:
         """Depth, (rows, cols); NaN out of reach of all soundings."""
         if self._reference is None:
             return np.full(self._count.shape, np.nan)
-        weight, first = self._sums[:2]
+        weight, first, _ = self._moments.transpose(2, 0, 1)
         return np.asarray(self._reference + _divide(first, weight))
 
     @property
@@ -85,11 +118,11 @@ class GaussianInterpolator:
         The error of the weighted mean: stated sounding errors (growing as the weights fall off), and the
         scatter of the soundings about the mean over the effective number of soundings.
         """
-        weight, _, _, squares = self._sums
-        return np.sqrt(_divide(np.ones_like(weight), weight) + self._scatter() * _divide(squares, weight**2))
+        weight = self._moments[..., 0]
+        return np.sqrt(_divide(np.ones_like(weight), weight) + self._scatter() * _divide(self._squares, weight**2))
 
     def _scatter(self) -> FloatArray:
-        weight, first, second, _ = self._sums
+        weight, first, second = self._moments.transpose(2, 0, 1)
         return np.maximum(_divide(second, weight) - _divide(first, weight) ** 2, 0.0)
 
     def to_map(self, mask: BoolArray | None = None) -> BathymetricMap:
@@ -97,7 +130,7 @@ class GaussianInterpolator:
         wanted = np.ones(self._count.shape, np.bool_) if mask is None else mask
         if wanted.shape != self._count.shape:
             raise ValueError(f"mask has shape {wanted.shape}; the grid has {self._count.shape}")
-        weight, _, _, squares = self._sums
+        weight, squares = self._moments[..., 0], self._squares
         scatter = self._scatter()
         known = wanted & np.isfinite(scatter)
         typical = float(scatter[known].mean()) if known.any() else 0.0
@@ -137,7 +170,7 @@ def choose_width(soundings: Soundings, grid: Grid) -> float:
         raise ValueError("soundings is empty; a kernel width needs soundings")
     points = np.column_stack([soundings.east_m, soundings.north_m])
     tree = cKDTree(points)
-    gap, _ = nearest(tree, grid.centres_m, 1)
+    gap, _ = nearest(tree, grid.centres_m[:: max(1, grid.rows * grid.cols // GAP_CELLS)], 1)
     diagonal = math.hypot(grid.rows, grid.cols) * grid.cell_m
     gap = gap[gap <= max(GAP_LIMIT * diagonal, float(gap.min()))]
     hole = max(float(np.median(gap)), 0.25 * grid.cell_m)
@@ -166,29 +199,107 @@ def _divide(a: FloatArray, b: FloatArray) -> FloatArray:
     return np.divide(a, b, out=np.full_like(a, np.nan), where=b > 0.0)
 
 
+def _bands(row: FloatArray, rows: int) -> list[slice]:
+    """Cut the grid's rows into bands for the threads, about as many soundings (at the rows ``row``) in each."""
+    cuts = np.quantile(row, np.linspace(0.0, 1.0, BANDS + 1)[1:-1])
+    edges = np.unique(np.concatenate([[0], np.clip(np.round(cuts), 0, rows).astype(np.int64), [rows]]))
+    return [slice(int(a), int(b)) for a, b in itertools.pairwise(edges)]
+
+
+@njit(cache=True, nogil=True)
+def _block_order(row: FloatArray, col: FloatArray, rows: int, cols: int) -> IntArray:
+    """Order of the soundings by blocks of cells, row-major; within a block as given (a counting sort)."""
+    down = rows // BLOCK_CELLS + 1
+    across = cols // BLOCK_CELLS + 1
+    n = len(row)
+    block = np.empty(n, np.int64)
+    start = np.zeros(down * across + 1, np.int64)
+    for i in range(n):
+        r = int(min(max(row[i], 0.0), rows - 1.0)) // BLOCK_CELLS
+        c = int(min(max(col[i], 0.0), cols - 1.0)) // BLOCK_CELLS
+        block[i] = r * across + c
+        start[block[i] + 1] += 1
+    for b in range(down * across):
+        start[b + 1] += start[b]
+    order = np.empty(n, np.int64)
+    for i in range(n):
+        order[start[block[i]]] = i
+        start[block[i]] += 1
+    return order
+
+
+@njit(cache=True, nogil=True)
+def _count(count: IntArray, cells: IntArray) -> None:
+    for i in range(len(cells)):
+        if cells[i] >= 0:
+            count[cells[i]] += 1
+
+
+@njit(cache=True, nogil=True, fastmath={"contract"})
+def _bell(first: float, per_width: float, out: FloatArray, n: int) -> None:
+    """Write ``exp(-(d / width)^2)`` for the distances ``first``, ``first + 1``, ..."""
+    for j in range(np.uint64(n)):
+        t = (first + np.float64(j)) * per_width
+        out[j] = exp_minus(t * t)
+
+
+@njit(cache=True, nogil=True, fastmath={"contract"})
+def _add_multiple(into: FloatArray, first: int, factor: float, line: FloatArray, n: int) -> None:
+    # unsigned numbers: a sign would have to be looked at for every element
+    start = np.uint64(first)
+    for j in range(np.uint64(n)):
+        into[start + j] += factor * line[j]
+
+
 @njit(cache=True, nogil=True)
 def _scatter(
-    sums: FloatArray, col: FloatArray, row: FloatArray, depth: FloatArray, precision: FloatArray, width: float
+    moments: FloatArray,
+    squares: FloatArray,
+    cols: int,
+    col: FloatArray,
+    row: FloatArray,
+    depth: FloatArray,
+    precision: FloatArray,
+    width: float,
+    first_row: int,
+    past_row: int,
 ) -> None:
-    rows, cols = sums.shape[1], sums.shape[2]
+    """Add the soundings' weights to the rows from ``first_row`` up to before ``past_row``.
+
+    ``moments`` is (rows * (cols + PADDING) * 3,), ``squares`` (rows * (cols + PADDING),). The kernel is a product of a
+    factor per axis, so a sounding costs an exponential per row and per column of its stencil, not one per cell; what
+    is left is adding multiples of one short line to others. The line is filled up with zeros to whole groups of
+    ``PADDING`` cells, which vector instructions add without a remainder.
+    """
     reach = REACH * width
-    side = int(2.0 * reach) + 2
+    side = int(2.0 * reach) + 3 + PADDING
+    line = np.zeros(3 * side)
+    line_squares = np.zeros(side)
+    along_row = np.empty(side)
     along_col = np.empty(side)
+    per_width = 1.0 / width
     for i in range(len(depth)):
-        r0 = max(math.ceil(row[i] - reach), 0)
-        r1 = min(math.floor(row[i] + reach), rows - 1)
-        c0 = max(math.ceil(col[i] - reach), 0)
-        c1 = min(math.floor(col[i] + reach), cols - 1)
-        for c in range(c0, c1 + 1):
-            t = (c - col[i]) / width
-            along_col[c - c0] = math.exp(-t * t)
-        z = depth[i]
+        y, x, z = row[i], col[i], depth[i]
+        r0 = max(math.ceil(y - reach), first_row)
+        r1 = min(math.floor(y + reach), past_row - 1)
+        c0 = max(math.ceil(x - reach), 0)
+        c1 = min(math.floor(x + reach), cols - 1)
+        if r1 < r0 or c1 < c0:
+            continue
+        n = c1 - c0 + 1
+        padded = (n + PADDING - 1) // PADDING * PADDING
+        _bell(c0 - x, per_width, along_row, n)
+        for c in range(n):
+            w = along_row[c]
+            line[3 * c] = w
+            line[3 * c + 1] = w * z
+            line[3 * c + 2] = w * z * z
+            line_squares[c] = w * w
+        for c in range(n, padded):
+            line[3 * c] = line[3 * c + 1] = line[3 * c + 2] = line_squares[c] = 0.0
+        _bell(r0 - y, per_width, along_col, r1 - r0 + 1)
         for r in range(r0, r1 + 1):
-            t = (r - row[i]) / width
-            f = precision[i] * math.exp(-t * t)
-            for c in range(c0, c1 + 1):
-                w = f * along_col[c - c0]
-                sums[0, r, c] += w
-                sums[1, r, c] += w * z
-                sums[2, r, c] += w * z * z
-                sums[3, r, c] += w * w
+            f = precision[i] * along_col[r - r0]
+            at = r * (cols + PADDING) + c0
+            _add_multiple(moments, 3 * at, f, line, 3 * padded)
+            _add_multiple(squares, at, f * f, line_squares, padded)

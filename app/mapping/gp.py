@@ -1,27 +1,48 @@
 """The default map: a nonstationary Gaussian process, kriged locally."""
 
 import math
-from typing import Self
+from dataclasses import replace
+from typing import Literal, Self
 
 import numpy as np
-from scipy.spatial import cKDTree
 
+from app.mapping.calibration import Calibration, checked_log_scale, error_ratio, gaps, hold_out, mixed, uncalibrated
 from app.mapping.counting import count_per_cell
+from app.mapping.fields import Field, coarse_grid
 from app.mapping.gaussian import GaussianInterpolator
 from app.mapping.kernels import KERNEL_CODES, KernelName
-from app.mapping.kriging import Conditioned, krige_holes, tile_rows
+from app.mapping.kriging import Conditioned, krige_holes
 from app.mapping.levels import two_levels
 from app.mapping.likelihood import Hyperparameters, RestrictedLikelihood, spread_subset
-from app.mapping.neighbours import nearest
 from app.mapping.outliers import OutlierReport, flag_outliers
-from app.mapping.roughness import HOLE_NEIGHBOURS, HoleErrors, hole_errors, local_ratio, neighbours_beyond
-from app.mapping.scales import LocalScales, Stretch, local_scales, stretch_from_relief, uniform_scales
+from app.mapping.roughness import HOLE_NEIGHBOURS, hole_errors, local_ratio, neighbours_beyond
+from app.mapping.scales import LocalScales, local_scales, stretch_from_relief, uniform_scales
 from app.mapping.types import BathymetricMap, BoolArray, FloatArray, Grid, IntArray, Soundings
 
-TILE_CELLS = 4
 COARSE_FACTOR = 3.0  # side of the squares of merged soundings over that of single ones
-FIRST_MAP_CELLS = 32  # of the coarse map that shows the grain, along the longer side
-REACH_OF_ROUGHNESS = 0.1  # of the extent
+LEAST_RESOLUTION = 100  # squares of single soundings along the extent; more where there are more soundings
+
+# lengths in squares of single soundings
+HOLE_UNITS = 8.0
+REACH_UNITS = 10.0  # how far roughness is carried where nothing was sounded
+RELIEF_UNITS = 3.125  # cell of the coarse map that shows grain and edges
+MOST_RELIEF_CELLS = 256
+MOST_RATIO_CELLS = 128
+
+LEAST_HOLES, MOST_HOLES, SOUNDINGS_PER_HOLE = 800, 4000, 10
+CHECK_POINTS = 800
+
+SMALL_GRID_CELLS = 60_000
+NEIGHBOURS_OF_SMALL_GRIDS = (32, 64)
+NEIGHBOURS_OF_LARGE_GRIDS = (24, 40)
+SOUNDINGS_PER_TILE = 6
+TILE_RANGE = (4, 16)
+
+KERNEL_LADDER: tuple[KernelName, ...] = ("matern32", "matern52", "gaussian")
+KERNEL_GAIN = 0.05  # of log likelihood per sounding, to prefer a smoother kernel
+CHOICE_OF_KERNEL_POINTS = 200
+REFINEMENT_GAIN = 5.0  # of log likelihood, to consider the nonstationary process
+FULL_TRUST_GAIN = 0.04  # by which part it must predict better to be trusted alone
 
 LENGTH_FACTORS = (1.0, 1.5, 2.2, 3.3)
 LENGTHEN_FROM = 30  # soundings; fewer cannot choose
@@ -80,19 +101,20 @@ class GaussianProcessMap:
 
     def __init__(
         self,
-        kernel: KernelName = "matern32",
+        kernel: KernelName | Literal["auto"] = "auto",
         *,
         nonstationary: bool = True,
-        neighbours: tuple[int, int] = (16, 32),
+        neighbours: tuple[int, int] | None = None,
         learning_points: int = 350,
-        hole_points: int = 800,
+        hole_points: int | None = None,
         merge_m: float | None = None,
         hole_m: float | None = None,
         reject_outliers: bool = True,
+        calibrate: bool = True,
     ) -> None:
-        if kernel not in KERNEL_CODES:
-            raise ValueError(f"kernel is {kernel!r}; it must be one of {', '.join(KERNEL_CODES)}")
-        self.kernel: KernelName = kernel
+        if kernel != "auto" and kernel not in KERNEL_CODES:
+            raise ValueError(f"kernel is {kernel!r}; it must be auto or one of {', '.join(KERNEL_CODES)}")
+        self.kernel = kernel
         self.nonstationary = nonstationary
         self.neighbours = neighbours
         self.learning_points = learning_points
@@ -100,6 +122,7 @@ class GaussianProcessMap:
         self.merge_m = merge_m
         self.hole_m = hole_m
         self.reject_outliers = reject_outliers
+        self.calibrate = calibrate
 
     def fit(self, soundings: Soundings, *, learn: bool = True) -> Self:
         """Take in all soundings so far.
@@ -122,13 +145,14 @@ class GaussianProcessMap:
         start = getattr(self, "stationary_hyperparameters_", None)
         self.outliers_: OutlierReport | None = None
         if self.reject_outliers:
-            self.outliers_ = flag_outliers(soundings, kernel=self.kernel, hyperparameters=start)
+            kernel = "matern32" if self.kernel == "auto" else self.kernel
+            self.outliers_ = flag_outliers(soundings, kernel=kernel, hyperparameters=start)
             start = self.outliers_.hyperparameters
             soundings = soundings.take(~self.outliers_.rejected)
         self.soundings_ = soundings
         extent = max(float(np.ptp(soundings.east_m)), float(np.ptp(soundings.north_m)), 1e-3)
-        fine_m = self.merge_m or extent / 100.0
-        self._levels = two_levels(soundings, fine_m, COARSE_FACTOR * fine_m)
+        self._unit_m = self.merge_m or extent / max(LEAST_RESOLUTION, math.sqrt(len(soundings)))
+        self._levels = two_levels(soundings, self._unit_m, COARSE_FACTOR * self._unit_m)
         fine = self._levels.soundings.take(np.arange(self._levels.n_fine))
         self._points = np.column_stack([fine.east_m, fine.north_m])
         self._depth = fine.depth_m
@@ -136,32 +160,58 @@ class GaussianProcessMap:
         learn = learn or not hasattr(self, "hyperparameters_")
         subset = spread_subset(self._points, self.learning_points)
         uniform = uniform_scales(len(self._levels.soundings))
+        if learn:
+            self.kernel_ = self._choose_kernel() if self.kernel == "auto" else self.kernel
         likelihood = self._likelihood(subset, uniform)
         if learn:
-            self.stationary_hyperparameters_, _ = likelihood.maximise(start)
-        self._process = self._condition(self.stationary_hyperparameters_, likelihood, uniform)
-        self._reach = REACH_OF_ROUGHNESS * extent
-        self._errors = self._hole_errors(extent)
-        self._stretch: Stretch | None = None
-        if self.nonstationary:
-            ratio = local_ratio(self._errors, self._levels.points, self._reach)
-            self._ratio_scale = float(np.exp(np.mean(np.log(ratio))))
-            self._stretch = self._find_stretch(extent)
-            scales = local_scales(ratio / self._ratio_scale, self._stretch.at(self._levels.points))
+            self.stationary_hyperparameters_, least = likelihood.maximise(start)
+            self.refinement_ = 0.0
+        self._plain = self._condition(self.stationary_hyperparameters_, likelihood, uniform)
+        self._refined: Conditioned | None = None
+        ratio = self._local_ratio()
+        self._log_ratio = Field(ratio.grid, np.log(ratio.values))
+        relief = self._coarse_relief(extent)
+        self._scale_fields = _scale_fields(ratio, self._points, stretch_from_relief(*relief))
+        if self.nonstationary and (learn or self.refinement_ > 0.0):
+            scales = _scales(self._scale_fields.at(self._levels.points))
             likelihood = self._likelihood(subset, scales)
             if learn:
-                start = getattr(self, "hyperparameters_", self.stationary_hyperparameters_)
-                hyper, _ = likelihood.maximise(start)
-                self.hyperparameters_ = self._lengthen(hyper, likelihood, scales, extent)
-            self._process = self._condition(self.hyperparameters_, likelihood, scales)
-        else:
-            self.hyperparameters_ = self.stationary_hyperparameters_
-        self.trend_ = self._process.trend
+                hyper, value = likelihood.maximise(getattr(self, "_refined_hyperparameters", start))
+                self._refined_hyperparameters = self._lengthen(hyper, likelihood, scales)
+                self.refinement_ = float(value < least - REFINEMENT_GAIN)
+            if self.refinement_ > 0.0:
+                self._refined = self._condition(self._refined_hyperparameters, likelihood, scales)
+        self._calibration: Calibration | None = None
+        if self.calibrate:
+            self._calibration = uncalibrated(*relief, fine)
+        if learn:
+            self._check()
+        if self._calibration is not None:
+            self._calibration = replace(self._calibration, log_scale=self.log_scale_)
+        best = self._refined if self._refined is not None and self.refinement_ >= 0.5 else self._plain
+        self.hyperparameters_ = (
+            self._refined_hyperparameters if best is self._refined else self.stationary_hyperparameters_
+        )
+        self.trend_ = best.trend
         return self
+
+    def _choose_kernel(self) -> KernelName:
+        """Climb from the roughest kernel to smoother ones while the likelihood gains enough by it."""
+        subset = spread_subset(self._points, CHOICE_OF_KERNEL_POINTS)
+        best = KERNEL_LADDER[0]
+        least = math.inf
+        hyper: Hyperparameters | None = None
+        for kernel in KERNEL_LADDER:
+            self.kernel_ = kernel
+            hyper, value = self._likelihood(subset, uniform_scales(len(self._levels.soundings))).maximise(hyper)
+            if not value < least - KERNEL_GAIN * len(subset):
+                break
+            best, least = kernel, value
+        return best
 
     def _likelihood(self, subset: IntArray, scales: LocalScales) -> RestrictedLikelihood:
         return RestrictedLikelihood(
-            self.kernel,
+            self.kernel_,
             self._points[subset],
             self._depth[subset],
             self._variance[subset],
@@ -170,7 +220,7 @@ class GaussianProcessMap:
 
     def _condition(self, hyper: Hyperparameters, likelihood: RestrictedLikelihood, scales: LocalScales) -> Conditioned:
         return Conditioned(
-            self.kernel,
+            self.kernel_,
             self._levels,
             hyper.noise_scale * self._levels.soundings.sd_m**2,
             hyper.length_m,
@@ -179,19 +229,16 @@ class GaussianProcessMap:
             scales,
         )
 
-    def _find_stretch(self, extent: float) -> Stretch:
-        """Read the grain of the sea floor from a coarse stationary map."""
-        low, high = self._points.min(axis=0), self._points.max(axis=0)
-        cell = extent / FIRST_MAP_CELLS
-        cols, rows = (max(2, math.ceil(s / cell)) for s in high - low)
-        grid = Grid(float(low[0]), float(low[1]), cell, rows, cols)
-        first, _ = self._process.predict(
-            grid, self._scales_at(grid, 2), np.ones((rows, cols), np.bool_), self.neighbours, 2
-        )
-        return stretch_from_relief(grid, first - self._process.trend(grid.centres_m).reshape(rows, cols))
+    def _coarse_relief(self, extent: float) -> tuple[Grid, FloatArray]:
+        """A coarse stationary map, depth minus trend: shows the grain and the edges of the sea floor."""
+        cell = max(RELIEF_UNITS * self._unit_m, extent / MOST_RELIEF_CELLS)
+        grid = coarse_grid(self._points.min(axis=0), self._points.max(axis=0), cell)
+        everywhere = np.ones((grid.rows, grid.cols), np.bool_)
+        first, _ = self._plain.predict(grid, _uniform_over, everywhere, NEIGHBOURS_OF_LARGE_GRIDS, 2)
+        return grid, first - self._plain.trend(grid.centres_m).reshape(grid.rows, grid.cols)
 
     def _lengthen(
-        self, hyper: Hyperparameters, likelihood: RestrictedLikelihood, scales: LocalScales, extent: float
+        self, hyper: Hyperparameters, likelihood: RestrictedLikelihood, scales: LocalScales
     ) -> Hyperparameters:
         """Choose the length by how well soundings are predicted across the gaps that the survey leaves.
 
@@ -199,10 +246,8 @@ class GaussianProcessMap:
         back to the trend between the lines. Amplitude grows with length: the variance of short differences stays.
         """
         n = len(self._points)
-        west, south = (float(x) for x in self._points.min(axis=0))
-        coarse = Grid(west, south, extent / FIRST_MAP_CELLS, FIRST_MAP_CELLS, FIRST_MAP_CELLS)
-        gap = nearest(cKDTree(self._points), coarse.centres_m, 1)[0]
-        gap = gap[gap < self._reach]
+        gap = gaps(self._points)
+        gap = gap[gap < REACH_UNITS * self._unit_m]
         if n < LENGTHEN_FROM or len(gap) == 0:
             return hyper
         rows = np.unique(np.linspace(0, n - 1, min(n, CHOICE_POINTS)).astype(np.int64))
@@ -212,7 +257,7 @@ class GaussianProcessMap:
         for factor in LENGTH_FACTORS:
             candidate = Hyperparameters(hyper.length_m * factor, hyper.amplitude_m * factor, hyper.noise_scale)
             error, _, _ = krige_holes(
-                KERNEL_CODES[self.kernel],
+                KERNEL_CODES[self.kernel_],
                 self._points,
                 self._depth - likelihood.trend(candidate)(self._points),
                 candidate.noise_scale * self._variance,
@@ -229,30 +274,43 @@ class GaussianProcessMap:
                 best, least = candidate, loss
         return best
 
-    def _hole_errors(self, extent: float) -> HoleErrors:
+    def _local_ratio(self) -> Field:
+        """How variable the sea floor is, place by place, from predicting soundings across holes."""
         hyper = self.stationary_hyperparameters_
         n = len(self._points)
-        rows = np.unique(np.linspace(0, n - 1, min(n, self.hole_points)).astype(np.int64))
-        return hole_errors(
-            KERNEL_CODES[self.kernel],
+        count = self.hole_points or min(max(LEAST_HOLES, n // SOUNDINGS_PER_HOLE), MOST_HOLES)
+        errors = hole_errors(
+            KERNEL_CODES[self.kernel_],
             self._points,
-            self._depth - self._process.trend(self._points),
+            self._depth - self._plain.trend(self._points),
             hyper.noise_scale * self._variance,
             uniform_scales(n).scaled_metric(hyper.length_m),
             np.full(n, hyper.amplitude_m),
-            rows,
-            self.hole_m or 0.08 * extent,
+            np.unique(np.linspace(0, n - 1, min(n, count)).astype(np.int64)),
+            self.hole_m or HOLE_UNITS * self._unit_m,
         )
+        reach = REACH_UNITS * self._unit_m
+        low, high = self._points.min(axis=0), self._points.max(axis=0)
+        margin = 4.0 * reach  # beyond it the ratio has returned to what holds without soundings
+        cell = max(RELIEF_UNITS * self._unit_m, float((high - low).max()) / MOST_RATIO_CELLS)
+        grid = coarse_grid(low - margin, high + margin, cell)
+        return Field(grid, local_ratio(errors, grid.centres_m, reach).reshape(1, grid.rows, grid.cols))
 
-    def _ratio_at(self, grid: Grid, side: int) -> FloatArray:
-        _, middle = tile_rows(grid, side)
-        return _spread_over_cells(local_ratio(self._errors, middle, self._reach), grid, side)
+    def _check(self) -> None:
+        """Hold soundings out: how far to trust the nonstationary process, and the factor on deviations."""
+        n = len(self._points)
+        rows = np.unique(np.linspace(0, n - 1, min(n, CHECK_POINTS)).astype(np.int64))
+        held_out = hold_out(self._plain, rows, NEIGHBOURS_OF_LARGE_GRIDS)
+        if self._refined is not None:
+            refined = hold_out(self._refined, rows, NEIGHBOURS_OF_LARGE_GRIDS)
+            gain = 1.0 - error_ratio(refined, held_out)
+            self.refinement_ = float(np.clip(gain / FULL_TRUST_GAIN, 0.0, 1.0))
+            held_out = mixed(refined, held_out, self.refinement_)
+        if self._calibration is not None:
+            self.log_scale_ = checked_log_scale(self._calibration, held_out)
 
-    def _scales_at(self, grid: Grid, side: int) -> LocalScales:
-        if self._stretch is None:
-            return uniform_scales(grid.rows * grid.cols)
-        ratio = self._ratio_at(grid, side).ravel() / self._ratio_scale
-        return local_scales(ratio, self._stretch.at(grid.centres_m))
+    def _scales_over(self, grid: Grid) -> LocalScales:
+        return _scales(self._scale_fields.over(grid).reshape(3, -1))
 
     def predict(self, grid: Grid, mask: BoolArray | None = None) -> BathymetricMap:
         """Return the map on ``grid``; cells where ``mask`` (rows, cols) is False stay NaN.
@@ -268,42 +326,56 @@ class GaussianProcessMap:
         wanted = np.ones(shape, np.bool_) if mask is None else np.asarray(mask, np.bool_)
         if wanted.shape != shape:
             raise ValueError(f"mask has shape {wanted.shape}; the grid has {shape}")
-        depth, variance = self._process.predict(
-            grid, self._scales_at(grid, TILE_CELLS), wanted, self.neighbours, TILE_CELLS
-        )
+        few = grid.rows * grid.cols <= SMALL_GRID_CELLS
+        neighbours = self.neighbours or (NEIGHBOURS_OF_SMALL_GRIDS if few else NEIGHBOURS_OF_LARGE_GRIDS)
+        depth, variance = self._predict(grid, wanted, neighbours)
+        deviation = np.sqrt(variance) if self._calibration is None else self._calibration.deviation(grid, variance)
         count = count_per_cell(grid, self.soundings_)
-        roughness = np.where(wanted, self._ratio_at(grid, TILE_CELLS), np.nan)
-        kind = "nonstationary" if self.nonstationary else "stationary"
+        roughness = np.where(wanted, np.exp(self._log_ratio.over(grid)[0]), np.nan)
+        kind = "nonstationary" if self.refinement_ > 0.0 else "stationary"
         return BathymetricMap(
             grid=grid,
             depth_m=depth,
-            sd_m=np.sqrt(variance),
+            sd_m=deviation,
             count=count,
             sounded=count > 0,
             roughness=roughness / np.nanmean(roughness) if wanted.any() else roughness,
             correlation_length_m=self.hyperparameters_.length_m,
-            model=f"{kind} Gaussian process, {self.kernel}",
+            model=f"{kind} Gaussian process, {self.kernel_}",
         )
 
+    def _predict(self, grid: Grid, wanted: BoolArray, neighbours: tuple[int, int]) -> tuple[FloatArray, FloatArray]:
+        """Depth and variance, (rows, cols): of one process, or averaged over both as far as each is trusted."""
+        side, weight = self._tile_cells(grid), self.refinement_
+        if self._refined is None or weight == 0.0:
+            return self._plain.predict(grid, _uniform_over, wanted, neighbours, side)
+        depth, variance = self._refined.predict(grid, self._scales_over, wanted, neighbours, side)
+        if weight < 1.0:
+            plain, plain_variance = self._plain.predict(grid, _uniform_over, wanted, neighbours, side)
+            apart = depth - plain
+            depth = plain + weight * apart
+            variance = weight * variance + (1.0 - weight) * (plain_variance + weight * apart**2)
+        return depth, variance
 
-def _spread_over_cells(tile_values: FloatArray, grid: Grid, side: int) -> FloatArray:
-    """Interpolate values at the tiles' middles bilinearly (in the logarithm) to all cells: (rows, cols)."""
-    n_rows, n_cols = -(-grid.rows // side), -(-grid.cols // side)
-    logs = np.log(tile_values).reshape(n_rows, n_cols)
+    def _tile_cells(self, grid: Grid) -> int:
+        """Side of the tiles: few soundings in each, so that all its cells have much the same nearest ones."""
+        side = math.sqrt(SOUNDINGS_PER_TILE) * self._unit_m / grid.cell_m
+        return int(np.clip(round(side), *TILE_RANGE))
 
-    def weights(n: int, n_tiles: int) -> tuple[IntArray, FloatArray]:
-        middle = np.array([(min(side * (t + 1), n) - 1 + side * t) / 2.0 for t in range(n_tiles)])
-        at = np.clip(np.arange(n, dtype=float), middle[0], middle[-1])
-        low = np.clip(np.searchsorted(middle, at, side="right") - 1, 0, max(n_tiles - 2, 0))
-        if n_tiles == 1:
-            return low, np.zeros(n)
-        return low, (at - middle[low]) / (middle[low + 1] - middle[low])
 
-    r, fr = weights(grid.rows, n_rows)
-    c, fc = weights(grid.cols, n_cols)
-    r1, c1 = np.minimum(r + 1, n_rows - 1), np.minimum(c + 1, n_cols - 1)
-    south = logs[r] * (1.0 - fr)[:, None] + logs[r1] * fr[:, None]
-    return np.exp(south[:, c] * (1.0 - fc) + south[:, c1] * fc)
+def _scale_fields(ratio: Field, points: FloatArray, log_stretch: Field) -> Field:
+    """Logarithm of the roughness, 0 on average over the soundings, and of the stretch, on one grid: (3, rows, cols)."""
+    log_ratio = np.log(ratio.values)
+    log_ratio -= float(Field(ratio.grid, log_ratio).at(points).mean())
+    return Field(ratio.grid, np.concatenate([log_ratio, log_stretch.over(ratio.grid)]))
+
+
+def _uniform_over(grid: Grid) -> LocalScales:
+    return uniform_scales(grid.rows * grid.cols)
+
+
+def _scales(fields: FloatArray) -> LocalScales:
+    return local_scales(np.exp(fields[0]), fields[1:])
 
 
 def warm_up() -> None:

@@ -23,6 +23,64 @@ SQRT5 = math.sqrt(5.0)
 
 _FAST = {"reassoc", "contract", "arcp", "nsz"}
 
+LARGEST_EXPONENT = 60.0  # beyond it a correlation is zero for every purpose
+
+
+@njit(cache=True, nogil=True, inline="always")
+def exp_minus(t: float) -> float:
+    """``exp(-t)`` for t >= 0 without a branch or a call, so that loops over it become vector instructions.
+
+    Taylor's polynomial of exp(-t / 256), then squared eight times: relative error below 1e-12 for t < 10, 2e-6 at
+    60, where it is held.
+    """
+    x = -min(t, LARGEST_EXPONENT) * (1.0 / 256.0)
+    p = 1.0 + x * (1.0 + x * (1 / 2 + x * (1 / 6 + x * (1 / 24 + x * (1 / 120 + x * (1 / 720))))))
+    p *= p
+    p *= p
+    p *= p
+    p *= p
+    p *= p
+    p *= p
+    p *= p
+    p *= p
+    return p
+
+
+@njit(cache=True, nogil=True, fastmath=_FAST)
+def covariance_row(kind: int, place: FloatArray, others: FloatArray, n: int, out: FloatArray) -> None:
+    """Covariance between one place and the first ``n`` of ``others``, written to ``out``.
+
+    Parameters
+    ----------
+    place : (7,), others : (7, m)
+        East, north, amplitude, and the four numbers of the squared-length matrix as in ``paciorek``.
+    """
+    x, y, amplitude, a0, a1, a2, a3 = place[0], place[1], place[2], place[3], place[4], place[5], place[6]
+    distance = np.empty(n)
+    for c in range(n):
+        dx = others[0, c] - x
+        dy = others[1, c] - y
+        xx = 0.5 * (others[3, c] + a0)
+        xy = 0.5 * (others[4, c] + a1)
+        yy = 0.5 * (others[5, c] + a2)
+        det = xx * yy - xy * xy
+        distance[c] = math.sqrt(abs(yy * dx * dx - 2.0 * xy * dx * dy + xx * dy * dy) / det)
+        out[c] = amplitude * others[2, c] * a3 * others[6, c] / math.sqrt(det)
+    if kind == MATERN32:
+        for c in range(n):
+            t = SQRT3 * distance[c]
+            out[c] *= (1.0 + t) * exp_minus(t)
+    elif kind == MATERN52:
+        for c in range(n):
+            t = SQRT5 * distance[c]
+            out[c] *= (1.0 + t + t * t * (1 / 3)) * exp_minus(t)
+    elif kind == EXPONENTIAL:
+        for c in range(n):
+            out[c] *= exp_minus(distance[c])
+    else:
+        for c in range(n):
+            out[c] *= exp_minus(0.5 * distance[c] * distance[c])
+
 
 @njit(cache=True, nogil=True, inline="always")
 def correlation(kind: int, r: float) -> float:
@@ -107,3 +165,16 @@ def solve_lower_in_place(a: FloatArray, n: int, b: FloatArray) -> None:
         for k in range(i):
             s -= a[i, k] * b[k]
         b[i] = s / a[i, i]
+
+
+@njit(cache=True, nogil=True, fastmath=_FAST)
+def solve_lower_columns_in_place(a: FloatArray, n: int, b: FloatArray, columns: int) -> None:
+    """Replace the first ``columns`` columns of ``b`` (n or more rows) by ``L^-1 b``, all of them at once."""
+    for i in range(n):
+        for k in range(i):
+            factor = a[i, k]
+            for c in range(columns):
+                b[i, c] -= factor * b[k, c]
+        scale = 1.0 / a[i, i]
+        for c in range(columns):
+            b[i, c] *= scale

@@ -1,15 +1,28 @@
 """Local kriging: every tile of the grid is predicted from its nearest soundings only."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
 
-from app.mapping.kernels import KERNEL_CODES, KernelName, cholesky_in_place, paciorek, solve_lower_in_place
+from app.mapping.kernels import (
+    KERNEL_CODES,
+    KernelName,
+    cholesky_in_place,
+    covariance_row,
+    paciorek,
+    solve_lower_columns_in_place,
+    solve_lower_in_place,
+)
 from app.mapping.levels import TwoLevels
 from app.mapping.likelihood import Trend
 from app.mapping.scales import LocalScales
+from app.mapping.threads import each
 from app.mapping.types import BoolArray, FloatArray, Grid, IntArray
+
+STRIP_CELLS = 60_000
+"""A grid is predicted in strips of about this many cells: bounds the memory, and threads share the strips."""
 
 
 @njit(cache=True, nogil=True)
@@ -58,66 +71,87 @@ def krige_tiles(
     mean = np.full(q, np.nan)
     variance = np.full(q, np.nan)
     widest = neighbours.shape[1]
+    side = tiles.shape[1]
     a = np.empty((widest, widest))
     y = np.empty(widest)
-    v = np.empty(widest)
+    v = np.empty((widest, side))
     whitened = np.empty((p, widest))
+    place = np.empty(7)
+    near = np.empty((7, widest))
+    cells = np.empty((7, side))
+    inside = np.empty(side, np.int64)
     for t in range(tiles.shape[0]):
-        any_wanted = False
-        for c in range(tiles.shape[1]):
-            if tiles[t, c] >= 0 and wanted[tiles[t, c]]:
-                any_wanted = True
-        if not any_wanted:
+        m = 0
+        for c in range(side):
+            target = tiles[t, c]
+            if target >= 0 and wanted[target]:
+                inside[m] = target
+                cells[0, m], cells[1, m], cells[2, m] = targets[target, 0], targets[target, 1], target_amplitude[target]
+                for f in range(4):
+                    cells[3 + f, m] = target_metric[target, f]
+                m += 1
+        if m == 0:
             continue
         k = 0
         while k < widest and neighbours[t, k] >= 0:
+            i = neighbours[t, k]
+            near[0, k], near[1, k], near[2, k], y[k] = points[i, 0], points[i, 1], amplitude[i], residual[i]
+            for f in range(4):
+                near[3 + f, k] = metric[i, f]
+            for f in range(p):
+                whitened[f, k] = basis[i, f]
             k += 1
         for i in range(k):
-            pi = neighbours[t, i]
-            for j in range(i):
-                pj = neighbours[t, j]
-                dx = points[pi, 0] - points[pj, 0]
-                dy = points[pi, 1] - points[pj, 1]
-                a[i, j] = amplitude[pi] * amplitude[pj] * paciorek(kind, dx, dy, metric[pi], metric[pj])
-            a[i, i] = amplitude[pi] * amplitude[pi] * (1.0 + 1e-9) + noise[pi]
-            y[i] = residual[pi]
-            for f in range(p):
-                whitened[f, i] = basis[pi, f]
+            place[:] = near[:, i]
+            covariance_row(kind, place, near, i, a[i])
+            a[i, i] = place[2] * place[2] * (1.0 + 1e-9) + noise[neighbours[t, i]]
+            covariance_row(kind, place, cells, m, v[i])
         if not cholesky_in_place(a, k):
             continue
         solve_lower_in_place(a, k, y)
         for f in range(p):
             solve_lower_in_place(a, k, whitened[f])
-        for c in range(tiles.shape[1]):
-            target = tiles[t, c]
-            if target < 0 or not wanted[target]:
-                continue
-            for i in range(k):
-                pi = neighbours[t, i]
-                dx = points[pi, 0] - targets[target, 0]
-                dy = points[pi, 1] - targets[target, 1]
-                v[i] = (
-                    amplitude[pi] * target_amplitude[target] * paciorek(kind, dx, dy, metric[pi], target_metric[target])
-                )
-            solve_lower_in_place(a, k, v)
-            estimate = 0.0
-            explained = 0.0
-            for i in range(k):
-                estimate += v[i] * y[i]
-                explained += v[i] * v[i]
-            spread = max(target_amplitude[target] * target_amplitude[target] - explained, 0.0)
-            for f in range(p):
-                rf = target_basis[target, f]
-                for i in range(k):
-                    rf -= v[i] * whitened[f, i]
-                for g in range(f + 1):
-                    rg = target_basis[target, g]
-                    for i in range(k):
-                        rg -= v[i] * whitened[g, i]
-                    spread += (1.0 if f == g else 2.0) * rf * rg * trend_covariance[f, g]
-            mean[target] = estimate
-            variance[target] = max(spread, 0.0)
+        solve_lower_columns_in_place(a, k, v, m)
+        _finish_tile(inside[:m], v, y[:k], whitened, trend_covariance, target_basis, cells[2], mean, variance)
     return mean, variance
+
+
+@njit(cache=True, nogil=True, fastmath={"reassoc", "contract"})
+def _finish_tile(
+    inside: IntArray,
+    v: FloatArray,
+    y: FloatArray,
+    whitened: FloatArray,
+    trend_covariance: FloatArray,
+    target_basis: FloatArray,
+    amplitude: FloatArray,
+    mean: FloatArray,
+    variance: FloatArray,
+) -> None:
+    """Write estimate and variance of a tile's cells, ``v`` (k, cells) and ``y`` (k,) being whitened."""
+    m = len(inside)
+    p = whitened.shape[0]
+    estimate = np.zeros(m)
+    explained = np.zeros(m)
+    rest = np.empty((p, m))
+    for f in range(p):
+        for c in range(m):
+            rest[f, c] = target_basis[inside[c], f]
+    for i in range(len(y)):
+        for c in range(m):
+            estimate[c] += v[i, c] * y[i]
+            explained[c] += v[i, c] * v[i, c]
+        for f in range(p):
+            w = whitened[f, i]
+            for c in range(m):
+                rest[f, c] -= v[i, c] * w
+    for c in range(m):
+        spread = max(amplitude[c] * amplitude[c] - explained[c], 0.0)
+        for f in range(p):
+            for g in range(f + 1):
+                spread += (1.0 if f == g else 2.0) * rest[f, c] * rest[g, c] * trend_covariance[f, g]
+        mean[inside[c]] = estimate[c]
+        variance[inside[c]] = max(spread, 0.0)
 
 
 @njit(cache=True, nogil=True)
@@ -248,39 +282,59 @@ class Conditioned:
     scales: LocalScales
 
     def predict(
-        self, grid: Grid, scales: LocalScales, wanted: BoolArray, neighbours: tuple[int, int], side: int
+        self,
+        grid: Grid,
+        scales_over: Callable[[Grid], LocalScales],
+        wanted: BoolArray,
+        neighbours: tuple[int, int],
+        side: int,
     ) -> tuple[FloatArray, FloatArray]:
         """Return depth and its variance, (rows, cols) each, NaN where not ``wanted``.
 
         Parameters
         ----------
-        scales
-            Of all cells, row-major.
+        scales_over
+            Scales of all cells of a grid, row-major.
         neighbours
             Fine and coarse soundings used per tile.
         side
             Tiles are ``side`` x ``side`` cells.
         """
-        tiles, middle = tile_rows(grid, side)
-        near = self.levels.neighbours(middle, *neighbours)
         points = self.levels.points
-        targets = grid.centres_m
-        mean, variance = krige_tiles(
-            KERNEL_CODES[self.kernel],
-            points,
-            self.levels.soundings.depth_m - self.trend(points),
-            self.noise_variance,
-            self.scales.scaled_metric(self.length_m),
-            self.amplitude_m * self.scales.amplitude,
-            self.trend.basis(points),
-            self.trend.covariance,
-            tiles,
-            near,
-            targets,
-            scales.scaled_metric(self.length_m),
-            self.amplitude_m * scales.amplitude,
-            self.trend.basis(targets),
-            wanted.ravel(),
-        )
-        shape = (grid.rows, grid.cols)
-        return (mean + self.trend(targets)).reshape(shape), variance.reshape(shape)
+        residual = self.levels.soundings.depth_m - self.trend(points)
+        metric = self.scales.scaled_metric(self.length_m)
+        amplitude = self.amplitude_m * self.scales.amplitude
+        basis = self.trend.basis(points)
+        depth = np.empty((grid.rows, grid.cols))
+        variance = np.empty((grid.rows, grid.cols))
+
+        def fill(strip: slice) -> None:
+            part = Grid(
+                grid.west_m, grid.south_m + strip.start * grid.cell_m, grid.cell_m, strip.stop - strip.start, grid.cols
+            )
+            tiles, middle = tile_rows(part, side)
+            targets = part.centres_m
+            scales = scales_over(part)
+            mean, spread = krige_tiles(
+                KERNEL_CODES[self.kernel],
+                points,
+                residual,
+                self.noise_variance,
+                metric,
+                amplitude,
+                basis,
+                self.trend.covariance,
+                tiles,
+                self.levels.neighbours(middle, *neighbours),
+                targets,
+                scales.scaled_metric(self.length_m),
+                self.amplitude_m * scales.amplitude,
+                self.trend.basis(targets),
+                wanted[strip].ravel(),
+            )
+            depth[strip] = (mean + self.trend(targets)).reshape(part.rows, part.cols)
+            variance[strip] = spread.reshape(part.rows, part.cols)
+
+        height = side * max(1, STRIP_CELLS // (side * grid.cols))
+        each(fill, [slice(r, min(r + height, grid.rows)) for r in range(0, grid.rows, height)])
+        return depth, variance

@@ -23,6 +23,8 @@ class TwoLevels:
     ----------
     soundings : Soundings
         ``n_fine`` fine ones, then the coarse ones.
+    coarse_m
+        Side of the squares that coarse soundings are merged from.
     members, start
         ``members[start[g]:start[g + 1]]`` are the fine soundings of coarse sounding g.
     """
@@ -32,6 +34,7 @@ class TwoLevels:
     members: IntArray
     start: IntArray
     coarse_tree: cKDTree
+    coarse_m: float
 
     @property
     def points(self) -> FloatArray:
@@ -46,6 +49,14 @@ class TwoLevels:
         """
         _, groups = nearest(self.coarse_tree, at, n_fine + n_coarse)
         return _expand(groups, self.members, self.start, self.n_fine, n_fine, n_coarse)
+
+    def neighbours_beyond(self, at: FloatArray, radius_m: FloatArray, n_fine: int, n_coarse: int) -> IntArray:
+        """Choose neighbours as ``neighbours`` does, as if nothing had been sounded within ``radius_m`` (m,)."""
+        inside = int(np.ceil(np.pi * (float(radius_m.max()) / self.coarse_m + 1.5) ** 2))
+        _, groups = nearest(self.coarse_tree, at, n_fine + n_coarse + inside)
+        return _expand_beyond(
+            groups, self.members, self.start, self.n_fine, n_fine, n_coarse, self.points, at, radius_m
+        )
 
 
 def two_levels(soundings: Soundings, fine_m: float, coarse_m: float) -> TwoLevels:
@@ -64,6 +75,7 @@ def two_levels(soundings: Soundings, fine_m: float, coarse_m: float) -> TwoLevel
         members=np.argsort(group, kind="stable").astype(np.int64),
         start=np.concatenate([[0], np.cumsum(np.bincount(group, minlength=len(coarse)))]).astype(np.int64),
         coarse_tree=cKDTree(np.column_stack([coarse.east_m, coarse.north_m])),
+        coarse_m=coarse_m,
     )
 
 
@@ -82,6 +94,47 @@ def _expand(
                 for i in range(start[g], start[g + 1]):
                     if used < n_fine + n_coarse:
                         result[t, used] = members[i]
+                        used += 1
+            elif used < n_fine + n_coarse and merged < n_coarse:
+                result[t, used] = first_coarse + g
+                used += 1
+                merged += 1
+    return result
+
+
+@njit(cache=True, nogil=True)
+def _expand_beyond(
+    groups: IntArray,
+    members: IntArray,
+    start: IntArray,
+    first_coarse: int,
+    n_fine: int,
+    n_coarse: int,
+    points: FloatArray,
+    at: FloatArray,
+    radius: FloatArray,
+) -> IntArray:
+    result = np.full((groups.shape[0], n_fine + n_coarse), -1, np.int64)
+    left = np.empty(0, np.int64)
+    for t in range(groups.shape[0]):
+        used = 0
+        merged = 0
+        for c in range(groups.shape[1]):
+            g = groups[t, c]
+            size = start[g + 1] - start[g]
+            if size > len(left):
+                left = np.empty(size, np.int64)
+            n = 0
+            for i in range(start[g], start[g + 1]):
+                dx = points[members[i], 0] - at[t, 0]
+                dy = points[members[i], 1] - at[t, 1]
+                if dx * dx + dy * dy >= radius[t] * radius[t]:
+                    left[n] = members[i]
+                    n += 1
+            if (merged == 0 and used + n <= n_fine) or n < size or size == 1 or n_coarse == 0:
+                for i in range(n):
+                    if used < n_fine + n_coarse:
+                        result[t, used] = left[i]
                         used += 1
             elif used < n_fine + n_coarse and merged < n_coarse:
                 result[t, used] = first_coarse + g

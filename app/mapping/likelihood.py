@@ -26,6 +26,9 @@ SLOPE_SD = 0.1
 
 MAX_ITERATIONS = 25
 
+MANY_TO_CHOOSE_FROM = 4000
+CLUSTER = 16  # neighbours taken with each of some points, where there are many to choose from
+
 
 @dataclass(frozen=True)
 class Hyperparameters:
@@ -134,30 +137,29 @@ class RestrictedLikelihood:
         except linalg.LinAlgError:
             return 1e25, np.zeros(3)
         n = len(k)
-        inverse, _ = linalg.lapack.dpotri(lower, lower=1)
-        inverse = np.tril(inverse) + np.tril(inverse, -1).T
-        ki_f = inverse @ self._basis
+        ki_f = linalg.cho_solve((lower, True), self._basis, check_finite=False)
         a = self._basis.T @ ki_f + self._prior_precision
         a_factor = linalg.cho_factor(a, lower=True)
         beta = linalg.cho_solve(a_factor, ki_f.T @ self._depth)
         # P = K^-1 - K^-1 F A^-1 F' K^-1 takes the trend out
-        alpha = inverse @ self._depth - ki_f @ beta
-        p = inverse - ki_f @ linalg.cho_solve(a_factor, ki_f.T)
+        alpha = linalg.cho_solve((lower, True), self._depth - self._basis @ beta, check_finite=False)
+        trend_part = linalg.cho_solve(a_factor, ki_f.T).T
         nll = (
             0.5 * float(self._depth @ alpha)
             + float(np.log(np.diag(lower)).sum())
             + float(np.log(np.diag(a_factor[0])).sum())
             + 0.5 * n * math.log(2.0 * math.pi)
         )
-        outer_minus = p - np.outer(alpha, alpha)
+        inverse, _ = linalg.lapack.dpotri(lower, lower=1, overwrite_c=1)  # its upper triangle is zero
+
+        def trace(s: FloatArray) -> float:
+            """Trace of (P - alpha alpha') S for a symmetric matrix."""
+            whole = 2.0 * float(np.vdot(inverse, s)) - float(np.diag(inverse) @ np.diag(s))
+            return whole - float(np.vdot(s @ ki_f, trend_part)) - float(alpha @ (s @ alpha))
+
         noise = math.exp(theta[2]) * self._noise
-        gradient = 0.5 * np.array(
-            [
-                float(np.vdot(outer_minus, slope)),
-                2.0 * float(np.vdot(outer_minus, value)),
-                float(np.diag(outer_minus) @ noise),
-            ]
-        )
+        diagonal = np.diag(inverse) - (ki_f * trend_part).sum(axis=1) - alpha**2
+        gradient = 0.5 * np.array([trace(slope), 2.0 * trace(value), float(diagonal @ noise)])
         z = (theta - self._prior_mean) / self._prior_sd
         return nll + 0.5 * float(z @ z), gradient + z / self._prior_sd
 
@@ -192,13 +194,17 @@ def spread_subset(points: FloatArray, size: int) -> IntArray:
     """Choose at most ``size`` rows of ``points`` (n, 2), deterministically.
 
     Two thirds are every so-manieth in the given order (spatial order gives an even spread), one third the
-    nearest neighbours of those: short distances tell noise and fine detail, long ones the large scales.
+    nearest neighbours of those: short distances tell noise and fine detail, long ones the large scales. Of very many
+    points neighbours are too far from each other in such a choice to tell one from the other; then two thirds are
+    clusters of neighbours.
     """
     n = len(points)
     if n <= size:
         return np.arange(n)
-    n_spread = (2 * size) // 3
+    many = n > MANY_TO_CHOOSE_FROM
+    n_spread = size // 3 if many else (2 * size) // 3
+    together = CLUSTER if many else 1
     spread = ((np.arange(n_spread) + 0.5) * (n / n_spread)).astype(np.int64)
-    anchors = spread[:: max(1, n_spread // (size - n_spread))]
-    _, near = nearest(cKDTree(points), points[anchors], 2)
-    return np.union1d(spread, near[:, 1])[:size]
+    anchors = spread[:: max(1, -(-n_spread * together // (size - n_spread)))]
+    _, near = nearest(cKDTree(points), points[anchors], together + 1)
+    return np.union1d(spread, near[:, 1:])[:size]

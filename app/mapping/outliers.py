@@ -12,6 +12,7 @@ from app.mapping.likelihood import Hyperparameters, RestrictedLikelihood, Trend,
 from app.mapping.neighbours import nearest
 from app.mapping.scales import uniform_scales
 from app.mapping.supersoundings import merge_soundings
+from app.mapping.threads import each
 from app.mapping.types import BoolArray, FloatArray, IntArray, Soundings
 
 PLANE_NEIGHBOURS = 16
@@ -27,6 +28,8 @@ EXCUSE_POINTS = 600
 EXCUSE_NEIGHBOURS = 12
 EXCUSE_PRIOR_WEIGHT = 2.0
 NORMAL_99 = 2.576
+CHUNK = 30_000
+"""Planes are fitted to so many soundings at a time: bounds the memory, and threads share the chunks."""
 
 
 @dataclass(frozen=True)
@@ -183,26 +186,45 @@ def _suspects(points: FloatArray, soundings: Soundings) -> BoolArray:
     n = len(points)
     if n < 8:  # too few neighbours to tell an outlier from the sea floor
         return np.zeros(n, np.bool_)
-    _, near = nearest(cKDTree(points), points, PLANE_NEIGHBOURS + 1)
-    residual = _plane_residuals(points, soundings.depth_m, near)
-    around = np.abs(residual[near])
-    scale = np.maximum(1.4826 * np.median(around, axis=1), soundings.sd_m)
-    return np.asarray(np.abs(residual) > SUSPICION * scale)
+    tree = cKDTree(points)
+    chunks = [slice(i, min(i + CHUNK, n)) for i in range(0, n, CHUNK)]
+    residual = np.empty(n)
+    near = np.empty((n, min(PLANE_NEIGHBOURS + 1, n)), np.int32)
+
+    def fit_planes(chunk: slice) -> None:
+        index = nearest(tree, points[chunk], PLANE_NEIGHBOURS + 1)[1]
+        near[chunk] = index
+        residual[chunk] = _plane_residuals(points, soundings.depth_m, chunk.start, index)
+
+    each(fit_planes, chunks)
+    suspect = np.empty(n, np.bool_)
+
+    def judge(chunk: slice) -> None:
+        around = np.abs(residual[near[chunk]])
+        scale = np.maximum(1.4826 * np.median(around, axis=1), soundings.sd_m[chunk])
+        suspect[chunk] = np.abs(residual[chunk]) > SUSPICION * scale
+
+    each(judge, chunks)
+    return suspect
 
 
 @njit(cache=True, nogil=True)
-def _plane_residuals(points: FloatArray, depth: FloatArray, near: IntArray) -> FloatArray:
-    """Depth minus a robust plane through the neighbours (Huber; slopes damped for collinear tracks)."""
+def _plane_residuals(points: FloatArray, depth: FloatArray, first: int, near: IntArray) -> FloatArray:
+    """Depth minus a robust plane through the neighbours (Huber; slopes damped for collinear tracks).
+
+    Row i of ``near`` holds the neighbours of point ``first + i``.
+    """
     n, k = near.shape
     result = np.zeros(n)
     z = np.empty(k)
     weight = np.empty(k)
     size = np.empty(k)
-    for i in range(n):
+    for t in range(n):
+        i = first + t
         m = 0
         radius2 = 1e-12
         for c in range(k):
-            j = near[i, c]
+            j = near[t, c]
             if j != i:
                 z[m] = depth[j]
                 dx, dy = points[j, 0] - points[i, 0], points[j, 1] - points[i, 1]
@@ -213,7 +235,7 @@ def _plane_residuals(points: FloatArray, depth: FloatArray, near: IntArray) -> F
         for _ in range(8):
             c = 0
             for q in range(k):
-                j = near[i, q]
+                j = near[t, q]
                 if j != i:
                     dx, dy = points[j, 0] - points[i, 0], points[j, 1] - points[i, 1]
                     size[c] = abs(z[c] - centre - slope_e * dx - slope_n * dy)
@@ -225,7 +247,7 @@ def _plane_residuals(points: FloatArray, depth: FloatArray, near: IntArray) -> F
             b = np.zeros(3)
             c = 0
             for q in range(k):
-                j = near[i, q]
+                j = near[t, q]
                 if j != i:
                     w = weight[c]
                     dx, dy = points[j, 0] - points[i, 0], points[j, 1] - points[i, 1]
@@ -244,5 +266,5 @@ def _plane_residuals(points: FloatArray, depth: FloatArray, near: IntArray) -> F
             a[1, 0], a[2, 0], a[2, 1] = a[0, 1], a[0, 2], a[1, 2]
             solution = np.linalg.solve(a, b)
             centre, slope_e, slope_n = solution[0], solution[1], solution[2]
-        result[i] = depth[i] - centre
+        result[t] = depth[i] - centre
     return result

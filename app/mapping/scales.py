@@ -3,8 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import gaussian_filter, map_coordinates
+from scipy.ndimage import gaussian_filter
 
+from app.mapping.fields import Field
 from app.mapping.types import FloatArray, Grid, IntArray
 
 AMPLITUDE_EXPONENT = 0.15
@@ -47,31 +48,19 @@ def uniform_scales(m: int) -> LocalScales:
     return LocalScales(np.ones(m), np.tile([1.0, 0.0, 1.0, 1.0], (m, 1)))
 
 
-@dataclass(frozen=True)
-class Stretch:
-    """Direction and strength of the sea floor's grain on a coarse grid: ``log`` of the stretch matrix, (3, r, c).
-
-    The matrix is symmetric with zero trace; its components are ``xx``, ``xy`` and ``yy``. Zero means no
-    direction.
-    """
-
-    grid: Grid
-    log: FloatArray
-
-    def at(self, points: FloatArray) -> FloatArray:
-        """Interpolate at ``points`` (m, 2): (3, m)."""
-        row = (points[:, 1] - self.grid.south_m) / self.grid.cell_m - 0.5
-        col = (points[:, 0] - self.grid.west_m) / self.grid.cell_m - 0.5
-        return np.array([map_coordinates(part, [row, col], order=1, mode="nearest") for part in self.log])
-
-
-def stretch_from_relief(grid: Grid, relief_m: FloatArray) -> Stretch:
+def stretch_from_relief(grid: Grid, relief_m: FloatArray) -> Field:
     """Read from a first map along which direction the sea floor varies least (structure tensor of its gradients).
 
     Parameters
     ----------
     relief_m : (rows, cols)
         Depth minus trend.
+
+    Returns
+    -------
+    log_stretch : Field
+        Logarithm of the stretch matrix: ``xx`` and ``xy`` of a symmetric matrix with zero trace. Zero means no
+        direction.
     """
     d_north, d_east = np.gradient(relief_m, grid.cell_m)
     xx, xy, yy = (
@@ -86,17 +75,17 @@ def stretch_from_relief(grid: Grid, relief_m: FloatArray) -> Stretch:
     log_stretch = np.clip(STRETCH_EXPONENT * log_ratio, 0.0, np.log(STRETCH_RANGE))
     scale = np.where(half > 0.0, log_stretch / np.maximum(half, 1e-300), 0.0)
     across_xx, across_xy = 0.5 * (xx - yy) * scale, xy * scale
-    return Stretch(grid, np.array([-across_xx, -across_xy, across_xx]))
+    return Field(grid, np.array([-across_xx, -across_xy]))
 
 
 def local_scales(relative_roughness: FloatArray, log_stretch: FloatArray) -> LocalScales:
-    """Turn roughness (m,) and log stretch (3, m) into scales.
+    """Turn roughness (m,) and log stretch (2, m) into scales.
 
     Rough places get a somewhat larger amplitude and a shorter length; the length matrix is
     ``f^2 exp(2 log_stretch)``.
     """
     factor = np.clip(relative_roughness**LENGTH_EXPONENT, *LENGTH_FACTOR_RANGE)
-    xx, xy, _ = log_stretch
+    xx, xy = log_stretch
     strength = np.hypot(xx, xy)
     cosh, sinhc = (
         np.cosh(2.0 * strength),

@@ -25,7 +25,7 @@ class Finding(_View):
     remedy: str = ""
 
 
-class LinkState(_View):
+class LinkRecord(_View):
     """One change of a vehicle's link."""
 
     at: datetime
@@ -43,7 +43,7 @@ class VehicleDiagnosis(_View):
     healthy: bool
     causes: list[Cause] = Field(description="Of its problems, the one to look at first in front")
     findings: list[Finding]
-    history: list[LinkState] = Field(description="The last changes of its link, oldest first")
+    history: list[LinkRecord] = Field(description="The last changes of its link, oldest first")
 
 
 class DoctorView(_View):
@@ -86,7 +86,7 @@ def _vehicle(node: NodeDiagnosis) -> VehicleDiagnosis:
         causes=list(node.causes),
         findings=[_finding(finding) for finding in node.findings],
         history=[
-            LinkState(
+            LinkRecord(
                 at=datetime.fromtimestamp(change.at_s, UTC),
                 state=change.state,
                 engaged=change.engaged,

@@ -374,7 +374,7 @@ class MissionService:
         InvalidRequestError
             When the file is no log of a vehicle, or does not tell which one's.
         """
-        from app.missions.importing import LogImport
+        from app.missions.log_import import LogImport
 
         live = await self._get(mission_id)
         work = await asyncio.to_thread(LogImport, live, self._database, self._settings, path, vehicle)

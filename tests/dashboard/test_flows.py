@@ -240,3 +240,13 @@ def test_the_page_has_no_unlabelled_controls(page: Page, service: Service) -> No
             .map(e => e.outerHTML)"""
     )
     assert unlabelled == []
+
+
+def test_the_link_doctor_says_what_is_missing_and_what_to_do(page: Page) -> None:
+    page.goto("/")
+    by_id(page, "open-links").click()
+    dialog = by_id(page, "links-dialog")
+    expect(dialog).to_contain_text("does not listen for IMC vehicles")
+    expect(dialog).to_contain_text("Set imc.enabled = true")
+    by_id(page, "links-close").click()
+    expect(dialog).not_to_be_visible()

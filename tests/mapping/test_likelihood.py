@@ -23,7 +23,7 @@ RNG = np.random.default_rng(0)
 POINTS = RNG.uniform(0, 30, (40, 2))
 DEPTH = 8 + np.sin(POINTS[:, 0] / 4) + 0.1 * RNG.standard_normal(40)
 NOISE = np.full(40, 0.01)
-SCALES = local_scales(RNG.uniform(0.3, 3, 40), RNG.uniform(-0.4, 0.4, (3, 40)))
+SCALES = local_scales(RNG.uniform(0.3, 3, 40), RNG.uniform(-0.4, 0.4, (2, 40)))
 
 
 def plain_paciorek(d: FloatArray, a: FloatArray, b: FloatArray) -> float:

@@ -13,7 +13,7 @@ from rasterio.io import MemoryFile
 from rasterio.warp import transform
 
 from app.mapping.georeference import LocalFrame
-from app.mapping.products.colours import DEPTH_COLOURS, depth_range
+from app.mapping.products.colours import depth_range, palette
 from app.mapping.products.contours import contours_geojson
 from app.mapping.products.geotiff import NODATA, geotiff
 from app.mapping.products.overlay import overlay_corners, overlay_png
@@ -111,7 +111,7 @@ def test_overlay_pixels_are_the_cells_north_up(bathymetry: BathymetricMap) -> No
     assert np.all(image[:5, :5, 3] == 0)
     assert np.all(image[5:, 10, 3] == 255)
     assert 0 < image[29, 11, 3] < 255
-    colour = DEPTH_COLOURS((bathymetry.depth_m[0, 20] - 4.0) / 10.0, bytes=True)
+    colour = palette("depth")((bathymetry.depth_m[0, 20] - 4.0) / 10.0, bytes=True)
     np.testing.assert_allclose(image[29, 20, :3].astype(int), colour[:3], atol=1)
 
 

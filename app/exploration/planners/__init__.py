@@ -1,5 +1,7 @@
 """The planners by name. Adding one: a class derived from PlannerBase in its own file, and its name in ``PLANNERS``."""
 
+from functools import cache
+
 import numpy as np
 
 from app.estimation import RangeSensor, Sensor, SingleBeam
@@ -23,6 +25,9 @@ ONLY_IN_SIMULATION = ("osarses", "spsa-tried", "fdsa-tried")
 """Yardsticks that really try their moves and take them back, as only ``bathyfleet evaluate explore`` can."""
 
 REFUSAL = "{name} really tries its moves before it takes one, which only bathyfleet evaluate explore can simulate"
+
+QUICK = PlannerOptions(search=8, rollouts=8, candidates=4)
+"""Enough to run through every part of a planner once."""
 
 
 def create_planner(
@@ -60,16 +65,28 @@ def create_planner(
     return planner(options, sensor)
 
 
+@cache
 def warm_up(*sensors: Sensor) -> None:
-    """Compile what the planners need for these sensors (or load it from the cache), so that no step waits for it."""
-    area = np.array([[0.0, 0.0], [20.0, 0.0], [20.0, 20.0], [0.0, 20.0]])
-    east, north = np.meshgrid(np.arange(2.0, 20.0, 4.0), np.arange(2.0, 20.0, 4.0))
+    """Compile what the planners need for these sensors (or load it from the cache), so that no step waits for it.
+
+    Once in a process is enough: another call does nothing.
+    """
+    for sensor in sensors:
+        # A sea floor of a few times the sensor's reach: one that a single step surveys needs the same machine code.
+        situation = _small_situation(sensor.visibility_m if isinstance(sensor, RangeSensor) else 4.0)
+        planners = {type(planner): planner for planner in (create_planner(name, QUICK, sensor) for name in PLANNERS)}
+        for planner in planners.values():
+            planner.propose(situation, np.random.default_rng(0))
+
+
+def _small_situation(unit_m: float) -> Situation:
+    """Return two vehicles before a flat bottom of 5 by 5 units, with a keep-out zone."""
+    area = unit_m * np.array([[0.0, 0.0], [5.0, 0.0], [5.0, 5.0], [0.0, 5.0]])
+    east, north = np.meshgrid(unit_m * np.arange(0.5, 5.0), unit_m * np.arange(0.5, 5.0))
     xy = np.column_stack([east.ravel(), north.ravel()])
     n = len(xy)
     belief = Belief(xy, np.full(n, 9.0), np.ones(n), np.zeros(n, dtype=np.bool_), np.ones(n), 8.0)
-    constraints = Constraints(area, (np.array([[12.0, 12.0], [14.0, 12.0], [14.0, 14.0]]),), max_step_m=4.0)
-    positions = np.array([[2.0, 2.0, 1.0], [6.0, 2.0, 1.0]])
-    situation = Situation(1, 10, ("a", "b"), positions, np.full(2, np.nan), belief, positions[:, :2], constraints)
-    for sensor in sensors:
-        for name in tuple(PLANNERS):
-            create_planner(name, sensor=sensor).propose(situation, np.random.default_rng(0))
+    zone = unit_m * np.array([[3.0, 3.0], [3.5, 3.0], [3.5, 3.5]])
+    constraints = Constraints(area, (zone,), max_step_m=unit_m)
+    positions = np.column_stack([unit_m * np.array([[0.5, 0.5], [1.5, 0.5]]), np.ones(2)])
+    return Situation(1, 10, ("a", "b"), positions, np.full(2, np.nan), belief, positions[:, :2], constraints)

@@ -81,7 +81,9 @@ class GradientPlanner(PlannerBase):
     def __init__(self, options: PlannerOptions, sensor: Sensor) -> None:
         super().__init__(options, sensor)
         self._model: LandmarkRegressors | SurveyRegressors = (
-            SurveyRegressors(options, self._at_cruise) if self._surveys else LandmarkRegressors(options, sensor)
+            SurveyRegressors(options, self._at_cruise, every_step=True)
+            if self._surveys
+            else LandmarkRegressors(options, sensor)
         )
         self._steps = 0
 

@@ -21,7 +21,7 @@ from app.exploration.planners.base import PlannerBase, settle
 from app.exploration.problem import Proposal, Situation
 from app.exploration.rollout.backbones import Backbone, backbones, with_team
 from app.exploration.rollout.flight import Course, Plan, Rules, Work, begin, fly_plan, fly_step, make_work, new_course
-from app.exploration.rollout.floor import Floor, estimate_floor, sample
+from app.exploration.rollout.floor import Floor, estimate_floor, fill_depths
 from app.exploration.rollout.free_space import Free, clear_ways, free_space, settle_waypoint
 from app.exploration.rollout.search import DRAWS, improve
 from app.exploration.routes import FreeSpace
@@ -219,11 +219,9 @@ class _Mission:
         self, xy: FloatArray, depth: FloatArray, sd: FloatArray, accurate: NDArray[np.bool_], options: PlannerOptions
     ) -> Work:
         open_ = ~accurate
-        floor = self._floor
         xyz = np.column_stack([xy[open_], depth[open_]])
         unseen = np.isnan(xyz[:, 2])
-        for k in np.flatnonzero(unseen):
-            xyz[k, 2] = sample(floor.depth_m, floor.west_m, floor.south_m, floor.cell_m, xyz[k, 0], xyz[k, 1])
+        fill_depths(xyz, self._floor)
         enough = 1.0 / options.accuracy_sd_m**2
         have = np.where(np.isfinite(sd[open_]), 1.0 / np.maximum(sd[open_], 1e-9) ** 2, 0.0)
         need = np.maximum(1e-6 * enough, np.where(unseen, HEDGE * enough, enough - have))
@@ -277,7 +275,7 @@ class _Mission:
     def fresh_starts(self, most: int) -> list[_Best]:
         """Return the best of the sweeps over what is left."""
         sweeps = backbones(
-            self._work.xyz[:, :2], self._start[:, :2], self._area, self._sight, self._com_range, self._link
+            self._work.xyz[:2].T, self._start[:, :2], self._area, self._sight, self._com_range, self._link
         )
         heights = np.full(ROOM, HEIGHT * self._sight)
         scratch = new_course(ROOM, len(self._start), len(self._work.need))
@@ -306,8 +304,8 @@ class _Mission:
         """Return the vertices (k, 2) of the way from the middle vehicle to the landmark nearest to it."""
         middle = self._start[np.argmin(np.linalg.norm(self._start - self._start.mean(axis=0), axis=1)), :2]
         space = FreeSpace(constraints, CONVOY_MARGIN * self._free.cell_m)
-        nearest = np.argmin(np.linalg.norm(self._work.xyz[:, :2] - middle, axis=1))
-        return np.vstack([middle, space.way(middle, space.nearest(self._work.xyz[nearest, :2]))])
+        nearest = np.argmin(np.linalg.norm(self._work.xyz[:2].T - middle, axis=1))
+        return np.vstack([middle, space.way(middle, space.nearest(self._work.xyz[:2, nearest]))])
 
     def refine(self, best: _Best, changes: int) -> _Best:
         """Try so many changes; the plan is improved in place."""

@@ -1,49 +1,54 @@
 """Predictions for bathymeter missions, from the current map: what a leg gains, and how good the final map becomes.
 
-The team holds two plans for all remaining steps: the coverage backbone, and a freer plan that is improved step by step
-(:mod:`app.exploration.survey_search`) towards where the map is rough and little sounded. It follows the backbone until
-the freer plan promises a clearly better final map. Candidates are the next legs of both, turns that a vehicle can fly,
-legs to places of high gain, and random ones; each is judged by the final map when the plan goes on from its end.
+The team holds two plans for all remaining steps: the coverage backbone, and a freer plan that is improved again and
+again (:mod:`app.exploration.survey_search`) towards where the map is rough and little sounded. It follows the backbone
+until the freer plan promises a clearly better final map. The plan is made anew ``REPLANS`` times in a mission, and when
+the team changes. Then the candidates are the next legs of both plans, turns that a vehicle can fly, legs to places of
+high gain, and random ones; each is judged by the final map when the plan goes on from its end. In between the plan
+is followed.
 
 phi = (improvement of the predicted final map over the plan kept so far, uncertainty removed by the legs alone); the
 objective measured after a step is the improvement of the predicted final map that really came about.
 """
 
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
+from shapely import Polygon, unary_union
 
 from app.exploration.bottom import Bottom
-from app.exploration.constraints import inside_area
+from app.exploration.constraints import Constraints, inside_area
 from app.exploration.geometry import convex
 from app.exploration.options import PlannerOptions
 from app.exploration.planners.base import vehicle_rng
 from app.exploration.planners.handover import hand_over
 from app.exploration.problem import Belief, Situation
 from app.exploration.routes import next_waypoint
-from app.exploration.survey_backbone import MARGIN_M, Nodes, backbone
+from app.exploration.survey_backbone import MARGIN_M, backbone
+from app.exploration.survey_error import expected_roughness
 from app.exploration.survey_search import DRAWS, improve
-from app.exploration.survey_value import plan_value, values_after_first_leg
+from app.exploration.survey_value import Nodes, Objective, make_nodes, plan_value, values_after_first_leg
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
 AtCruise = Callable[[Situation, Bottom, FloatArray], FloatArray]
 
-MAX_NODES = 900
-SEARCH_VIAS = 60
-"""Plans with more via points than this get proportionally fewer tries, so that a step takes no longer."""
+MAX_NODES = 2500
+REPLANS = 20
+"""How often the plan is made anew in a mission."""
+HEAT = 0.01
+"""Part by which changes to a plan may worsen it while the search begins."""
 POWER = 2.0
-SLOPE_SHARE = 0.5
-STEEPEST = 10.0
 LEAVE_BACKBONE = 0.93
 """The freer plan must promise at most this part of the squared error that the backbone promises."""
 LEAVE_PLAN = 0.02
 """A leg off the plan must promise a squared error smaller by this part: predictions are noisy, and a choice among many
 takes the luckiest."""
+JITTER = 0.7
 TURN_PENALTY = 0.002
 """Relative worsening of the final map that a reversal counts for."""
 TURNS_RAD = np.deg2rad([-120.0, -90.0, -60.0, -30.0, 0.0, 30.0, 60.0, 90.0, 120.0])
@@ -52,37 +57,66 @@ TURNS_RAD = np.deg2rad([-120.0, -90.0, -60.0, -30.0, 0.0, 30.0, 60.0, 90.0, 120.
 class SurveyRegressors:
     """See the module's text."""
 
-    def __init__(self, options: PlannerOptions, at_cruise: AtCruise) -> None:
-        """Vehicles move at their cruise depths by ``at_cruise``."""
+    def __init__(self, options: PlannerOptions, at_cruise: AtCruise, *, every_step: bool = False) -> None:
+        """Vehicles move at their cruise depths by ``at_cruise``.
+
+        ``every_step``: the regressors are asked for other legs than :meth:`candidates` in every step; costs time.
+        """
         self._options = options
         self._at_cruise = at_cruise
+        self._every_step = every_step
         self._backbone: dict[str, FloatArray] = {}
         self._coarse: dict[str, int] = {}
         self._plan: dict[str, FloatArray] = {}
         self._expected: float | None = None
+        self._planned = 0
+        self._free = False
+        self._row = [0.0, 0.0]
 
     def begin(self, team: Situation, bottom: Bottom, seed: int) -> float:
-        """See :class:`app.exploration.planners.cao.Regressors`."""
+        """See :class:`app.exploration.planners.cao.Regressors`.
+
+        What came of a plan is only measured when the next is made, for the leg chosen when that one was made.
+        """
         self._team, self._bottom, self._seed = team, bottom, seed
-        constraints = team.constraints
         self._en = np.ascontiguousarray(team.positions[:, :2])
         self._steps = max(1, team.steps_total - team.step + 1)
-        self._step_m = constraints.max_step_m * (1 - 1e-9)
-        self._nodes = thin_nodes(team, expected_variability(team.belief, bottom))
-        self._px, self._py = (np.ascontiguousarray(self._nodes.en_m[:, k]) for k in (0, 1))
-        area = float(len(self._nodes.en_m)) * _cell(self._nodes.en_m) ** 2
-        self._spacing = area / max(1.0, len(self._en) * self._steps * constraints.max_step_m)
-        self._scale = max(team.belief.correlation_length_m, self._spacing)
-        soundings = np.vstack([team.soundings_en_m, self._en])
-        distance, _ = cKDTree(soundings).query(self._nodes.en_m)
-        self._d2 = np.asarray(distance**2)
-        self._reference = max(1e-12, float(self._nodes.weight.sum()))
-        self._adopt()
+        self._step_m = team.constraints.max_step_m * (1 - 1e-9)
+        begins = not self._plan.keys() & set(team.vehicles)
+        changed = not begins and self._plan.keys() != set(team.vehicles)
+        every = max(1, round(team.steps_total / REPLANS))
+        explores = not begins and any(self._coarse.get(v, 0) == 0 for v in team.vehicles)
+        self._replans = changed or (explores and team.step - self._planned >= every)
+        self._looks = begins or self._replans or self._every_step
+        if not self._looks:
+            self._followed = self._packed(self._plan if self._free else self._backbone)
+            return np.nan
+        self._look()
+        if begins:
+            self._adopt_backbone()
+        elif changed:
+            self._hand_over()
         plan, lattice = self._packed(self._plan), self._packed(self._backbone)
-        expected = min(self._value(*plan), self._value(*lattice)) / self._reference
+        values = self._value(*plan), self._value(*lattice)
+        expected = min(values) / self._reference
         before, self._expected = self._expected, expected
-        self._choose_plan(plan, lattice)
+        if self._replans:
+            plan, values = self._improve_plan(plan, lattice, values)
+        self._followed = plan if self._free else lattice
+        self._expected_value = values[0] if self._free else values[1]
         return np.nan if before is None else before - expected
+
+    def _look(self) -> None:
+        """See what is known and where it is far to the next sounding."""
+        team, constraints = self._team, self._team.constraints
+        self._spacing = _free_area(constraints) / (len(self._en) * team.steps_total * constraints.max_step_m)
+        tree = cKDTree(np.vstack([team.soundings_en_m, self._en]), balanced_tree=False)
+        distance = np.asarray(tree.query(team.belief.xy_m)[0])
+        self._nodes = thin_nodes(team, expected_roughness(team.belief, distance, self._spacing))
+        self._scale = max(team.belief.correlation_length_m, self._spacing)
+        self._objective = Objective(self._step_m, self._steps, self._scale, POWER, TURN_PENALTY)
+        self._d2 = np.asarray(tree.query(self._nodes.en_m)[0]) ** 2
+        self._reference = max(1e-12, float(self._nodes.weight.sum()))
 
     def prior(self, team: Situation) -> tuple[FloatArray, float]:
         """The final map counts fully, what is gained at once a little."""
@@ -94,11 +128,13 @@ class SurveyRegressors:
         return np.array([final, float(np.clip(theta[1], 0.0, 0.1 * final))])
 
     def candidates(self, alpha: float) -> FloatArray:
-        """Per vehicle: the legs described above, the others following the plan; and both plans for the whole team."""
+        """The next legs of the plan; when it was made anew also, per vehicle, others as described above."""
         team, n = self._team, len(self._en)
         along = self._first_legs(self._followed)
+        targets = [along]
+        if not self._replans:
+            return self._at_cruise(team, self._bottom, np.array(targets))
         legs = [self._legs_of(i, alpha) for i in range(n)]
-        targets = [along, self._first_legs(self._other)]
         for i, name in enumerate(team.vehicles):
             if self._coarse[name] > 0:
                 continue  # before the first pass is over too little is known to be worth a detour
@@ -110,19 +146,22 @@ class SurveyRegressors:
 
     def regressors(self, candidates: FloatArray) -> FloatArray:
         """See the module's text."""
+        if not self._looks:
+            return np.tile(self._row, (len(candidates), 1))
         values = self._after_legs(candidates)
         now = self._uncertainty_now()
         kept = self._expected_value
-        along = [
-            np.hypot(*np.moveaxis(candidates[..., :2] - self._first_legs(p), 2, 0)) < 1e-3
-            for p in (self._followed, self._other)
-        ]
-        off_plan = ~(along[0].all(axis=1) | along[1].all(axis=1))
+        off_plan = ~self._on_plan(candidates).all(axis=1)
         final = values[:, 1] + LEAVE_PLAN * kept * off_plan
-        return np.column_stack([(kept - final) / self._reference, (now - values[:, 0]) / self._reference])
+        phi = np.column_stack([kept - final, now - values[:, 0]]) / self._reference
+        self._asked = candidates, phi
+        return phi
 
     def chosen(self, positions: FloatArray) -> None:
         """Drop the via points that the legs reach."""
+        if self._looks:
+            candidates, phi = self._asked
+            self._row = phi[int(np.argmin(np.abs(candidates - positions).sum(axis=(1, 2))))].tolist()
         for i, name in enumerate(self._team.vehicles):
             x, y = self._en[i]
             for routes in (self._plan, self._backbone):
@@ -140,6 +179,9 @@ class SurveyRegressors:
             "coarse": self._coarse,
             "plan": self._plan,
             "expected": self._expected,
+            "planned": self._planned,
+            "free": self._free,
+            "row": self._row,
         }
 
     def recall(self, state: dict[str, Any]) -> None:
@@ -150,39 +192,50 @@ class SurveyRegressors:
         )
         self._coarse = {str(k): int(v) for k, v in state["coarse"].items()}
         self._expected = state["expected"]
+        self._planned = int(state["planned"])
+        self._free = bool(state["free"])
+        self._row = [float(x) for x in state["row"]]
 
-    def _adopt(self) -> None:
-        """Give every vehicle of the team both plans."""
+    def _adopt_backbone(self) -> None:
+        """Give every vehicle of the team its share of the backbone."""
         team = self._team
-        if not self._plan.keys() & set(team.vehicles):
-            shares = backbone(team.constraints, self._en, self._steps, self._nodes, self._scale, POWER)
-            self._backbone = {name: share.stops for name, share in zip(team.vehicles, shares, strict=True)}
-            self._coarse = {name: share.coarse for name, share in zip(team.vehicles, shares, strict=True)}
-            self._plan = dict(self._backbone)
-        elif self._plan.keys() != set(team.vehicles):
-            self._backbone = hand_over(self._backbone, team.vehicles, self._en)
-            self._plan = hand_over(self._plan, team.vehicles, self._en)
-            self._coarse = dict.fromkeys(team.vehicles, 0)
+        shares = backbone(team.constraints, self._en, self._steps, self._nodes, self._scale, POWER)
+        self._backbone = {name: share.stops for name, share in zip(team.vehicles, shares, strict=True)}
+        self._coarse = {name: share.coarse for name, share in zip(team.vehicles, shares, strict=True)}
+        self._plan = dict(self._backbone)
+        self._free, self._planned = False, team.step
 
-    def _choose_plan(self, plan: tuple[FloatArray, IntArray], lattice: tuple[FloatArray, IntArray]) -> None:
-        """Improve the freer plan, then decide which of the two to follow."""
+    def _hand_over(self) -> None:
+        """Give both plans to a team that has changed."""
         team = self._team
-        if self._value(*lattice) < self._value(*plan):
-            plan = lattice
-        locked = np.array(
-            [min(self._coarse[v], k) for v, k in zip(team.vehicles, plan[1], strict=True)], dtype=np.int64
-        )
-        vias, counts, value = self._improved(plan[0], plan[1], locked)
+        self._backbone = hand_over(self._backbone, team.vehicles, self._en)
+        self._plan = hand_over(self._plan, team.vehicles, self._en)
+        self._coarse = dict.fromkeys(team.vehicles, 0)
+
+    def _improve_plan(
+        self, plan: tuple[FloatArray, IntArray], lattice: tuple[FloatArray, IntArray], values: tuple[float, float]
+    ) -> tuple[tuple[FloatArray, IntArray], tuple[float, float]]:
+        """Improve the freer plan, then decide which of the two to follow; return it and the value of both."""
+        team = self._team
+        coarse = np.array([self._coarse[v] for v in team.vehicles], dtype=np.int64)
+        best: tuple[float, FloatArray, IntArray] | None = None
+        for which, begin in enumerate((plan, lattice)):
+            vias, counts, value = self._improved(*begin, np.minimum(coarse, begin[1]), which)
+            if best is None or value < best[0]:
+                best = value, vias, counts
+        assert best is not None  # noqa: S101 - two beginnings
+        value, vias, counts = best
         self._plan = {v: vias[i, : counts[i]].copy() for i, v in enumerate(team.vehicles)}
-        lattice_value = self._value(*lattice)
-        free = value < LEAVE_BACKBONE * lattice_value
-        self._followed, self._other = ((vias, counts), lattice) if free else (lattice, (vias, counts))
-        self._expected_value = value if free else lattice_value
+        knows = bool((np.isfinite(team.belief.depth_m) & np.isfinite(team.belief.sd_m)).any())
+        self._free = knows and value < (1.0 if self._free else LEAVE_BACKBONE) * values[1]
+        self._planned = team.step
+        return (vias, counts), (value, values[1])
 
-    def _improved(self, vias: FloatArray, counts: IntArray, locked: IntArray) -> tuple[FloatArray, IntArray, float]:
+    def _improved(
+        self, vias: FloatArray, counts: IntArray, locked: IntArray, which: int
+    ) -> tuple[FloatArray, IntArray, float]:
         constraints = self._team.constraints
-        rng = np.random.default_rng([self._seed, 1])
-        tries = int(self._options.search * min(1.0, SEARCH_VIAS / max(1, int(counts.sum()))))
+        rng = np.random.default_rng([self._seed, 1, which])
         roomy = np.zeros((len(vias), vias.shape[1] + 32, 2))
         roomy[:, : vias.shape[1]] = vias
         zones = [np.ascontiguousarray(z, dtype=np.float64) for z in constraints.keep_out]
@@ -190,9 +243,8 @@ class SurveyRegressors:
         flat = np.vstack(zones) if zones else np.zeros((0, 2))
         area = np.ascontiguousarray(constraints.area, dtype=np.float64)
         return improve(
-            self._d2, self._px, self._py, self._nodes.weight, self._en, self._headings, roomy, counts, locked,
-            self._step_m, self._steps, self._scale, POWER, TURN_PENALTY, self._spacing, area, flat, starts,
-            convex(area), MARGIN_M, rng.random((tries, DRAWS)),
+            self._d2, self._nodes, self._objective, self._en, self._headings, roomy, counts, locked,
+            self._spacing, area, flat, starts, convex(area), MARGIN_M, HEAT, rng.random((self._options.search, DRAWS)),
         )  # fmt: skip
 
     @property
@@ -200,10 +252,7 @@ class SurveyRegressors:
         return np.ascontiguousarray(self._team.headings_rad)
 
     def _value(self, vias: FloatArray, counts: IntArray) -> float:
-        return plan_value(
-            self._d2, self._px, self._py, self._nodes.weight, self._en, self._headings, vias, counts,
-            self._step_m, self._steps, self._scale, POWER, TURN_PENALTY,
-        )  # fmt: skip
+        return plan_value(self._d2, self._nodes, self._objective, self._en, self._headings, vias, counts)
 
     def _uncertainty_now(self) -> float:
         nothing = np.zeros(len(self._en), dtype=np.int64)
@@ -225,6 +274,11 @@ class SurveyRegressors:
         ]
         return np.array(legs)
 
+    def _on_plan(self, candidates: FloatArray) -> BoolArray:
+        """Return which vehicles' legs are those of the plan that is followed, (c, n_vehicles)."""
+        away = candidates[..., :2] - self._first_legs(self._followed)
+        return np.asarray(np.hypot(away[..., 0], away[..., 1]) < 1e-3)
+
     def _legs_of(self, i: int, alpha: float) -> FloatArray:
         """Return the free candidates (k, 2) of one vehicle."""
         rng = vehicle_rng(self._seed, self._team.vehicles[i])
@@ -245,64 +299,48 @@ class SurveyRegressors:
         return np.vstack([turns, towards, here + random])
 
     def _after_legs(self, candidates: FloatArray) -> FloatArray:
-        """Return U after the first legs and at the end, when the team goes on with the plan it follows, (c, 2).
-
-        Only the candidate that is the first leg of the other plan for the whole team goes on with that one.
-        """
+        """Return U after the first legs and at the end, when the team goes on with the plan it follows, (c, 2)."""
         c, n = candidates.shape[:2]
-        width = max(self._followed[0].shape[1], self._other[0].shape[1])
-        vias, counts = np.zeros((c, n, width, 2)), np.zeros((c, n), dtype=np.int64)
-        for plan in (self._followed, self._other):
-            on_plan = np.hypot(*np.moveaxis(candidates[..., :2] - self._first_legs(plan), 2, 0)) < 1e-3
-            takes = np.ones(c, dtype=np.bool_) if plan is self._followed else on_plan.all(axis=1)
-            for i in range(n):
-                route = plan[0][i, : plan[1][i]]
-                *_, passed = next_waypoint(self._en[i, 0], self._en[i, 1], route, 0, len(route), self._step_m)
-                for which, rest in ((takes & on_plan[:, i], route[passed:]), (takes & ~on_plan[:, i], route)):
-                    vias[which, i, : len(rest)] = rest
-                    counts[which, i] = len(rest)
+        plan_vias, plan_counts = self._followed
+        vias, counts = np.zeros((c, n, plan_vias.shape[1], 2)), np.zeros((c, n), dtype=np.int64)
+        on_plan = self._on_plan(candidates)
+        for i in range(n):
+            route = plan_vias[i, : plan_counts[i]]
+            *_, passed = next_waypoint(self._en[i, 0], self._en[i, 1], route, 0, len(route), self._step_m)
+            for which, rest in ((on_plan[:, i], route[passed:]), (~on_plan[:, i], route)):
+                vias[which, i, : len(rest)] = rest
+                counts[which, i] = len(rest)
+        targets = np.ascontiguousarray(candidates[..., :2])
         return values_after_first_leg(
-            self._d2, self._px, self._py, self._nodes.weight, self._en, self._headings,
-            np.ascontiguousarray(candidates[..., :2]), vias, counts, self._step_m, self._steps, self._scale,
-            POWER, TURN_PENALTY,
-        )  # fmt: skip
-
-
-def expected_variability(belief: Belief, bottom: Bottom) -> FloatArray:
-    """Return how large squared errors between soundings are expected to be at the landmarks, (n,), mean about 1.
-
-    Half of it is the map's roughness, half the slope's squared deviation from its mean: an edge that runs along between
-    two survey lines shows in no sounding as roughness, only as a steep interpolation between the lines.
-    """
-    roughness = np.where(np.isfinite(belief.weight), belief.weight, 1.0)
-    roughness = roughness / max(1e-12, float(roughness.mean()))
-    depth = bottom.depth_m
-    if min(depth.shape) < 3 or not np.isfinite(depth).any():
-        return roughness
-    filled = np.where(np.isfinite(depth), depth, np.nanmean(depth))
-    squared = sum((g - g.mean()) ** 2 for g in np.gradient(filled, bottom.cell_m))
-    steepness = replace(bottom, depth_m=np.asarray(squared, dtype=np.float64)).at(belief.xy_m)
-    mean = float(np.nanmean(steepness))
-    if not mean > 0.0:
-        return roughness
-    relative = np.clip(np.nan_to_num(steepness / mean, nan=1.0), 0.0, STEEPEST)
-    return np.asarray((1.0 - SLOPE_SHARE) * roughness + SLOPE_SHARE * relative)
+            self._d2, self._nodes, self._objective, self._en, self._headings, targets, vias, counts
+        )
 
 
 def thin_nodes(team: Situation, variability: FloatArray) -> Nodes:
-    """Return at most about ``MAX_NODES`` nodes of the area; nodes of one square are merged, their weights averaged."""
+    """Return at most about ``MAX_NODES`` nodes of the area; nodes of one square are merged, their weights averaged.
+
+    They are moved about a little: on a regular grid a plan would gain by lying on its lines.
+    """
     belief: Belief = team.belief
     inside = inside_area(team.constraints, belief.xy_m)
     xy, weight = belief.xy_m[inside], variability[inside]
-    if len(xy) <= MAX_NODES:
-        return Nodes(xy, np.ascontiguousarray(weight))
-    low, size = xy.min(axis=0), np.ptp(xy, axis=0)
-    side = float(np.sqrt(max(size[0], 1e-9) * max(size[1], 1e-9) / MAX_NODES))
-    bins = np.floor((xy - low) / side + 1e-9).astype(np.int64)
-    _, which = np.unique(bins[:, 0] * 1_000_003 + bins[:, 1], return_inverse=True)
-    count = np.bincount(which)
-    centre = np.column_stack([np.bincount(which, xy[:, k]) / count for k in (0, 1)])
-    return Nodes(centre, np.bincount(which, weight) / count)
+    if len(xy) > MAX_NODES:
+        low, size = xy.min(axis=0), np.ptp(xy, axis=0)
+        side = float(np.sqrt(max(size[0], 1e-9) * max(size[1], 1e-9) / MAX_NODES))
+        bins = np.floor((xy - low) / side + 1e-9).astype(np.int64)
+        _, which = np.unique(bins[:, 0] * 1_000_003 + bins[:, 1], return_inverse=True)
+        count = np.bincount(which)
+        xy = np.column_stack([np.bincount(which, xy[:, k]) / count for k in (0, 1)])
+        weight = np.bincount(which, weight) / count
+    if len(xy) > 1:
+        k = np.arange(len(xy))[:, None]
+        xy = xy + JITTER * _cell(xy) * ((k * np.array([0.7548776662, 0.5698402910])) % 1.0 - 0.5)
+    return make_nodes(xy, weight)
+
+
+def _free_area(constraints: Constraints) -> float:
+    zones = unary_union([Polygon(zone) for zone in constraints.keep_out])
+    return max(1.0, float(Polygon(constraints.area).difference(zones).area))
 
 
 def _cell(xy: FloatArray) -> float:

@@ -28,14 +28,17 @@ PER_LEFT = 0.8
 
 CLIMB_PASSES = 4
 
+NEAREST = 1e-12
+"""Square of the least distance of a landmark, in visibilities: a sensor right on it learns no more."""
+
 
 class Work(NamedTuple):
     """Landmarks still to be done, sorted by the bucket (square cell, row by row) they lie in.
 
     Attributes
     ----------
-    xyz : (m, 3)
-        Where they are presumed to be, depth positive down.
+    xyz : (3, m)
+        Where they are presumed to be, depth positive down; one row per axis, for loops over neighbours.
     need : (m,)
         Information (1/m^2) each still lacks.
     first : (n_rows * n_cols + 1,)
@@ -114,7 +117,7 @@ def make_work(
     first = np.zeros(rows * cols + 1, dtype=np.int64)
     first[1:] = np.cumsum(np.bincount(bucket, minlength=rows * cols))
     return Work(
-        np.ascontiguousarray(xyz[order], dtype=np.float64),
+        np.ascontiguousarray(xyz[order].T, dtype=np.float64),
         np.ascontiguousarray(need[order], dtype=np.float64),
         first,
         float(low[0]),
@@ -128,7 +131,7 @@ def make_work(
     )
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def look(x: float, y: float, z: float, work: Work, rules: Rules, need: FloatArray) -> int:
     """Take what a vehicle sees at (x, y, z) from ``need``; return how many landmarks that completes."""
     reach = rules.visibility_m
@@ -147,17 +150,19 @@ def look(x: float, y: float, z: float, work: Work, rules: Rules, need: FloatArra
         right = min(work.cols - 1, int(np.floor((x + half - work.west_m) / b)))
         if right < left:
             continue
-        for m in range(work.first[row * work.cols + left], work.first[row * work.cols + right + 1]):
-            if need[m] <= 0.0:
-                continue
-            dx = work.xyz[m, 0] - x
-            dy = work.xyz[m, 1] - y
-            dz = work.xyz[m, 2] - z
-            r2 = dx * dx + dy * dy + dz * dz
-            if r2 < v2:
-                need[m] -= gain * dz * dz / (r2 * r2)
-                if need[m] <= 0.0:
-                    done += 1
+        low_m, high_m = work.first[row * work.cols + left], work.first[row * work.cols + right + 1]
+        xs, ys, zs = work.xyz[0, low_m:high_m], work.xyz[1, low_m:high_m], work.xyz[2, low_m:high_m]
+        lacks = need[low_m:high_m]
+        # No branches: such a loop is compiled to take several landmarks at a time.
+        for m in range(len(lacks)):
+            dx = xs[m] - x
+            dy = ys[m] - y
+            dz = zs[m] - z
+            r2 = max(dx * dx + dy * dy + dz * dz, NEAREST * v2)
+            before = lacks[m]
+            after = before - (gain * dz * dz / (r2 * r2) if r2 < v2 else 0.0)
+            lacks[m] = after
+            done += 1 if (before > 0.0) & (after <= 0.0) else 0
     return done
 
 

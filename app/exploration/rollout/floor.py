@@ -94,7 +94,8 @@ def estimate_floor(
     smooth = gaussian_filter(depth, 0.12 * visibility_m / cell, mode="nearest")
     limit = depth - clearance_m - MARGIN * visibility_m
     # The constraints' sea floor has steps between cells: whatever lies within a cell of a node counts there.
-    shifts = np.stack(np.meshgrid(*[np.linspace(-cell, cell, 5)] * 2), axis=-1).reshape(-1, 1, 1, 2)
+    looks = int(np.ceil(2.0 * cell / bottom.cell_m)) + 1  # no cell of the constraints' sea floor is skipped
+    shifts = np.stack(np.meshgrid(*[np.linspace(-cell, cell, looks)] * 2), axis=-1).reshape(-1, 1, 1, 2)
     around = bottom.at(np.stack([east, north], axis=-1) + shifts)
     limit = np.minimum(limit, np.where(np.isnan(around), np.inf, around).min(axis=0) - clearance_m)
     for x, y, z in felt_m:
@@ -114,6 +115,29 @@ def _from_neighbours(
     local = (weight * depth_m[index]).sum(axis=1) / weight.sum(axis=1)
     trust = np.exp(-np.maximum(0.0, distance[:, 0] / visibility_m - 0.25) / FADE)
     return np.asarray(trust * local + (1.0 - trust) * depth_m.mean())
+
+
+@njit(cache=True, nogil=True, inline="always")
+def sample(raster: FloatArray, west: float, south: float, cell: float, x: float, y: float) -> float:
+    """Interpolate a raster bilinearly at (x, y); beyond its border the border's value counts."""
+    rows, cols = raster.shape
+    u = min(max((x - west) / cell, 0.0), cols - 1.000001)
+    v = min(max((y - south) / cell, 0.0), rows - 1.000001)
+    c = int(u)
+    r = int(v)
+    u -= c
+    v -= r
+    lower = raster[r, c] * (1.0 - u) + raster[r, c + 1] * u
+    upper = raster[r + 1, c] * (1.0 - u) + raster[r + 1, c + 1] * u
+    return float(lower * (1.0 - v) + upper * v)
+
+
+@njit(cache=True, nogil=True)
+def fill_depths(xyz: FloatArray, floor: Floor) -> None:
+    """Give points (n, 3) whose depth is not known (NaN) the floor's."""
+    for k in range(len(xyz)):
+        if np.isnan(xyz[k, 2]):
+            xyz[k, 2] = sample(floor.depth_m, floor.west_m, floor.south_m, floor.cell_m, xyz[k, 0], xyz[k, 1])
 
 
 @njit(cache=True, nogil=True)
@@ -149,18 +173,3 @@ def _envelope(limit: FloatArray, cell: float) -> FloatArray:
                         best = min(best, out[r + 1, c + 1] + far)
                 out[r, c] = best
     return out
-
-
-@njit(cache=True, nogil=True, inline="always")
-def sample(raster: FloatArray, west: float, south: float, cell: float, x: float, y: float) -> float:
-    """Interpolate a raster bilinearly at (x, y); beyond its border the border's value counts."""
-    rows, cols = raster.shape
-    u = min(max((x - west) / cell, 0.0), cols - 1.000001)
-    v = min(max((y - south) / cell, 0.0), rows - 1.000001)
-    c = int(u)
-    r = int(v)
-    u -= c
-    v -= r
-    lower = raster[r, c] * (1.0 - u) + raster[r, c + 1] * u
-    upper = raster[r + 1, c] * (1.0 - u) + raster[r + 1, c + 1] * u
-    return float(lower * (1.0 - v) + upper * v)

@@ -161,7 +161,7 @@ def _change(
         m = _unfinished(left_need, u[2])
         if m < 0 or count >= room:
             return count, -1, -1
-        place = _visit(plan, count, start, work.xyz[m, 0], work.xyz[m, 1], u)
+        place = _visit(plan, count, start, work.xyz[0, m], work.xyz[1, m], u)
         return count + 1, place, place + 1
     if kind == 9:
         # Fly a section the other way round, or move one waypoint elsewhere.

@@ -1,13 +1,22 @@
 """One colour scale for pictures and overlays."""
 
-import cmocean
+from typing import TYPE_CHECKING
+
 import numpy as np
-from matplotlib.colors import Colormap
 
 from app.mapping.types import BathymetricMap, FloatArray
 
-DEPTH_COLOURS: Colormap = cmocean.cm.deep
-UNCERTAINTY_COLOURS: Colormap = cmocean.cm.amp
+if TYPE_CHECKING:
+    from matplotlib.colors import Colormap
+
+
+def palette(layer: str) -> "Colormap":
+    """Return the colours of a layer: depths, or amounts of something."""
+    # They bring all of Matplotlib: a quarter of the service's start, before anyone has asked for a picture.
+    import cmocean
+
+    colours: Colormap = {"depth": cmocean.cm.deep}.get(layer, cmocean.cm.amp)
+    return colours
 
 
 def depth_range(bathymetry: BathymetricMap) -> tuple[float, float]:

@@ -7,7 +7,7 @@ import numpy as np
 from PIL import Image
 
 from app.mapping.georeference import LocalFrame
-from app.mapping.products.colours import DEPTH_COLOURS, UNCERTAINTY_COLOURS, scaled
+from app.mapping.products.colours import palette, scaled
 from app.mapping.types import BathymetricMap, Grid
 
 INTERPOLATED_ALPHA = 0.72
@@ -28,12 +28,10 @@ def overlay_png(
         Values of the first and the last colour. Fixed by the caller: a range that follows the data would make
         successive pictures of a mission incomparable.
     """
-    values, colours = (
-        (bathymetry.depth_m, DEPTH_COLOURS) if layer == "depth" else (bathymetry.sd_m, UNCERTAINTY_COLOURS)
-    )
+    values = bathymetry.depth_m if layer == "depth" else bathymetry.sd_m
     alpha = np.where(bathymetry.sounded, 1.0, INTERPOLATED_ALPHA)
     fractions = scaled(values, range_m)
-    pixels = colours(np.nan_to_num(fractions), bytes=True)
+    pixels = palette(layer)(np.nan_to_num(fractions), bytes=True)
     pixels[..., 3] = np.where(np.isfinite(fractions), np.round(255 * alpha), 0)
     stream = io.BytesIO()
     Image.fromarray(np.ascontiguousarray(pixels[::-1])).save(stream, "PNG", compress_level=6)

@@ -2,14 +2,15 @@
 
 import io
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 
-from app.mapping.products.colours import DEPTH_COLOURS, depth_range
+from app.mapping.products.colours import depth_range, palette
 from app.mapping.types import BathymetricMap, FloatArray
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 DPI = 150
 
@@ -33,6 +34,9 @@ def picture_png(
     tracks
         Per vehicle the positions, (n, 2) east and north.
     """
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
     grid = bathymetry.grid
     low, high = depth_range(bathymetry) if range_m is None else range_m
     width_m, height_m = grid.cols * grid.cell_m, grid.rows * grid.cell_m
@@ -46,7 +50,7 @@ def picture_png(
         np.ma.masked_invalid(bathymetry.depth_m),
         origin="lower",
         extent=extent,
-        cmap=DEPTH_COLOURS,
+        cmap=palette("depth"),
         vmin=low,
         vmax=high,
         interpolation="nearest",
@@ -87,7 +91,7 @@ def picture_png(
     return stream.getvalue()
 
 
-def _scale_bar(axes: Axes, extent: tuple[float, float, float, float]) -> None:
+def _scale_bar(axes: "Axes", extent: tuple[float, float, float, float]) -> None:
     span = extent[1] - extent[0]
     length = max(step for step in _round_lengths(span) if step <= 0.25 * span)
     x = extent[0] + 0.04 * span

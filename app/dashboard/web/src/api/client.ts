@@ -1,6 +1,7 @@
 import { kept } from "../kept";
 import type {
   ActionView,
+  DoctorView,
   EventView,
   FieldProblem,
   MapView,
@@ -80,6 +81,7 @@ const missionPath = (id: string) => `/missions/${encodeURIComponent(id)}`;
 
 export const api = {
   missions: () => request<MissionSummary[]>("/missions"),
+  doctor: () => request<DoctorView>("/doctor"),
   vehicles: () => request<VehicleView[]>("/vehicles"),
   planners: () => request<PlannerView[]>("/planners"),
   create: (mission: NewMission) => post<MissionView>("/missions", mission),

@@ -721,6 +721,28 @@ export interface components {
             min_vertical_separation_m: number;
         };
         /**
+         * LinkRecord
+         * @description One change of a vehicle's link.
+         */
+        LinkRecord: {
+            /**
+             * At
+             * Format: date-time
+             */
+            at: string;
+            state: components["schemas"]["NodeState"];
+            /**
+             * Engaged
+             * @description Whether the vehicle followed us
+             */
+            engaged: boolean;
+            /**
+             * Reason
+             * @default
+             */
+            reason: string;
+        };
+        /**
          * LinkState
          * @description How well a vehicle can be reached, worst to best.
          * @enum {string}
@@ -1094,8 +1116,8 @@ export interface components {
             alpha_floor: number;
             /**
              * Search
-             * @description Most changes to the survey plan tried in a step.
-             * @default 1500
+             * @description Changes tried when a survey plan is made anew.
+             * @default 4000
              */
             search: number;
             /**
@@ -1408,7 +1430,7 @@ export interface components {
              * History
              * @description The last changes of its link, oldest first
              */
-            history: components["schemas"]["app__missions__doctoring__LinkState"][];
+            history: components["schemas"]["LinkRecord"][];
         };
         /**
          * VehicleKind
@@ -1478,7 +1500,7 @@ export interface components {
              * @default true
              */
             active: boolean;
-            link: components["schemas"]["app__missions__fleet__LinkState"];
+            link: components["schemas"]["LinkState"];
             /**
              * Reason
              * @description What is missing or wrong, and what to do; empty when all is well
@@ -1592,34 +1614,6 @@ export interface components {
             /** Waypoints */
             waypoints: components["schemas"]["WaypointView"][];
         };
-        /**
-         * LinkState
-         * @description One change of a vehicle's link.
-         */
-        app__missions__doctoring__LinkState: {
-            /**
-             * At
-             * Format: date-time
-             */
-            at: string;
-            state: components["schemas"]["NodeState"];
-            /**
-             * Engaged
-             * @description Whether the vehicle followed us
-             */
-            engaged: boolean;
-            /**
-             * Reason
-             * @default
-             */
-            reason: string;
-        };
-        /**
-         * LinkState
-         * @description How well a vehicle can be reached, worst to best.
-         * @enum {string}
-         */
-        app__missions__fleet__LinkState: "unknown" | "lost" | "expected_offline" | "heard" | "ready" | "engaged";
     };
     responses: never;
     parameters: never;

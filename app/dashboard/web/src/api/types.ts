@@ -12,6 +12,7 @@ export type LngLat = [longitude: number, latitude: number];
 export type MissionState = Schemas["MissionState"];
 export type LinkState = Schemas["LinkState"];
 export type WaypointStatus = Schemas["WaypointStatus"];
+export type Severity = Schemas["Severity"];
 export type Level = Schemas["Level"];
 export type MissionAction = "start" | "pause" | "resume" | "abort" | "finish";
 
@@ -24,6 +25,9 @@ export type EventView = Complete<Schemas["EventView"]>;
 export type MapView = Complete<Schemas["MapView"]>;
 export type PlannerView = Complete<Schemas["PlannerView"]>;
 export type ActionView = Complete<Schemas["ActionView"]>;
+export type DoctorView = Complete<Schemas["DoctorView"]>;
+export type VehicleDiagnosis = Complete<Schemas["VehicleDiagnosis"]>;
+export type Finding = Complete<Schemas["Finding"]>;
 export type StopView = Complete<Schemas["StopView"]>;
 export type LiveMessage = Complete<Schemas["LiveMessage"]>;
 export type Problem = Complete<Schemas["Problem"]>;

@@ -107,4 +107,7 @@ export const mapCentre = signal<LngLat>([-8.7044, 41.1854]);
 export const panelOpen = signal(matchMedia("(min-width: 1180px)").matches);
 export const describing = signal(false);
 export const abortDialogOpen = signal(false);
+
+/** Whether the link doctor is shown. */
+export const linksOpen = signal(false);
 export const logOpen = signal(false);

@@ -4,6 +4,7 @@ import type {
   LinkState,
   MissionAction,
   MissionState,
+  Severity,
   VehicleView,
   WaypointStatus,
   WaypointView,
@@ -49,6 +50,9 @@ const LINK_WORDS: Record<LinkState, string> = {
 };
 
 export type Tone = "calm" | "good" | "warning" | "alarm";
+
+export const FINDING_TONES: Record<Severity, Tone> = { ok: "good", note: "warning", problem: "alarm" };
+export const FINDING_SIGNS: Record<Severity, string> = { ok: "✓", note: "▲", problem: "✕" };
 
 const LINK_TONES: Record<LinkState, Tone> = {
   unknown: "warning",

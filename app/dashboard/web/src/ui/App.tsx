@@ -4,6 +4,7 @@ import { BottomStrip } from "./BottomStrip";
 import { ChartPane } from "./ChartPane";
 import { Alarms } from "./EventLog";
 import { Legend } from "./Legend";
+import { LinksDialog } from "./LinksDialog";
 import { MissionPanel } from "./MissionPanel";
 import { Notices } from "./Notices";
 import { Readout } from "./Readout";
@@ -28,6 +29,7 @@ export function App() {
       <VehicleCards />
       <BottomStrip />
       <AbortDialog />
+      <LinksDialog />
     </div>
   );
 }

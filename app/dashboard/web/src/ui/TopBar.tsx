@@ -3,6 +3,7 @@ import { age, clock, duration } from "../state/format";
 import { act, busyWith } from "../state/session";
 import {
   abortDialogOpen,
+  linksOpen,
   mission,
   now,
   panelOpen,
@@ -30,6 +31,18 @@ export function TopBar() {
         }}
       >
         ☰
+      </button>
+      <button
+        type="button"
+        class="tool"
+        aria-label="Links to vehicles"
+        title="Links: what is missing"
+        data-testid="open-links"
+        onClick={() => {
+          linksOpen.value = true;
+        }}
+      >
+        ⇄
       </button>
       <div class="title">
         <h1 data-testid="mission-name">{present?.name ?? "bathyfleet"}</h1>

@@ -213,7 +213,15 @@ async def test_a_command_that_was_killed_and_run_again_has_imported_everything_o
 ) -> None:
     mission = await service.create(make_spec(area=rectangle(0, 0, 30, 1600)))
     log = writer.write(tmp_path / "Data.lsf.gz", writer.survey(5000))
-    command = [sys.executable, "-c", "from app.cli import main; main()", "import", mission.id[:8], str(log), "--json"]
+    command = [
+        sys.executable,
+        "-c",
+        "from app.cli import main; main()",
+        "import-log",
+        mission.id[:8],
+        str(log),
+        "--json",
+    ]
     command += ["--database", f"sqlite+aiosqlite:///{database_path}"]
     environment = {name: value for name, value in os.environ.items() if not name.startswith("BATHYFLEET_")}
     await asyncio.to_thread(kill_after_the_first_batch, command, environment, database_path)

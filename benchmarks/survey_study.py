@@ -1,0 +1,202 @@
+"""The survey planner beside its yardsticks on all sea floors: every symmetry of the square, budgets, samplings, sonars.
+
+    python benchmarks/survey_study.py --terrains FOLDER [--symmetries 0:8] [--budgets 2.5,1.0]
+        [--samplings step,continuous] [--sounders single] [--only NAME,...] [--jobs 1] [--out docs/results] [--no-run]
+
+Each run is what ``bathyfleet evaluate survey`` does: 2 vehicles, 500 steps, noise of 1 % of the range. Runs are kept in
+``survey.jsonl`` as soon as they are done, so that the study can be interrupted and goes on where it was; ``survey.md``
+reports those that are there. Terrains are those of 100 x 100 m in the folder and two generated ones.
+"""
+
+import argparse
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.progress import Progress as ProgressBar
+
+from app.estimation import Sensor
+from app.evaluation.jobs import Progress, run_jobs
+from app.evaluation.recorded import recorded_soundings
+from app.evaluation.summary import spread
+from app.evaluation.survey_job import SurveyJob
+from app.evaluation.survey_world import Sampling, Sounder, SurveyScenario
+from app.evaluation.symmetry import turned, turned_soundings
+from app.evaluation.tables.facts import made
+from app.evaluation.tables.store import Results
+from app.exploration.options import PlannerOptions
+from app.mapping.types import Soundings
+from simulator.seafloors import generate
+from simulator.terrain import Terrain
+from simulator.terrain_files import load_terrain
+
+SIDE_M = (95.0, 110.0)
+GENERATED = (("reef", 1), ("reef_field", 1))
+PATCHY = ("leixoes_sharp", "leixoes_sharp_wall_sw", "leixoes_sharp_diagonal", "reef", "reef_field")
+STEPS, VEHICLES = 500, 2
+
+Run = Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class SeaFloor:
+    """A terrain as its file has it, with the track that was flown over it where there is one."""
+
+    name: str
+    terrain: Terrain
+    recorded: Soundings | None
+
+
+@dataclass(frozen=True)
+class StudyJob:
+    """One run; ``key`` says what makes it what it is."""
+
+    key: str
+    job: SurveyJob
+
+    @property
+    def title(self) -> str:
+        return f"{self.job.scenario.terrain.name}, {self.job.title}"
+
+    @property
+    def steps(self) -> int:
+        return self.job.steps
+
+    @property
+    def sensor(self) -> Sensor:
+        return self.job.sensor
+
+    def run(self, progress: Progress) -> dict[str, Any]:
+        return {"key": self.key, **self.job.run(progress)}
+
+
+def sea_floors(folder: Path | None) -> list[SeaFloor]:
+    """Return the generated sea floors and those of about 100 x 100 m in the folder."""
+    found = [SeaFloor(name, replace(generate(name, seed), name=name), None) for name, seed in GENERATED]
+    for file in sorted(folder.glob("*.npz")) if folder else []:
+        terrain = replace(load_terrain(file), name=file.stem)
+        if all(SIDE_M[0] <= side <= SIDE_M[1] for side in (terrain.width_m, terrain.height_m)):
+            found.append(SeaFloor(file.stem, terrain, recorded_soundings(file)))
+    return sorted(found, key=lambda floor: (floor.name not in PATCHY, floor.name))
+
+
+def study_jobs(
+    floors: Iterable[SeaFloor],
+    symmetries: Sequence[int],
+    budgets: Sequence[float],
+    samplings: Sequence[Sampling],
+    sounders: Sequence[Sounder],
+) -> list[StudyJob]:
+    """Return every run, symmetry by symmetry, so that an interrupted study has all terrains."""
+    floors = list(floors)
+    jobs = []
+    for symmetry in symmetries:
+        for sounder in sounders:
+            for sampling in samplings:
+                for budget in budgets:
+                    for floor in floors:
+                        scenario = SurveyScenario(
+                            turned(floor.terrain, symmetry), VEHICLES, STEPS, budget, sampling,
+                            seed=symmetry, sounder=sounder, symmetry=symmetry,
+                        )  # fmt: skip
+                        recorded = floor.recorded
+                        if recorded is not None:
+                            recorded = turned_soundings(recorded, floor.terrain, symmetry)
+                        key = f"{floor.name}/{symmetry}/{budget:g}/{sampling}/{sounder}"
+                        jobs.append(StudyJob(key, SurveyJob(scenario, "cao", PlannerOptions(), recorded)))
+    return jobs
+
+
+def report(runs: Sequence[Run], facts: Mapping[str, str]) -> str:
+    """Return the report in Markdown."""
+    lines = ["# Surveys: the field experiment beside its yardsticks", ""]
+    lines += [f"- {name}: {value}" for name, value in facts.items()]
+    lines += [
+        "",
+        f"{VEHICLES} vehicles, {STEPS} steps, noise 1 % of the range to the bottom. RMSE in metres of the default map,"
+        " mean over the symmetries of the square that were run. *ratio*: over the RMSE of the better of lawnmower and"
+        " equal-area coverage, each with the better of the default map and a stationary Matern 3/2 process; with its"
+        " 95 % interval, and the worst run. *map*: default over stationary map on our own soundings. The oracle places"
+        " as many soundings anywhere, knowing the truth; *gap* is how far we came from the better pattern to it.",
+    ]
+    setups = dict.fromkeys((r["sounder"], r["sampling"], r["max_step_m"]) for r in runs)
+    for sounder, sampling, budget in sorted(setups):
+        mine = [r for r in runs if (r["sounder"], r["sampling"], r["max_step_m"]) == (sounder, sampling, budget)]
+        lines += ["", f"## Largest step {budget:g} m, sampling {sampling}, {sounder}", "", *_table(mine)]
+    return "\n".join(lines) + "\n"
+
+
+def _table(runs: Sequence[Run]) -> list[str]:
+    rows = [
+        "| terrain | runs | ours | better pattern | random | oracle | ratio | worst | gap | map | recorded |",
+        "|---|---|---|---|---|---|---|---|---|---|---|",
+    ]
+    names = list(dict.fromkeys(r["terrain"] for r in runs))
+    names.sort(key=lambda name: (name not in PATCHY, name))
+    means: dict[str, float] = {}
+    for name in names:
+        mine = [r for r in runs if r["terrain"] == name]
+        ratio = spread([r["ratio"] for r in mine])
+        means[name] = ratio.mean
+        pattern = [min(r["usual_practice"]["rmse_m"], r["coverage"]["rmse_m"]) for r in mine]
+        recorded = [r["ratio_recorded"] for r in mine if r.get("ratio_recorded") is not None]
+        rows.append(
+            f"| {name} | {len(mine)} | {_mean(r['rmse_m'] for r in mine):.3f} | {np.mean(pattern):.3f} | "
+            f"{_mean(r['random']['rmse_m'] for r in mine):.2f} | {_mean(r['oracle']['rmse_m'] for r in mine):.3f} | "
+            f"{ratio.mean:.3f} ± {ratio.ci95:.3f} | {ratio.max:.3f} | {_mean(r['gap_closed'] for r in mine):.2f} | "
+            f"{_mean(r['rmse_m'] / r['rmse_stationary_m'] for r in mine):.3f} | "
+            f"{f'{np.mean(recorded):.3f}' if recorded else ''} |"
+        )
+    patchy = [value for name, value in means.items() if name in PATCHY]
+    rows += ["", f"Mean ratio over all terrains {np.mean(list(means.values())):.3f}, worst {max(means.values()):.3f}"]
+    rows[-1] += f"; over the patchy ones {np.mean(patchy):.3f}." if patchy else "."
+    return rows
+
+
+def _mean(values: Iterable[float]) -> float:
+    return float(np.nanmean(list(values)))
+
+
+def _numbers(text: str) -> list[int]:
+    first, colon, end = text.partition(":")
+    return list(range(int(first), int(end))) if colon else [int(part) for part in text.split(",")]
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--terrains", type=Path, help="folder of terrain files")
+    parser.add_argument("--symmetries", type=_numbers, default=list(range(8)))
+    parser.add_argument("--budgets", default="2.5,1.0", help="largest steps in metres")
+    parser.add_argument("--samplings", default="step,continuous")
+    parser.add_argument("--sounders", default="single")
+    parser.add_argument("--only", help="terrains, separated by commas")
+    parser.add_argument("--jobs", type=int, default=1)
+    parser.add_argument("--out", type=Path, default=Path("docs/results"))
+    parser.add_argument("--no-run", action="store_true")
+    given = parser.parse_args()
+    floors = sea_floors(given.terrains)
+    if given.only:
+        wanted = given.only.split(",")
+        lacking = set(wanted) - {floor.name for floor in floors}
+        if lacking:
+            parser.error(f"--only: there is no {', '.join(sorted(lacking))}")
+        floors = [floor for floor in floors if floor.name in wanted]
+    budgets = [float(part) for part in given.budgets.split(",")]
+    jobs = study_jobs(floors, given.symmetries, budgets, given.samplings.split(","), given.sounders.split(","))
+    given.out.mkdir(parents=True, exist_ok=True)
+    results = Results(given.out / "survey.jsonl")
+    open_ = [] if given.no_run else [job for job in jobs if job.key not in results.runs]
+    with ProgressBar(disable=not open_) as bar:
+        task = bar.add_task("surveys", total=len(open_))
+        for run in run_jobs(open_, given.jobs, lambda job, step: bar.update(task, description=job.title)):
+            results.add(run)
+            bar.advance(task)
+    facts = made("python benchmarks/survey_study.py --terrains FOLDER", given.jobs)
+    (given.out / "survey.md").write_text(report(list(results.runs.values()), facts), encoding="utf-8")
+    print(f"{given.out / 'survey.md'}: {len(open_)} runs made, {len(results.runs)} kept")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,72 @@
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from app.exploration.routes import fly, next_waypoint
+from app.exploration.survey_search import DRAWS, improve
+from app.exploration.survey_value import Objective, lower_to_segment, make_nodes, plan_value
+
+SQUARE = np.array([[0.0, 0.0], [100.0, 0.0], [100.0, 100.0], [0.0, 100.0]])
+coordinate = st.floats(0.0, 100.0)
+
+
+def nodes_of(seed=0, n=400):
+    rng = np.random.default_rng(seed)
+    return make_nodes(rng.uniform(0.0, 100.0, (n, 2)), rng.gamma(1.0, 1.0, n))
+
+
+def distance_to_segment(points, a, b):
+    along = b - a
+    t = np.clip((points - a) @ along / max(along @ along, 1e-12), 0.0, 1.0)
+    return np.hypot(*(points - a - t[:, None] * along).T)
+
+
+@settings(max_examples=50, deadline=None)
+@given(coordinate, coordinate, coordinate, coordinate, st.floats(1.0, 150.0))
+def test_nodes_within_reach_of_a_leg_get_their_distance_to_it(ax, ay, bx, by, reach):
+    nodes = nodes_of()
+    d2 = np.full(len(nodes.x), np.inf)
+    lower_to_segment(d2, nodes, ax, ay, bx, by, reach)
+    true = distance_to_segment(nodes.en_m, np.array([ax, ay]), np.array([bx, by]))
+    near = true <= reach
+    np.testing.assert_allclose(np.sqrt(d2[near]), true[near], atol=1e-6)
+    assert (np.sqrt(d2[~near]) >= reach - 1e-6).all()
+
+
+@settings(max_examples=50, deadline=None)
+@given(st.lists(st.tuples(coordinate, coordinate), min_size=1, max_size=6), st.floats(0.5, 12.0), st.integers(1, 80))
+def test_a_route_is_flown_leg_by_leg_however_many_are_taken_at_once(route, step, steps):
+    route = np.array(route)
+    vertices = np.empty((steps + 2, 2))
+    n, used = fly(3.0, 4.0, route, len(route), step, steps, vertices)
+    x, y, first, legs = 3.0, 4.0, 0, 0
+    while legs < steps and first < len(route):
+        nx, ny, first = next_waypoint(x, y, route, first, len(route), step)
+        if np.hypot(nx - x, ny - y) < 1e-9:
+            break
+        x, y, legs = nx, ny, legs + 1
+    assert used == legs
+    np.testing.assert_allclose(vertices[n - 1], [x, y], atol=1e-6)
+
+
+def test_searching_never_worsens_a_plan_and_says_truly_what_it_is_worth():
+    nodes = nodes_of(1)
+    starts, headings = np.array([[2.0, 2.0], [7.0, 2.0]]), np.full(2, np.nan)
+    objective = Objective(5.0, 60, 15.0, 2.0, 0.002)
+    d2 = np.full(len(nodes.x), np.inf)
+    vias = np.zeros((2, 40, 2))
+    vias[:, :2] = [[[20.0, 90.0], [40.0, 10.0]], [[70.0, 90.0], [90.0, 10.0]]]
+    counts, locked = np.array([2, 2]), np.array([1, 0])
+    before = plan_value(d2, nodes, objective, starts, headings, vias, counts)
+    draws = np.random.default_rng(0).random((1500, DRAWS))
+    none = np.zeros((0, 2)), np.zeros(1, np.int64)
+    after, after_counts, value = improve(
+        d2, nodes, objective, starts, headings, vias, counts, locked, 5.0, SQUARE, *none, True, 0.5, 0.01, draws
+    )
+    assert value < 0.9 * before
+    assert value == pytest.approx(plan_value(d2, nodes, objective, starts, headings, after, after_counts))
+    np.testing.assert_array_equal(after[0, 0], vias[0, 0])
+    for j in range(2):
+        route = after[j, : after_counts[j]]
+        assert ((route >= 0.5 - 1e-9) & (route <= 99.5 + 1e-9)).all()
