@@ -15,6 +15,7 @@ import imcpy
 
 from imc_bridge.acoustics import SoundPath
 from imc_bridge.codec import BROADCAST_ID, Decoder, Header, Message, encode
+from imc_bridge.consoles import Board
 from imc_bridge.discovery import Announcement, own_announce, read_announce
 from imc_bridge.events import (
     BridgeEvent,
@@ -119,6 +120,8 @@ class Bridge:
         self._on_event: EventCallback = lambda _event: None
         self._roster = Roster(settings)
         self._seabed = Seabed()
+        self.board = Board(settings.name)
+        """What other consoles are shown."""
         self._followers: dict[int, Follower] = {}
         self._guidance: dict[int, Guidance] = {}
         self._rates: dict[int, RateRequest] = {}
@@ -326,6 +329,10 @@ class Bridge:
         for node in self._roster:
             if node.is_vehicle and self._talks_to(node):
                 self._tick_vehicle(node, now)
+        for message in self.board.due(now):
+            for node in self._roster:
+                if self._is_other_console(node):
+                    self._send(node, message)
         self._roster.pass_time(now)
         for node in self._roster:
             self._check_link(node, now)
@@ -563,6 +570,14 @@ class Bridge:
             self._tell(refused)
 
     # Nodes
+
+    def _is_other_console(self, node: Node) -> bool:
+        return (
+            self._commanding
+            and node.address is not None
+            and node.announcement is not None
+            and node.announcement.system_type == int(imcpy.SystemType.CCU)
+        )
 
     def _talks_to(self, node: Node) -> bool:
         wanted = self.settings.vehicles

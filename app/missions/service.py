@@ -111,6 +111,7 @@ class MissionService:
         self._sim = SimFleetLink(settings.simulation, settings.time_scale)
         links: list[FleetLink] = [self._rest, self._sim]
         self._examine: Examine = switched_off
+        self._show_area: Callable[[str, Sequence[tuple[float, float]]], None] = lambda _mission, _ring: None
         self._lead: Callable[[str, str, str | None], None] = lambda _vehicle, _guidance, _gateway: None
         if settings.imc.enabled:
             from app.missions.links.imc import make_imc_link
@@ -118,6 +119,7 @@ class MissionService:
             imc = make_imc_link(settings.imc, settings.time_scale)
             self._examine = imc.diagnosis
             self._lead = imc.lead
+            self._show_area = imc.show_area
             links.append(imc)
         if settings.neptus.enabled:
             from app.missions.neptus import NeptusSessions
@@ -723,6 +725,7 @@ class MissionService:
         self._hub.claim(key, live.id, live.receive)
         if vehicle.kind is VehicleKind.IMC:
             self._lead(vehicle.name, vehicle.guidance, vehicle.gateway)
+            self._show_area(live.spec.name, live.spec.area.ring)
         if vehicle.kind is VehicleKind.SIM:
             try:
                 self._launch(live, vehicle)
@@ -748,6 +751,7 @@ class MissionService:
             raise ConflictError(f"vehicle {vehicle.name!r} cannot be launched: {error}", "change its start") from error
 
     def _release_team(self, live: LiveMission) -> None:
+        self._show_area(live.spec.name, ())
         for member in live.team:
             self._hub.release(member.key, live.id)
 

@@ -33,6 +33,7 @@ from imc_bridge import (
     Waypoint,
     WaypointChange,
 )
+from imc_bridge.consoles import Mark
 from imc_bridge.doctor import Diagnosis, judge
 
 _UNENGAGED = {
@@ -44,6 +45,8 @@ _UNENGAGED = {
     NodeState.LOST: LinkState.LOST,
     NodeState.EXPECTED_OFFLINE: LinkState.EXPECTED_OFFLINE,
 }
+MAX_CORNERS = 24
+"""Of an area that are shown to other consoles."""
 _SILENT = frozenset({NodeState.LOST, NodeState.EXPECTED_OFFLINE})
 
 
@@ -102,6 +105,14 @@ class ImcFleetLink:
         """Say how a vehicle shall be led from its next engagement on, as its mission describes it."""
         self._led[vehicle] = Guidance(guidance), gateway or ""
 
+    def show_area(self, mission: str, ring: Sequence[tuple[float, float]]) -> None:
+        """Show a mission's area on other consoles' maps, corner by corner: (longitude, latitude); empty: no longer."""
+        board = self._bridge.board
+        for name in [name for name in board.marks if name.startswith(f"{mission} corner ")]:
+            board.show(name, None)
+        for index, (lon, lat) in enumerate(ring[:MAX_CORNERS]):
+            board.show(f"{mission} corner {index + 1}", Mark("Area", lat, lon))
+
     async def engage(self, vehicle: str) -> None:
         """Make the vehicle ours; raises VehicleRefusedError.
 
@@ -136,9 +147,14 @@ class ImcFleetLink:
             self._bridge.goto(order.vehicle, waypoint)
         except RefusedError as error:
             raise VehicleRefusedError(order.vehicle, error.reason, error.remedy) from error
+        place = order.position
+        self._bridge.board.show(
+            f"waypoint of {order.vehicle}", Mark("Waypoint", place.lat_deg, place.lon_deg, place.depth_m)
+        )
 
     async def stop(self, vehicle: str, *, timeout_s: float = 3.0) -> StopReceipt:
         """Stop the vehicle; a plan of another console is left alone."""
+        self._bridge.board.show(f"waypoint of {vehicle}", None)
         result = await self._bridge.stop(vehicle, timeout_s=timeout_s)
         return StopReceipt(result.vehicle, result.acknowledged, result.detail)
 

@@ -1116,8 +1116,8 @@ export interface components {
             alpha_floor: number;
             /**
              * Search
-             * @description Most changes to the survey plan tried in a step.
-             * @default 1500
+             * @description Changes tried when a survey plan is made anew.
+             * @default 4000
              */
             search: number;
             /**
