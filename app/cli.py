@@ -3,6 +3,8 @@
 import asyncio
 import json
 import sys
+from collections.abc import AsyncIterator, Iterator
+from contextlib import asynccontextmanager
 from datetime import UTC, datetime
 from enum import StrEnum
 from pathlib import Path
@@ -13,6 +15,8 @@ import typer
 from app import __version__
 
 if TYPE_CHECKING:
+    from app.missions.service import MissionService
+    from app.missions.views import LogImportView
     from app.settings import Settings
     from imc_bridge.doctor import Diagnosis
 
@@ -251,29 +255,13 @@ def export(
     """Write a mission's map or soundings to a file, from the database; no service has to run."""
     settings = _settings(database_url=database)
     from app.missions.maps import FORMATS, Product
-    from app.missions.service import MissionService
-    from app.storage.database import Database as Store
-    from app.storage.prepare import prepare_database
 
     if format not in FORMATS:
         raise typer.BadParameter(f"{format!r} is not one of {', '.join(FORMATS)}", param_hint="--format")
 
     async def run() -> Product:
-        await prepare_database(settings.database_url, may_upgrade=settings.migrates_itself)
-        store = Store(settings.database_url)
-        # Nothing is started: the links stay closed, whatever a service on this database is doing.
-        closed = settings.service().model_copy(update={"imc": settings.imc.model_copy(update={"enabled": False})})
-        service = MissionService(closed, store)
-        try:
-            every = await service.missions()
-            meant = [summary.id for summary in every if summary.id.startswith(mission)]
-            if len(meant) != 1:
-                ids = "; ".join(f"{summary.id} {summary.name}" for summary in every[:5]) or "none"
-                raise CommandError(f"{len(meant)} missions have ids that begin with {mission!r}", f"There are: {ids}")
-            return await service.export(meant[0], format)
-        finally:
-            await service.shutdown()
-            await store.close()
+        async with _closed_service(settings) as service:
+            return await service.export(await _meant(service, mission), format)
 
     product = asyncio.run(run())
     if out == Path("-"):
@@ -286,6 +274,101 @@ def export(
     except OSError as error:
         raise CommandError(f"{path} cannot be written: {error.strerror}") from None
     typer.echo(f"{path}: {len(product.content)} bytes")
+
+
+@app.command("import")
+def import_logs(
+    mission: Annotated[str, typer.Argument(metavar="MISSION", help="Its id, or the begin of it.")],
+    logs: Annotated[list[Path], typer.Argument(metavar="LOG...", help="DUNE logs: Data.lsf or Data.lsf.gz.")],
+    vehicle: Annotated[
+        str | None, typer.Option(help="Name of the vehicle [default: the one that the log announces]")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+    database: Database = None,
+) -> None:
+    """Take the soundings of vehicles' own logs into a mission. Begun again after a crash, nothing is stored twice."""
+    settings = _settings(database_url=database)
+    import getpass
+
+    from rich.console import Console
+    from rich.progress import BarColumn, DownloadColumn, Progress, TextColumn, TimeRemainingColumn
+
+    from app.missions.views import LogImportView
+
+    console = Console(stderr=True)
+    columns = (TextColumn("{task.description}"), BarColumn(), DownloadColumn(), TimeRemainingColumn())
+
+    views: list[LogImportView] = []
+
+    async def run(bar: Progress) -> None:
+        async with _closed_service(settings) as service:
+            mission_id = await _meant(service, mission)
+            for path in logs:
+                task = bar.add_task(path.name, total=None)
+
+                def show(done: int, total: int, task: Any = task) -> None:
+                    bar.update(task, completed=done, total=total)
+
+                views.append(
+                    await service.import_log(
+                        mission_id, path, vehicle=vehicle, actor=f"{getpass.getuser()} at the console", progress=show
+                    )
+                )
+
+    try:
+        with Progress(*columns, console=console, disable=not console.is_terminal) as bar:
+            asyncio.run(run(bar))
+    finally:
+        # What one log brought is told also when the next one cannot be read.
+        if as_json:
+            typer.echo(json.dumps([view.model_dump() for view in views], indent=2))
+        else:
+            typer.echo("\n".join(line for view in views for line in _import_lines(view)), nl=bool(views))
+
+
+def _import_lines(view: "LogImportView") -> Iterator[str]:
+    yield (
+        f"{view.file}: {view.vehicle}, {view.soundings} soundings accepted, {view.rejected} rejected, "
+        f"{view.duplicate} there before" + (" (imported before, nothing new)" if view.known else "")
+    )
+    for reason, count in sorted(view.reasons.items(), key=lambda item: -item[1]):
+        yield f"  {count} rejected: {reason}"
+    for reason, count in sorted(view.refused.items(), key=lambda item: -item[1]):
+        yield f"  {count} ranges refused: {reason}"
+    for reason, count in view.unreadable.items():
+        yield f"  {count} packets unreadable: {reason}"
+    if view.skipped_bytes:
+        yield f"  {view.skipped_bytes} bytes skipped that are no packet"
+    if view.cut_off:
+        yield "  the file ends in the middle; what came before is used"
+
+
+@asynccontextmanager
+async def _closed_service(settings: "Settings") -> AsyncIterator["MissionService"]:
+    """Yield the missions of the database. Nothing is started: the links stay closed, whatever a service is doing."""
+    from app.missions.service import MissionService
+    from app.storage.database import Database as Store
+    from app.storage.prepare import prepare_database
+
+    await prepare_database(settings.database_url, may_upgrade=settings.migrates_itself)
+    store = Store(settings.database_url)
+    closed = settings.service().model_copy(update={"imc": settings.imc.model_copy(update={"enabled": False})})
+    service = MissionService(closed, store)
+    try:
+        yield service
+    finally:
+        await service.shutdown()
+        await store.close()
+
+
+async def _meant(service: "MissionService", begin: str) -> str:
+    """Return the id that begins so. Raises CommandError when none or several do."""
+    every = await service.missions()
+    meant = [summary.id for summary in every if summary.id.startswith(begin)]
+    if len(meant) != 1:
+        ids = "; ".join(f"{summary.id} {summary.name}" for summary in every[:5]) or "none"
+        raise CommandError(f"{len(meant)} missions have ids that begin with {begin!r}", f"There are: {ids}")
+    return meant[0]
 
 
 @app.command()

@@ -16,6 +16,7 @@ from starlette.middleware.cors import CORSMiddleware
 
 from app import __version__
 from app.api import fleet, logs, maps, measurements, missions, openapi, problems, streams
+from app.api.auth import console_log_in
 from app.api.health import health_router
 from app.api.middleware import BodyMiddleware, RequestMiddleware
 from app.api.schemas import API
@@ -23,7 +24,7 @@ from app.api.state import EdgeState
 from app.api.tokens import TokenStore
 from app.dashboard.serve import mount_dashboard
 from app.missions.service import MissionService
-from app.settings import Settings, StartupError, load_settings
+from app.settings import Settings, StartupError, is_loopback, load_settings
 from app.storage.database import Database
 from app.storage.prepare import prepare_database
 
@@ -50,7 +51,18 @@ def create_app(settings: Settings | None = None) -> FastAPI:
                     f"host is {settings.host}, which other machines reach, but there is no access token: "
                     "make one with 'bathyfleet token create NAME --role operator', or allow everyone with --insecure"
                 )
-            service = MissionService(settings.service(), database)
+            if settings.neptus.enabled and not (
+                is_loopback(settings.neptus.host) or settings.insecure or await tokens.any()
+            ):
+                raise StartupError(
+                    f"neptus.host is {settings.neptus.host}, which other machines reach, but there is no access token: "
+                    "make one with 'bathyfleet token create NAME --role operator'; it is the panel's password"
+                )
+            service = MissionService(
+                settings.service(),
+                database,
+                lambda password, host: console_log_in(tokens, password, host, insecure=settings.insecure),
+            )
             app.state.edge = EdgeState(settings, service, tokens)
             await service.startup()
             try:

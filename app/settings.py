@@ -16,7 +16,7 @@ from pydantic_settings import (
     TomlConfigSettingsSource,
 )
 
-from app.missions.settings import ImcSettings, ServiceSettings, SimulationSettings
+from app.missions.settings import ImcSettings, NeptusSettings, ServiceSettings, SimulationSettings
 
 PREFIX = "BATHYFLEET_"
 CONFIG_VARIABLE = "BATHYFLEET_CONFIG"
@@ -85,6 +85,7 @@ class Settings(BaseSettings):
         default=1.0, gt=0, le=1000, description="How much faster than wall time simulated vehicles live"
     )
     imc: ImcSettings = Field(default=ImcSettings(), description="The link to IMC vehicles")
+    neptus: NeptusSettings = Field(default=NeptusSettings(), description="The gateway for Neptus' ConvCAO panel")
     simulation: SimulationSettings = Field(
         default=SimulationSettings(), description="The world of vehicles of kind sim"
     )
@@ -133,6 +134,7 @@ class Settings(BaseSettings):
             database_url=self.database_url,
             time_scale=self.time_scale,
             imc=self.imc,
+            neptus=self.neptus,
             simulation=self.simulation,
         )
 

@@ -4,6 +4,7 @@ from imc_bridge.bridge import Bridge
 from imc_bridge.events import (
     BottomPoint,
     BridgeEvent,
+    Guidance,
     LinkChange,
     NodeState,
     NodeView,
@@ -24,6 +25,7 @@ __all__ = [
     "Bridge",
     "BridgeEvent",
     "BridgeSettings",
+    "Guidance",
     "LinkChange",
     "NodeState",
     "NodeView",

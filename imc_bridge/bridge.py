@@ -9,15 +9,18 @@ import logging
 import math
 import time
 from collections import Counter, deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import imcpy
 
+from imc_bridge.acoustics import SoundPath
 from imc_bridge.codec import BROADCAST_ID, Decoder, Header, Message, encode
+from imc_bridge.consoles import Board
 from imc_bridge.discovery import Announcement, own_announce, read_announce
 from imc_bridge.events import (
     BridgeEvent,
     EventCallback,
+    Guidance,
     LinkChange,
     NodeState,
     NodeView,
@@ -27,11 +30,13 @@ from imc_bridge.events import (
     Waypoint,
 )
 from imc_bridge.follow import Follower, Phase
+from imc_bridge.legs import LegFollower
 from imc_bridge.nodes import Node
 from imc_bridge.rates import RateRequest
 from imc_bridge.roster import Roster
 from imc_bridge.seabed import Seabed
 from imc_bridge.settings import BridgeSettings
+from imc_bridge.soundings import offer_distance
 from imc_bridge.transport import Address, Transport
 from imc_bridge.vehicle_clock import Tick
 
@@ -49,6 +54,7 @@ WANTED = (
     "NavigationUncertainty",
     "PlanControl",
     "PlanControlState",
+    "TransmissionStatus",
     "VehicleMedium",
     "VehicleState",
 )
@@ -114,7 +120,10 @@ class Bridge:
         self._on_event: EventCallback = lambda _event: None
         self._roster = Roster(settings)
         self._seabed = Seabed()
+        self.board = Board(settings.name)
+        """What other consoles are shown."""
         self._followers: dict[int, Follower] = {}
+        self._guidance: dict[int, Guidance] = {}
         self._rates: dict[int, RateRequest] = {}
         self._links: dict[int, deque[LinkChange]] = {}
         self._state_reported: dict[int, float] = {}
@@ -191,8 +200,15 @@ class Bridge:
         now = self._now()
         return tuple(self._view(node, now) for node in self._roster)
 
-    async def engage(self, vehicle: str) -> None:
-        """Start our plan on the vehicle and wait until it follows; it then holds its place at the surface.
+    async def engage(self, vehicle: str, guidance: Guidance = Guidance.FOLLOW, gateway: str = "") -> None:
+        """Make the vehicle ours: with references it then holds its place at the surface, with legs it floats.
+
+        Parameters
+        ----------
+        vehicle
+        guidance
+        gateway
+            Name of the node with the modem, for guidance ``acoustic``.
 
         Raises
         ------
@@ -205,7 +221,10 @@ class Bridge:
         if node is None:
             known = ", ".join(n.name for n in self._roster if n.is_vehicle) or "none"
             raise RefusedError(vehicle, f"never heard of (known: {known})", "Switch it on; see `bathyfleet doctor`")
+        self._guide(node, guidance)
         follower = self._follower(node)
+        if guidance is Guidance.ACOUSTIC:
+            self._attach_sound(node, follower, gateway)
         if not follower.engaged and follower.engage(self._now()):
             self._rate_request(node).begin()
         while follower.engaged and follower.phase is not Phase.FOLLOWING:
@@ -263,7 +282,7 @@ class Bridge:
                     vehicle,
                     False,
                     f"no acknowledgement within {timeout_s:g} s{f' ({reason})' if reason else ''}; "
-                    "references have ceased, so its plan ends by itself",
+                    f"{follower.unheard_stop}",
                 )
             if waited >= STOP_ESCALATION * timeout_s:
                 follower.escalate_stop()
@@ -310,6 +329,10 @@ class Bridge:
         for node in self._roster:
             if node.is_vehicle and self._talks_to(node):
                 self._tick_vehicle(node, now)
+        for message in self.board.due(now):
+            for node in self._roster:
+                if self._is_other_console(node):
+                    self._send(node, message)
         self._roster.pass_time(now)
         for node in self._roster:
             self._check_link(node, now)
@@ -476,6 +499,8 @@ class Bridge:
     def _relayed(self, via: Node, packet: bytes, now: float) -> None:
         follower = self._followers.get(via.imc_id)
         message = self.decoder.message(packet)
+        if isinstance(message, imcpy.EstimatedState):
+            self._heard_by_sound(via, message, now)
         if follower is None or message is None:
             return
         if isinstance(message, imcpy.Abort):
@@ -514,6 +539,10 @@ class Bridge:
                 follower.plan_control_reply(message, now)
             case "VehicleMedium":
                 node.medium = int(message.medium)
+            case "TransmissionStatus":
+                for other in self._by_sound_through(node):
+                    if other.sound is not None:
+                        other.left_by_sound(other.sound.status(message), now)
             case "FuelLevel":
                 node.battery_pct = float(message.value)
             case "EntityList" if message.op == imcpy.EntityList.OperationEnum.REPORT:
@@ -536,20 +565,19 @@ class Bridge:
             self._tell(result)
 
     def _take_distance(self, node: Node, message: Message) -> None:
-        lever_arm = (0.0, 0.0, 0.0)
-        for device in message.location:
-            # The wire lets any message stand where a DeviceState belongs.
-            if isinstance(device, imcpy.DeviceState):
-                lever_arm = (float(device.x), float(device.y), float(device.z))
-            break
-        valid = message.validity == imcpy.Distance.ValidityEnum.VALID
-        refused = node.gate.offer(
-            message.timestamp, node.entity_name(int(message.src_ent)), valid, float(message.value), lever_arm
-        )
+        refused = offer_distance(node.gate, node.entity_name(int(message.src_ent)), message)
         if refused is not None:
             self._tell(refused)
 
     # Nodes
+
+    def _is_other_console(self, node: Node) -> bool:
+        return (
+            self._commanding
+            and node.address is not None
+            and node.announcement is not None
+            and node.announcement.system_type == int(imcpy.SystemType.CCU)
+        )
 
     def _talks_to(self, node: Node) -> bool:
         wanted = self.settings.vehicles
@@ -561,10 +589,57 @@ class Bridge:
     def _controlled(self) -> list[tuple[Node, Follower]]:
         return [(self._roster[imc_id], follower) for imc_id, follower in self._followers.items()]
 
+    def _guide(self, node: Node, guidance: Guidance) -> None:
+        """Change how a vehicle is led, unless it is being led or stopped now."""
+        follower = self._followers.get(node.imc_id)
+        if self._guidance.get(node.imc_id, Guidance.FOLLOW) is guidance:
+            return
+        if follower is None or not (follower.engaged or follower.phase is Phase.STOPPING):
+            self._guidance[node.imc_id] = guidance
+            self._followers.pop(node.imc_id, None)
+
+    def _attach_sound(self, node: Node, follower: Follower, gateway: str) -> None:
+        via = self._roster.named(gateway)
+        if via is None or via.address is None:
+            known = ", ".join(other.name for other in self._roster if not other.is_vehicle) or "none"
+            raise RefusedError(
+                node.name,
+                f"its acoustic gateway {gateway!r} was never heard of (other nodes: {known})",
+                "Switch the gateway on, or name another one",
+            )
+        if isinstance(follower, LegFollower) and (follower.sound is None or follower.sound.gateway != gateway):
+            follower.attach(
+                SoundPath(
+                    node.name,
+                    gateway,
+                    lambda message: self._send(via, message),
+                    lambda: next(self._request_ids) & 0xFFFF,
+                    self._wall_clock,
+                    self.settings.time_scale,
+                ),
+                lambda message: self._send(node, message),
+                self._now,
+            )
+
+    def _by_sound_through(self, gateway: Node) -> Iterator[LegFollower]:
+        """The vehicles that are spoken to through a gateway."""
+        for follower in self._followers.values():
+            if isinstance(follower, LegFollower) and follower.sound and follower.sound.gateway == gateway.name:
+                yield follower
+
+    def _heard_by_sound(self, gateway: Node, message: Message, now: float) -> None:
+        """Take a vehicle's report that its gateway has made an EstimatedState of."""
+        for follower in self._by_sound_through(gateway):
+            if follower.node.imc_id == int(message.src) and follower.sound is not None:
+                report = follower.sound.take_report(message)
+                if report is not None:
+                    follower.reported_by_sound(report, now)
+
     def _follower(self, node: Node) -> Follower:
         follower = self._followers.get(node.imc_id)
         if follower is None:
-            follower = self._followers[node.imc_id] = Follower(
+            kind = Follower if self._guidance.get(node.imc_id, Guidance.FOLLOW) is Guidance.FOLLOW else LegFollower
+            follower = self._followers[node.imc_id] = kind(
                 node,
                 self.settings,
                 lambda message: self._send(node, message),

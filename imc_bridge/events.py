@@ -25,6 +25,17 @@ class NodeState(StrEnum):
     """Silent under water in a plan that needs no contact."""
 
 
+class Guidance(StrEnum):
+    """How a vehicle is led."""
+
+    FOLLOW = "follow"
+    """By references, one a second: it can be led anew at any moment, and ends its plan when they cease."""
+    LEGS = "legs"
+    """By a plan for each whole leg: needs no contact under way, and cannot be led anew or guarded meanwhile."""
+    ACOUSTIC = "acoustic"
+    """By legs; while radio is silent plans, stops and reports go by sound through a gateway."""
+
+
 class WaypointStatus(StrEnum):
     """The life of one waypoint on its vehicle."""
 

@@ -220,6 +220,9 @@ class Follower:
         What all vehicles have measured of the bottom.
     """
 
+    unheard_stop = "references have ceased, so its plan ends by itself"
+    """What happens to a vehicle that does not acknowledge a stop."""
+
     def __init__(
         self,
         node: Node,

@@ -136,6 +136,9 @@ class Node:
         self.plan_state: int | None = None
         self.plan_state_at: float | None = None
         self.plan_id = ""
+        self.plan_outcome: int | None = None
+        self.expected_back: float | None = None
+        """Until when its silence is part of a plan of ours, seconds of the bridge's clock."""
         self.controller: int | None = None
         """Whose references its FollowReference maneuver takes, by its own account."""
         self.medium: int | None = None
@@ -263,6 +266,7 @@ class Node:
         self.plan_state = int(message.state)
         self.plan_state_at = now
         self.plan_id = str(message.plan_id)
+        self.plan_outcome = int(message.last_outcome)
         if self.plan_state not in (PlanState.EXECUTING, PlanState.INITIALIZING):
             self.controller = None
 
@@ -273,13 +277,7 @@ class Node:
 
     def take_entities(self, message: Message) -> None:
         """EntityList report: ``Name=id;…``."""
-        entities = {}
-        for item in str(message.list).split(";"):
-            name, separator, number = item.rpartition("=")
-            if separator and number.isdigit():
-                entities[int(number)] = name
-        if entities:
-            self.entities = entities
+        self.entities = listed_entities(message) or self.entities
 
     def entity_name(self, entity: int) -> str | None:
         """Name of an entity, None while names are unknown; an id the list lacks has the name ``entity N``."""
@@ -295,7 +293,7 @@ class Node:
     @property
     def references_needed(self) -> bool:
         """Whether what it executes is our FollowReference plan, which ends by itself when references cease."""
-        return self.executing(self._settings.plan_id)
+        return self.executing(self._settings.plan_id) and self.expected_back is None
 
     @property
     def patience_s(self) -> float:
@@ -337,7 +335,7 @@ class Node:
             return self._without_telemetry(now, self.announced_at, self.first_announced_at)
         silence = math.inf if self.heard_at is None else now - self.heard_at
         if silence > lost_after:
-            return self._silent(silence)
+            return self._silent(silence, now)
         if self.operation_mode is None or self.plan_state is None:
             return Status(NodeState.ACTIVE, "waiting for its VehicleState and PlanControlState")
         if self.plan_state in (PlanState.EXECUTING, PlanState.INITIALIZING):
@@ -369,8 +367,14 @@ class Node:
             f"or a firewall blocks UDP port {self._settings.port}",
         )
 
-    def _silent(self, silence: float) -> Status:
+    def _silent(self, silence: float, now: float) -> Status:
         seconds = silence / self._settings.time_scale
+        if self.expected_back is not None and now <= self.expected_back:
+            left = (self.expected_back - now) / self._settings.time_scale
+            return Status(
+                NodeState.EXPECTED_OFFLINE,
+                f"silent for {seconds:.0f} s on a leg of ours, expected back within {left:.0f} s",
+            )
         if self.submerged and self.plan_state == PlanState.EXECUTING and silence <= self.patience_s:
             whose = "our plan" if self.executing(self._settings.plan_id) else f"plan {self.plan_id!r}"
             comes_up = "; without references that ends and it comes up" if self.references_needed else ""
@@ -398,6 +402,16 @@ class Node:
     def plan_state_name(self) -> str | None:
         """The state of plan control in words."""
         return None if self.plan_state is None else _enum_name(PlanState, self.plan_state)
+
+
+def listed_entities(message: Message) -> dict[int, str]:
+    """Names by id of an EntityList report; empty when it lists none."""
+    entities = {}
+    for item in str(message.list).split(";"):
+        name, separator, number = item.rpartition("=")
+        if separator and number.isdigit():
+            entities[int(number)] = name
+    return entities
 
 
 def _fresh(at: float | None, now: float) -> bool:

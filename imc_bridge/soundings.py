@@ -13,13 +13,17 @@ from collections import Counter, deque
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+import imcpy
 from imcpy.coordinates import WGS84
 
+from imc_bridge.codec import Message
 from imc_bridge.events import Sounding, SoundingRefused
 from imc_bridge.settings import AltimeterGeometry
 
 JANUS_ANGLE_RAD = math.radians(22.5)
 """Angle between each of a DVL's four beams and its axis."""
+DVL_FILTERED_INDEX = 4
+"""A number of its own: it comes at the same instant as the beams 0 to 3, and a time and a beam make one sounding."""
 MAX_STATE_GAP_S = 2.0
 """States further apart than this are not interpolated (they come every 0.5 s by default)."""
 MAX_EDGE_S = 0.6
@@ -51,7 +55,7 @@ def beam_table(altimeter: AltimeterGeometry) -> dict[str, Beam]:
     """
     table = {
         "Altimeter": Beam(body_fixed=altimeter == "body"),
-        "DVL Filtered": Beam(body_fixed=altimeter == "body"),
+        "DVL Filtered": Beam(DVL_FILTERED_INDEX, body_fixed=altimeter == "body"),
     }
     for index in range(4):
         table[f"DVL Beam {index}"] = Beam(index, math.radians(90.0 * index), JANUS_ANGLE_RAD)
@@ -309,6 +313,24 @@ class SoundingGate:
                 position_sd_m=position_sd_m,
             )
 
+    def give_up(self) -> Iterator[SoundingRefused]:
+        """Refuse what is still pending: no further state will come, as at the end of a log."""
+        while self._pending:
+            ping = self._pending.popleft()
+            yield self._refuse(ping.time_s, ping.source, ping.range_m, "no state of the vehicle around its time")
+
     def _refuse(self, time_s: float, source: str, range_m: float, reason: str) -> SoundingRefused:
         self.refused[reason] += 1
         return SoundingRefused(self.vehicle, time_s, source, range_m, reason)
+
+
+def offer_distance(gate: SoundingGate, source: str | None, message: Message) -> SoundingRefused | None:
+    """Hand a Distance of the entity named ``source`` to its vehicle's gate."""
+    lever_arm = (0.0, 0.0, 0.0)
+    for device in message.location:
+        # The wire lets any message stand where a DeviceState belongs.
+        if isinstance(device, imcpy.DeviceState):
+            lever_arm = (float(device.x), float(device.y), float(device.z))
+        break
+    valid = message.validity == imcpy.Distance.ValidityEnum.VALID
+    return gate.offer(message.timestamp, source, valid, float(message.value), lever_arm)

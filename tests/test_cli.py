@@ -19,6 +19,7 @@ import rasterio
 
 from app.cli import main
 from tests.api.conftest import mission_spec, soundings
+from tests.imc_bridge import log_writer as writer
 
 ROOT = Path(__file__).resolve().parents[1]
 COMMAND = [sys.executable, "-c", "import sys; sys.argv[0] = 'bathyfleet'; from app.cli import main; main()"]
@@ -91,7 +92,7 @@ def serving(folder: Path, environment: dict[str, str], *arguments: str) -> Itera
 def test_help_lists_every_command_without_loading_the_service(bathyfleet: Run) -> None:
     shown = bathyfleet("--help")
     assert shown.code == 0
-    for command in ("serve", "demo", "evaluate", "export", "doctor", "migrate", "token"):
+    for command in ("serve", "demo", "evaluate", "export", "import", "doctor", "migrate", "token"):
         assert command in shown.stdout
     imported = subprocess.run(
         [sys.executable, "-X", "importtime", "-c", "import app.cli"],
@@ -105,7 +106,8 @@ def test_help_lists_every_command_without_loading_the_service(bathyfleet: Run) -
 
 
 @pytest.mark.parametrize(
-    "command", ["serve", "demo", "evaluate", "evaluate explore", "export", "doctor", "migrate", "token", "token create"]
+    "command",
+    ["serve", "demo", "evaluate", "evaluate explore", "export", "import", "doctor", "migrate", "token", "token create"],
 )
 def test_every_command_explains_its_options(bathyfleet: Run, command: str) -> None:
     shown = bathyfleet(*command.split(), "--help")
@@ -125,6 +127,7 @@ def test_every_command_explains_its_options(bathyfleet: Run, command: str) -> No
         (["serve", "--host", "192.0.2.77", "--insecure"], {}, 1, "cannot listen on 192.0.2.77:8080"),
         (["export", "nowhere"], {}, 1, "0 missions have ids that begin with 'nowhere'. There are: none"),
         (["export", "nowhere", "--format", "doc"], {}, 2, "'doc' is not one of tif, xyz"),
+        (["import", "nowhere", "Data.lsf"], {}, 1, "0 missions have ids that begin with 'nowhere'"),
         (["token", "create", "x", "--role", "king"], {}, 2, "king"),
         (["token", "create", "x", "--role", "viewer", "--vehicle", "a"], {}, 2, "only a token of role vehicle"),
         (["token", "revoke", "zzz"], {}, 2, "no valid token has an id that begins with 'zzz'"),
@@ -185,11 +188,16 @@ def test_a_mission_is_served_exported_and_found_again(
     assert written.code == 0, written.stderr
     with rasterio.open(tmp_path / "maps" / "basin.tif") as raster:
         assert raster.count >= 2
+    log = writer.write(tmp_path / "Data.lsf", writer.survey(20))
+    imported = bathyfleet("import", mission["id"][:8], str(log), "nowhere.lsf")
+    assert imported.code == 1
+    assert imported.stdout == "Data.lsf: lauv-log-1, 20 soundings accepted, 0 rejected, 0 there before\n"
+    assert "nowhere.lsf cannot be read: No such file" in imported.stderr
     bathyfleet("export", mission["id"], "--format", "png")
     assert (tmp_path / "output" / "harbour-basin.png").stat().st_size > 1000
 
     with serving(tmp_path, environment) as (process, url), httpx.Client(base_url=f"{url}/api/v1") as client:
-        assert client.get(f"/missions/{mission['id']}").json()["progress"]["soundings"] == 12
+        assert client.get(f"/missions/{mission['id']}").json()["progress"]["soundings"] == 32
         process.terminate()
         assert process.wait(20) == 0
 

@@ -11,7 +11,7 @@ from starlette.requests import HTTPConnection
 
 from app.api.problems import ProblemError
 from app.api.state import EdgeState, State
-from app.api.tokens import Principal, Role
+from app.api.tokens import Principal, Role, TokenStore
 from app.settings import is_loopback
 
 LOCAL_OPERATOR = Principal("local operator", Role.ADMIN)
@@ -55,6 +55,19 @@ async def authenticate(connection: HTTPConnection, state: EdgeState, *, query_to
         "without access tokens only this machine may use the service",
         remedy="Make one on the machine of the service: bathyfleet token create NAME --role operator",
     )
+
+
+async def console_log_in(tokens: TokenStore, password: str, host: str, *, insecure: bool = False) -> str | None:
+    """Return the name of an operator who logs in with a token as password; None: not let in.
+
+    As with HTTP, without any token this machine's own user is an operator.
+    """
+    principal = await tokens.principal(password.strip())
+    if principal is not None:
+        return principal.name if principal.role in OPERATORS else None
+    if not await tokens.any() and (insecure or is_loopback(host)):
+        return LOCAL_OPERATOR.name
+    return None
 
 
 def _unauthenticated(detail: str) -> ProblemError:

@@ -6,7 +6,7 @@ accepted only when that transaction has committed.
 
 import asyncio
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -91,16 +91,7 @@ class Journal:
                 return
             self.travelled_m += leg_m
         self._track_ends[report.vehicle] = end
-        self._positions.append(
-            {
-                "mission_id": self._mission_id,
-                "vehicle": report.vehicle,
-                "time_s": report.time_s,
-                "lat_deg": place.lat_deg,
-                "lon_deg": place.lon_deg,
-                "depth_m": place.depth_m,
-            }
-        )
+        self._positions.append(position_row(self._mission_id, report))
         self._start_pump()
 
     def waypoint(self, report: WaypointReport) -> None:
@@ -135,15 +126,15 @@ class Journal:
             self._count(gated, new)
 
     async def take(
-        self, reports: Sequence[SoundingReport], session: AsyncSession
+        self, reports: Sequence[SoundingReport], session: AsyncSession, *, gate: Gate | None = None
     ) -> tuple[list[ItemVerdict], Callable[[], None]]:
-        """Store soundings in the caller's transaction.
+        """Store soundings in the caller's transaction; ``gate`` judges them in place of the mission's own.
 
         Returns
         -------
         The verdicts in the order of the reports, and what to call once the transaction has committed.
         """
-        gated, new = await self._store(session, reports)
+        gated, new = await self._store(session, reports, gate)
         left = set(new)
         verdicts = []
         for index, item in enumerate(gated):
@@ -169,6 +160,12 @@ class Journal:
         async with self._database.writing() as session:
             session.add(row)
 
+    async def count_again(self, read: Callable[[], Awaitable[Counts]]) -> None:
+        """Let ``read`` take up what another process has written, while nothing is written here."""
+        await self.flush()
+        async with self._writing:
+            self.counts = await read()
+
     async def close(self) -> None:
         """Write what is left and stop."""
         if self._pump is not None:
@@ -190,9 +187,9 @@ class Journal:
                 log.exception("could not write to the database, trying again", mission=self._mission_id)
 
     async def _store(
-        self, session: AsyncSession, reports: Sequence[SoundingReport]
+        self, session: AsyncSession, reports: Sequence[SoundingReport], gate: Gate | None = None
     ) -> tuple[list[GatedSounding], set[sounding_queries.Identity]]:
-        gated = self._gate.check(reports)
+        gated = (gate or self._gate).check(reports)
         received = now()
         rows = [_row(self._mission_id, self.step, received, item) for item in gated if _storable(item)]
         return gated, await sounding_queries.insert_new(session, rows)
@@ -208,6 +205,19 @@ class Journal:
         metrics.SOUNDINGS.labels(Verdict.DUPLICATE).inc(len(gated) - len(fresh))
         if accepted:
             self._on_accepted(np.array([(s.east_m, s.north_m, s.depth_m, s.sd_m) for s in accepted]))
+
+
+def position_row(mission_id: str, report: VehicleReport) -> dict[str, Any]:
+    """Return a point of a vehicle's track as it is stored."""
+    place = report.position
+    return {
+        "mission_id": mission_id,
+        "vehicle": report.vehicle,
+        "time_s": report.time_s,
+        "lat_deg": place.lat_deg,
+        "lon_deg": place.lon_deg,
+        "depth_m": place.depth_m,
+    }
 
 
 def track_length_m(track: Sequence[tuple[float, float]]) -> float:

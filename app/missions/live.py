@@ -39,6 +39,7 @@ from app.missions.views import (
     WaypointsMessage,
     WaypointView,
 )
+from app.storage import events as event_queries
 from app.storage import missions as mission_queries
 from app.storage import soundings as sounding_queries
 from app.storage.database import Database
@@ -83,14 +84,9 @@ class LiveMission:
         self.team = Team()
         self.broadcaster = Broadcaster()
         self.builder = MapBuilder(self.area, spec.cell_m, spec.accuracy_m)
-        gate = Gate(
-            self.frame,
-            Polygon(self.area),
-            margin_m=2 * spec.limits.max_step_m,
-            noise=spec.sounding_noise,
-            tide_level_m=spec.tide.level_m,
+        self.journal = Journal(
+            database, row.id, self.make_gate(), counts, self.broadcaster, lambda rows: self.builder.add(rows)
         )
-        self.journal = Journal(database, row.id, gate, counts, self.broadcaster, self.builder.add)
         self.changed = asyncio.Event()
         """Set whenever a vehicle reported something that the step loop may be waiting for."""
         self.halted = False
@@ -102,6 +98,7 @@ class LiveMission:
         self._executor = executor
         self._waypoints: dict[str, WaypointView] = {}
         self._ticker: asyncio.Task[None] | None = None
+        self._imports_noticed = 0
 
     @classmethod
     async def load(cls, database: Database, hub: FleetHub, executor: Executor, row: MissionRow) -> "LiveMission":
@@ -114,11 +111,13 @@ class LiveMission:
             step = await mission_queries.last_step(session, row.id)
             tracks = await mission_queries.tracks(session, row.id)
             positions = await mission_queries.last_positions(session, row.id)
+            imported = await event_queries.last_event_id(session, row.id, kind="import")
         # Building the spec checks geometry, which takes milliseconds: not on the event loop.
         spec = await asyncio.get_running_loop().run_in_executor(executor, MissionSpec.model_validate, row.spec)
         counts = Counts(counted.get("accepted", 0), counted.get("rejected", 0))
         live = cls(database, hub, executor, row, spec, counts)
         live.builder.add(soundings)
+        live._imports_noticed = imported
         live.journal.travelled_m = sum(track_length_m(track) for track in tracks.values())
         if step is not None:
             live.set_step(step.number, step.objective, step.terms)
@@ -128,6 +127,41 @@ class LiveMission:
                 member.report = _last_report(positions.get(member.name))
         live.show_waypoints([live.waypoint_view(waypoint) for waypoint in waypoints])
         return live
+
+    def make_gate(self) -> Gate:
+        """Return a gate as the mission is described, which has seen no sounding yet."""
+        return Gate(
+            self.frame,
+            Polygon(self.area),
+            margin_m=self.track_margin_m,
+            noise=self.spec.sounding_noise,
+            tide_level_m=self.spec.tide.level_m,
+        )
+
+    @property
+    def track_margin_m(self) -> float:
+        """How far outside the area what vehicles measured still belongs to the mission."""
+        return 2 * self.spec.limits.max_step_m
+
+    async def notice_imports(self) -> None:
+        """Take up the soundings of logs that the command line imported while this process had the mission."""
+        async with self._database.reading() as session:
+            newest = await event_queries.last_event_id(session, self.id, kind="import")
+        if newest <= self._imports_noticed:
+            return
+
+        async def read() -> Counts:
+            async with self._database.reading() as session:
+                counted = await sounding_queries.counts(session, self.id)
+                soundings = await sounding_queries.accepted_arrays(session, self.id)
+            versions = self.builder.newest.version if self.builder.newest else 0
+            self.builder = MapBuilder(self.area, self.spec.cell_m, self.spec.accuracy_m, versions)
+            self.builder.add(soundings)
+            return Counts(counted.get("accepted", 0), counted.get("rejected", 0))
+
+        await self.journal.count_again(read)
+        self._imports_noticed = newest
+        self.publish_summary()
 
     def halt(self) -> None:
         """Keep the step loop from sending anything more, and wake everyone who waits for a waypoint."""

@@ -48,9 +48,15 @@ class MapBuilder:
     """Collects soundings and makes maps of them.
 
     ``add`` may be called from the event loop at any time; ``build`` and ``learn`` belong in worker threads.
+
+    Parameters
+    ----------
+    versions
+        How many maps a builder before this one made, whose versions must not come again.
     """
 
-    def __init__(self, area: FloatArray, cell_m: float, accuracy_m: float) -> None:
+    def __init__(self, area: FloatArray, cell_m: float, accuracy_m: float, versions: int = 0) -> None:
+        self._versions = versions
         self.grid, self.mask = make_grid(area, cell_m)
         self._accuracy_m = accuracy_m
         stride = int(np.ceil(np.sqrt(max(self.mask.sum(), 1) / MAX_LANDMARKS)))
@@ -112,7 +118,7 @@ class MapBuilder:
             # The first fit had to learn; keep what it found.
             self._learned = (model, rejected)
         digest = hashlib.sha256(bathymetry.depth_m.tobytes()).hexdigest()
-        version = self._newest.version + 1 if self._newest else 1
+        version = (self._newest.version if self._newest else self._versions) + 1
         return BuiltMap(version, len(self._soundings), bathymetry, digest)
 
     def learn(self, *, always: bool = False) -> None:

@@ -253,6 +253,7 @@ class Runner:
         live = self._live
         started_s = asyncio.get_running_loop().time()
         await live.journal.flush()
+        await live.notice_imports()
         before = live.builder.newest
 
         def work() -> Decision:

@@ -8,6 +8,8 @@ import uuid
 from collections.abc import AsyncIterator, Awaitable, Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import asynccontextmanager
+from functools import cache
+from pathlib import Path
 from typing import Literal
 
 import orjson
@@ -56,6 +58,7 @@ from app.missions.views import (
     ItemVerdict,
     Level,
     LiveMessage,
+    LogImportView,
     Measurement,
     MissionSummary,
     MissionView,
@@ -92,21 +95,36 @@ class MissionService:
         See :class:`ServiceSettings`.
     database
         Migrated and open; the caller closes it after ``shutdown``.
+    log_in
+        Who may use the Neptus gateway with a password from a host; without it nobody.
     """
 
-    def __init__(self, settings: ServiceSettings, database: Database) -> None:
+    def __init__(
+        self,
+        settings: ServiceSettings,
+        database: Database,
+        log_in: Callable[[str, str], Awaitable[str | None]] | None = None,
+    ) -> None:
         self._settings = settings
         self._database = database
         self._rest = RestFleetLink()
         self._sim = SimFleetLink(settings.simulation, settings.time_scale)
         links: list[FleetLink] = [self._rest, self._sim]
         self._examine: Examine = switched_off
+        self._show_area: Callable[[str, Sequence[tuple[float, float]]], None] = lambda _mission, _ring: None
+        self._lead: Callable[[str, str, str | None], None] = lambda _vehicle, _guidance, _gateway: None
         if settings.imc.enabled:
             from app.missions.links.imc import make_imc_link
 
             imc = make_imc_link(settings.imc, settings.time_scale)
             self._examine = imc.diagnosis
+            self._lead = imc.lead
+            self._show_area = imc.show_area
             links.append(imc)
+        if settings.neptus.enabled:
+            from app.missions.neptus import NeptusSessions
+
+            links.append(NeptusSessions(self, database, settings.neptus, log_in or _nobody).link)
         self._hub = FleetHub(links)
         self._executor = ThreadPoolExecutor(WORKERS, thread_name_prefix="planning")
         self._live: dict[str, LiveMission] = {}
@@ -286,6 +304,10 @@ class MissionService:
             await live.journal.log(Level.INFO, "vehicle", f"{name} left", vehicle=name, actor=actor)
         return self._view(live)
 
+    async def note(self, mission_id: str, level: Level, kind: str, message: str, **data: str | float) -> None:
+        """Write a line of a mission's log."""
+        await (await self._get(mission_id)).journal.log(level, kind, message, **data)
+
     # Measurements and waypoints
 
     async def measure(
@@ -335,6 +357,28 @@ class MissionService:
         # Where the vehicle is, and whether it arrived, is on disk as well before it is answered.
         await live.journal.flush()
         return answer
+
+    async def import_log(
+        self,
+        mission_id: str,
+        path: Path,
+        *,
+        vehicle: str | None = None,
+        actor: str,
+        progress: Callable[[int, int], None] | None = None,
+    ) -> LogImportView:
+        """Take in a vehicle's own log; importing it again, also after a crash, stores nothing twice.
+
+        Raises
+        ------
+        InvalidRequestError
+            When the file is no log of a vehicle, or does not tell which one's.
+        """
+        from app.missions.importing import LogImport
+
+        live = await self._get(mission_id)
+        work = await asyncio.to_thread(LogImport, live, self._database, self._settings, path, vehicle)
+        return await work.run(actor=actor, progress=progress)
 
     def _hear(self, live: LiveMission, items: Sequence[Measurement], *, only_unknown: bool = False) -> None:
         """Tell the link where vehicles are; ``only_unknown``: of those only whose place it does not know."""
@@ -394,6 +438,7 @@ class MissionService:
     async def map(self, mission_id: str) -> MapSnapshot:
         """Return the newest map. Raises MapNotReadyError when there is no sounding yet."""
         live = await self._get(mission_id)
+        await live.notice_imports()
         built = live.builder.newest
         if built is None or (live.builder.stale and mission_id not in self._runs):
             built = await live.build_map()
@@ -678,6 +723,9 @@ class MissionService:
     def _claim(self, live: LiveMission, vehicle: VehicleSpec) -> None:
         key = (vehicle.kind, vehicle.name)
         self._hub.claim(key, live.id, live.receive)
+        if vehicle.kind is VehicleKind.IMC:
+            self._lead(vehicle.name, vehicle.guidance, vehicle.gateway)
+            self._show_area(live.spec.name, live.spec.area.ring)
         if vehicle.kind is VehicleKind.SIM:
             try:
                 self._launch(live, vehicle)
@@ -703,6 +751,7 @@ class MissionService:
             raise ConflictError(f"vehicle {vehicle.name!r} cannot be launched: {error}", "change its start") from error
 
     def _release_team(self, live: LiveMission) -> None:
+        self._show_area(live.spec.name, ())
         for member in live.team:
             self._hub.release(member.key, live.id)
 
@@ -721,7 +770,13 @@ class MissionService:
         return _impossible_place(item, live.frame)
 
 
+async def _nobody(_password: str, _host: str) -> str | None:
+    return None
+
+
+@cache
 def _warm_up() -> None:
+    """Compile what planning needs; once in a process is enough."""
     try:
         mapping_warm_up()
         planning_warm_up(SingleBeam())

@@ -1,9 +1,9 @@
 """Settings of the mission service. ``app.settings`` composes them with those of the HTTP edge."""
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 
 class Section(BaseModel):
@@ -50,6 +50,58 @@ class ImcSettings(Section):
     )
 
 
+class NeptusSettings(Section):
+    """The gateway for Neptus' ConvCAO panel. Area and depths have to be the same as in the panel's own settings."""
+
+    enabled: bool = Field(default=False, description="Answer Neptus' ConvCAO panel in place of the original service")
+    host: str = Field(default="127.0.0.1", description="Address on which the panel is answered")
+    ftp_port: int = Field(default=21, ge=0, le=65535, description="TCP port for its uploads; the panel uses 21")
+    http_port: int = Field(default=80, ge=0, le=65535, description="TCP port for its polls; the panel uses 80")
+    passive_ports: tuple[int, ...] = Field(
+        default=(), description="First and last TCP port of FTP data connections; empty: any"
+    )
+    public_address: str | None = Field(
+        default=None, description="Address told for FTP data connections where a router stands between"
+    )
+    centre_lat_deg: float | None = Field(default=None, ge=-90, le=90, description="Area Center, latitude")
+    centre_lon_deg: float | None = Field(default=None, ge=-180, le=180, description="Area Center, longitude")
+    rows: int = Field(default=240, ge=4, le=2000, description="Number of Rows")
+    cols: int = Field(default=240, ge=4, le=2000, description="Number of Columns")
+    cell_m: float = Field(default=1.0, gt=0, le=100, description="Cell size")
+    max_depth_m: float = Field(default=50.0, gt=0, le=6000, description="Maximum Depth, from which heights are counted")
+    first_depth_m: float = Field(default=1.5, ge=0, le=1000, description="First Depth, of the first vehicle")
+    depth_separation_m: float = Field(default=1.5, gt=0, le=100, description="Depth separation between vehicles")
+    bathymeter: Literal["twice", "once", "off"] = Field(
+        default="twice",
+        description="Bathymeter figures, used where a step has no beams; twice: the vehicle's depth was subtracted "
+        "twice, as the unmodified panel does; once: by a corrected panel; off: not used",
+    )
+    prior_map: Literal["ignore", "depth", "height"] = Field(
+        default="ignore",
+        description="The sparse map that the panel sends with a session: ignore: not used; depth: taken in as depths; "
+        "height: as heights above max_depth_m",
+    )
+    prior_map_sd_m: float = Field(default=1.0, gt=0, le=100, description="Standard deviation of the sparse map")
+    planner: str = Field(default="cao", description="Planner of the sessions' missions")
+    steps: int = Field(default=500, ge=1, le=100_000, description="Steps of a session's mission")
+    max_step_m: float = Field(default=20.0, gt=0, le=2000, description="Largest distance of one step")
+    min_altitude_m: float = Field(default=2.0, ge=0, le=1000, description="Least clearance above the sea floor")
+    lost_after_s: float = Field(
+        default=300.0, gt=0, le=86_400, description="A panel that was silent for this long is not waited for"
+    )
+
+    @model_validator(mode="after")
+    def _has_what_it_needs(self) -> Self:
+        if self.enabled and (self.centre_lat_deg is None or self.centre_lon_deg is None):
+            raise ValueError(
+                "the gateway needs centre_lat_deg and centre_lon_deg: the Area Center of conf/noptcoords.properties"
+            )
+        ports = self.passive_ports
+        if ports and not (len(ports) == 2 and 0 < ports[0] <= ports[1] <= 65535):
+            raise ValueError(f"passive_ports {list(ports)} must be a first and a last port, 1 to 65535, or empty")
+        return self
+
+
 class SimulationSettings(Section):
     """The sea floor under vehicles of kind ``sim``, which are simulated inside the service."""
 
@@ -69,4 +121,5 @@ class ServiceSettings(Section):
         default=1.0, gt=0, le=1000, description="How much faster than wall time simulated vehicles live"
     )
     imc: ImcSettings = ImcSettings()
+    neptus: NeptusSettings = NeptusSettings()
     simulation: SimulationSettings = SimulationSettings()

@@ -73,6 +73,16 @@ class VehicleKind(StrEnum):
     IMC = "imc"
     REST = "rest"
     SIM = "sim"
+    NEPTUS = "neptus"
+    """Commanded by a Neptus console that asks this service where to, through the gateway."""
+
+
+class Guidance(StrEnum):
+    """How a vehicle of kind ``imc`` is led."""
+
+    FOLLOW = "follow"
+    LEGS = "legs"
+    ACOUSTIC = "acoustic"
 
 
 class VehicleSpec(Model):
@@ -81,7 +91,8 @@ class VehicleSpec(Model):
     name: Name = Field(description="Its name; for IMC the name it announces", examples=["lauv-xplore-1"])
     kind: VehicleKind = Field(
         default=VehicleKind.IMC,
-        description="imc: DUNE over UDP; rest: polls and posts by itself; sim: simulated inside the service",
+        description="imc: DUNE over UDP; rest: polls and posts by itself; sim: simulated inside the service; "
+        "neptus: of a session of Neptus' ConvCAO panel, which makes its mission itself",
     )
     sensor: Sensor = Sensor.SINGLE_BEAM
     depth_m: float | None = Field(
@@ -91,10 +102,31 @@ class VehicleSpec(Model):
         description="Depth it travels at where the bottom leaves room; null: the first vehicle of a mission at "
         "limits.min_depth_m, each further one limits.min_vertical_separation_m deeper",
     )
+    guidance: Guidance = Field(
+        default=Guidance.FOLLOW,
+        description="How a vehicle of kind imc is led. follow: by references, one a second; legs: by a plan for each "
+        "whole leg, where radio ends at the surface; acoustic: by legs, and by sound while radio is silent",
+    )
+    gateway: Name | None = Field(
+        default=None, description="With guidance acoustic: the name that the node with the modem announces"
+    )
     start: tuple[Longitude, Latitude] | None = Field(
         default=None,
         description="Where a simulated vehicle starts, [longitude, latitude]; default: a corner of the area",
     )
+
+    @model_validator(mode="after")
+    def _is_led_as_its_kind_can_be(self) -> Self:
+        if self.guidance is not Guidance.FOLLOW and self.kind is not VehicleKind.IMC:
+            raise ValueError(
+                f"guidance is {self.guidance} but kind is {self.kind}: only vehicles of kind imc have that"
+            )
+        if (self.guidance is Guidance.ACOUSTIC) != (self.gateway is not None):
+            raise ValueError(
+                f"guidance is {self.guidance} and gateway is {self.gateway!r}: "
+                "a gateway is named with guidance acoustic, and only there"
+            )
+        return self
 
 
 class Limits(Model):

@@ -148,6 +148,25 @@ class BatchVerdict(View):
     )
 
 
+class LogImportView(View):
+    """What came of a vehicle's log."""
+
+    file: str
+    vehicle: str
+    soundings: int = Field(description="Accepted, stored for good")
+    rejected: int = Field(description="Kept but not used")
+    duplicate: int = Field(description="There before, from live telemetry or another log")
+    reasons: dict[str, int] = Field(description="Why soundings were rejected, and how many each")
+    refused: dict[str, int] = Field(description="Why ranges did not become soundings, and how many each")
+    first_s: float | None = Field(description="Vehicle's clock at the first record, Unix seconds")
+    last_s: float | None = Field(description="Vehicle's clock at the last record, Unix seconds")
+    packets: int
+    unreadable: dict[str, int] = Field(description="Packets that could not be read, by reason")
+    skipped_bytes: int = Field(description="Bytes that are no packet")
+    cut_off: bool = Field(description="The file ends in the middle, as after a power loss; what came before is used")
+    known: bool = Field(description="The whole log had been imported before; nothing was written")
+
+
 class Level(StrEnum):
     """How much an event matters."""
 

@@ -19,6 +19,13 @@ async def events_after(session: AsyncSession, mission_id: str, after: int, limit
     return (await session.scalars(query)).all()
 
 
-async def last_event_id(session: AsyncSession, mission_id: str) -> int:
-    """Return the id of the newest event, 0 when there is none."""
-    return (await session.scalar(select(func.max(EventRow.id)).where(EventRow.mission_id == mission_id))) or 0
+async def last_event_id(session: AsyncSession, mission_id: str, *, kind: str | None = None) -> int:
+    """Return the id of the newest event, of this kind where one is given; 0 when there is none."""
+    query = select(func.max(EventRow.id)).where(EventRow.mission_id == mission_id)
+    return (await session.scalar(query if kind is None else query.where(EventRow.kind == kind))) or 0
+
+
+async def newest_of_kind(session: AsyncSession, mission_id: str, kind: str) -> EventRow | None:
+    """Return the newest event of a kind."""
+    query = select(EventRow).where(EventRow.mission_id == mission_id, EventRow.kind == kind)
+    return (await session.scalars(query.order_by(EventRow.id.desc()).limit(1))).first()

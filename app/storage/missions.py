@@ -21,6 +21,12 @@ async def missions_in(session: AsyncSession, states: Sequence[str]) -> Sequence[
     return (await session.scalars(query)).all()
 
 
+async def newest_named(session: AsyncSession, name: str) -> MissionRow | None:
+    """Return the newest mission of this name."""
+    query = select(MissionRow).where(MissionRow.name == name).order_by(MissionRow.created_at.desc()).limit(1)
+    return (await session.scalars(query)).first()
+
+
 async def set_state(session: AsyncSession, mission_id: str, state: str, reason: str, now: datetime) -> None:
     """Record a mission's new state."""
     await session.execute(
@@ -90,11 +96,11 @@ async def add_positions(session: AsyncSession, rows: Sequence[dict[str, Any]]) -
 
 
 async def tracks(session: AsyncSession, mission_id: str) -> dict[str, list[tuple[float, float]]]:
-    """Return each vehicle's track as (longitude, latitude), in the order it was heard."""
+    """Return each vehicle's track as (longitude, latitude), in the order of the vehicle's clock."""
     query = (
         select(PositionRow.vehicle, PositionRow.lon_deg, PositionRow.lat_deg)
         .where(PositionRow.mission_id == mission_id)
-        .order_by(PositionRow.vehicle, PositionRow.id)
+        .order_by(PositionRow.vehicle, PositionRow.time_s, PositionRow.id)
     )
     result: dict[str, list[tuple[float, float]]] = {}
     for vehicle, lon, lat in await session.execute(query):
@@ -103,7 +109,16 @@ async def tracks(session: AsyncSession, mission_id: str) -> dict[str, list[tuple
 
 
 async def last_positions(session: AsyncSession, mission_id: str) -> dict[str, PositionRow]:
-    """Return the last recorded position of each vehicle."""
-    newest = select(func.max(PositionRow.id)).where(PositionRow.mission_id == mission_id).group_by(PositionRow.vehicle)
-    rows = await session.scalars(select(PositionRow).where(PositionRow.id.in_(newest)))
-    return {row.vehicle: row for row in rows}
+    """Return each vehicle's newest position by its own clock; what a log brought later may be older."""
+    newest = (
+        select(PositionRow.vehicle, func.max(PositionRow.time_s).label("time_s"))
+        .where(PositionRow.mission_id == mission_id)
+        .group_by(PositionRow.vehicle)
+        .subquery()
+    )
+    query = (
+        select(PositionRow)
+        .join(newest, (PositionRow.vehicle == newest.c.vehicle) & (PositionRow.time_s == newest.c.time_s))
+        .where(PositionRow.mission_id == mission_id)
+    )
+    return {row.vehicle: row for row in await session.scalars(query)}

@@ -9,6 +9,7 @@ import imcpy
 
 from simulator.dune.entities import ANY, SIMULATION
 from simulator.dune.follow_reference import FollowReference
+from simulator.dune.goto import GotoManeuver
 from simulator.geodesy import LocalFrame
 from simulator.world import SimulatedVehicle
 
@@ -22,6 +23,11 @@ NO_ETA = 0xFFFF
 PLAN_ENGINE = SIMULATION["Plan Engine"]
 SUPERVISOR = SIMULATION["Vehicle Supervisor"]
 FOLLOW_REFERENCE = SIMULATION["Follow Reference Maneuver"]
+IS_DONE = "ManeuverIsDone"
+
+Maneuver = FollowReference | GotoManeuver
+SPECIFICATIONS = (imcpy.FollowReference, imcpy.Goto)
+"""Of the maneuvers that are flown."""
 
 Send = Callable[..., None]
 """``send(message, entity, dst=0xFFFF, dst_ent=255, src=None)``: put a message of this node on the network."""
@@ -56,7 +62,7 @@ class Outcome(IntEnum):
 
 
 class PlanEngine:
-    """Executes one FollowReference plan at a time.
+    """Executes one plan at a time: a FollowReference, or Gotos one after the other.
 
     Parameters
     ----------
@@ -72,7 +78,10 @@ class PlanEngine:
         self.op_mode = OpMode.BOOT
         self.plan_state = PlanState.BLOCKED
         self.outcome = Outcome.NONE
-        self.maneuver: FollowReference | None = None
+        self.maneuver: Maneuver | None = None
+        self._maneuver_type = NO_MANEUVER
+        self._plan: dict[str, imcpy.Message] = {}
+        self._after: dict[str, str] = {}
         self._vehicle = vehicle
         self._vehicle_id = imc_id
         self._frame = frame
@@ -103,7 +112,7 @@ class PlanEngine:
     def on_reference(self, message: imcpy.Reference, now_s: float) -> None:
         """Follow a Reference if it comes from the controlling system; others are ignored without a word."""
         maneuver = self.maneuver
-        if maneuver is None or not maneuver.accepts(message):
+        if not isinstance(maneuver, FollowReference) or not maneuver.accepts(message):
             return
         if maneuver.follow(message, now_s):
             self._complete()
@@ -134,9 +143,11 @@ class PlanEngine:
             return
         failure = self.maneuver.failure(now_s)
         if failure is None:
+            if isinstance(self.maneuver, GotoManeuver) and self.maneuver.done():
+                self._next(now_s)
             return
         text, is_error = failure
-        if not is_error:
+        if not is_error and isinstance(self.maneuver, FollowReference):
             self._send(self.maneuver.state_message(), FOLLOW_REFERENCE)
         self._halt()
         self._error(text, now_s)
@@ -157,7 +168,7 @@ class PlanEngine:
         message = imcpy.VehicleState()
         message.op_mode = imcpy.VehicleState.OperationModeEnum(int(self.op_mode))
         maneuvering = self.maneuver is not None
-        message.maneuver_type = imcpy.FollowReference().msg_id if maneuvering else NO_MANEUVER
+        message.maneuver_type = self._maneuver_type if maneuvering else NO_MANEUVER
         message.maneuver_stime = self._started_s if maneuvering else -1.0
         message.maneuver_eta = NO_ETA
         moving = maneuvering and self._vehicle.vehicle.guidance.value != "idle"
@@ -177,7 +188,7 @@ class PlanEngine:
         message.plan_eta = -1 if executing else 0
         message.plan_progress = -1.0
         message.man_id = self._maneuver_id if executing else ""
-        message.man_type = imcpy.FollowReference().msg_id if executing else NO_MANEUVER
+        message.man_type = self._maneuver_type if executing else NO_MANEUVER
         message.man_eta = NO_ETA
         message.last_outcome = imcpy.PlanControlState.LastPlanOutcomeEnum(int(self.outcome))
         return message
@@ -186,32 +197,51 @@ class PlanEngine:
         if self.op_mode in (OpMode.BOOT, OpMode.ERROR):
             self._reply(message.op, request, message.plan_id, f"vehicle is in {self.op_mode.name} mode", ok=False)
             return
-        specification, maneuver_id, maneuver, problem = _follow_reference_of(message)
-        if maneuver is None or specification is None:
+        specification, problem = _plan_of(message)
+        if specification is None:
             self._reply(message.op, request, message.plan_id, problem, ok=False)
             return
         self._halt()
+        self._plan = {item.maneuver_id: item.data for item in specification.maneuvers}
+        self._after = {item.source_man: item.dest_man for item in specification.transitions}
         self._request = request
         self.outcome = Outcome.NONE
         self._plan_id = ""
         self.plan_state = PlanState.INITIALIZING
         self._send_plan_state()
-        self._plan_id, self._maneuver_id = message.plan_id, maneuver_id
+        self._plan_id = message.plan_id
         self._reply_to_start("plan loaded", ok=True)
         self._send(specification, PLAN_ENGINE, self._vehicle_id, ANY, request[0])
+        self._execute(specification.start_man_id, now_s)
+
+    def _execute(self, maneuver_id: str, now_s: float) -> None:
+        """Begin a maneuver of the plan."""
+        maneuver = self._plan[maneuver_id]
+        self._maneuver_id, self._maneuver_type = maneuver_id, int(maneuver.msg_id)
         command = self._command(imcpy.VehicleCommand.CommandEnum.EXEC_MANEUVER)
         command.maneuver = maneuver
         self._send(command, PLAN_ENGINE)
         self.plan_state = PlanState.EXECUTING
         self._send_plan_state()
         self._reply_to_start(f"{maneuver_id}: executing maneuver", ok=True)
-        self.maneuver = FollowReference(maneuver, self._vehicle, self._frame, now_s)
         self.op_mode = OpMode.MANEUVER
         self._started_s = now_s
         self._last_error, self._last_error_s = "", -1.0
-        self._send(self.maneuver.state_message(), FOLLOW_REFERENCE)
+        if isinstance(maneuver, imcpy.Goto):
+            self.maneuver = GotoManeuver(maneuver, self._vehicle, self._frame, now_s)
+        else:
+            self.maneuver = FollowReference(maneuver, self._vehicle, self._frame, now_s)
+            self._send(self.maneuver.state_message(), FOLLOW_REFERENCE)
         self._send_vehicle_state()
-        self._answer_command("FollowReference maneuver started")
+        self._answer_command(f"{maneuver.msg_name} maneuver started")
+
+    def _next(self, now_s: float) -> None:
+        """A maneuver is done: go on with the one that follows it, or end the plan."""
+        following = self._after.get(self._maneuver_id)
+        if following is None:
+            self._complete()
+        else:
+            self._execute(following, now_s)
 
     def _stop(self, message: imcpy.PlanControl, request: tuple[int, int, int]) -> None:
         if self.maneuver is None:
@@ -225,7 +255,7 @@ class PlanEngine:
         self._answer_command("OK")
 
     def _complete(self) -> None:
-        """The controlling system ended the maneuver."""
+        """The controlling system ended the maneuver, or the last one of the plan is done."""
         state = self.vehicle_state()
         state.maneuver_eta = 0
         state.flags = 1
@@ -298,29 +328,32 @@ class PlanEngine:
         self._send(message, SUPERVISOR, self._vehicle_id, PLAN_ENGINE)
 
 
-def _follow_reference_of(
-    message: imcpy.PlanControl,
-) -> tuple[imcpy.PlanSpecification | None, str, imcpy.FollowReference | None, str]:
-    """The plan, its first maneuver's name and specification, or else what is wrong with the request."""
+def _plan_of(message: imcpy.PlanControl) -> tuple[imcpy.PlanSpecification | None, str]:
+    """The plan that a request starts, or else what is wrong with it."""
     argument = message.arg
     if argument is None:
-        return None, "", None, "undefined plan"
-    if isinstance(argument, imcpy.FollowReference):
+        return None, "undefined plan"
+    if isinstance(argument, SPECIFICATIONS):
         plan = imcpy.PlanSpecification()
         plan.plan_id = message.plan_id
-        plan.start_man_id = "FollowReference"
+        plan.start_man_id = argument.msg_name
         item = imcpy.PlanManeuver()
-        item.maneuver_id = "FollowReference"
+        item.maneuver_id = argument.msg_name
         item.data = argument
         plan.maneuvers.append(item)
-        return plan, "FollowReference", argument, ""
+        return plan, ""
     if not isinstance(argument, imcpy.PlanSpecification):
-        return None, "", None, "plan load failed: undefined maneuver or plan"
-    for item in argument.maneuvers:
-        if item.maneuver_id == argument.start_man_id:
-            data = item.data
-            if isinstance(data, imcpy.FollowReference):
-                return argument, item.maneuver_id, data, ""
+        return None, "plan load failed: undefined maneuver or plan"
+    known = {item.maneuver_id: item.data for item in argument.maneuvers}
+    wanted = [argument.start_man_id, *(item.dest_man for item in argument.transitions)]
+    for maneuver_id in wanted:
+        if maneuver_id not in known:
+            return None, f"plan validation failed: {maneuver_id}: invalid maneuver ID"
+        data = known[maneuver_id]
+        if not isinstance(data, SPECIFICATIONS):
             name = "no maneuver" if data is None else data.msg_name
-            return None, "", None, f"plan validation failed: {name} is not supported"
-    return None, "", None, f"plan validation failed: {argument.start_man_id}: invalid maneuver ID"
+            return None, f"plan validation failed: {name} is not supported"
+    for item in argument.transitions:
+        if item.conditions != IS_DONE:
+            return None, f"plan validation failed: {item.conditions}: condition not supported"
+    return argument, ""

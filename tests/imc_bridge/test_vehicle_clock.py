@@ -49,9 +49,8 @@ def test_single_packet_from_the_future_changes_nothing():
 @pytest.mark.parametrize("leap", [3600.0, -3600.0, -30.0])
 def test_clock_that_was_set_is_followed_once_it_is_confirmed(leap):
     clock, now = running()
-    ticks = []
-    for k in range(1, CONFIRMATIONS + 2):
-        ticks.append(clock.take(T + now + 0.1 * k + leap, now + 0.1 * k, T + now))
+    later = [0.1 * k for k in range(1, CONFIRMATIONS + 2)]
+    ticks = [clock.take(T + now + leap + dt, now + dt, T + now) for dt in later]
     assert ticks.count(Tick.JUMPED) == 1
     assert ticks[CONFIRMATIONS - 1] is Tick.JUMPED
     assert ticks[-1] is Tick.GOOD

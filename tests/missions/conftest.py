@@ -8,7 +8,10 @@ from app.missions.service import MissionService
 from app.missions.settings import ImcSettings, ServiceSettings
 from app.storage import migrate
 from app.storage.database import Database
+from tests.imc_bridge.conftest import captures
 from tests.missions.fleet import Harbour
+
+__all__ = ["captures"]
 
 
 @pytest.fixture(scope="session")

@@ -1,5 +1,7 @@
 """How a node takes commands."""
 
+import math
+
 import imcpy
 import pytest
 from dune_bench import CONSOLE_ID, Bench, done, reference, start_request, stop_request
@@ -82,8 +84,56 @@ def test_impossible_plans_fail_with_the_reason(bench, break_it, info):
 
 
 def test_unsupported_maneuvers_fail_with_their_name(bench):
-    bench.say(start_request(data=imcpy.Goto()))
-    assert replies(bench) == [(2, 0, 100, "plan validation failed: Goto is not supported")]
+    bench.say(start_request(data=imcpy.Loiter()))
+    assert replies(bench) == [(2, 0, 100, "plan validation failed: Loiter is not supported")]
+
+
+def goto_request(frame, *places, request_id=100, nowhere=None):
+    """A plan of Gotos joined by "ManeuverIsDone": (east, north, depth) of each."""
+    plan = imcpy.PlanSpecification()
+    plan.plan_id, plan.start_man_id = "legs", "0"
+    for index, (east, north, depth) in enumerate(places):
+        goto = imcpy.Goto()
+        lat, lon = frame.to_geodetic(east, north)
+        goto.lat, goto.lon, goto.z, goto.z_units = math.radians(lat), math.radians(lon), depth, imcpy.ZUnits.DEPTH
+        goto.speed, goto.speed_units, goto.timeout = 1.3, imcpy.SpeedUnits.METERS_PS, 1000
+        item = imcpy.PlanManeuver()
+        item.maneuver_id, item.data = str(index), goto
+        plan.maneuvers.append(item)
+        if index:
+            transition = imcpy.PlanTransition()
+            transition.source_man, transition.dest_man = str(index - 1), nowhere or str(index)
+            transition.conditions = "ManeuverIsDone"
+            plan.transitions.append(transition)
+    request = start_request(request_id=request_id)
+    request.plan_id, request.arg = "legs", plan
+    return request
+
+
+def test_gotos_are_flown_one_after_the_other_without_further_contact(bench):
+    bench.say(goto_request(bench.vehicle.terrain.frame, (60.0, 20.0, 2.0), (60.0, 60.0, 0.0)))
+    assert replies(bench)[:2] == [(1, 0, 100, "plan loaded"), (1, 0, 100, "0: executing maneuver")]
+    bench.run(200.0, bench.beat)
+    assert [info for *_, info in replies(bench)] == [
+        "plan loaded", "0: executing maneuver", "1: executing maneuver", "plan completed",
+    ]  # fmt: skip
+    assert bench.states() == (SERVICE, READY)
+    assert bench.last(imcpy.PlanControlState).last_outcome == imcpy.PlanControlState.LastPlanOutcomeEnum.SUCCESS
+    assert bench.vehicle.position.horizontal_distance_m(60.0, 60.0) < 15.0
+
+
+def test_gotos_can_be_stopped_on_the_way(bench):
+    bench.say(goto_request(bench.vehicle.terrain.frame, (80.0, 80.0, 2.0)))
+    bench.run(5.0)
+    assert bench.states() == (MANEUVER, EXECUTING)
+    bench.say(stop_request())
+    assert bench.states() == (SERVICE, READY)
+
+
+def test_transitions_to_nowhere_are_refused(bench):
+    places = (80.0, 80.0, 2.0), (10.0, 10.0, 0.0)
+    bench.say(goto_request(bench.vehicle.terrain.frame, *places, nowhere="7"))
+    assert replies(bench) == [(2, 0, 100, "plan validation failed: 7: invalid maneuver ID")]
 
 
 def test_each_reference_is_answered_with_its_echo(started):

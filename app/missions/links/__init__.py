@@ -1,1 +1,1 @@
-"""The three implementations of the fleet interface: IMC, REST vehicles that poll, in-process simulation."""
+"""The implementations of the fleet interface: IMC, REST vehicles that poll, simulation in process, Neptus sessions."""

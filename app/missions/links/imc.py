@@ -23,6 +23,7 @@ from imc_bridge import (
     Bridge,
     BridgeEvent,
     BridgeSettings,
+    Guidance,
     LinkChange,
     NodeState,
     NodeView,
@@ -32,6 +33,7 @@ from imc_bridge import (
     Waypoint,
     WaypointChange,
 )
+from imc_bridge.consoles import Mark
 from imc_bridge.doctor import Diagnosis, judge
 
 _UNENGAGED = {
@@ -43,6 +45,8 @@ _UNENGAGED = {
     NodeState.LOST: LinkState.LOST,
     NodeState.EXPECTED_OFFLINE: LinkState.EXPECTED_OFFLINE,
 }
+MAX_CORNERS = 24
+"""Of an area that are shown to other consoles."""
 _SILENT = frozenset({NodeState.LOST, NodeState.EXPECTED_OFFLINE})
 
 
@@ -76,6 +80,7 @@ class ImcFleetLink:
     def __init__(self, settings: BridgeSettings) -> None:
         self._bridge = Bridge(settings)
         self._sink: EventSink = lambda _event: None
+        self._led: dict[str, tuple[Guidance, str]] = {}
 
     @property
     def kind(self) -> str:
@@ -96,8 +101,20 @@ class ImcFleetLink:
         wanted = self._bridge.settings.vehicles
         return [_info(node) for node in self._bridge.nodes() if node.is_vehicle and (not wanted or node.name in wanted)]
 
+    def lead(self, vehicle: str, guidance: str, gateway: str | None) -> None:
+        """Say how a vehicle shall be led from its next engagement on, as its mission describes it."""
+        self._led[vehicle] = Guidance(guidance), gateway or ""
+
+    def show_area(self, mission: str, ring: Sequence[tuple[float, float]]) -> None:
+        """Show a mission's area on other consoles' maps, corner by corner: (longitude, latitude); empty: no longer."""
+        board = self._bridge.board
+        for name in [name for name in board.marks if name.startswith(f"{mission} corner ")]:
+            board.show(name, None)
+        for index, (lon, lat) in enumerate(ring[:MAX_CORNERS]):
+            board.show(f"{mission} corner {index + 1}", Mark("Area", lat, lon))
+
     async def engage(self, vehicle: str) -> None:
-        """Start the FollowReference plan; raises VehicleRefusedError.
+        """Make the vehicle ours; raises VehicleRefusedError.
 
         A vehicle that someone else aborted or took over is left alone until it was stopped from here, which pausing a
         mission does: only an operator may decide that it goes on.
@@ -107,7 +124,7 @@ class ImcFleetLink:
             remedy = "It is left alone; when it may go on, pause and resume the mission"
             raise VehicleRefusedError(vehicle, intervention, remedy)
         try:
-            await self._bridge.engage(vehicle)
+            await self._bridge.engage(vehicle, *self._led.get(vehicle, (Guidance.FOLLOW, "")))
         except RefusedError as error:
             raise VehicleRefusedError(vehicle, error.reason, error.remedy) from error
 
@@ -130,9 +147,14 @@ class ImcFleetLink:
             self._bridge.goto(order.vehicle, waypoint)
         except RefusedError as error:
             raise VehicleRefusedError(order.vehicle, error.reason, error.remedy) from error
+        place = order.position
+        self._bridge.board.show(
+            f"waypoint of {order.vehicle}", Mark("Waypoint", place.lat_deg, place.lon_deg, place.depth_m)
+        )
 
     async def stop(self, vehicle: str, *, timeout_s: float = 3.0) -> StopReceipt:
         """Stop the vehicle; a plan of another console is left alone."""
+        self._bridge.board.show(f"waypoint of {vehicle}", None)
         result = await self._bridge.stop(vehicle, timeout_s=timeout_s)
         return StopReceipt(result.vehicle, result.acknowledged, result.detail)
 
@@ -149,18 +171,9 @@ class ImcFleetLink:
 def _translate(event: BridgeEvent) -> FleetEvent | None:
     match event:
         case StateReport():
-            return _report(event)
+            return vehicle_report(event)
         case Sounding():
-            return SoundingReport(
-                vehicle=event.vehicle,
-                time_s=event.time_s,
-                footprint=Position(event.lat_deg, event.lon_deg, event.bottom_depth_m),
-                vehicle_depth_m=event.vehicle_depth_m,
-                range_m=event.range_m,
-                source=event.source,
-                beam=event.beam,
-                position_sd_m=event.position_sd_m,
-            )
+            return sounding_report(event)
         case WaypointChange():
             return WaypointReport(
                 vehicle=event.vehicle,
@@ -185,7 +198,22 @@ def _link_state(state: NodeState, engaged: bool, ours: bool) -> LinkState:
     return _UNENGAGED[state]
 
 
-def _report(state: StateReport) -> VehicleReport:
+def sounding_report(event: Sounding) -> SoundingReport:
+    """What the bridge measured, as missions know it."""
+    return SoundingReport(
+        vehicle=event.vehicle,
+        time_s=event.time_s,
+        footprint=Position(event.lat_deg, event.lon_deg, event.bottom_depth_m),
+        vehicle_depth_m=event.vehicle_depth_m,
+        range_m=event.range_m,
+        source=event.source,
+        beam=event.beam,
+        position_sd_m=event.position_sd_m,
+    )
+
+
+def vehicle_report(state: StateReport) -> VehicleReport:
+    """What the bridge heard of a vehicle, as missions know it."""
     return VehicleReport(
         vehicle=state.vehicle,
         time_s=state.time_s,
@@ -219,6 +247,6 @@ def _info(node: NodeView) -> VehicleInfo:
         age_s=node.age_s,
         address=node.address,
         imc_id=node.imc_id,
-        report=None if node.report is None else _report(node.report),
+        report=None if node.report is None else vehicle_report(node.report),
         details={key: value for key, value in details.items() if value is not None},
     )

@@ -648,6 +648,12 @@ export interface components {
             remedy: string;
         };
         /**
+         * Guidance
+         * @description How a vehicle of kind ``imc`` is led.
+         * @enum {string}
+         */
+        Guidance: "follow" | "legs" | "acoustic";
+        /**
          * ItemVerdict
          * @description The verdict on one item of a batch.
          */
@@ -1431,7 +1437,7 @@ export interface components {
          * @description Which link reaches a vehicle.
          * @enum {string}
          */
-        VehicleKind: "imc" | "rest" | "sim";
+        VehicleKind: "imc" | "rest" | "sim" | "neptus";
         /**
          * VehicleSpec
          * @description A vehicle that takes part in a mission.
@@ -1444,7 +1450,7 @@ export interface components {
              */
             name: string;
             /**
-             * @description imc: DUNE over UDP; rest: polls and posts by itself; sim: simulated inside the service
+             * @description imc: DUNE over UDP; rest: polls and posts by itself; sim: simulated inside the service; neptus: of a session of Neptus' ConvCAO panel, which makes its mission itself
              * @default imc
              */
             kind: components["schemas"]["VehicleKind"];
@@ -1455,6 +1461,16 @@ export interface components {
              * @description Depth it travels at where the bottom leaves room; null: the first vehicle of a mission at limits.min_depth_m, each further one limits.min_vertical_separation_m deeper
              */
             depth_m?: number | null;
+            /**
+             * @description How a vehicle of kind imc is led. follow: by references, one a second; legs: by a plan for each whole leg, where radio ends at the surface; acoustic: by legs, and by sound while radio is silent
+             * @default follow
+             */
+            guidance: components["schemas"]["Guidance"];
+            /**
+             * Gateway
+             * @description With guidance acoustic: the name that the node with the modem announces
+             */
+            gateway?: string | null;
             /**
              * Start
              * @description Where a simulated vehicle starts, [longitude, latitude]; default: a corner of the area

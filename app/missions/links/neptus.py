@@ -1,0 +1,367 @@
+"""Vehicles that a Neptus console commands: its ConvCAO panel tells where they are and asks where they shall go.
+
+The panel works in steps: it uploads a step, waits for the answer, flies it, and uploads the next one when every vehicle
+was within its own 12.5 m. So an upload is the arrival at the places of the last answer. It knows no stop: what is not
+answered any more flies its last leg and circles at its end, until someone presses STOP in the panel.
+"""
+
+import asyncio
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from app.missions.fleet import (
+    EventSink,
+    LinkReport,
+    LinkState,
+    Position,
+    SoundingReport,
+    StopReceipt,
+    VehicleInfo,
+    VehicleRefusedError,
+    VehicleReport,
+    WaypointOrder,
+    WaypointReport,
+    WaypointStatus,
+)
+from app.missions.settings import NeptusSettings
+from imc_bridge.neptus import (
+    Area,
+    CellSounding,
+    Conventions,
+    GatewaySettings,
+    NeptusGateway,
+    Place,
+    SessionKeeper,
+    StepData,
+)
+
+GATHER_S = 0.3
+"""Orders of one step come within a moment; a vehicle without one by then is told to stay."""
+DEPTH_TOLERANCE_M = 0.25
+PRIOR_SPACING_S = 3600.0
+"""Between cells of a prior map, which are no track: far enough apart that no move is a jump."""
+
+
+def gateway_settings(settings: NeptusSettings) -> GatewaySettings:
+    """The gateway's settings as the service's describe them."""
+    if settings.centre_lat_deg is None or settings.centre_lon_deg is None:
+        raise ValueError("the gateway needs centre_lat_deg and centre_lon_deg")
+    area = Area(
+        settings.centre_lat_deg,
+        settings.centre_lon_deg,
+        settings.rows,
+        settings.cols,
+        settings.cell_m,
+        settings.max_depth_m,
+    )
+    return GatewaySettings(
+        Conventions(area, settings.bathymeter),
+        settings.host,
+        settings.ftp_port,
+        settings.http_port,
+        (settings.passive_ports[0], settings.passive_ports[1]) if settings.passive_ports else None,
+        settings.public_address,
+    )
+
+
+@dataclass
+class _Craft:
+    name: str
+    depth_m: float
+    """At which the panel sends it, whatever it is told."""
+    state: LinkState = LinkState.HEARD
+    place: Place | None = None
+    report: VehicleReport | None = None
+    order: WaypointOrder | None = None
+    published: bool = False
+    status: WaypointStatus | None = None
+
+
+@dataclass
+class _Fleet:
+    session: str
+    crafts: list[_Craft]
+    host: str
+    heard_s: float
+    """By the wall clock: the panel gives no times."""
+    time_step: int = 0
+    pending: int | None = None
+    """The step that the panel waits to be answered."""
+    superseded: bool = False
+    prior: Sequence[tuple[int, int, float]] = ()
+    """Cells of a prior map that the mission will hear of when it has begun."""
+    timer: asyncio.TimerHandle | None = field(default=None, repr=False)
+
+
+class NeptusFleetLink:
+    """The fleet interface for the gateway's sessions; see :class:`app.missions.fleet.FleetLink` for its contract."""
+
+    kind = "neptus"
+
+    def __init__(self, settings: NeptusSettings, keeper: SessionKeeper) -> None:
+        self._settings = settings
+        self.gateway = NeptusGateway(gateway_settings(settings), keeper)
+        self._fleets: dict[str, _Fleet] = {}
+        self._sink: EventSink = lambda _event: None
+        self._watch: asyncio.Task[None] | None = None
+
+    async def start(self, sink: EventSink) -> None:
+        """Bind both ports and answer. Raises ``imc_bridge.PortInUseError`` when one cannot be had."""
+        self._sink = sink
+        await self.gateway.start()
+        self._watch = asyncio.create_task(self._watch_silence())
+
+    async def close(self) -> None:
+        """Answer nothing more, then release the ports."""
+        if self._watch is not None:
+            self._watch.cancel()
+            await asyncio.gather(self._watch, return_exceptions=True)
+        await self.gateway.close()
+        for fleet in self._fleets.values():
+            if fleet.timer is not None:
+                fleet.timer.cancel()
+
+    def vehicles(self) -> Sequence[VehicleInfo]:
+        """Every vehicle of a session since the service started."""
+        return [
+            VehicleInfo(
+                name=craft.name,
+                kind=self.kind,
+                state=craft.state,
+                reason=self._reason(craft.state),
+                age_s=time.time() - fleet.heard_s,
+                address=fleet.host,
+                report=craft.report,
+                details={"session": fleet.session, "time step": str(fleet.time_step)},
+            )
+            for fleet in self._fleets.values()
+            for craft in fleet.crafts
+        ]
+
+    async def engage(self, vehicle: str) -> None:
+        """Let a vehicle take part in answers. Raises VehicleRefusedError before its session's first step."""
+        _, craft = self._find(vehicle)
+        if craft.state in (LinkState.HEARD, LinkState.LOST):
+            raise VehicleRefusedError(vehicle, self._reason(craft.state), "press START in the panel")
+        self._set_state(craft, LinkState.ENGAGED)
+
+    async def order(self, order: WaypointOrder) -> None:
+        """Lay a waypoint out for the next answer.
+
+        Raises VehicleRefusedError when the depth at which the panel will send it is not safe there.
+        """
+        fleet, craft = self._find(order.vehicle)
+        if craft.state is not LinkState.ENGAGED:
+            raise VehicleRefusedError(order.vehicle, "does not follow this service now", "press START in the panel")
+        if order.position.depth_m < craft.depth_m - DEPTH_TOLERANCE_M:
+            raise VehicleRefusedError(
+                order.vehicle,
+                f"the panel sends it at {craft.depth_m:g} m whatever it is told, and there "
+                f"{order.position.depth_m:.1f} m is the deepest that is safe",
+                "It stays where it is; make First Depth in the panel smaller, or the area without that place",
+            )
+        same = craft.order is not None and (craft.order.mission_id, craft.order.step) == (order.mission_id, order.step)
+        if not same or craft.status is None:
+            craft.order, craft.published = order, False
+            self._report(craft, WaypointStatus.SENT)
+        elif craft.status is not None:
+            self._report(craft, craft.status)
+        self._publish_soon(fleet)
+
+    async def stop(self, vehicle: str, *, timeout_s: float = 3.0) -> StopReceipt:
+        """Answer nothing more for the vehicle; only the panel's own STOP ends its plan."""
+        try:
+            fleet, craft = self._find(vehicle)
+        except VehicleRefusedError:
+            return StopReceipt(vehicle, acknowledged=True, detail="was not following")
+        followed = craft.state is LinkState.ENGAGED or craft.order is not None
+        craft.order, craft.published, craft.status = None, False, None
+        if craft.state is LinkState.ENGAGED:
+            self._set_state(craft, LinkState.READY)
+        if fleet.superseded:
+            return StopReceipt(vehicle, acknowledged=True, detail="its panel has begun another session")
+        if not followed:
+            return StopReceipt(vehicle, acknowledged=True, detail="was not following")
+        return StopReceipt(
+            vehicle,
+            acknowledged=False,
+            detail="the panel knows no stop from here: it flies its last leg and stays there; press STOP in it",
+        )
+
+    # What the panel says, by way of the sessions
+
+    def add(self, session: str, vehicles: Sequence[str], host: str, *, time_step: int = 0) -> None:
+        """Take up a session; ``time_step`` of one that was taken up before a restart, and may wait for an answer."""
+        depths = [
+            self._settings.first_depth_m + index * self._settings.depth_separation_m for index in range(len(vehicles))
+        ]
+        crafts = [_Craft(name, depth) for name, depth in zip(vehicles, depths, strict=True)]
+        fleet = self._fleets[session] = _Fleet(session, crafts, host, time.time(), time_step)
+        if time_step:
+            fleet.pending = time_step
+            for craft in crafts:
+                self._set_state(craft, LinkState.READY)
+
+    def supersede(self, session: str, host: str) -> list[str]:
+        """Return the sessions of a console that has begun another one now."""
+        old = [fleet for fleet in self._fleets.values() if fleet.host == host and fleet.session != session]
+        for fleet in old:
+            fleet.superseded = True
+            for craft in fleet.crafts:
+                self._set_state(craft, LinkState.LOST)
+        return [fleet.session for fleet in old]
+
+    def knows(self, session: str) -> bool:
+        """Whether a session was taken up in this run."""
+        return session in self._fleets
+
+    def locate(self, data: StepData, host: str) -> None:
+        """Note where the vehicles are: from now on they can take part."""
+        fleet = self._fleets[data.session]
+        fleet.host = host
+        now_s = time.time()
+        for craft, place in zip(fleet.crafts, data.places, strict=True):
+            lat, lon = self.gateway.area.to_geographic(place.row, place.col)
+            craft.place = place
+            craft.report = VehicleReport(craft.name, now_s, Position(lat, lon, place.depth_m))
+            if craft.state is not LinkState.ENGAGED:
+                self._set_state(craft, LinkState.READY)
+
+    def take(self, data: StepData) -> None:
+        """Tell of a step: what was sounded, where the vehicles are, and that they arrived."""
+        fleet = self._fleets[data.session]
+        now_s, since_s = time.time(), fleet.heard_s
+        for sounding in self._prior_soundings(fleet):
+            self._sink(sounding)
+        for sounding in self._soundings(fleet, data.soundings, since_s, now_s):
+            self._sink(sounding)
+        fleet.heard_s, fleet.time_step, fleet.pending = now_s, data.time_step, data.time_step
+        for craft in fleet.crafts:
+            if craft.report is not None:
+                self._sink(craft.report)
+        for craft in fleet.crafts:
+            if craft.order is not None and craft.published and craft.status is not WaypointStatus.REACHED:
+                self._report(craft, WaypointStatus.REACHED)
+        if any(craft.order is not None and not craft.published for craft in fleet.crafts):
+            self._publish_soon(fleet)
+
+    def prior(self, session: str, cells: Sequence[tuple[int, int, float]]) -> None:
+        """Keep the known cells of a prior map, values being depths, to be taken in as soundings with the first step."""
+        self._fleets[session].prior = cells
+
+    def fetched(self, session: str) -> None:
+        """Note that the panel has read the newest answer, which acknowledges its waypoints."""
+        fleet = self._fleets.get(session)
+        for craft in fleet.crafts if fleet is not None else ():
+            if craft.published and craft.status is WaypointStatus.SENT:
+                self._report(craft, WaypointStatus.ACKNOWLEDGED)
+
+    # Helpers
+
+    def _soundings(
+        self, fleet: _Fleet, samples: Sequence[CellSounding], since_s: float, now_s: float
+    ) -> list[SoundingReport]:
+        """Give the panel's samples, which come in their order, a vehicle and a time of their own."""
+        area = self.gateway.area
+        reports = []
+        for index, sample in enumerate(samples):
+            craft = fleet.crafts[sample.vehicle if sample.vehicle is not None else self._nearest(fleet, sample)]
+            lat, lon = area.to_geographic(sample.row, sample.col)
+            reports.append(
+                SoundingReport(
+                    vehicle=craft.name,
+                    time_s=since_s + (now_s - since_s) * (index + 1) / (len(samples) + 1),
+                    footprint=Position(lat, lon, sample.bottom_depth_m),
+                    vehicle_depth_m=sample.vehicle_depth_m,
+                    range_m=sample.bottom_depth_m - sample.vehicle_depth_m,
+                    source=sample.source,
+                    depth_sd_m=sample.depth_sd_m,
+                )
+            )
+        return reports
+
+    def _prior_soundings(self, fleet: _Fleet) -> list[SoundingReport]:
+        cells, fleet.prior = fleet.prior, ()
+        begin_s = fleet.heard_s - PRIOR_SPACING_S * (len(cells) + 1)
+        places = [self.gateway.area.to_geographic(row, col) for row, col, _ in cells]
+        return [
+            SoundingReport(
+                vehicle=fleet.crafts[0].name,
+                time_s=begin_s + index * PRIOR_SPACING_S,
+                footprint=Position(lat, lon, depth_m),
+                vehicle_depth_m=0.0,
+                range_m=depth_m,
+                source="neptus prior map",
+                depth_sd_m=self._settings.prior_map_sd_m,
+            )
+            for index, ((lat, lon), (_, _, depth_m)) in enumerate(zip(places, cells, strict=True))
+        ]
+
+    @staticmethod
+    def _nearest(fleet: _Fleet, sample: CellSounding) -> int:
+        """Return the vehicle that flies at the sample's depth, or nearest to it."""
+        return int(np.argmin([abs(craft.depth_m - sample.vehicle_depth_m) for craft in fleet.crafts]))
+
+    def _publish_soon(self, fleet: _Fleet) -> None:
+        if fleet.pending is None:
+            return
+        engaged = [craft for craft in fleet.crafts if craft.state is LinkState.ENGAGED]
+        complete = len(engaged) == len(fleet.crafts) and all(
+            craft.order is not None and not craft.published for craft in engaged
+        )
+        if complete:
+            self._publish(fleet)
+        elif fleet.timer is None:
+            fleet.timer = asyncio.get_running_loop().call_later(GATHER_S, self._publish, fleet)
+
+    def _publish(self, fleet: _Fleet) -> None:
+        if fleet.timer is not None:
+            fleet.timer.cancel()
+            fleet.timer = None
+        placed = all(craft.place is not None or craft.order is not None for craft in fleet.crafts)
+        if fleet.pending is None or not placed or not any(craft.order is not None for craft in fleet.crafts):
+            return
+        places = []
+        for craft in fleet.crafts:
+            if craft.order is not None:
+                position = craft.order.position
+                places.append(Place(*self.gateway.area.to_cells(position.lat_deg, position.lon_deg), position.depth_m))
+                craft.published = True
+            elif craft.place is not None:
+                places.append(craft.place)
+        self.gateway.answer(fleet.session, fleet.pending, places)
+        fleet.pending = None
+
+    def _find(self, vehicle: str) -> tuple[_Fleet, _Craft]:
+        for fleet in self._fleets.values():
+            for craft in fleet.crafts:
+                if craft.name == vehicle:
+                    return fleet, craft
+        raise VehicleRefusedError(vehicle, "its session is not known", "wait for the panel's next upload")
+
+    def _reason(self, state: LinkState) -> str:
+        if state is LinkState.LOST:
+            return f"its panel was silent for more than {self._settings.lost_after_s:g} s, or began another session"
+        return "connected; no step yet: press START in the panel" if state is LinkState.HEARD else ""
+
+    def _set_state(self, craft: _Craft, state: LinkState) -> None:
+        if craft.state is not state:
+            craft.state = state
+            self._sink(LinkReport(craft.name, state, self._reason(state)))
+
+    def _report(self, craft: _Craft, status: WaypointStatus) -> None:
+        craft.status = status
+        if craft.order is not None:
+            self._sink(WaypointReport(craft.name, craft.order.mission_id, craft.order.step, status))
+
+    async def _watch_silence(self) -> None:
+        while True:
+            await asyncio.sleep(self._settings.lost_after_s / 10)
+            limit_s = time.time() - self._settings.lost_after_s
+            for fleet in self._fleets.values():
+                if fleet.heard_s < limit_s:
+                    for craft in fleet.crafts:
+                        self._set_state(craft, LinkState.LOST)

@@ -1,0 +1,365 @@
+"""One vehicle that is sent a whole leg at a time, for links that end at the surface.
+
+Each waypoint becomes a plan of Goto maneuvers: there, then up. Once the vehicle has acknowledged it, silence is
+expected until the leg should be over; what became of it shows when the vehicle is heard again. Between legs it has
+no plan and floats. Everything else, engaging, stopping and what ended a plan, is the :class:`Follower`'s.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import imcpy
+
+from imc_bridge.acoustics import SoundPath, SoundReport
+from imc_bridge.codec import Message
+from imc_bridge.events import StateReport, Waypoint, WaypointStatus
+from imc_bridge.follow import (
+    OPERATION_START,
+    OPERATION_STOP,
+    PLAN_CONTROL_FAILURE,
+    PLAN_CONTROL_SUCCESS,
+    SPEED_METERS_PS,
+    START_RETRY_S,
+    Z_DEPTH,
+    Evidence,
+    Follower,
+    Order,
+    Phase,
+)
+from imc_bridge.guard import distance_m
+from imc_bridge.nodes import PlanState
+from imc_bridge.settings import BridgeSettings
+
+THERE, UP = "there", "up"
+DONE = "ManeuverIsDone"
+SLOWEST_SHARE = 0.6
+"""A leg may take as long as at this share of the speed asked for."""
+CLIMB_MPS = 0.15
+"""At the least, when floating up."""
+TURNING_S = 45.0
+"""For turning, diving and reporting."""
+MANEUVER_TIMEOUT_S = 0xFFFF
+END_WITHIN_M = 25.0
+"""A leg that ended farther from its waypoint did not lead there: Goto ends some 7 m before, and the vehicle floats."""
+OUTCOME_FAILURE = 2
+PLAN_SETTLES_S = 5.0
+RADIO_SILENT_S = 3.0
+"""After this long without a packet sound is tried."""
+SOUND_START_TIMEOUT_S = 90.0
+START_TIMEOUT_WALLS = 3.0
+"""In units of the silence on the wall clock that is never a loss, however fast the vehicles live."""
+REPORT_KEEPS_S = 90.0
+"""A vehicle that was heard by sound is expected for at least this much longer."""
+
+
+@dataclass(slots=True)
+class Leg:
+    """A waypoint under way as a plan."""
+
+    depth_m: float
+    expected_s: float
+    acknowledged: bool = False
+    running: bool = False
+    """Seen in execution."""
+    ended: bool = False
+    sent_at: float = 0.0
+
+
+def leg_plan(settings: BridgeSettings, waypoint: Waypoint, depth_m: float) -> Message:
+    """A plan that leads to a waypoint at a depth and then up to the surface, with no further contact."""
+    plan = imcpy.PlanSpecification()
+    plan.plan_id = settings.plan_id
+    plan.start_man_id = THERE
+    for name, depth in ((THERE, depth_m), (UP, 0.0)):
+        step = imcpy.PlanManeuver()
+        step.maneuver_id = name
+        step.data = goto_maneuver(waypoint, depth)
+        plan.maneuvers.append(step)
+    transition = imcpy.PlanTransition()
+    transition.source_man = THERE
+    transition.dest_man = UP
+    transition.conditions = DONE
+    plan.transitions.append(transition)
+    return plan
+
+
+def goto_maneuver(waypoint: Waypoint, depth_m: float) -> Message:
+    """A Goto to a waypoint at a depth."""
+    goto = imcpy.Goto()
+    goto.timeout = MANEUVER_TIMEOUT_S
+    goto.lat = math.radians(waypoint.lat_deg)
+    goto.lon = math.radians(waypoint.lon_deg)
+    goto.z = depth_m
+    goto.z_units = imcpy.ZUnits(Z_DEPTH)
+    goto.speed = waypoint.speed_mps
+    goto.speed_units = imcpy.SpeedUnits(SPEED_METERS_PS)
+    # DUNE takes attitudes only where they are finite; these say that none is asked for.
+    goto.roll = goto.pitch = goto.yaw = -1.0
+    return goto
+
+
+def leg_time_s(length_m: float, depth_m: float, speed_mps: float) -> float:
+    """How long a leg may take until the vehicle is heard again."""
+    return length_m / (SLOWEST_SHARE * max(speed_mps, 0.1)) + depth_m / CLIMB_MPS + TURNING_S
+
+
+class LegFollower(Follower):
+    """The control of one vehicle by whole legs; see :class:`Follower` for the parameters."""
+
+    unheard_stop = "it flies its leg to the end and is told to stop when it is heard"
+
+    sound: SoundPath | None = None
+    """The way to it when radio is silent, where it has one."""
+    _leg: Leg | None = None
+
+    def attach(self, sound: SoundPath, by_radio: Callable[[Message], None], now: Callable[[], float]) -> None:
+        """Speak by sound while radio is silent."""
+        self.sound = sound
+
+        def send(message: Message) -> None:
+            if self._by_sound(now()):
+                sound.send(message, now())
+            else:
+                by_radio(message)
+
+        self._send = send
+
+    def _by_sound(self, now: float) -> bool:
+        return self.sound is not None and self._silence(now) > RADIO_SILENT_S
+
+    def left_by_sound(self, what: str, now: float) -> None:
+        """Note that the gateway has sent a message: nothing more is heard of a plan that was received."""
+        if what == "PlanControl" and self.phase is Phase.FOLLOWING:
+            self._acknowledged(now)
+
+    def reported_by_sound(self, report: SoundReport, now: float) -> None:
+        """Take a place that was reported by sound: it tells of arrival where radio does not."""
+        leg, order = self._leg, self._order
+        if self.phase is not Phase.FOLLOWING or leg is None or not leg.acknowledged or order is None:
+            return
+        distance = distance_m((report.lat_deg, report.lon_deg), (order.waypoint.lat_deg, order.waypoint.lon_deg))
+        self.node.expected_back = max(self.node.expected_back or 0.0, now + REPORT_KEEPS_S)
+        if distance <= END_WITHIN_M:
+            self._forget_leg()
+            words = f"reported by sound {distance:.0f} m from it"
+            self._advance(order, WaypointStatus.REACHED, "; ".join(filter(None, (words, order.limited))))
+
+    def engage(self, now: float) -> bool:
+        """Take the vehicle over when it is in service; it gets no plan before the first waypoint."""
+        self._forget_leg()
+        return super().engage(now)
+
+    def order(self, waypoint: Waypoint, now: float) -> None:
+        """Send the vehicle off to a waypoint. Repeating one is harmless unless it had been refused."""
+        before = self._order
+        super().order(waypoint, now)
+        if self._order is not before:
+            self._forget_leg()
+            self.tick(now)
+
+    def begin_stop(self, now: float) -> None:
+        """Stop the leg: STOP is repeated until the vehicle acknowledges, and again when it comes back."""
+        self._forget_leg()
+        super().begin_stop(now)
+
+    # What the vehicle says
+
+    def plan_control_reply(self, message: Message, now: float) -> None:
+        """PlanControl of the vehicle to us."""
+        leg = self._leg
+        if self.phase is Phase.STOPPING or leg is None or int(message.op) != OPERATION_START:
+            if int(message.op) == OPERATION_STOP:
+                super().plan_control_reply(message, now)
+            return
+        if int(message.request_id) != self._request_id:
+            return
+        kind, info = int(message.type), str(message.info)
+        if kind == PLAN_CONTROL_SUCCESS and "completed" in info:
+            self._leg_over()
+        elif kind == PLAN_CONTROL_SUCCESS:
+            self._acknowledged(now)
+        elif kind == PLAN_CONTROL_FAILURE and not leg.acknowledged:
+            reason = f"plan refused: {info or 'no reason given'}"
+            self._release(reason, "Clear what the vehicle complains about, then engage", now)
+        elif kind == PLAN_CONTROL_FAILURE:
+            self._evidence.failure = info or "no reason given"
+            self._plan_ended(now)
+
+    def plan_state_changed(self, now: float) -> None:
+        """PlanControlState has been taken in by the node."""
+        leg, node = self._leg, self.node
+        if self.phase is not Phase.FOLLOWING:
+            if self.phase is not Phase.ENDED or not node.executing(self._settings.plan_id):
+                super().plan_state_changed(now)
+            return
+        if leg is None:
+            # Between two legs it is idle, unless someone else gave it a plan.
+            if node.plan_state == PlanState.EXECUTING and not self._ours_or_none():
+                self._plan_ended(now)
+            return
+        if node.executing(self._settings.plan_id):
+            if node.plan_state == PlanState.EXECUTING:
+                leg.running = True
+                self._acknowledged(now)
+        elif node.plan_state != PlanState.INITIALIZING and leg.acknowledged and not leg.ended:
+            if not leg.running and now - leg.sent_at < PLAN_SETTLES_S:
+                # A state from before the plan that overtook its acknowledgement.
+                return
+            if node.plan_state == PlanState.READY and node.plan_outcome != OUTCOME_FAILURE:
+                self._leg_over()
+            else:
+                self._evidence.blocked = node.plan_state == PlanState.BLOCKED
+                self._plan_ended(now)
+
+    def follow_state(self, message: Message, now: float) -> None:
+        """Nothing follows references here."""
+
+    def moved(self, report: StateReport, now: float) -> None:
+        """EstimatedState has been taken in: where the vehicle is after its leg tells whether it arrived."""
+        leg, order = self._leg, self._order
+        if self.phase is not Phase.FOLLOWING or leg is None or not leg.ended or order is None:
+            return
+        distance = distance_m((report.lat_deg, report.lon_deg), (order.waypoint.lat_deg, order.waypoint.lon_deg))
+        self._forget_leg()
+        if distance <= max(END_WITHIN_M, order.waypoint.arrival_radius_m):
+            words = "" if distance <= order.waypoint.arrival_radius_m else f"its leg ended {distance:.0f} m from it"
+            self._advance(order, WaypointStatus.REACHED, "; ".join(filter(None, (words, order.limited))))
+        else:
+            self._restart(f"its leg ended {distance:.0f} m from the waypoint", now)
+
+    # The passing of time
+
+    def _tick_waiting(self, now: float) -> None:
+        if self.node.can_start(now):
+            self._evidence = Evidence()
+            self._forget_leg()
+            self._enter(Phase.FOLLOWING, now)
+            self._following_since = now
+            self._tick_following(now)
+        else:
+            super()._tick_waiting(now)
+
+    def _tick_following(self, now: float) -> None:
+        order, leg = self._order, self._leg
+        if order is None or order.status in (WaypointStatus.REACHED, WaypointStatus.REFUSED):
+            self._watch_idle(now)
+            return
+        if leg is None:
+            leg = self._begin_leg(order, now)
+        if leg.ended:
+            return
+        if self.sound is not None and leg.acknowledged and self._by_sound(now):
+            self.sound.ask(now)
+        if not leg.acknowledged:
+            if now - leg.sent_at > self._start_timeout_s:
+                self._release(
+                    f"no answer to its leg within {now - leg.sent_at:.0f} s"
+                    + (f"; {self.sound.last_problem}" if self.sound and self.sound.last_problem else ""),
+                    "It may be under water or out of reach; engage it again when it is heard",
+                    now,
+                    abandoned=True,
+                )
+            elif now >= self._request_due:
+                self._send_leg(order, leg, now)
+        elif self._silence(now) > self._settings.lost_after_s and not self._expected_away(now):
+            self._release(
+                f"not heard since it left on a leg of {leg.expected_s:.0f} s",
+                "Look for it at its waypoint; engage it again when it is heard",
+                now,
+                abandoned=True,
+            )
+
+    def _watch_idle(self, now: float) -> None:
+        if self.sound is not None and self._by_sound(now):
+            self.sound.ask(now)
+            return
+        silence = self._silence(now)
+        if silence > max(self._settings.release_after_s, self._settings.lost_after_wall_s * self._settings.time_scale):
+            self._release(
+                f"silent for {silence / self._settings.time_scale:.0f} s between two legs",
+                "Engage it again when it is heard",
+                now,
+                abandoned=True,
+            )
+
+    @property
+    def _start_timeout_s(self) -> float:
+        settings = self._settings
+        shortest = SOUND_START_TIMEOUT_S if self.sound is not None else settings.start_timeout_s
+        return max(shortest, START_TIMEOUT_WALLS * settings.lost_after_wall_s * settings.time_scale)
+
+    def _silence(self, now: float) -> float:
+        return math.inf if self.node.heard_at is None else now - self.node.heard_at
+
+    def _expected_away(self, now: float) -> bool:
+        return self.node.expected_back is not None and now <= self.node.expected_back
+
+    # Legs
+
+    def _begin_leg(self, order: Order, now: float) -> Leg:
+        waypoint, report = order.waypoint, self.node.report
+        depth, length = waypoint.depth_m, 0.0
+        order.limited = ""
+        if report is not None:
+            limit = self.guard.limit(
+                waypoint.depth_m,
+                waypoint.min_altitude_m,
+                report.time_s,
+                report.lat_deg,
+                report.lon_deg,
+                now=now,
+                towards=((waypoint.lat_deg, waypoint.lon_deg),),
+                mapped=waypoint.bottom,
+            )
+            depth, order.limited = limit.depth_m, limit.reason
+            length = distance_m((report.lat_deg, report.lon_deg), (waypoint.lat_deg, waypoint.lon_deg))
+        leg = self._leg = Leg(depth, leg_time_s(length, depth, waypoint.speed_mps), sent_at=now)
+        self._request_id = self._next_request_id()
+        self._send_leg(order, leg, now)
+        return leg
+
+    def _send_leg(self, order: Order, leg: Leg, now: float) -> None:
+        self._request_due = now + START_RETRY_S
+        request = imcpy.PlanControl()
+        request.type = imcpy.PlanControl.TypeEnum.REQUEST
+        request.op = imcpy.PlanControl.OperationEnum.START
+        request.request_id = self._request_id
+        request.plan_id = self._settings.plan_id
+        request.flags = 0
+        # A single maneuver is the shortest plan there is.
+        request.arg = (
+            goto_maneuver(order.waypoint, leg.depth_m)
+            if self._by_sound(now)
+            else leg_plan(self._settings, order.waypoint, leg.depth_m)
+        )
+        self._send(request)
+        if order.status is None:
+            self._advance(order, WaypointStatus.SENT, order.limited)
+
+    def _acknowledged(self, now: float) -> None:
+        leg, order = self._leg, self._order
+        if leg is None or order is None or leg.acknowledged:
+            return
+        leg.acknowledged = True
+        self.node.expected_back = now + leg.expected_s
+        self._advance(order, WaypointStatus.ACKNOWLEDGED, order.limited)
+
+    def _leg_over(self) -> None:
+        """Note that the plan is done; the next report of its place tells where that led."""
+        if self._leg is not None:
+            self._leg.ended = True
+            self.node.expected_back = None
+
+    def _forget_leg(self) -> None:
+        self._leg = None
+        self.node.expected_back = None
+
+    def _starved(self) -> bool:
+        return False
+
+    def _plan_ended(self, now: float) -> None:
+        self._forget_leg()
+        super()._plan_ended(now)

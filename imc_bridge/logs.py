@@ -1,0 +1,261 @@
+"""A vehicle's own log (``Data.lsf``, ``Data.lsf.gz``) as the soundings and positions that were measured.
+
+An LSF file is IMC packets one after another. DUNE writes everything into it that passes on board, at the full rates:
+what radio never carried while the vehicle was under water is here. The same gate as for live telemetry judges it.
+"""
+
+from __future__ import annotations
+
+import gzip
+import struct
+import zlib
+from collections import Counter
+from collections.abc import Generator, Iterator
+from io import BufferedReader
+from pathlib import Path
+from typing import cast
+
+import imcpy
+
+from imc_bridge.codec import (
+    FOOTER_SIZE,
+    HEADER_SIZE,
+    SYNC,
+    Decoder,
+    Header,
+    Message,
+    PacketFault,
+    message_ids,
+)
+from imc_bridge.discovery import read_announce
+from imc_bridge.events import Sounding, SoundingRefused, StateReport
+from imc_bridge.nodes import Node, listed_entities
+from imc_bridge.settings import BridgeSettings
+from imc_bridge.soundings import offer_distance
+from imc_bridge.vehicle_clock import Tick
+
+BLOCK_BYTES = 1 << 20
+GZIP_MAGIC = b"\x1f\x8b"
+_ORDERS = {struct.pack(f"{order}H", SYNC): struct.Struct(f"{order}H") for order in "<>"}
+"""How a packet's size is read, by its first two bytes."""
+SIZE_OFFSET = 4
+UNREADABLE = (EOFError, gzip.BadGzipFile, zlib.error)
+"""What a log raises that was cut off while it was written or copied."""
+
+OWN = ("EstimatedState", "Distance", "NavigationUncertainty", "EntityList", "EntityInfo", "FuelLevel")
+IDENTIFYING = ("Announce", "EntityList", "EntityInfo")
+VEHICLE_SENDS = message_ids(("EstimatedState",))
+
+LogEvent = StateReport | Sounding | SoundingRefused
+
+
+class LogError(Exception):
+    """A file cannot be used as a log; ``remedy`` says what would be right."""
+
+    def __init__(self, message: str, remedy: str = "") -> None:
+        super().__init__(message)
+        self.remedy = remedy
+
+
+class PacketFile:
+    """The packets of an LSF file in their order; what is no packet is skipped and counted.
+
+    Attributes
+    ----------
+    size_bytes, read_bytes : int
+        Of the file as it lies on disk, for showing how far reading has come.
+    packets, skipped_bytes : int
+    cut_off : bool
+        Whether the file ends in the middle of a packet or of its compression, as after a power loss.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.size_bytes = path.stat().st_size
+        self.read_bytes = 0
+        self.packets = 0
+        self.skipped_bytes = 0
+        self.cut_off = False
+        self._path = path
+
+    def __iter__(self) -> Iterator[bytes]:
+        """Yield every packet from the beginning."""
+        self.packets = self.skipped_bytes = self.read_bytes = 0
+        self.cut_off = False
+        with self._path.open("rb") as raw:
+            compressed = raw.read(len(GZIP_MAGIC)) == GZIP_MAGIC
+            raw.seek(0)
+            stream = cast(BufferedReader, gzip.GzipFile(fileobj=raw)) if compressed else raw
+            rest = b""
+            while block := self._block(stream, raw):
+                data = rest + block
+                used = yield from self._packets(data, last=False)
+                rest = data[used:]
+            self.read_bytes = self.size_bytes
+            used = yield from self._packets(rest, last=True)
+            self.cut_off |= used < len(rest)
+
+    def _block(self, stream: BufferedReader, raw: BufferedReader) -> bytes:
+        try:
+            # Not read(), which of a file that is cut off would throw away what was unpacked already.
+            block = stream.read1(BLOCK_BYTES)
+        except UNREADABLE:
+            self.cut_off = True
+            return b""
+        self.read_bytes = min(raw.tell(), self.size_bytes)
+        return block
+
+    def _packets(self, data: bytes, *, last: bool) -> Generator[bytes, None, int]:
+        """Yield the whole packets in ``data``; returns how many of its bytes are done with."""
+        place, end = 0, len(data)
+        while end - place >= HEADER_SIZE + FOOTER_SIZE:
+            order = _ORDERS.get(data[place : place + 2])
+            if order is None:
+                place = self._skip(data, place)
+                continue
+            size = HEADER_SIZE + order.unpack_from(data, place + SIZE_OFFSET)[0] + FOOTER_SIZE
+            after = place + size
+            if after + 2 > end and not (last and after == end):
+                if last:
+                    # A size that was damaged must not swallow the packets behind it.
+                    place = self._skip(data, place)
+                    continue
+                break
+            if after < end and data[after : after + 2] not in _ORDERS and not _sound(data[place:after]):
+                place = self._skip(data, place)
+                continue
+            self.packets += 1
+            yield data[place:after]
+            place = after
+        return place
+
+    def _skip(self, data: bytes, place: int) -> int:
+        """Return where the next packet may begin."""
+        found = [at for sync in _ORDERS if (at := data.find(sync, place + 1)) >= 0]
+        after = min(found, default=len(data) - 1)
+        self.skipped_bytes += after - place
+        return after
+
+
+def _sound(packet: bytes) -> bool:
+    try:
+        imcpy.Packet.deserialize(packet)
+    except (RuntimeError, UnicodeDecodeError, ValueError):
+        return False
+    return True
+
+
+class VehicleLog:
+    """One vehicle's log as events in the order of the file.
+
+    Parameters
+    ----------
+    path
+        ``.lsf`` or ``.lsf.gz``; what it is shows from its content.
+    settings
+        Geometry of the altimeter and the largest range.
+    vehicle
+        The vehicle's name; without it the name that the vehicle announces in the log.
+
+    Raises
+    ------
+    LogError
+        When the file holds no IMC, no vehicle's states, or no name and none is given.
+    OSError
+        When it cannot be read.
+    """
+
+    def __init__(self, path: Path, settings: BridgeSettings, vehicle: str | None = None) -> None:
+        self.file = PacketFile(path)
+        self.refused: Counter[str] = Counter()
+        self._settings = settings
+        self._decoder = Decoder(OWN)
+        self._path = path
+        self.imc_id, name, self._entities = self._identify()
+        if vehicle is None and not name:
+            raise LogError(f"{path.name} does not tell its vehicle's name", "give it with --vehicle NAME")
+        self.vehicle = vehicle or name
+
+    @property
+    def faults(self) -> dict[str, int]:
+        """How many packets could not be read, by reason."""
+        return {fault.value: count for fault, count in self._decoder.faults.items() if fault is not PacketFault.UNKNOWN}
+
+    def _identify(self) -> tuple[int, str, dict[int, str]]:
+        """Whose log it is, by which name, and its entities by id: read up to the vehicle's own announce."""
+        decoder = Decoder(IDENTIFYING)
+        states: Counter[int] = Counter()
+        names: dict[int, str] = {}
+        entities: dict[int, dict[int, str]] = {}
+        for packet in self.file:
+            header = decoder.header(packet)
+            if header is None:
+                continue
+            if header.msg_id in VEHICLE_SENDS:
+                states[header.src] += 1
+            elif decoder.wants(header) and (message := decoder.message(packet)) is not None:
+                if isinstance(message, imcpy.Announce):
+                    announcement = read_announce(message)
+                    names[header.src] = announcement.name
+                else:
+                    _note_entities(entities.setdefault(header.src, {}), message)
+            if states and states.most_common(1)[0][0] in names:
+                break
+        if not self.file.packets:
+            raise LogError(f"{self._path.name} holds no IMC packet", "give a DUNE log: Data.lsf or Data.lsf.gz")
+        if not states:
+            raise LogError(f"{self._path.name} holds no EstimatedState", "give the log that DUNE wrote on the vehicle")
+        own = states.most_common(1)[0][0]
+        return own, names.get(own, ""), entities.get(own, {})
+
+    def events(self) -> Iterator[LogEvent]:
+        """Yield states, soundings and refused Distances; the same file gives the same events every time."""
+        node = Node(self.imc_id, self.vehicle, self._settings, 0.0)
+        node.entities = dict(self._entities) or None
+        self.refused.clear()
+        for packet in self.file:
+            header = self._decoder.header(packet)
+            if header is None or header.src != self.imc_id or not self._decoder.wants(header):
+                continue
+            message = self._decoder.message(packet)
+            if message is not None:
+                yield from self._counted(_take(node, header, message))
+        yield from self._counted(node.gate.resolve(node.history, node.position_sd_m()))
+        yield from self._counted(node.gate.give_up())
+
+    def _counted(self, events: Iterator[LogEvent]) -> Iterator[LogEvent]:
+        for event in events:
+            if isinstance(event, SoundingRefused):
+                self.refused[event.reason] += 1
+            yield event
+
+
+def _take(node: Node, header: Header, message: Message) -> Iterator[LogEvent]:
+    # A log tells no arrival times: a leap of the clock counts once it repeats.
+    if node.take_time(message.timestamp, 0.0, message.timestamp) is Tick.DOUBTFUL:
+        return
+    match type(message).__name__:
+        case "EstimatedState":
+            report = node.take_state(message)
+            if report is not None:
+                yield report
+            yield from node.gate.resolve(node.history, node.position_sd_m())
+        case "Distance":
+            refused = offer_distance(node.gate, node.entity_name(header.src_ent), message)
+            if refused is not None:
+                yield refused
+        case "NavigationUncertainty":
+            node.take_uncertainty(message)
+        case "FuelLevel":
+            node.battery_pct = float(message.value)
+        case _:
+            names = dict(node.entities or {})
+            _note_entities(names, message)
+            node.entities = names or None
+
+
+def _note_entities(names: dict[int, str], message: Message) -> None:
+    """EntityList lists all of them, EntityInfo describes one."""
+    if isinstance(message, imcpy.EntityInfo):
+        names[int(message.id)] = str(message.label)
+    elif isinstance(message, imcpy.EntityList) and message.op == imcpy.EntityList.OperationEnum.REPORT:
+        names.update(listed_entities(message))

@@ -1,0 +1,88 @@
+"""Writes LSF logs as DUNE does, over a sea floor that is known exactly."""
+
+import gzip
+import math
+from collections.abc import Iterator
+from pathlib import Path
+
+import imcpy
+from imcpy.coordinates import WGS84
+
+from imc_bridge.codec import encode
+
+VEHICLE_ID, OTHER_ID = 0x1E, 0x1F
+NAME = "lauv-log-1"
+ALTIMETER, FORWARD = 58, 59
+LAT_RAD, LON_RAD = math.radians(41.185), math.radians(-8.705)
+START_S = 1_795_225_140.0
+SPEED_MPS = 1.5
+STATE_PERIOD_S, PING_PERIOD_S = 0.1, 0.2
+VEHICLE_DEPTH_M = 2.0
+
+
+def bottom_m(north_m: float) -> float:
+    """Depth of the sea floor along the track."""
+    return 12.0 + 2.0 * math.sin(north_m / 20.0)
+
+
+def packet(message: object, time_s: float, src: int = VEHICLE_ID, entity: int = 0) -> bytes:
+    data = bytearray(encode(message, src=src, dst=0xFFFF, time_s=time_s))
+    if not entity:
+        return bytes(data)
+    again = imcpy.Packet.deserialize(bytes(data))
+    again.src_ent = entity
+    return bytes(imcpy.Packet.serialize(again))
+
+
+def state(time_s: float, north_m: float, src: int = VEHICLE_ID) -> bytes:
+    message = imcpy.EstimatedState()
+    message.lat, message.lon = WGS84.displace(LAT_RAD, LON_RAD, north_m, 5.0)
+    message.depth = VEHICLE_DEPTH_M
+    message.vx = SPEED_MPS
+    message.alt = -1.0
+    return packet(message, time_s, src)
+
+
+def distance(
+    time_s: float, value: float, *, valid: bool = True, entity: int = ALTIMETER, src: int = VEHICLE_ID
+) -> bytes:
+    message = imcpy.Distance()
+    message.validity = imcpy.Distance.ValidityEnum.VALID if valid else imcpy.Distance.ValidityEnum.INVALID
+    message.value = value
+    return packet(message, time_s, src, entity)
+
+
+def announce(time_s: float, name: str = NAME, src: int = VEHICLE_ID) -> bytes:
+    message = imcpy.Announce()
+    message.sys_name = name
+    message.sys_type = imcpy.SystemType.UUV
+    message.services = "dune://0.0.0.0/uid/1;imc+info://0.0.0.0/version/5.4.31;imc+udp://127.0.0.1:6002/"
+    return packet(message, time_s, src)
+
+
+def entities(time_s: float) -> bytes:
+    message = imcpy.EntityList()
+    message.op = imcpy.EntityList.OperationEnum.REPORT
+    message.list = f"Daemon=0;Altimeter={ALTIMETER};Echo Sounder={FORWARD}"
+    return packet(message, time_s)
+
+
+def survey(pings: int) -> Iterator[bytes]:
+    """A line due north: states at 10 Hz, pings at 5 Hz, everything valid."""
+    yield entities(START_S)
+    yield announce(START_S)
+    for tick in range(pings * round(PING_PERIOD_S / STATE_PERIOD_S) + 2):
+        time_s = START_S + tick * STATE_PERIOD_S
+        north_m = SPEED_MPS * (time_s - START_S)
+        yield state(time_s, north_m)
+        if tick % 2 == 0 and tick // 2 < pings:
+            # Between two states, where only interpolation places it right.
+            at_s = time_s + 0.4 * STATE_PERIOD_S
+            yield distance(at_s, bottom_m(SPEED_MPS * (at_s - START_S)) - VEHICLE_DEPTH_M)
+
+
+def write(path: Path, packets: Iterator[bytes] | list[bytes], *, cut_bytes: int = 0) -> Path:
+    data = b"".join(packets)
+    data = data[: len(data) - cut_bytes]
+    path.write_bytes(gzip.compress(data, 1, mtime=0) if path.suffix == ".gz" else data)
+    return path
