@@ -21,7 +21,8 @@ OUR_IMC_VERSION = "5.4.30"
 CLOCK_TOLERANCE_S = 5.0
 CLOCK_WRONG_S = 60.0
 """Tides and times in products are wrong by then."""
-RATE_TOLERANCE = 0.1
+SLOWEST_RATE, FASTEST_RATE = 0.5, 1.5
+"""Relative to what is expected; a simulation that merely cannot keep up lies between."""
 MIN_STATE_RATE_HZ = 1.0
 SILENT_HEARTBEAT_S = 5.0
 
@@ -337,7 +338,7 @@ def _sounding_findings(node: NodeView, *, live: bool) -> list[Finding]:
 
 def _clock_findings(node: NodeView, settings: BridgeSettings) -> list[Finding]:
     scale, rate, offset = settings.time_scale, node.clock_rate, node.clock_offset_s
-    if rate is not None and abs(rate / scale - 1.0) > RATE_TOLERANCE:
+    if rate is not None and not SLOWEST_RATE < rate / scale < FASTEST_RATE:
         return [
             problem(
                 Cause.CLOCK_RATE,

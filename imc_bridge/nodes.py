@@ -293,7 +293,7 @@ class Node:
     @property
     def references_needed(self) -> bool:
         """Whether what it executes is our FollowReference plan, which ends by itself when references cease."""
-        return self.executing(self._settings.plan_id)
+        return self.executing(self._settings.plan_id) and self.expected_back is None
 
     @property
     def patience_s(self) -> float:
