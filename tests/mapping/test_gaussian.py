@@ -51,6 +51,17 @@ def test_one_by_one_or_all_at_once_is_the_same(seed: int, cut: int) -> None:
     np.testing.assert_array_equal(in_parts.to_map().count, at_once.to_map().count)
 
 
+def test_very_many_soundings_are_added_as_a_few_are() -> None:
+    s = random_soundings(25_000, seed=2)
+    at_once, in_parts = GaussianInterpolator(GRID, 0.8), GaussianInterpolator(GRID, 0.8)
+    at_once.add(s)
+    for part in np.array_split(np.arange(len(s)), 5):
+        in_parts.add(s.take(part))
+    np.testing.assert_allclose(at_once.depth_m, in_parts.depth_m, rtol=1e-9)
+    np.testing.assert_allclose(at_once.sd_m, in_parts.sd_m, rtol=1e-6)
+    np.testing.assert_array_equal(at_once.to_map().count, in_parts.to_map().count)
+
+
 @settings(deadline=None)
 @given(depth=st.floats(0.5, 6000.0))
 def test_a_constant_sea_floor_is_reproduced(depth: float) -> None:

@@ -47,3 +47,17 @@ def test_all_precision_is_in_both_levels() -> None:
     weight = levels.soundings.sd_m**-2.0
     np.testing.assert_allclose(weight[: levels.n_fine].sum(), np.sum(s.sd_m**-2.0))
     np.testing.assert_allclose(weight[levels.n_fine :].sum(), np.sum(s.sd_m**-2.0))
+
+
+def test_what_lies_within_the_radius_is_not_used() -> None:
+    rng = np.random.default_rng(1)
+    s = Soundings(rng.uniform(0, 30, 400), rng.uniform(0, 30, 400), rng.uniform(5, 9, 400), np.full(400, 0.1))
+    levels = two_levels(s, 0.5, 3.0)
+    at, radius = rng.uniform(0, 30, (12, 2)), rng.uniform(0.1, 6.0, 12)
+    for row, place, r in zip(levels.neighbours_beyond(at, radius, 16, 32), at, radius, strict=True):
+        used = row[row >= 0]
+        fine = [i for i in used if i < levels.n_fine]
+        for g in used[used >= levels.n_fine] - levels.n_fine:
+            fine.extend(levels.members[levels.start[g] : levels.start[g + 1]])
+        assert len(fine) == len(set(fine)) >= 16
+        assert np.linalg.norm(levels.points[fine] - place, axis=1).min() >= r
