@@ -14,6 +14,7 @@ from app.exploration.survey_value import Nodes, Objective, make_nodes, plan_valu
 FloatArray = NDArray[np.float64]
 
 MARGIN_M = 0.5
+FAR_M = 1e6
 ACROSS_PENALTY = 1.05
 """How much worse lines across the longer axis count: of equally good ones those along it are flown."""
 TRANSIT_PENALTY = 0.5
@@ -90,7 +91,7 @@ def _best_share(
     inside = (u >= low_u) & (u <= high_u)
     mine = make_nodes(nodes.en_m[inside], nodes.weight[inside])
     unknown = np.full(len(mine.x), np.inf)
-    objective = Objective(step_m, steps, scale_m, power, 0.0)
+    objective = Objective(step_m, steps, scale_m, power, 0.0, FAR_M)
     affordable = most_lines(lambda n: _steps(sweep, start, low_u, high_u, n, step_m) <= steps)
     best: tuple[float, Share] | None = None
     for n in {max(1, affordable - 1), affordable, affordable + 1}:

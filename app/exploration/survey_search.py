@@ -5,7 +5,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from app.exploration.geometry import enters, leaves, signed_distance
-from app.exploration.survey_value import Nodes, Objective, lower_to_route
+from app.exploration.survey_value import Nodes, Objective, lower_to_route, unknown_part
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -93,14 +93,12 @@ def _left(d2: FloatArray, after: FloatArray, weight: FloatArray, scale_m: float,
     """
     total = 0.0
     running = np.empty(len(d2))
-    half = 0.5 * power
-    inverse = 1.0 / (scale_m * scale_m)
+    inverse2 = 1.0 / (scale_m * scale_m)
     for i in range(len(d2)):
         least = d2[i]
         for j in range(len(after)):
             least = min(least, after[j, i])
-        share = min(1.0, least * inverse)
-        total += weight[i] * (share if power == 2.0 else share**half)
+        total += unknown_part(least, weight[i], inverse2, power)
         running[i] = total
     return running
 

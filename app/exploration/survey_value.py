@@ -1,9 +1,11 @@
-"""What a survey plan is worth: roughness-weighted squared interpolation error as a function of distance to soundings.
+"""What a survey plan is worth: the squared interpolation error that is expected after it.
 
-A node at distance D from the nearest sounding is interpolated with an expected squared error proportional to
-``a (D / l)^p`` up to D = l, and ``a`` beyond, with ``a`` the local roughness, ``l`` the correlation length and p
-between 1 and 3 (Matern field of smoothness nu: p = 2 nu). ``U`` is the sum over the nodes. Soundings are taken all
-along the legs.
+Where the sea floor is rough, soundings inform their surroundings less far, but what may be wrong has the same size
+everywhere: a node at distance D from the nearest sounding has an expected squared error, as a part of what is quite
+unknown, of x / (1 + x) with x = a (D / l)^p, where ``a`` is the local roughness, ``l`` the correlation length where it
+is 1, and p the exponent of short distances. So rough places are worth close lines only as far as these can still
+resolve them, and a smooth place must not be left out altogether. ``U`` is the sum over the nodes. Soundings are taken
+all along the legs.
 """
 
 from typing import NamedTuple
@@ -54,13 +56,17 @@ class Nodes(NamedTuple):
 
 
 class Objective(NamedTuple):
-    """How a plan is judged: the largest leg, legs per vehicle, l and p as above, and what a reversal costs."""
+    """How a plan is judged: the largest leg, legs per vehicle, l and p as above, and what a reversal costs.
+
+    Nodes farther than ``reach_m`` from all soundings count as quite unknown.
+    """
 
     step: float
     steps: int
     scale_m: float
     power: float
     turn_penalty: float
+    reach_m: float
 
 
 def make_nodes(en_m: FloatArray, weight: FloatArray) -> Nodes:
@@ -151,23 +157,29 @@ def lower_to_route(
     n, _ = fly(x, y, route, count, objective.step, objective.steps, vertices)
     for k in range(1, n):
         lower_to_segment(
-            d2, nodes, vertices[k - 1, 0], vertices[k - 1, 1], vertices[k, 0], vertices[k, 1], objective.scale_m
+            d2, nodes, vertices[k - 1, 0], vertices[k - 1, 1], vertices[k, 0], vertices[k, 1], objective.reach_m
         )
     return turning(vertices, n, heading)
+
+
+@njit(cache=True, nogil=True, inline="always")
+def unknown_part(d2: float, weight: float, inverse2: float, power: float) -> float:
+    """Return x / (1 + x) for a squared distance; ``inverse2`` is 1 / l^2."""
+    r2 = d2 * inverse2
+    if r2 > 1e6:
+        return 1.0
+    x = weight * (r2 if power == 2.0 else r2 * np.sqrt(r2) if power == 3.0 else r2 ** (0.5 * power))
+    part: float = x / (1.0 + x)
+    return part
 
 
 @njit(cache=True, nogil=True)
 def uncertainty(d2: FloatArray, weight: FloatArray, scale_m: float, power: float) -> float:
     """Return U for squared distances ``d2`` (m,) and roughness ``weight`` (m,)."""
     total = 0.0
-    inverse = 1.0 / (scale_m * scale_m)
-    if power == 2.0:
-        for i in range(len(d2)):
-            total += weight[i] * min(1.0, d2[i] * inverse)
-        return total
-    half = 0.5 * power
+    inverse2 = 1.0 / (scale_m * scale_m)
     for i in range(len(d2)):
-        total += weight[i] * (min(1.0, d2[i] * inverse)) ** half
+        total += unknown_part(d2[i], weight[i], inverse2, power)
     return total
 
 
@@ -240,14 +252,21 @@ def values_after_first_leg(
     c, n, _ = targets.shape
     out = np.empty((c, 2))
     courses = np.empty(n)
-    rest = Objective(objective.step, objective.steps - 1, objective.scale_m, objective.power, objective.turn_penalty)
+    rest = Objective(
+        objective.step,
+        objective.steps - 1,
+        objective.scale_m,
+        objective.power,
+        objective.turn_penalty,
+        objective.reach_m,
+    )
     for i in range(c):
         after = d2.copy()
         turns = 0.0
         for j in range(n):
             ax, ay = starts[j, 0], starts[j, 1]
             bx, by = targets[i, j, 0], targets[i, j, 1]
-            lower_to_segment(after, nodes, ax, ay, bx, by, objective.scale_m)
+            lower_to_segment(after, nodes, ax, ay, bx, by, objective.reach_m)
             courses[j] = headings[j]
             if np.hypot(bx - ax, by - ay) > 1e-6:
                 courses[j] = 0.5 * np.pi - np.arctan2(by - ay, bx - ax)

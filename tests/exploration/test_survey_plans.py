@@ -53,7 +53,7 @@ def test_a_route_is_flown_leg_by_leg_however_many_are_taken_at_once(route, step,
 def test_searching_never_worsens_a_plan_and_says_truly_what_it_is_worth():
     nodes = nodes_of(1)
     starts, headings = np.array([[2.0, 2.0], [7.0, 2.0]]), np.full(2, np.nan)
-    objective = Objective(5.0, 60, 15.0, 2.0, 0.002)
+    objective = Objective(5.0, 60, 15.0, 2.0, 0.002, 60.0)
     d2 = np.full(len(nodes.x), np.inf)
     vias = np.zeros((2, 40, 2))
     vias[:, :2] = [[[20.0, 90.0], [40.0, 10.0]], [[70.0, 90.0], [90.0, 10.0]]]

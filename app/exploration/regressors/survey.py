@@ -43,6 +43,8 @@ REPLANS = 20
 HEAT = 0.01
 """Part by which changes to a plan may worsen it while the search begins."""
 POWER = 2.0
+REACH = 4.0
+"""Line spacings beyond which a place counts as quite unknown."""
 LEAVE_BACKBONE = 0.93
 """The freer plan must promise at most this part of the squared error that the backbone promises."""
 LEAVE_PLAN = 0.02
@@ -114,9 +116,9 @@ class SurveyRegressors:
         distance = np.asarray(tree.query(team.belief.xy_m)[0])
         self._nodes = thin_nodes(team, expected_roughness(team.belief, distance, self._spacing))
         self._scale = max(team.belief.correlation_length_m, self._spacing)
-        self._objective = Objective(self._step_m, self._steps, self._scale, POWER, TURN_PENALTY)
+        self._objective = Objective(self._step_m, self._steps, self._scale, POWER, TURN_PENALTY, REACH * self._spacing)
         self._d2 = np.asarray(tree.query(self._nodes.en_m)[0]) ** 2
-        self._reference = max(1e-12, float(self._nodes.weight.sum()))
+        self._reference = float(len(self._nodes.x))
 
     def prior(self, team: Situation) -> tuple[FloatArray, float]:
         """The final map counts fully, what is gained at once a little."""
