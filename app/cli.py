@@ -3,15 +3,19 @@
 import asyncio
 import json
 import sys
+from collections.abc import Awaitable, Callable
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
 from app import __version__
 
+T = TypeVar("T")
+
 if TYPE_CHECKING:
+    from app.missions.service import MissionService
     from app.settings import Settings
     from imc_bridge.doctor import Diagnosis
 
@@ -240,41 +244,44 @@ def revoke_token(
 def export(
     mission: Annotated[str, typer.Argument(metavar="MISSION", help="Its id, or the begin of it.")],
     format: Annotated[  # noqa: A002 - the option's name
-        str, typer.Option("--format", "-f", help="tif, xyz, csv (soundings), geojson (contours and tracks) or png.")
+        str,
+        typer.Option(
+            "--format",
+            "-f",
+            help="Of the map tif, nc, bag, xyz, csv (soundings), geojson, kml (contours) or png; soundings.csv, "
+            "soundings.xyz, soundings.geojson (IHO B-12); tracks.geojson, tracks.kml, tracks.gpx.",
+        ),
     ] = "tif",
     out: Annotated[
         Path | None, typer.Option("--out", "-o", help="File to write; '-' is stdout [default: in output_dir]")
     ] = None,
+    order: Annotated[
+        str, typer.Option(help="IHO S-44 order that the TVU is compared with: exclusive, special, 1a, 1b or 2.")
+    ] = "1a",
+    interval: Annotated[
+        float | None, typer.Option(min=0.01, max=1000, help="Metres between contours [default: about ten contours]")
+    ] = None,
+    vehicle: Annotated[
+        str | None, typer.Option(help="Whose soundings, for soundings.geojson [default: the only vehicle's]")
+    ] = None,
     database: Database = None,
 ) -> None:
-    """Write a mission's map or soundings to a file, from the database; no service has to run."""
+    """Write a mission's map, soundings or tracks to a file, from the database; no service has to run."""
     settings = _settings(database_url=database)
-    from app.missions.maps import FORMATS, Product
+    from app.mapping.s44 import Order
+    from app.missions.products import PRODUCTS, Product, ProductOptions
     from app.missions.service import MissionService
-    from app.storage.database import Database as Store
-    from app.storage.prepare import prepare_database
 
-    if format not in FORMATS:
-        raise typer.BadParameter(f"{format!r} is not one of {', '.join(FORMATS)}", param_hint="--format")
+    if format not in PRODUCTS:
+        raise typer.BadParameter(f"{format!r} is not one of {', '.join(PRODUCTS)}", param_hint="--format")
+    if order not in list(Order):
+        raise typer.BadParameter(f"{order!r} is not one of {', '.join(Order)}", param_hint="--order")
+    options = ProductOptions(Order(order), interval, vehicle=vehicle)
 
-    async def run() -> Product:
-        await prepare_database(settings.database_url, may_upgrade=settings.migrates_itself)
-        store = Store(settings.database_url)
-        # Nothing is started: the links stay closed, whatever a service on this database is doing.
-        closed = settings.service().model_copy(update={"imc": settings.imc.model_copy(update={"enabled": False})})
-        service = MissionService(closed, store)
-        try:
-            every = await service.missions()
-            meant = [summary.id for summary in every if summary.id.startswith(mission)]
-            if len(meant) != 1:
-                ids = "; ".join(f"{summary.id} {summary.name}" for summary in every[:5]) or "none"
-                raise CommandError(f"{len(meant)} missions have ids that begin with {mission!r}", f"There are: {ids}")
-            return await service.export(meant[0], format)
-        finally:
-            await service.shutdown()
-            await store.close()
+    async def run(service: MissionService) -> Product:
+        return await service.export(await _meant(service, mission), format, options)
 
-    product = asyncio.run(run())
+    product = _with_missions(settings, run)
     if out == Path("-"):
         sys.stdout.buffer.write(product.content)
         return
@@ -409,6 +416,36 @@ def _with_tokens(database: str | None, run: Any) -> Any:
             await store.close()
 
     return asyncio.run(use())
+
+
+def _with_missions(settings: "Settings", run: "Callable[[MissionService], Awaitable[T]]") -> "T":
+    """Run something with the missions of a database; nothing is started, the links stay closed."""
+    from app.missions.service import MissionService
+    from app.storage.database import Database as Store
+    from app.storage.prepare import prepare_database
+
+    async def use() -> "T":
+        await prepare_database(settings.database_url, may_upgrade=settings.migrates_itself)
+        store = Store(settings.database_url)
+        closed = settings.service().model_copy(update={"imc": settings.imc.model_copy(update={"enabled": False})})
+        service = MissionService(closed, store)
+        try:
+            return await run(service)
+        finally:
+            await service.shutdown()
+            await store.close()
+
+    return asyncio.run(use())
+
+
+async def _meant(service: "MissionService", begin: str) -> str:
+    """Return the id of the one mission whose id begins so. Raises CommandError."""
+    every = await service.missions()
+    meant = [summary.id for summary in every if summary.id.startswith(begin)]
+    if len(meant) != 1:
+        ids = "; ".join(f"{summary.id} {summary.name}" for summary in every[:5]) or "none"
+        raise CommandError(f"{len(meant)} missions have ids that begin with {begin!r}", f"There are: {ids}")
+    return meant[0]
 
 
 def _settings(**overrides: Any) -> "Settings":

@@ -16,7 +16,7 @@ from pydantic_settings import (
     TomlConfigSettingsSource,
 )
 
-from app.missions.settings import ImcSettings, ServiceSettings, SimulationSettings
+from app.missions.settings import ImcSettings, ProviderSettings, ServiceSettings, SimulationSettings
 
 PREFIX = "BATHYFLEET_"
 CONFIG_VARIABLE = "BATHYFLEET_CONFIG"
@@ -88,6 +88,9 @@ class Settings(BaseSettings):
     simulation: SimulationSettings = Field(
         default=SimulationSettings(), description="The world of vehicles of kind sim"
     )
+    provider: ProviderSettings = Field(
+        default=ProviderSettings(), description="Who hands soundings in as crowdsourced bathymetry"
+    )
 
     @field_validator("log_level", "log_format", mode="before")
     @classmethod
@@ -134,6 +137,7 @@ class Settings(BaseSettings):
             time_scale=self.time_scale,
             imc=self.imc,
             simulation=self.simulation,
+            provider=self.provider,
         )
 
 

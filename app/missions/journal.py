@@ -72,7 +72,8 @@ class Journal:
         self._positions: list[dict[str, Any]] = []
         self._statuses: list[WaypointReport] = []
         self._track_ends: dict[str, tuple[float, float]] = {}
-        self._writing = asyncio.Lock()
+        self.writing = asyncio.Lock()
+        """Held while soundings are stored, so that corrections do not change under them."""
         self._pump: asyncio.Task[None] | None = None
 
     def sounding(self, report: SoundingReport) -> None:
@@ -113,7 +114,7 @@ class Journal:
         await to_the_end(self._flush())
 
     async def _flush(self) -> None:
-        async with self._writing:
+        async with self.writing:
             soundings, self._soundings = self._soundings, []
             positions, self._positions = self._positions, []
             statuses, self._statuses = self._statuses, []
@@ -137,7 +138,7 @@ class Journal:
     async def take(
         self, reports: Sequence[SoundingReport], session: AsyncSession
     ) -> tuple[list[ItemVerdict], Callable[[], None]]:
-        """Store soundings in the caller's transaction.
+        """Store soundings in the caller's transaction; the caller holds ``writing``.
 
         Returns
         -------
@@ -245,6 +246,7 @@ def _storable(item: GatedSounding) -> bool:
 
 def _row(mission_id: str, step: int, received: Any, item: GatedSounding) -> dict[str, Any]:
     report = item.report
+    geometry = report.beam_geometry
     return {
         "mission_id": mission_id,
         "vehicle": report.vehicle,
@@ -263,6 +265,14 @@ def _row(mission_id: str, step: int, received: Any, item: GatedSounding) -> dict
         "depth_m": item.depth_m,
         "sd_m": item.sd_m,
         "position_sd_m": report.position_sd_m,
+        "level_m": item.level_m,
+        "vehicle_lat_deg": geometry and geometry.lat_deg,
+        "vehicle_lon_deg": geometry and geometry.lon_deg,
+        "roll_deg": geometry and geometry.roll_deg,
+        "pitch_deg": geometry and geometry.pitch_deg,
+        "heading_deg": geometry and geometry.heading_deg,
+        "beam_azimuth_deg": geometry and geometry.azimuth_deg,
+        "beam_off_nadir_deg": geometry and geometry.off_nadir_deg,
         "verdict": Verdict.ACCEPTED if item.accepted else Verdict.REJECTED,
         "reason": item.reason,
     }

@@ -4,7 +4,7 @@ import copy
 import hashlib
 import threading
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import shapely
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from shapely.geometry import Polygon
 
 from app.exploration.problem import Belief
+from app.mapping.counting import count_per_cell
 from app.mapping.gp import GaussianProcessMap
 from app.mapping.outliers import flag_outliers
 from app.mapping.types import BathymetricMap, BoolArray, FloatArray, Grid, Soundings
@@ -21,6 +22,14 @@ MAX_LANDMARKS = 4000
 
 RELEARN_GROWTH = 1.15
 """Hyperparameters are learned again when the soundings grew by this factor."""
+
+
+@dataclass(frozen=True)
+class _Everything:
+    """Soundings that take the place of all that were there, shape (n, 4), and those that were imported."""
+
+    soundings: NDArray[np.float64]
+    prior: NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -61,18 +70,27 @@ class MapBuilder:
             self._nodes = self.mask.copy()
         self._nodes_xy = self.grid.centres_m[self._nodes.ravel()]
         self._accurate = np.zeros(len(self._nodes_xy), dtype=bool)
-        self._pending: deque[NDArray[np.float64]] = deque()
+        self._pending: deque[NDArray[np.float64] | _Everything] = deque()
         self._soundings = np.zeros((0, 4))
-        # The model with its hyperparameters, and for the soundings it was learned on which are outliers.
+        self._prior = np.zeros((0, 4))
+        # The model with its hyperparameters, and which of the soundings it was learned on (imported ones first) are
+        # outliers.
         self._learned = (GaussianProcessMap(reject_outliers=False), np.zeros(0, dtype=bool))
         self._building = threading.Lock()
         self._learning = threading.Lock()
         self._newest: BuiltMap | None = None
+        self._version = 0
+        # Counts how often all soundings were replaced: what is learned meanwhile of the old ones is void.
+        self._generation = 0
 
     def add(self, soundings: NDArray[np.float64]) -> None:
         """Take in soundings, shape (n, 4): east, north, depth, standard deviation in metres."""
         if len(soundings):
             self._pending.append(soundings)
+
+    def replace(self, soundings: NDArray[np.float64], prior: NDArray[np.float64]) -> None:
+        """Take these in place of all soundings so far; ``prior`` are those that were imported. Shapes (n, 4)."""
+        self._pending.append(_Everything(soundings, prior))
 
     @property
     def newest(self) -> BuiltMap | None:
@@ -91,44 +109,73 @@ class MapBuilder:
         every sounding and learns the model first, as a product should.
         """
         with self._building:
-            arrived = []
-            while self._pending:
-                arrived.append(self._pending.popleft())
-            if arrived:
-                self._soundings = np.concatenate([self._soundings, *arrived])
+            changed = self._take_in()
+            if not len(self._soundings) + len(self._prior):
+                self._newest = None
+                return None
             if thorough:
                 self.learn(always=True)
-            if arrived or (self._newest is not None and thorough):
+            if changed or (self._newest is not None and thorough):
                 self._newest = self._build()
             return self._newest
 
+    def _take_in(self) -> bool:
+        """Add what is pending; tells whether there was anything."""
+        arrived: list[NDArray[np.float64]] = []
+        changed = bool(self._pending)
+        while self._pending:
+            item = self._pending.popleft()
+            if isinstance(item, _Everything):
+                arrived = []
+                self._generation += 1
+                self._soundings, self._prior = item.soundings, item.prior
+                self._learned = (GaussianProcessMap(reject_outliers=False), np.zeros(0, dtype=bool))
+            else:
+                arrived.append(item)
+        if arrived:
+            self._soundings = np.concatenate([self._soundings, *arrived])
+        return changed
+
     def _build(self) -> BuiltMap:
         model, rejected = self._learned
-        trusted = np.ones(len(self._soundings), dtype=bool)
+        known = np.concatenate([self._prior, self._soundings])
+        trusted = np.ones(len(known), dtype=bool)
         trusted[: len(rejected)] = ~rejected
         model = copy.copy(model)
-        bathymetry = model.fit(_as_soundings(self._soundings[trusted]), learn=False).predict(self.grid, self.mask)
+        bathymetry = model.fit(_as_soundings(known[trusted]), learn=False).predict(self.grid, self.mask)
+        if len(self._prior):
+            measured = _as_soundings(known[len(self._prior) :][trusted[len(self._prior) :]])
+            bathymetry = self._without_prior(bathymetry, measured)
         if not rejected.size:
             # The first fit had to learn; keep what it found.
             self._learned = (model, rejected)
         digest = hashlib.sha256(bathymetry.depth_m.tobytes()).hexdigest()
-        version = self._newest.version + 1 if self._newest else 1
-        return BuiltMap(version, len(self._soundings), bathymetry, digest)
+        self._version += 1
+        return BuiltMap(self._version, len(self._soundings), bathymetry, digest)
+
+    def _without_prior(self, bathymetry: BathymetricMap, measured: Soundings) -> BathymetricMap:
+        """Return the map with only this mission's own soundings counted; the imported ones are a layer of their own."""
+        count = np.where(self.mask, count_per_cell(self.grid, measured), 0)
+        prior = self.mask & (count_per_cell(self.grid, _as_soundings(self._prior)) > 0)
+        return replace(bathymetry, count=count, sounded=count > 0, prior=prior)
 
     def learn(self, *, always: bool = False) -> None:
         """Judge outliers and learn the model's hyperparameters anew when there are enough more soundings.
 
         Slower than a build, so it is done while the vehicles travel. The next ``build`` uses what was found.
         """
-        known = self._soundings
         with self._learning:
+            generation = self._generation
             model, rejected = self._learned
+            known = np.concatenate([self._prior, self._soundings])
             if not len(known) or (len(known) < RELEARN_GROWTH * len(rejected) and not always):
                 return
             soundings = _as_soundings(known)
             verdict = flag_outliers(soundings, hyperparameters=getattr(model, "stationary_hyperparameters_", None))
             trusted = ~verdict.rejected
-            self._learned = (copy.copy(model).fit(soundings.take(trusted), learn=True), verdict.rejected)
+            fitted = copy.copy(model).fit(soundings.take(trusted), learn=True)
+            if generation == self._generation:
+                self._learned = (fitted, verdict.rejected)
 
     def coverage_pct(self) -> float:
         """Return the share of the area's cells that are known to the asked accuracy."""

@@ -19,6 +19,7 @@ from app.exploration.planners import ONLY_IN_SIMULATION, PLANNERS, REFUSAL
 from app.exploration.planners import warm_up as planning_warm_up
 from app.mapping.georeference import LocalFrame
 from app.mapping.gp import warm_up as mapping_warm_up
+from app.mapping.products.tracks import Track, TrackPoint
 from app.missions import states
 from app.missions.broadcast import Subscription
 from app.missions.clock import now
@@ -43,7 +44,17 @@ from app.missions.journal import event_view
 from app.missions.links.rest import RestFleetLink
 from app.missions.links.sim import Launch, SimFleetLink
 from app.missions.live import LiveMission
-from app.missions.maps import MapSnapshot, Product, make_product
+from app.missions.maps import MapSnapshot
+from app.missions.products import (
+    MAP,
+    SOUNDINGS,
+    TRACKS,
+    Material,
+    Product,
+    ProductOptions,
+    make_product,
+    product_kind,
+)
 from app.missions.runner import Runner
 from app.missions.settings import ServiceSettings
 from app.missions.spec import MissionSpec, VehicleKind, VehicleSpec
@@ -302,7 +313,7 @@ class MissionService:
         digest = hashlib.sha256(orjson.dumps([item.model_dump() for item in items])).hexdigest()
         strangers = {i: self._stranger(live, item) for i, item in enumerate(items)}
         reports = {i: report for i, item in enumerate(items) if not strangers[i] and (report := _sounding(item))}
-        async with self._database.writing() as session:
+        async with live.journal.writing, self._database.writing() as session:
             if idempotency_key is not None:
                 known = await sounding_queries.answer_to(session, mission_id, idempotency_key)
                 if known is not None:
@@ -397,17 +408,34 @@ class MissionService:
             raise MapNotReadyError(
                 "no sounding was accepted yet, so there is no map", "start the mission or post measurements"
             )
-        return MapSnapshot(mission_id, live.spec, live.frame, live.area, built, live.header.step)
+        return live.snapshot(built)
 
-    async def export(self, mission_id: str, extension: str, options: Mapping[str, float] | None = None) -> Product:
-        """Return a product file of the mission. Raises InvalidRequestError for an unknown one, MapNotReadyError."""
-        snapshot = await self.map(mission_id)
-        rows = await self.soundings(mission_id)
-        tracks = await self.tracks(mission_id)
-        loop = asyncio.get_running_loop()
-        return await loop.run_in_executor(
-            self._executor, make_product, snapshot, rows, tracks, extension, dict(options or {})
+    async def export(self, mission_id: str, name: str, options: ProductOptions | None = None) -> Product:
+        """Return a product file of the mission, a key of ``PRODUCTS``.
+
+        Raises
+        ------
+        InvalidRequestError, MapNotReadyError
+            For an unknown kind or options that cannot be; where the map is needed and there is none yet.
+        """
+        needs = product_kind(name).needs
+        material = Material(
+            facts=(await self._get(mission_id)).facts,
+            created=now(),
+            provider=self._settings.provider.named(),
+            map=await self.map(mission_id) if MAP in needs else None,
+            soundings=await self.soundings(mission_id) if SOUNDINGS in needs else (),
+            tracks=await self._track_lines(mission_id) if TRACKS in needs else (),
         )
+        loop = asyncio.get_running_loop()
+        return await loop.run_in_executor(self._executor, make_product, name, material, options or ProductOptions())
+
+    async def _track_lines(self, mission_id: str) -> list[Track]:
+        live = await self._get(mission_id)
+        await live.journal.flush()
+        async with self._database.reading() as session:
+            found = await mission_queries.track_points(session, mission_id)
+        return [Track(name, [TrackPoint(*point) for point in points]) for name, points in found.items()]
 
     async def soundings(self, mission_id: str) -> Sequence[SoundingRow]:
         """Return every sounding, rejected ones included, in the order they came."""

@@ -8,6 +8,12 @@ from app.mapping.types import BathymetricMap, FloatArray
 
 DEPTH_COLOURS: Colormap = cmocean.cm.deep
 UNCERTAINTY_COLOURS: Colormap = cmocean.cm.amp
+DIFFERENCE_COLOURS: Colormap = cmocean.cm.balance
+
+
+def palette(layer: str) -> Colormap:
+    """Return the colours of a layer: depths, differences of either sign, or amounts of something."""
+    return {"depth": DEPTH_COLOURS, "difference": DIFFERENCE_COLOURS}.get(layer, UNCERTAINTY_COLOURS)
 
 
 def depth_range(bathymetry: BathymetricMap) -> tuple[float, float]:
