@@ -15,7 +15,7 @@ from fastapi_offline import FastAPIOffline
 from starlette.middleware.cors import CORSMiddleware
 
 from app import __version__
-from app.api import fleet, logs, maps, measurements, missions, openapi, problems, streams
+from app.api import corrections, fleet, logs, maps, measurements, missions, openapi, problems, streams
 from app.api.health import health_router
 from app.api.middleware import BodyMiddleware, RequestMiddleware
 from app.api.schemas import API
@@ -75,7 +75,15 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         openapi_tags=openapi.TAGS,
         lifespan=lifespan,
     )
-    for router in (missions.router, measurements.router, maps.router, streams.router, fleet.router, health_router(API)):
+    for router in (
+        missions.router,
+        measurements.router,
+        corrections.router,
+        maps.router,
+        streams.router,
+        fleet.router,
+        health_router(API),
+    ):
         app.include_router(router)
     app.include_router(health_router(""), include_in_schema=False)
     mount_dashboard(app)

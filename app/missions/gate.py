@@ -80,12 +80,13 @@ class Gate:
         east, north = found.east_m, found.north_m
         if found.reason:
             return GatedSounding(report, east, north, found.depth_m, sd, found.reason)
-        reason = self._outside(east, north) or self._jump(report, east, north)
+        reason = self.outside(east, north) or self._jump(report, east, north)
         if not reason:
             self._last[report.vehicle] = (report.time_s, east, north)
         return GatedSounding(report, east, north, found.depth_m, sd, reason, found.level_m)
 
-    def _outside(self, east: float, north: float) -> str:
+    def outside(self, east: float, north: float) -> str:
+        """Return why a place is too far from the area; empty when it is not."""
         if shapely.contains_xy(self._zone, east, north):
             return ""
         return (

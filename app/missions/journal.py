@@ -18,6 +18,7 @@ from sqlalchemy.ext.asyncio import AsyncSession
 from app.missions import metrics
 from app.missions.broadcast import Broadcaster
 from app.missions.clock import now
+from app.missions.corrections import NO_LEVEL
 from app.missions.fleet import SoundingReport, VehicleReport, WaypointReport
 from app.missions.gate import Gate, GatedSounding
 from app.missions.views import EventMessage, EventView, ItemVerdict, Level, Verdict
@@ -71,6 +72,9 @@ class Journal:
         self._soundings: list[SoundingReport] = []
         self._positions: list[dict[str, Any]] = []
         self._statuses: list[WaypointReport] = []
+        self.told_of_missing_level = False
+        """Whether the log has it that no water level is known for soundings; once is enough."""
+        self._untold = ""
         self._track_ends: dict[str, tuple[float, float]] = {}
         self.writing = asyncio.Lock()
         """Held while soundings are stored, so that corrections do not change under them."""
@@ -112,6 +116,11 @@ class Journal:
     async def flush(self) -> None:
         """Write everything noted so far. What could not be written stays noted."""
         await to_the_end(self._flush())
+        if self._untold:
+            why, self._untold = self._untold, ""
+            await self.log(
+                Level.ALARM, "corrections", f"soundings are rejected: {why}. Send a tide table that covers them"
+            )
 
     async def _flush(self) -> None:
         async with self.writing:
@@ -203,6 +212,9 @@ class Journal:
         fresh = [item for identity, item in first.items() if identity in new]
         accepted = [item for item in reversed(fresh) if item.accepted]
         rejected = len(fresh) - len(accepted)
+        no_level = next((item.reason for item in fresh if item.reason.startswith(NO_LEVEL)), "")
+        if no_level and not self.told_of_missing_level:
+            self.told_of_missing_level, self._untold = True, no_level.removeprefix(NO_LEVEL)
         self.counts = Counts(self.counts.accepted + len(accepted), self.counts.rejected + rejected)
         metrics.SOUNDINGS.labels(Verdict.ACCEPTED).inc(len(accepted))
         metrics.SOUNDINGS.labels(Verdict.REJECTED).inc(rejected)

@@ -23,6 +23,7 @@ from app.mapping.products.tracks import Track, TrackPoint
 from app.missions import states
 from app.missions.broadcast import Subscription
 from app.missions.clock import now
+from app.missions.correcting import check_level_is_known, corrections_view, set_sound_speed, set_tide
 from app.missions.errors import (
     ConflictError,
     InvalidRequestError,
@@ -31,6 +32,7 @@ from app.missions.errors import (
     VehicleNotFoundError,
 )
 from app.missions.fleet import (
+    BeamGeometry,
     FleetLink,
     LinkState,
     Position,
@@ -57,11 +59,12 @@ from app.missions.products import (
 )
 from app.missions.runner import Runner
 from app.missions.settings import ServiceSettings
-from app.missions.spec import MissionSpec, VehicleKind, VehicleSpec
+from app.missions.spec import MissionSpec, SoundSpeed, VehicleKind, VehicleSpec
 from app.missions.states import ENDED, MissionState
 from app.missions.views import (
     ActionView,
     BatchVerdict,
+    CorrectionsView,
     EventView,
     ItemVerdict,
     Level,
@@ -72,6 +75,7 @@ from app.missions.views import (
     PlannerView,
     SnapshotMessage,
     StopView,
+    TideCorrection,
     VehicleView,
     Verdict,
     WaypointView,
@@ -82,6 +86,7 @@ from app.storage import soundings as sounding_queries
 from app.storage.database import Database
 from app.storage.models import BatchRow, MissionRow, MissionVehicleRow, SoundingRow
 from app.storage.shielding import to_the_end
+from imc_bridge.soundings import Beam, StateSample, footprint
 
 Action = Literal["start", "pause", "resume", "abort", "finish"]
 
@@ -213,6 +218,7 @@ class MissionService:
             stops: list[StopReceipt] = []
             if action in ("start", "resume"):
                 self._check_team(live)
+                check_level_is_known(live)
                 if action == "start":
                     self._check_links(live)
                 self._claim_team(live)
@@ -395,6 +401,28 @@ class MissionService:
             self._rest.has_waypoint(vehicle, found.step)
             return live.waypoint_of(vehicle)
         return found
+
+    # Corrections
+
+    async def corrections(self, mission_id: str) -> CorrectionsView:
+        """Return how a mission's soundings are corrected."""
+        return corrections_view(await self._get(mission_id))
+
+    async def set_tide(self, mission_id: str, tide: TideCorrection, *, actor: str = "operator") -> CorrectionsView:
+        """Change the tide and correct every sounding anew. Raises InvalidRequestError for a table that is wrong."""
+        live = await self._get(mission_id)
+        async with self._acting.setdefault(mission_id, asyncio.Lock()):
+            await set_tide(live, self._database, self._executor, tide, actor)
+        return corrections_view(live)
+
+    async def set_sound_speed(
+        self, mission_id: str, sound_speed: SoundSpeed | None, *, actor: str = "operator"
+    ) -> CorrectionsView:
+        """Change the sound speed profile, or take it away, and correct every sounding anew."""
+        live = await self._get(mission_id)
+        async with self._acting.setdefault(mission_id, asyncio.Lock()):
+            await set_sound_speed(live, self._database, self._executor, sound_speed, actor)
+        return corrections_view(live)
 
     # What came of it
 
@@ -780,17 +808,46 @@ def _impossible_place(item: Measurement, frame: LocalFrame) -> str:
 def _sounding(item: Measurement) -> SoundingReport | None:
     if item.range_m is None:
         return None
+    place, geometry = _footprint(item, item.range_m)
     return SoundingReport(
         vehicle=item.vehicle,
         time_s=item.time_s,
-        footprint=Position(item.lat_deg, item.lon_deg, item.depth_m + item.range_m),
+        footprint=place,
         vehicle_depth_m=item.depth_m,
         range_m=item.range_m,
         source="rest",
         beam=item.beam,
         depth_sd_m=item.range_sd_m,
         position_sd_m=item.position_sd_m,
+        beam_geometry=geometry,
     )
+
+
+def _footprint(item: Measurement, range_m: float) -> tuple[Position, BeamGeometry]:
+    """Return where a beam met the bottom, and how it pointed."""
+    if item.beam_off_nadir_deg is None or item.heading_deg is None:
+        below = Position(item.lat_deg, item.lon_deg, item.depth_m + range_m)
+        return below, BeamGeometry(item.lat_deg, item.lon_deg)
+    state = StateSample(
+        item.time_s,
+        math.radians(item.lat_deg),
+        math.radians(item.lon_deg),
+        item.depth_m,
+        math.radians(item.roll_deg),
+        math.radians(item.pitch_deg),
+        math.radians(item.heading_deg),
+    )
+    beam = Beam(item.beam, math.radians(item.beam_azimuth_deg), math.radians(item.beam_off_nadir_deg))
+    geometry = BeamGeometry(
+        item.lat_deg,
+        item.lon_deg,
+        item.roll_deg,
+        item.pitch_deg,
+        item.heading_deg,
+        item.beam_azimuth_deg,
+        item.beam_off_nadir_deg,
+    )
+    return Position(*footprint(state, beam, range_m)), geometry
 
 
 def _vehicle_report(item: Measurement) -> VehicleReport:

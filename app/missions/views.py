@@ -2,13 +2,13 @@
 
 from datetime import datetime
 from enum import StrEnum
-from typing import Any, Literal
+from typing import Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from app.mapping.s44 import Order
 from app.missions.fleet import LinkState, WaypointStatus
-from app.missions.spec import Latitude, Longitude, MissionSpec, Name, Sensor, VehicleKind
+from app.missions.spec import Latitude, Longitude, MissionSpec, Name, Sensor, SoundSpeed, Tide, VehicleKind
 from app.missions.states import MissionState
 
 
@@ -119,14 +119,67 @@ class Measurement(BaseModel):
     lon_deg: float = Field(description="Longitude of the vehicle, WGS84 degrees")
     depth_m: float = Field(description="Depth of the vehicle below the surface, metres")
     range_m: float | None = Field(
-        default=None, description="Vertical range from the vehicle to the bottom; null: position report only"
+        default=None,
+        description="Range from the vehicle to the bottom: vertical, or along the beam where beam_off_nadir_deg is "
+        "given; null: position report only",
     )
     beam: int = Field(default=0, ge=0, lt=4096)
+    beam_off_nadir_deg: float | None = Field(
+        default=None,
+        ge=0,
+        lt=90,
+        description="Angle of the beam from straight down in the vehicle; the footprint is then computed from it and "
+        "the vehicle's attitude",
+    )
+    beam_azimuth_deg: float = Field(
+        default=0.0, ge=-360, le=360, description="Direction of the beam in the vehicle, from the bow to starboard"
+    )
+    roll_deg: float = Field(default=0.0, ge=-180, le=180, description="Starboard down is positive")
+    pitch_deg: float = Field(default=0.0, ge=-90, le=90, description="Nose up is positive")
     range_sd_m: float | None = Field(default=None, gt=0)
     position_sd_m: float | None = Field(default=None, ge=0)
     heading_deg: float | None = None
     speed_mps: float | None = Field(default=None, ge=0)
     battery_pct: float | None = Field(default=None, ge=0, le=100)
+
+    @model_validator(mode="after")
+    def _slanted_beams_have_a_heading(self) -> Self:
+        if self.beam_off_nadir_deg is not None and self.heading_deg is None:
+            raise ValueError("beam_off_nadir_deg is given but heading_deg is not: a slanted beam needs both")
+        return self
+
+
+class TideCorrection(Tide):
+    """A mission's tide: a constant level, or a table of high and low waters in its place."""
+
+    table: str | None = Field(
+        default=None,
+        max_length=8_000_000,
+        description="Text of a .tid table, UTC: a line 'YYYY/MM/DD hh:mm:ss.sss level' per high or low water. Levels "
+        "between two are a half cosine; soundings beyond the table are rejected until it covers them. Null: level_m",
+    )
+    table_name: str = Field(default="", max_length=200, description="Its name; default: the harbour that it states")
+
+
+class TideTableView(View):
+    """A tide table in short."""
+
+    name: str
+    first: datetime = Field(description="Time of the first entry")
+    last: datetime = Field(description="Time of the last entry")
+    entries: int
+    sha256: str = Field(description="Of the table as it was sent")
+
+
+class CorrectionsView(View):
+    """How soundings are corrected; their raw values stay beside the corrected ones."""
+
+    tide: Tide
+    tide_table: TideTableView | None = Field(description="Its levels count in place of tide.level_m")
+    sound_speed: SoundSpeed | None
+    vertical_datum: str = Field(description="What corrected depths are counted from")
+    accepted: int = Field(description="Soundings accepted under these corrections")
+    rejected: int
 
 
 class ItemVerdict(View):

@@ -1,8 +1,10 @@
 """Vehicles on the IMC network (DUNE on board), through :class:`imc_bridge.Bridge`."""
 
+import math
 from collections.abc import Sequence
 
 from app.missions.fleet import (
+    BeamGeometry,
     EventSink,
     FleetEvent,
     LinkReport,
@@ -147,6 +149,7 @@ def _translate(event: BridgeEvent) -> FleetEvent | None:
                 source=event.source,
                 beam=event.beam,
                 position_sd_m=event.position_sd_m,
+                beam_geometry=_beam_geometry(event),
             )
         case WaypointChange():
             return WaypointReport(
@@ -161,6 +164,20 @@ def _translate(event: BridgeEvent) -> FleetEvent | None:
         case _:
             # A refused Distance is counted in the vehicle's details.
             return None
+
+
+def _beam_geometry(sounding: Sounding) -> BeamGeometry | None:
+    if sounding.vehicle_lat_deg is None or sounding.vehicle_lon_deg is None:
+        return None
+    angles = (
+        sounding.roll_rad,
+        sounding.pitch_rad,
+        sounding.yaw_rad,
+        sounding.beam_azimuth_rad,
+        sounding.beam_off_nadir_rad,
+    )
+    degrees = (None if angle is None else math.degrees(angle) for angle in angles)
+    return BeamGeometry(sounding.vehicle_lat_deg, sounding.vehicle_lon_deg, *degrees)
 
 
 def _link_state(state: NodeState, engaged: bool, ours: bool) -> LinkState:
