@@ -231,6 +231,70 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/missions/{mission_id}/corrections": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * See how soundings are corrected
+         * @description Return tide, sound speed and the datum that depths are counted from.
+         */
+        get: operations["getCorrections"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/missions/{mission_id}/tide": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        /**
+         * Correct the tide
+         * @description Set the water level or a tide table, at any time: every sounding is corrected anew from its raw depth.
+         */
+        put: operations["setTide"];
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/missions/{mission_id}/sound-speed": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        /**
+         * Correct the sound speed
+         * @description Set the measured sound speed, at any time: every sounding is corrected anew from its raw range.
+         */
+        put: operations["setSoundSpeed"];
+        post?: never;
+        /**
+         * Take the sonars' own ranges
+         * @description Correct no sound speed any more.
+         */
+        delete: operations["deleteSoundSpeed"];
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/missions/{mission_id}/map": {
         parameters: {
             query?: never;
@@ -273,6 +337,48 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/missions/{mission_id}/quality": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Judge the map
+         * @description Say in how many cells the TVU estimate stays within each order of IHO S-44, and how far a reference grid is off.
+         *
+         *     No order is claimed by that: an order asks for more than vertical uncertainty.
+         */
+        get: operations["getQuality"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/missions/{mission_id}/products": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * List the files
+         * @description Return every file that can be downloaded, with its path.
+         */
+        get: operations["listProducts"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/missions/{mission_id}/map.{format}": {
         parameters: {
             query?: never;
@@ -285,6 +391,46 @@ export interface paths {
          * @description Return the map as a file.
          */
         get: operations["getMapFile"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/missions/{mission_id}/soundings.{format}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Download the soundings
+         * @description Return the soundings as a file.
+         */
+        get: operations["getSoundingsFile"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/missions/{mission_id}/tracks.{format}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Download the tracks
+         * @description Return where the vehicles were as a file.
+         */
+        get: operations["getTracksFile"];
         put?: never;
         post?: never;
         delete?: never;
@@ -510,6 +656,74 @@ export interface components {
             };
         };
         /**
+         * ConformityView
+         * @description How the TVU estimate stands beside one order of IHO S-44; no order is claimed by it.
+         */
+        ConformityView: {
+            order: components["schemas"]["Order"];
+            /**
+             * Cells Pct
+             * @description Share of the cells whose TVU estimate stays within the order's largest
+             */
+            cells_pct: number;
+            /**
+             * Sounded Pct
+             * @description The same among the sounded cells; null: none is
+             */
+            sounded_pct: number | null;
+            /**
+             * Statement
+             * @example TVU estimate meets Order 1a in 83.2 % of cells
+             */
+            statement: string;
+        };
+        /**
+         * CorrectionsView
+         * @description How soundings are corrected; their raw values stay beside the corrected ones.
+         */
+        CorrectionsView: {
+            tide: components["schemas"]["Tide"];
+            /** @description Its levels count in place of tide.level_m */
+            tide_table: components["schemas"]["TideTableView"] | null;
+            sound_speed: components["schemas"]["SoundSpeed"] | null;
+            /**
+             * Vertical Datum
+             * @description What corrected depths are counted from
+             */
+            vertical_datum: string;
+            /**
+             * Accepted
+             * @description Soundings accepted under these corrections
+             */
+            accepted: number;
+            /** Rejected */
+            rejected: number;
+        };
+        /**
+         * DifferenceView
+         * @description Map minus reference grid over the cells that both know.
+         */
+        DifferenceView: {
+            /** Rmse M */
+            rmse_m: number;
+            /**
+             * L2 Norm
+             * @description Euclidean norm of all differences; grows with the number of cells
+             */
+            l2_norm: number;
+            /** Bias M */
+            bias_m: number;
+            /**
+             * P95 M
+             * @description 95th percentile of the absolute difference
+             */
+            p95_m: number;
+            /** Max M */
+            max_m: number;
+            /** Cells */
+            cells: number;
+        };
+        /**
          * EventMessage
          * @description A new line of the log.
          */
@@ -594,6 +808,12 @@ export interface components {
              */
             reason: string;
         };
+        /**
+         * LayerName
+         * @description A layer of the map beside those that its JSON always has.
+         * @enum {string}
+         */
+        LayerName: "uncertainty" | "count" | "sounded" | "slope" | "tvu_fraction" | "difference";
         /**
          * Level
          * @description How much an event matters.
@@ -718,6 +938,11 @@ export interface components {
                 number,
                 number
             ][];
+            /**
+             * Vertical Datum
+             * @description What depths are counted from
+             */
+            vertical_datum: string;
             /** Min Depth M */
             min_depth_m: number | null;
             /** Max Depth M */
@@ -732,6 +957,13 @@ export interface components {
             count: number[][];
             /** Sounded */
             sounded: boolean[][];
+            /**
+             * Layers
+             * @description Further layers that were asked for, by name
+             */
+            layers: {
+                [key: string]: (number | null)[][];
+            };
         };
         /**
          * Measurement
@@ -763,7 +995,7 @@ export interface components {
             depth_m: number;
             /**
              * Range M
-             * @description Vertical range from the vehicle to the bottom; null: position report only
+             * @description Range from the vehicle to the bottom: vertical, or along the beam where beam_off_nadir_deg is given; null: position report only
              */
             range_m?: number | null;
             /**
@@ -771,6 +1003,29 @@ export interface components {
              * @default 0
              */
             beam: number;
+            /**
+             * Beam Off Nadir Deg
+             * @description Angle of the beam from straight down in the vehicle; the footprint is then computed from it and the vehicle's attitude
+             */
+            beam_off_nadir_deg?: number | null;
+            /**
+             * Beam Azimuth Deg
+             * @description Direction of the beam in the vehicle, from the bow to starboard
+             * @default 0
+             */
+            beam_azimuth_deg: number;
+            /**
+             * Roll Deg
+             * @description Starboard down is positive
+             * @default 0
+             */
+            roll_deg: number;
+            /**
+             * Pitch Deg
+             * @description Nose up is positive
+             * @default 0
+             */
+            pitch_deg: number;
             /** Range Sd M */
             range_sd_m?: number | null;
             /** Position Sd M */
@@ -867,6 +1122,8 @@ export interface components {
              */
             sounding_noise: number;
             tide?: components["schemas"]["Tide"];
+            /** @description Sound speed correction; null: the sonars' own ranges are taken */
+            sound_speed?: components["schemas"]["SoundSpeed"] | null;
             /**
              * Seed
              * @description Seed of every random decision
@@ -952,6 +1209,18 @@ export interface components {
              */
             waypoints: components["schemas"]["WaypointView"][];
         };
+        /**
+         * Order
+         * @description An order of survey.
+         * @enum {string}
+         */
+        Order: "exclusive" | "special" | "1a" | "1b" | "2";
+        /**
+         * OverlayLayer
+         * @description A layer that can be seen as a picture.
+         * @enum {string}
+         */
+        OverlayLayer: "depth" | "uncertainty" | "count" | "slope" | "tvu_fraction" | "difference";
         /**
          * PlannerOptions
          * @description Settings of the planners. Every planner reads those that concern it.
@@ -1167,6 +1436,32 @@ export interface components {
             errors: components["schemas"]["FieldProblem"][];
         };
         /**
+         * ProductView
+         * @description A file that can be downloaded.
+         */
+        ProductView: {
+            /**
+             * Name
+             * @description Its name for bathyfleet export
+             * @example tif
+             */
+            name: string;
+            /** Title */
+            title: string;
+            /** Media Type */
+            media_type: string;
+            /**
+             * Href
+             * @description Path on this service
+             */
+            href: string;
+            /**
+             * Needs Map
+             * @description Whether a first map is needed
+             */
+            needs_map: boolean;
+        };
+        /**
          * Progress
          * @description How far a mission has come.
          */
@@ -1225,6 +1520,28 @@ export interface components {
             eta_s: number | null;
         };
         /**
+         * QualityView
+         * @description How good the map is, as far as it can be told.
+         */
+        QualityView: {
+            /**
+             * Version
+             * @description Of the map
+             */
+            version: number;
+            /** Vertical Datum */
+            vertical_datum: string;
+            /**
+             * Common Sd M
+             * @description Standard deviation of what all soundings share, counted in every TVU
+             */
+            common_sd_m: number;
+            /** Tvu */
+            tvu: components["schemas"]["ConformityView"][];
+            /** @description To the reference grid; null: there is none that it meets */
+            difference: components["schemas"]["DifferenceView"] | null;
+        };
+        /**
          * Sensor
          * @description How a vehicle sounds the bottom.
          * @enum {string}
@@ -1258,6 +1575,46 @@ export interface components {
             last_event_id: number;
         };
         /**
+         * SoundSpeed
+         * @description Sound speed correction: every beam is followed through the profile for the time that its sonar measured.
+         */
+        SoundSpeed: {
+            /**
+             * Assumed Mps
+             * @description Speed that is set in the sonars, m/s
+             * @default 1500
+             */
+            assumed_mps: number;
+            /**
+             * Profile
+             * @description Measured speeds as [depth in m, speed in m/s], from top to bottom; one pair: the same everywhere
+             * @example [
+             *       [
+             *         0,
+             *         1512.3
+             *       ],
+             *       [
+             *         5,
+             *         1509.8
+             *       ],
+             *       [
+             *         20,
+             *         1506.1
+             *       ]
+             *     ]
+             */
+            profile: [
+                number,
+                number
+            ][];
+            /**
+             * Source
+             * @description Where the profile comes from, kept with the product
+             * @default
+             */
+            source: string;
+        };
+        /**
          * StateMessage
          * @description The mission's state or progress changed.
          */
@@ -1284,12 +1641,12 @@ export interface components {
         };
         /**
          * Tide
-         * @description Water level correction: chart depth = sounded depth - level.
+         * @description Water level correction: depth below the datum = sounded depth - level + datum_offset_m.
          */
         Tide: {
             /**
              * Level M
-             * @description Water level above chart datum, metres
+             * @description Water level above the zero of the tide gauge or table (chart datum), metres
              * @default 0
              */
             level_m: number;
@@ -1299,6 +1656,98 @@ export interface components {
              * @default none applied
              */
             source: string;
+            /**
+             * Sd M
+             * @description Standard deviation of the level; it counts in every cell's TVU estimate
+             * @default 0
+             */
+            sd_m: number;
+            /**
+             * Datum Epsg
+             * @description EPSG code of the depth datum that products state once a tide is applied, for example 5861 (LAT depth) or 5715 (MSL depth)
+             * @default 5861
+             */
+            datum_epsg: number;
+            /**
+             * Datum Offset M
+             * @description How far that datum lies above the zero that levels count from; added to every depth
+             * @default 0
+             */
+            datum_offset_m: number;
+        };
+        /**
+         * TideCorrection
+         * @description A mission's tide: a constant level, or a table of high and low waters in its place.
+         */
+        TideCorrection: {
+            /**
+             * Level M
+             * @description Water level above the zero of the tide gauge or table (chart datum), metres
+             * @default 0
+             */
+            level_m: number;
+            /**
+             * Source
+             * @description Where the level comes from, kept with the product
+             * @default none applied
+             */
+            source: string;
+            /**
+             * Sd M
+             * @description Standard deviation of the level; it counts in every cell's TVU estimate
+             * @default 0
+             */
+            sd_m: number;
+            /**
+             * Datum Epsg
+             * @description EPSG code of the depth datum that products state once a tide is applied, for example 5861 (LAT depth) or 5715 (MSL depth)
+             * @default 5861
+             */
+            datum_epsg: number;
+            /**
+             * Datum Offset M
+             * @description How far that datum lies above the zero that levels count from; added to every depth
+             * @default 0
+             */
+            datum_offset_m: number;
+            /**
+             * Table
+             * @description Text of a .tid table, UTC: a line 'YYYY/MM/DD hh:mm:ss.sss level' per high or low water. Levels between two are a half cosine; soundings beyond the table are rejected until it covers them. Null: level_m
+             */
+            table?: string | null;
+            /**
+             * Table Name
+             * @description Its name; default: the harbour that it states
+             * @default
+             */
+            table_name: string;
+        };
+        /**
+         * TideTableView
+         * @description A tide table in short.
+         */
+        TideTableView: {
+            /** Name */
+            name: string;
+            /**
+             * First
+             * Format: date-time
+             * @description Time of the first entry
+             */
+            first: string;
+            /**
+             * Last
+             * Format: date-time
+             * @description Time of the last entry
+             */
+            last: string;
+            /** Entries */
+            entries: number;
+            /**
+             * Sha256
+             * @description Of the table as it was sent
+             */
+            sha256: string;
         };
         /**
          * VehicleKind
@@ -2524,9 +2973,312 @@ export interface operations {
             };
         };
     };
-    getMap: {
+    getCorrections: {
         parameters: {
             query?: never;
+            header?: never;
+            path: {
+                /** @description The mission's id */
+                mission_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["CorrectionsView"];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such mission */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    setTide: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description The mission's id */
+                mission_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["TideCorrection"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["CorrectionsView"];
+                };
+            };
+            /** @description The body cannot be read */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such mission */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body is too large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body's media type is not supported */
+            415: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    setSoundSpeed: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description The mission's id */
+                mission_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["SoundSpeed"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["CorrectionsView"];
+                };
+            };
+            /** @description The body cannot be read */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such mission */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body is too large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body's media type is not supported */
+            415: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    deleteSoundSpeed: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description The mission's id */
+                mission_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["CorrectionsView"];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such mission */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    getMap: {
+        parameters: {
+            query?: {
+                /** @description Further layers, in `layers`; repeat it for several */
+                layer?: components["schemas"]["LayerName"][];
+                /** @description Order of IHO S-44 that the TVU is compared with */
+                order?: components["schemas"]["Order"];
+            };
             header?: {
                 /** @description ETag of the map that the client has */
                 "if-none-match"?: string;
@@ -2596,8 +3348,10 @@ export interface operations {
     getMapOverlay: {
         parameters: {
             query?: {
-                /** @description Depth, or its standard deviation */
-                layer?: "depth" | "uncertainty";
+                /** @description What is shown */
+                layer?: components["schemas"]["OverlayLayer"];
+                /** @description Order of IHO S-44 that the TVU is compared with */
+                order?: components["schemas"]["Order"];
                 /** @description Value at the palette's begin, m; default: the map's least */
                 min?: number;
                 /** @description Value at the palette's end, m; default: the map's largest */
@@ -2669,31 +3423,311 @@ export interface operations {
             };
         };
     };
-    getMapFile: {
+    getQuality: {
         parameters: {
             query?: never;
             header?: never;
             path: {
                 /** @description The mission's id */
                 mission_id: string;
-                /** @description One of tif, xyz, csv, geojson, png */
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["QualityView"];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such mission; there is no map yet */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    listProducts: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description The mission's id */
+                mission_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ProductView"][];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such mission */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    getMapFile: {
+        parameters: {
+            query?: {
+                /** @description Order of IHO S-44 that the TVU is compared with */
+                order?: components["schemas"]["Order"];
+                /** @description Between contours; default: about ten */
+                interval_m?: number;
+                /** @description A picture's least depth */
+                min?: number;
+                /** @description Its largest depth */
+                max?: number;
+                /** @description Whose soundings, in crowdsourced bathymetry; default: the only vehicle's */
+                vehicle?: string;
+            };
+            header?: never;
+            path: {
+                /** @description The mission's id */
+                mission_id: string;
+                /** @description One of tif, nc, bag, xyz, csv, geojson, kml, png */
                 format: string;
             };
             cookie?: never;
         };
         requestBody?: never;
         responses: {
-            /** @description `.tif`: GeoTIFF: depth, standard deviation and count; `.xyz`: longitude, latitude and depth of every cell; `.csv`: every sounding, raw and corrected, with its verdict; `.geojson`: depth contours, area and tracks; `.png`: a picture with axes and legend */
+            /** @description `.tif`: Cloud-Optimized GeoTIFF with every layer; `.nc`: CF-NetCDF with every layer; `.bag`: Bathymetric Attributed Grid: elevation and uncertainty; `.xyz`: longitude, latitude and depth of every cell; `.csv`: every sounding, raw and corrected, with its verdict; `.geojson`: depth contours, area and tracks; `.kml`: depth contours; `.png`: a picture with axes, colour bar and scale */
             200: {
                 headers: {
                     [name: string]: unknown;
                 };
                 content: {
-                    "image/tiff": string;
-                    "text/plain": string;
-                    "text/csv": string;
                     "application/geo+json": string;
+                    "application/vnd.google-earth.kml+xml": string;
+                    "application/x-bag": string;
+                    "application/x-netcdf": string;
                     "image/png": string;
+                    "image/tiff": string;
+                    "text/csv": string;
+                    "text/plain": string;
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such mission; there is no map yet; there is no such format */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    getSoundingsFile: {
+        parameters: {
+            query?: {
+                /** @description Order of IHO S-44 that the TVU is compared with */
+                order?: components["schemas"]["Order"];
+                /** @description Between contours; default: about ten */
+                interval_m?: number;
+                /** @description A picture's least depth */
+                min?: number;
+                /** @description Its largest depth */
+                max?: number;
+                /** @description Whose soundings, in crowdsourced bathymetry; default: the only vehicle's */
+                vehicle?: string;
+            };
+            header?: never;
+            path: {
+                /** @description The mission's id */
+                mission_id: string;
+                /** @description One of csv, xyz, geojson */
+                format: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description `.csv`: every sounding, raw and corrected, with its verdict; `.xyz`: longitude, latitude and corrected depth of accepted soundings; `.geojson`: raw soundings of one vehicle as crowdsourced bathymetry (IHO B-12) */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/geo+json": string;
+                    "text/csv": string;
+                    "text/plain": string;
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such mission; there is no map yet; there is no such format */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    getTracksFile: {
+        parameters: {
+            query?: {
+                /** @description Order of IHO S-44 that the TVU is compared with */
+                order?: components["schemas"]["Order"];
+                /** @description Between contours; default: about ten */
+                interval_m?: number;
+                /** @description A picture's least depth */
+                min?: number;
+                /** @description Its largest depth */
+                max?: number;
+                /** @description Whose soundings, in crowdsourced bathymetry; default: the only vehicle's */
+                vehicle?: string;
+            };
+            header?: never;
+            path: {
+                /** @description The mission's id */
+                mission_id: string;
+                /** @description One of geojson, kml, gpx */
+                format: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description `.geojson`: the vehicles' tracks with times and depths; `.kml`: the vehicles' tracks; `.gpx`: the vehicles' tracks with times and depths */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/geo+json": string;
+                    "application/gpx+xml": string;
+                    "application/vnd.google-earth.kml+xml": string;
                 };
             };
             /** @description An access token is needed */
