@@ -15,7 +15,7 @@ from fastapi_offline import FastAPIOffline
 from starlette.middleware.cors import CORSMiddleware
 
 from app import __version__
-from app.api import corrections, fleet, logs, maps, measurements, missions, openapi, problems, streams
+from app.api import corrections, fleet, imports, logs, maps, measurements, missions, openapi, problems, streams
 from app.api.health import health_router
 from app.api.middleware import BodyMiddleware, RequestMiddleware
 from app.api.schemas import API
@@ -79,6 +79,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         missions.router,
         measurements.router,
         corrections.router,
+        imports.router,
         maps.router,
         streams.router,
         fleet.router,
@@ -93,7 +94,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         app.add_middleware(
             CORSMiddleware, allow_origins=settings.allowed_origins, allow_methods=["*"], allow_headers=["*"]
         )
-    app.add_middleware(BodyMiddleware, max_bytes=settings.max_body_bytes)
+    app.add_middleware(BodyMiddleware, max_bytes=settings.max_body_bytes, max_file_bytes=settings.max_import_bytes)
     app.add_middleware(RequestMiddleware)
     return app
 

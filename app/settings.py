@@ -78,6 +78,9 @@ class Settings(BaseSettings):
     )
     output_dir: Path = Field(default=Path("output"), description="Folder for exported files")
     max_body_bytes: int = Field(default=8 * 2**20, ge=1024, le=2**30, description="Largest request body that is taken")
+    max_import_bytes: int = Field(
+        default=64 * 2**20, ge=1024, le=2**30, description="Largest file of soundings or of a map that is taken"
+    )
     max_streams: int = Field(
         default=200, ge=1, le=100_000, description="Most live views and event streams at the same time"
     )

@@ -124,7 +124,7 @@ def test_every_command_explains_its_options(bathyfleet: Run, command: str) -> No
         (["serve", "--time-scale", "0"], {}, 2, "greater than 0"),
         (["serve", "--host", "192.0.2.77", "--insecure"], {}, 1, "cannot listen on 192.0.2.77:8080"),
         (["export", "nowhere"], {}, 1, "0 missions have ids that begin with 'nowhere'. There are: none"),
-        (["export", "nowhere", "--format", "doc"], {}, 2, "'doc' is not one of tif, xyz"),
+        (["export", "nowhere", "--format", "doc"], {}, 2, "'doc' is not one of tif, nc, bag"),
         (["token", "create", "x", "--role", "king"], {}, 2, "king"),
         (["token", "create", "x", "--role", "viewer", "--vehicle", "a"], {}, 2, "only a token of role vehicle"),
         (["token", "revoke", "zzz"], {}, 2, "no valid token has an id that begins with 'zzz'"),

@@ -240,6 +240,11 @@ class LiveMission:
         """Return what every product states."""
         return MissionFacts(self.id, self.spec, self.frame, self.gate.corrections.vertical_datum)
 
+    def show_reference(self, depths_m: FloatArray | None) -> None:
+        """Compare the map with these depths at its cells, or with nothing."""
+        self.reference_m = depths_m
+        self.revision += 1
+
     def snapshot(self, built: BuiltMap) -> MapSnapshot:
         """Return a map with what is needed to understand it."""
         return MapSnapshot(self.facts, built, self.header.step, self.reference_m, self.revision)

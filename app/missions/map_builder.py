@@ -26,9 +26,12 @@ RELEARN_GROWTH = 1.15
 
 @dataclass(frozen=True)
 class _Everything:
-    """Soundings that take the place of all that were there, shape (n, 4), and those that were imported."""
+    """Soundings that take the place of all that were there, shape (n, 4), and those that were imported.
 
-    soundings: NDArray[np.float64]
+    None: the mission's own stay.
+    """
+
+    soundings: NDArray[np.float64] | None
     prior: NDArray[np.float64]
 
 
@@ -92,6 +95,10 @@ class MapBuilder:
         """Take these in place of all soundings so far; ``prior`` are those that were imported. Shapes (n, 4)."""
         self._pending.append(_Everything(soundings, prior))
 
+    def replace_prior(self, prior: NDArray[np.float64]) -> None:
+        """Take these, shape (n, 4), in place of all imported soundings so far."""
+        self._pending.append(_Everything(None, prior))
+
     @property
     def newest(self) -> BuiltMap | None:
         """The newest map; None before the first sounding was built in."""
@@ -126,9 +133,10 @@ class MapBuilder:
         while self._pending:
             item = self._pending.popleft()
             if isinstance(item, _Everything):
-                arrived = []
                 self._generation += 1
-                self._soundings, self._prior = item.soundings, item.prior
+                self._prior = item.prior
+                if item.soundings is not None:
+                    arrived, self._soundings = [], item.soundings
                 self._learned = (GaussianProcessMap(reject_outliers=False), np.zeros(0, dtype=bool))
             else:
                 arrived.append(item)

@@ -20,7 +20,7 @@ from app.exploration.planners import warm_up as planning_warm_up
 from app.mapping.georeference import LocalFrame
 from app.mapping.gp import warm_up as mapping_warm_up
 from app.mapping.products.tracks import Track, TrackPoint
-from app.missions import states
+from app.missions import importing, states
 from app.missions.broadcast import Subscription
 from app.missions.clock import now
 from app.missions.correcting import check_level_is_known, corrections_view, set_sound_speed, set_tide
@@ -66,6 +66,8 @@ from app.missions.views import (
     BatchVerdict,
     CorrectionsView,
     EventView,
+    ImportOptions,
+    ImportView,
     ItemVerdict,
     Level,
     LiveMessage,
@@ -73,6 +75,7 @@ from app.missions.views import (
     MissionSummary,
     MissionView,
     PlannerView,
+    ReferenceView,
     SnapshotMessage,
     StopView,
     TideCorrection,
@@ -123,6 +126,8 @@ class MissionService:
         self._executor = ThreadPoolExecutor(WORKERS, thread_name_prefix="planning")
         self._live: dict[str, LiveMission] = {}
         self._loading = asyncio.Lock()
+        # One file after the other: reading takes memory and a core.
+        self._importing = asyncio.Lock()
         self._runs: dict[str, asyncio.Task[None]] = {}
         self._acting: dict[str, asyncio.Lock] = {}
         self._started = False
@@ -423,6 +428,44 @@ class MissionService:
         async with self._acting.setdefault(mission_id, asyncio.Lock()):
             await set_sound_speed(live, self._database, self._executor, sound_speed, actor)
         return corrections_view(live)
+
+    # From elsewhere
+
+    async def imports(self, mission_id: str) -> list[ImportView]:
+        """Return what was imported, oldest first."""
+        return await importing.imports_of(await self._get(mission_id), self._database)
+
+    async def import_soundings(
+        self, mission_id: str, content: bytes, options: ImportOptions, *, actor: str = "operator"
+    ) -> ImportView:
+        """Begin with the soundings of a file; see ``importing.import_soundings``."""
+        live = await self._get(mission_id)
+        async with self._importing:
+            return await importing.import_soundings(live, self._database, self._executor, content, options, actor)
+
+    async def delete_import(self, mission_id: str, import_id: str, *, actor: str = "operator") -> None:
+        """Take an import back. Raises ImportNotFoundError."""
+        live = await self._get(mission_id)
+        async with self._importing:
+            await importing.delete_import(live, self._database, import_id, actor)
+
+    async def reference(self, mission_id: str) -> ReferenceView:
+        """Return what the map is compared with. Raises ImportNotFoundError."""
+        return await importing.reference_of(await self._get(mission_id), self._database)
+
+    async def set_reference(
+        self, mission_id: str, content: bytes, options: ImportOptions, *, actor: str = "operator"
+    ) -> ReferenceView:
+        """Compare the map with the grid in a file from now on. Raises InvalidRequestError."""
+        live = await self._get(mission_id)
+        async with self._importing:
+            return await importing.set_reference(live, self._database, content, options, actor)
+
+    async def delete_reference(self, mission_id: str, *, actor: str = "operator") -> None:
+        """Compare the map with nothing any more. Raises ImportNotFoundError."""
+        live = await self._get(mission_id)
+        async with self._importing:
+            await importing.delete_reference(live, self._database, actor)
 
     # What came of it
 
