@@ -3,20 +3,17 @@
 import asyncio
 import json
 import sys
-from collections.abc import Awaitable, Callable
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from app import __version__
-
-T = TypeVar("T")
+from app.commands.common import CommandError, Database, command_settings
+from app.commands.data import export, import_file, tide
 
 if TYPE_CHECKING:
-    from app.missions.service import MissionService
-    from app.settings import Settings
     from imc_bridge.doctor import Diagnosis
 
 app = typer.Typer(
@@ -28,14 +25,9 @@ app = typer.Typer(
 )
 token_app = typer.Typer(help="Make, list and revoke access tokens.", no_args_is_help=True)
 app.add_typer(token_app, name="token")
-
-
-class CommandError(Exception):
-    """A command failed for a reason that the user can do something about."""
-
-    def __init__(self, message: str, remedy: str = "") -> None:
-        super().__init__(message)
-        self.remedy = remedy
+app.command()(export)
+app.command("import")(import_file)
+app.command()(tide)
 
 
 DEMO_FOLDER = Path("bathyfleet-demo")
@@ -69,12 +61,6 @@ class TokenRole(StrEnum):
     ADMIN = "admin"
 
 
-Database = Annotated[
-    str | None,
-    typer.Option(help="Database URL: sqlite+aiosqlite:///FILE or postgresql+asyncpg://USER:PASSWORD@HOST/NAME"),
-]
-
-
 @app.callback(invoke_without_command=True)
 def _root(
     version: Annotated[bool, typer.Option("--version", help="Show the version and exit.")] = False,
@@ -101,7 +87,7 @@ def serve(
     log_format: Annotated[LogFormat | None, typer.Option(help="How it is written [default: console]")] = None,
 ) -> None:
     """Run the service. Further settings: environment BATHYFLEET_* or bathyfleet.toml."""
-    settings = _settings(
+    settings = command_settings(
         host=host,
         port=port,
         database_url=database,
@@ -129,7 +115,7 @@ def migrate(
     ] = None,
 ) -> None:
     """Bring the database's tables up to date."""
-    settings = _settings(database_url=database)
+    settings = command_settings(database_url=database)
     from alembic.util import CommandError as AlembicError
     from sqlalchemy.exc import SQLAlchemyError
 
@@ -241,66 +227,12 @@ def revoke_token(
 
 
 @app.command()
-def export(
-    mission: Annotated[str, typer.Argument(metavar="MISSION", help="Its id, or the begin of it.")],
-    format: Annotated[  # noqa: A002 - the option's name
-        str,
-        typer.Option(
-            "--format",
-            "-f",
-            help="Of the map tif, nc, bag, xyz, csv (soundings), geojson, kml (contours) or png; soundings.csv, "
-            "soundings.xyz, soundings.geojson (IHO B-12); tracks.geojson, tracks.kml, tracks.gpx.",
-        ),
-    ] = "tif",
-    out: Annotated[
-        Path | None, typer.Option("--out", "-o", help="File to write; '-' is stdout [default: in output_dir]")
-    ] = None,
-    order: Annotated[
-        str, typer.Option(help="IHO S-44 order that the TVU is compared with: exclusive, special, 1a, 1b or 2.")
-    ] = "1a",
-    interval: Annotated[
-        float | None, typer.Option(min=0.01, max=1000, help="Metres between contours [default: about ten contours]")
-    ] = None,
-    vehicle: Annotated[
-        str | None, typer.Option(help="Whose soundings, for soundings.geojson [default: the only vehicle's]")
-    ] = None,
-    database: Database = None,
-) -> None:
-    """Write a mission's map, soundings or tracks to a file, from the database; no service has to run."""
-    settings = _settings(database_url=database)
-    from app.mapping.s44 import Order
-    from app.missions.products import PRODUCTS, Product, ProductOptions
-    from app.missions.service import MissionService
-
-    if format not in PRODUCTS:
-        raise typer.BadParameter(f"{format!r} is not one of {', '.join(PRODUCTS)}", param_hint="--format")
-    if order not in list(Order):
-        raise typer.BadParameter(f"{order!r} is not one of {', '.join(Order)}", param_hint="--order")
-    options = ProductOptions(Order(order), interval, vehicle=vehicle)
-
-    async def run(service: MissionService) -> Product:
-        return await service.export(await _meant(service, mission), format, options)
-
-    product = _with_missions(settings, run)
-    if out == Path("-"):
-        sys.stdout.buffer.write(product.content)
-        return
-    path = out or settings.output_dir / product.filename
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_bytes(product.content)
-    except OSError as error:
-        raise CommandError(f"{path} cannot be written: {error.strerror}") from None
-    typer.echo(f"{path}: {len(product.content)} bytes")
-
-
-@app.command()
 def doctor(
     seconds: Annotated[float, typer.Option(min=0.1, max=3600, help="How long to listen.")] = 15.0,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
     """Listen for IMC vehicles and say what is missing. Nothing is commanded. Exit code 1 when something is wrong."""
-    settings = _settings()
+    settings = command_settings()
     import dataclasses
 
     from app.missions.links.imc import bridge_settings
@@ -402,7 +334,7 @@ def evaluate(context: typer.Context) -> None:
 
 
 def _with_tokens(database: str | None, run: Any) -> Any:
-    settings = _settings(database_url=database)
+    settings = command_settings(database_url=database)
     from app.api.tokens import TokenStore
     from app.storage.database import Database as Store
     from app.storage.prepare import prepare_database
@@ -418,45 +350,6 @@ def _with_tokens(database: str | None, run: Any) -> Any:
     return asyncio.run(use())
 
 
-def _with_missions(settings: "Settings", run: "Callable[[MissionService], Awaitable[T]]") -> "T":
-    """Run something with the missions of a database; nothing is started, the links stay closed."""
-    from app.missions.service import MissionService
-    from app.storage.database import Database as Store
-    from app.storage.prepare import prepare_database
-
-    async def use() -> "T":
-        await prepare_database(settings.database_url, may_upgrade=settings.migrates_itself)
-        store = Store(settings.database_url)
-        closed = settings.service().model_copy(update={"imc": settings.imc.model_copy(update={"enabled": False})})
-        service = MissionService(closed, store)
-        try:
-            return await run(service)
-        finally:
-            await service.shutdown()
-            await store.close()
-
-    return asyncio.run(use())
-
-
-async def _meant(service: "MissionService", begin: str) -> str:
-    """Return the id of the one mission whose id begins so. Raises CommandError."""
-    every = await service.missions()
-    meant = [summary.id for summary in every if summary.id.startswith(begin)]
-    if len(meant) != 1:
-        ids = "; ".join(f"{summary.id} {summary.name}" for summary in every[:5]) or "none"
-        raise CommandError(f"{len(meant)} missions have ids that begin with {begin!r}", f"There are: {ids}")
-    return meant[0]
-
-
-def _settings(**overrides: Any) -> "Settings":
-    from app.api import logs
-    from app.settings import load_settings
-
-    settings = load_settings(**overrides)
-    logs.configure("warning", settings.log_format)
-    return settings
-
-
 def main() -> None:
     """Run the command line; expected errors are one line and an exit code: 2 for wrong usage, 1 for failure."""
     try:
@@ -465,7 +358,8 @@ def main() -> None:
         code = _exit_code(error)
         if code is None:
             raise
-        lines = getattr(error, "problems", None) or [str(error)]
+        field = getattr(error, "field", "")
+        lines = getattr(error, "problems", None) or [f"{field}: {error}" if field else str(error)]
         remedy = getattr(error, "remedy", "")
         for line in lines:
             typer.echo(f"error: {line}" + (f". {remedy}" if remedy else ""), err=True)

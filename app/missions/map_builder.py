@@ -4,7 +4,7 @@ import copy
 import hashlib
 import threading
 from collections import deque
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import shapely
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from shapely.geometry import Polygon
 
 from app.exploration.problem import Belief
-from app.mapping.counting import count_per_cell
+from app.mapping.fusion import fuse, prior_map
 from app.mapping.gp import GaussianProcessMap
 from app.mapping.outliers import flag_outliers
 from app.mapping.types import BathymetricMap, BoolArray, FloatArray, Grid, Soundings
@@ -75,9 +75,8 @@ class MapBuilder:
         self._accurate = np.zeros(len(self._nodes_xy), dtype=bool)
         self._pending: deque[NDArray[np.float64] | _Everything] = deque()
         self._soundings = np.zeros((0, 4))
-        self._prior = np.zeros((0, 4))
-        # The model with its hyperparameters, and which of the soundings it was learned on (imported ones first) are
-        # outliers.
+        self._prior: BathymetricMap | None = None
+        # The model with its hyperparameters, and for the soundings it was learned on which are outliers.
         self._learned = (GaussianProcessMap(reject_outliers=False), np.zeros(0, dtype=bool))
         self._building = threading.Lock()
         self._learning = threading.Lock()
@@ -117,7 +116,7 @@ class MapBuilder:
         """
         with self._building:
             changed = self._take_in()
-            if not len(self._soundings) + len(self._prior):
+            if not len(self._soundings) and self._prior is None:
                 self._newest = None
                 return None
             if thorough:
@@ -133,11 +132,11 @@ class MapBuilder:
         while self._pending:
             item = self._pending.popleft()
             if isinstance(item, _Everything):
-                self._generation += 1
-                self._prior = item.prior
+                self._prior = prior_map(_as_soundings(item.prior), self.grid, self.mask) if len(item.prior) else None
                 if item.soundings is not None:
+                    self._generation += 1
                     arrived, self._soundings = [], item.soundings
-                self._learned = (GaussianProcessMap(reject_outliers=False), np.zeros(0, dtype=bool))
+                    self._learned = (GaussianProcessMap(reject_outliers=False), np.zeros(0, dtype=bool))
             else:
                 arrived.append(item)
         if arrived:
@@ -145,27 +144,27 @@ class MapBuilder:
         return changed
 
     def _build(self) -> BuiltMap:
-        model, rejected = self._learned
-        known = np.concatenate([self._prior, self._soundings])
-        trusted = np.ones(len(known), dtype=bool)
-        trusted[: len(rejected)] = ~rejected
-        model = copy.copy(model)
-        bathymetry = model.fit(_as_soundings(known[trusted]), learn=False).predict(self.grid, self.mask)
-        if len(self._prior):
-            measured = _as_soundings(known[len(self._prior) :][trusted[len(self._prior) :]])
-            bathymetry = self._without_prior(bathymetry, measured)
-        if not rejected.size:
-            # The first fit had to learn; keep what it found.
-            self._learned = (model, rejected)
+        bathymetry = self._prior
+        if len(self._soundings):
+            measured = self._measured()
+            bathymetry = measured if bathymetry is None else fuse(measured, bathymetry)
+        if bathymetry is None:
+            raise ValueError("there is no sounding to make a map of")
         digest = hashlib.sha256(bathymetry.depth_m.tobytes()).hexdigest()
         self._version += 1
         return BuiltMap(self._version, len(self._soundings), bathymetry, digest)
 
-    def _without_prior(self, bathymetry: BathymetricMap, measured: Soundings) -> BathymetricMap:
-        """Return the map with only this mission's own soundings counted; the imported ones are a layer of their own."""
-        count = np.where(self.mask, count_per_cell(self.grid, measured), 0)
-        prior = self.mask & (count_per_cell(self.grid, _as_soundings(self._prior)) > 0)
-        return replace(bathymetry, count=count, sounded=count > 0, prior=prior)
+    def _measured(self) -> BathymetricMap:
+        """Return the map of the mission's own soundings."""
+        model, rejected = self._learned
+        trusted = np.ones(len(self._soundings), dtype=bool)
+        trusted[: len(rejected)] = ~rejected
+        model = copy.copy(model)
+        bathymetry = model.fit(_as_soundings(self._soundings[trusted]), learn=False).predict(self.grid, self.mask)
+        if not rejected.size:
+            # The first fit had to learn; keep what it found.
+            self._learned = (model, rejected)
+        return bathymetry
 
     def learn(self, *, always: bool = False) -> None:
         """Judge outliers and learn the model's hyperparameters anew when there are enough more soundings.
@@ -175,7 +174,7 @@ class MapBuilder:
         with self._learning:
             generation = self._generation
             model, rejected = self._learned
-            known = np.concatenate([self._prior, self._soundings])
+            known = self._soundings
             if not len(known) or (len(known) < RELEARN_GROWTH * len(rejected) and not always):
                 return
             soundings = _as_soundings(known)
