@@ -295,6 +295,83 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/missions/{mission_id}/imports": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * List what was imported
+         * @description Return what the mission began with, oldest first.
+         */
+        get: operations["listImports"];
+        put?: never;
+        /**
+         * Begin with soundings or a map from elsewhere
+         * @description Take all of a file's soundings near the area, or nothing when any of it is wrong.
+         *
+         *     They count in the map by their own uncertainty, and are told apart from the mission's own. Sending the same file
+         *     again changes nothing.
+         */
+        post: operations["importSoundings"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/missions/{mission_id}/imports/{import_id}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        post?: never;
+        /**
+         * Take an import back
+         * @description Leave the soundings of a file out of the map again.
+         */
+        delete: operations["deleteImport"];
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/missions/{mission_id}/reference": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * See what the map is compared with
+         * @description Return the reference grid in short.
+         */
+        get: operations["getReference"];
+        /**
+         * Compare the map with a grid
+         * @description Sample a file's depths at the map's cells, to see how far off the map is.
+         *
+         *     Shown by `quality`, the layer `difference` and the GeoTIFF; never used for the map or for planning.
+         */
+        put: operations["setReference"];
+        post?: never;
+        /**
+         * Compare the map with nothing
+         * @description Forget the reference grid.
+         */
+        delete: operations["deleteReference"];
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/missions/{mission_id}/map": {
         parameters: {
             query?: never;
@@ -793,6 +870,55 @@ export interface components {
              * @description What would be right
              */
             expected: string;
+        };
+        /**
+         * ImportView
+         * @description Soundings from elsewhere that a mission began with. They are not among its own.
+         */
+        ImportView: {
+            /** Id */
+            id: string;
+            /** Filename */
+            filename: string;
+            /** Source */
+            source: string;
+            /**
+             * Sha256
+             * @description Of the file
+             */
+            sha256: string;
+            /**
+             * Created At
+             * Format: date-time
+             */
+            created_at: string;
+            /**
+             * Found
+             * @description Depths in the file
+             */
+            found: number;
+            /**
+             * Taken
+             * @description Those in or near the area, as they count in the map
+             */
+            taken: number;
+            /** Min Depth M */
+            min_depth_m: number;
+            /** Max Depth M */
+            max_depth_m: number;
+            /** Median Sd M */
+            median_sd_m: number;
+            /**
+             * Notes
+             * @description What was assumed or done, in words
+             */
+            notes: string[];
+            /**
+             * Replayed
+             * @description True: the same file was imported before, nothing changed
+             * @default false
+             */
+            replayed: boolean;
         };
         /**
          * ItemVerdict
@@ -1540,6 +1666,28 @@ export interface components {
             tvu: components["schemas"]["ConformityView"][];
             /** @description To the reference grid; null: there is none that it meets */
             difference: components["schemas"]["DifferenceView"] | null;
+        };
+        /**
+         * ReferenceView
+         * @description The grid that a mission's map is compared with.
+         */
+        ReferenceView: {
+            /** Filename */
+            filename: string;
+            /** Source */
+            source: string;
+            /**
+             * Created At
+             * Format: date-time
+             */
+            created_at: string;
+            /**
+             * Cells
+             * @description Cells of the map's grid that it knows
+             */
+            cells: number;
+            /** Notes */
+            notes: string[];
         };
         /**
          * Sensor
@@ -3252,6 +3400,443 @@ export interface operations {
                 };
             };
             /** @description There is no such mission */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    listImports: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description The mission's id */
+                mission_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ImportView"][];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such mission */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    importSoundings: {
+        parameters: {
+            query: {
+                /** @description Its name; the ending says what it is: .xyz, .csv, .txt (also with .gz), .asc, .tif, .nc or .bag */
+                filename: string;
+                /** @description Where it comes from, kept with the mission */
+                source?: string;
+                /** @description What positions are in where the file does not say: EPSG:4326, EPSG:32629, WKT, or local for the mission's own frame */
+                crs?: string;
+                /** @description Which way values grow: down for depths, up for heights; default: what the file says */
+                positive?: "down" | "up";
+                /** @description Standard deviation of the depths that state none, metres */
+                sd_m?: number;
+                /** @description In place of sd_m: the S-44 order surveyed to; its largest TVU is assumed */
+                order?: components["schemas"]["Order"];
+                /** @description Added to every depth to bring it to the mission's datum */
+                datum_offset_m?: number;
+            };
+            header?: never;
+            path: {
+                /** @description The mission's id */
+                mission_id: string;
+            };
+            cookie?: never;
+        };
+        /** @description The file as it is, whatever its media type */
+        requestBody: {
+            content: {
+                "application/octet-stream": string;
+            };
+        };
+        responses: {
+            /** @description The same file was imported before: nothing changed */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ImportView"];
+                };
+            };
+            /** @description Successful Response */
+            201: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ImportView"];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such mission */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description It contradicts the present state */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body is too large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    deleteImport: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description The mission's id */
+                mission_id: string;
+                /** @description The import's id */
+                import_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            204: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such mission; there is no such import */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    getReference: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description The mission's id */
+                mission_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ReferenceView"];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such mission; there is no such import */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    setReference: {
+        parameters: {
+            query: {
+                /** @description Its name; the ending says what it is: .xyz, .csv, .txt (also with .gz), .asc, .tif, .nc or .bag */
+                filename: string;
+                /** @description Where it comes from, kept with the mission */
+                source?: string;
+                /** @description What positions are in where the file does not say: EPSG:4326, EPSG:32629, WKT, or local for the mission's own frame */
+                crs?: string;
+                /** @description Which way values grow: down for depths, up for heights; default: what the file says */
+                positive?: "down" | "up";
+                /** @description Standard deviation of the depths that state none, metres */
+                sd_m?: number;
+                /** @description In place of sd_m: the S-44 order surveyed to; its largest TVU is assumed */
+                order?: components["schemas"]["Order"];
+                /** @description Added to every depth to bring it to the mission's datum */
+                datum_offset_m?: number;
+            };
+            header?: never;
+            path: {
+                /** @description The mission's id */
+                mission_id: string;
+            };
+            cookie?: never;
+        };
+        /** @description The file as it is, whatever its media type */
+        requestBody: {
+            content: {
+                "application/octet-stream": string;
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ReferenceView"];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such mission */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description It contradicts the present state */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body is too large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    deleteReference: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description The mission's id */
+                mission_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            204: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such mission; there is no such import */
             404: {
                 headers: {
                     [name: string]: unknown;

@@ -108,3 +108,4 @@ export const panelOpen = signal(matchMedia("(min-width: 1180px)").matches);
 export const describing = signal(false);
 export const abortDialogOpen = signal(false);
 export const logOpen = signal(false);
+export const filesOpen = signal(false);
