@@ -3,8 +3,6 @@
 import asyncio
 import json
 import sys
-from collections.abc import AsyncIterator, Iterator
-from contextlib import asynccontextmanager
 from datetime import UTC, datetime
 from enum import StrEnum
 from pathlib import Path
@@ -13,11 +11,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from app import __version__
+from app.commands.common import CommandError, Database, command_settings
+from app.commands.data import export, import_file, tide
+from app.commands.logs import import_logs
 
 if TYPE_CHECKING:
-    from app.missions.service import MissionService
-    from app.missions.views import LogImportView
-    from app.settings import Settings
     from imc_bridge.doctor import Diagnosis
 
 app = typer.Typer(
@@ -29,14 +27,10 @@ app = typer.Typer(
 )
 token_app = typer.Typer(help="Make, list and revoke access tokens.", no_args_is_help=True)
 app.add_typer(token_app, name="token")
-
-
-class CommandError(Exception):
-    """A command failed for a reason that the user can do something about."""
-
-    def __init__(self, message: str, remedy: str = "") -> None:
-        super().__init__(message)
-        self.remedy = remedy
+app.command()(export)
+app.command("import")(import_file)
+app.command("import-log")(import_logs)
+app.command()(tide)
 
 
 DEMO_FOLDER = Path("bathyfleet-demo")
@@ -70,12 +64,6 @@ class TokenRole(StrEnum):
     ADMIN = "admin"
 
 
-Database = Annotated[
-    str | None,
-    typer.Option(help="Database URL: sqlite+aiosqlite:///FILE or postgresql+asyncpg://USER:PASSWORD@HOST/NAME"),
-]
-
-
 @app.callback(invoke_without_command=True)
 def _root(
     version: Annotated[bool, typer.Option("--version", help="Show the version and exit.")] = False,
@@ -102,7 +90,7 @@ def serve(
     log_format: Annotated[LogFormat | None, typer.Option(help="How it is written [default: console]")] = None,
 ) -> None:
     """Run the service. Further settings: environment BATHYFLEET_* or bathyfleet.toml."""
-    settings = _settings(
+    settings = command_settings(
         host=host,
         port=port,
         database_url=database,
@@ -130,7 +118,7 @@ def migrate(
     ] = None,
 ) -> None:
     """Bring the database's tables up to date."""
-    settings = _settings(database_url=database)
+    settings = command_settings(database_url=database)
     from alembic.util import CommandError as AlembicError
     from sqlalchemy.exc import SQLAlchemyError
 
@@ -242,136 +230,6 @@ def revoke_token(
 
 
 @app.command()
-def export(
-    mission: Annotated[str, typer.Argument(metavar="MISSION", help="Its id, or the begin of it.")],
-    format: Annotated[  # noqa: A002 - the option's name
-        str, typer.Option("--format", "-f", help="tif, xyz, csv (soundings), geojson (contours and tracks) or png.")
-    ] = "tif",
-    out: Annotated[
-        Path | None, typer.Option("--out", "-o", help="File to write; '-' is stdout [default: in output_dir]")
-    ] = None,
-    database: Database = None,
-) -> None:
-    """Write a mission's map or soundings to a file, from the database; no service has to run."""
-    settings = _settings(database_url=database)
-    from app.missions.maps import FORMATS, Product
-
-    if format not in FORMATS:
-        raise typer.BadParameter(f"{format!r} is not one of {', '.join(FORMATS)}", param_hint="--format")
-
-    async def run() -> Product:
-        async with _closed_service(settings) as service:
-            return await service.export(await _meant(service, mission), format)
-
-    product = asyncio.run(run())
-    if out == Path("-"):
-        sys.stdout.buffer.write(product.content)
-        return
-    path = out or settings.output_dir / product.filename
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_bytes(product.content)
-    except OSError as error:
-        raise CommandError(f"{path} cannot be written: {error.strerror}") from None
-    typer.echo(f"{path}: {len(product.content)} bytes")
-
-
-@app.command("import-log")
-def import_logs(
-    mission: Annotated[str, typer.Argument(metavar="MISSION", help="Its id, or the begin of it.")],
-    logs: Annotated[list[Path], typer.Argument(metavar="LOG...", help="DUNE logs: Data.lsf or Data.lsf.gz.")],
-    vehicle: Annotated[
-        str | None, typer.Option(help="Name of the vehicle [default: the one that the log announces]")
-    ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
-    database: Database = None,
-) -> None:
-    """Take the soundings of vehicles' own logs into a mission. Begun again after a crash, nothing is stored twice."""
-    settings = _settings(database_url=database)
-    import getpass
-
-    from rich.console import Console
-    from rich.progress import BarColumn, DownloadColumn, Progress, TextColumn, TimeRemainingColumn
-
-    from app.missions.views import LogImportView
-
-    console = Console(stderr=True)
-    columns = (TextColumn("{task.description}"), BarColumn(), DownloadColumn(), TimeRemainingColumn())
-
-    views: list[LogImportView] = []
-
-    async def run(bar: Progress) -> None:
-        async with _closed_service(settings) as service:
-            mission_id = await _meant(service, mission)
-            for path in logs:
-                task = bar.add_task(path.name, total=None)
-
-                def show(done: int, total: int, task: Any = task) -> None:
-                    bar.update(task, completed=done, total=total)
-
-                views.append(
-                    await service.import_log(
-                        mission_id, path, vehicle=vehicle, actor=f"{getpass.getuser()} at the console", progress=show
-                    )
-                )
-
-    try:
-        with Progress(*columns, console=console, disable=not console.is_terminal) as bar:
-            asyncio.run(run(bar))
-    finally:
-        # What one log brought is told also when the next one cannot be read.
-        if as_json:
-            typer.echo(json.dumps([view.model_dump() for view in views], indent=2))
-        else:
-            typer.echo("\n".join(line for view in views for line in _import_lines(view)), nl=bool(views))
-
-
-def _import_lines(view: "LogImportView") -> Iterator[str]:
-    yield (
-        f"{view.file}: {view.vehicle}, {view.soundings} soundings accepted, {view.rejected} rejected, "
-        f"{view.duplicate} there before" + (" (imported before, nothing new)" if view.known else "")
-    )
-    for reason, count in sorted(view.reasons.items(), key=lambda item: -item[1]):
-        yield f"  {count} rejected: {reason}"
-    for reason, count in sorted(view.refused.items(), key=lambda item: -item[1]):
-        yield f"  {count} ranges refused: {reason}"
-    for reason, count in view.unreadable.items():
-        yield f"  {count} packets unreadable: {reason}"
-    if view.skipped_bytes:
-        yield f"  {view.skipped_bytes} bytes skipped that are no packet"
-    if view.cut_off:
-        yield "  the file ends in the middle; what came before is used"
-
-
-@asynccontextmanager
-async def _closed_service(settings: "Settings") -> AsyncIterator["MissionService"]:
-    """Yield the missions of the database. Nothing is started: the links stay closed, whatever a service is doing."""
-    from app.missions.service import MissionService
-    from app.storage.database import Database as Store
-    from app.storage.prepare import prepare_database
-
-    await prepare_database(settings.database_url, may_upgrade=settings.migrates_itself)
-    store = Store(settings.database_url)
-    closed = settings.service().model_copy(update={"imc": settings.imc.model_copy(update={"enabled": False})})
-    service = MissionService(closed, store)
-    try:
-        yield service
-    finally:
-        await service.shutdown()
-        await store.close()
-
-
-async def _meant(service: "MissionService", begin: str) -> str:
-    """Return the id that begins so. Raises CommandError when none or several do."""
-    every = await service.missions()
-    meant = [summary.id for summary in every if summary.id.startswith(begin)]
-    if len(meant) != 1:
-        ids = "; ".join(f"{summary.id} {summary.name}" for summary in every[:5]) or "none"
-        raise CommandError(f"{len(meant)} missions have ids that begin with {begin!r}", f"There are: {ids}")
-    return meant[0]
-
-
-@app.command()
 def doctor(
     seconds: Annotated[float, typer.Option(min=0.1, max=3600, help="How long to listen.")] = 15.0,
     replay: Annotated[
@@ -383,7 +241,7 @@ def doctor(
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
     """Listen for IMC vehicles and say what is missing. Nothing is commanded. Exit code 1 when something is wrong."""
-    settings = _settings()
+    settings = command_settings()
     from app.missions.doctoring import doctor_view
     from app.missions.links.imc import bridge_settings
     from imc_bridge.doctor import Diagnosis, diagnose, diagnose_recording
@@ -503,7 +361,7 @@ def evaluate(context: typer.Context) -> None:
 
 
 def _with_tokens(database: str | None, run: Any) -> Any:
-    settings = _settings(database_url=database)
+    settings = command_settings(database_url=database)
     from app.api.tokens import TokenStore
     from app.storage.database import Database as Store
     from app.storage.prepare import prepare_database
@@ -519,15 +377,6 @@ def _with_tokens(database: str | None, run: Any) -> Any:
     return asyncio.run(use())
 
 
-def _settings(**overrides: Any) -> "Settings":
-    from app.api import logs
-    from app.settings import load_settings
-
-    settings = load_settings(**overrides)
-    logs.configure("warning", settings.log_format)
-    return settings
-
-
 def main() -> None:
     """Run the command line; expected errors are one line and an exit code: 2 for wrong usage, 1 for failure."""
     try:
@@ -536,7 +385,8 @@ def main() -> None:
         code = _exit_code(error)
         if code is None:
             raise
-        lines = getattr(error, "problems", None) or [str(error)]
+        field = getattr(error, "field", "")
+        lines = getattr(error, "problems", None) or [f"{field}: {error}" if field else str(error)]
         remedy = getattr(error, "remedy", "")
         for line in lines:
             typer.echo(f"error: {line}" + (f". {remedy}" if remedy else ""), err=True)

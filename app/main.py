@@ -15,7 +15,7 @@ from fastapi_offline import FastAPIOffline
 from starlette.middleware.cors import CORSMiddleware
 
 from app import __version__
-from app.api import fleet, logs, maps, measurements, missions, openapi, problems, streams
+from app.api import corrections, fleet, imports, logs, maps, measurements, missions, openapi, problems, streams
 from app.api.auth import console_log_in
 from app.api.health import health_router
 from app.api.middleware import BodyMiddleware, RequestMiddleware
@@ -87,7 +87,16 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         openapi_tags=openapi.TAGS,
         lifespan=lifespan,
     )
-    for router in (missions.router, measurements.router, maps.router, streams.router, fleet.router, health_router(API)):
+    for router in (
+        missions.router,
+        measurements.router,
+        corrections.router,
+        imports.router,
+        maps.router,
+        streams.router,
+        fleet.router,
+        health_router(API),
+    ):
         app.include_router(router)
     app.include_router(health_router(""), include_in_schema=False)
     mount_dashboard(app)
@@ -97,7 +106,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         app.add_middleware(
             CORSMiddleware, allow_origins=settings.allowed_origins, allow_methods=["*"], allow_headers=["*"]
         )
-    app.add_middleware(BodyMiddleware, max_bytes=settings.max_body_bytes)
+    app.add_middleware(BodyMiddleware, max_bytes=settings.max_body_bytes, max_file_bytes=settings.max_import_bytes)
     app.add_middleware(RequestMiddleware)
     return app
 

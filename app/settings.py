@@ -16,14 +16,14 @@ from pydantic_settings import (
     TomlConfigSettingsSource,
 )
 
-from app.missions.settings import ImcSettings, NeptusSettings, ServiceSettings, SimulationSettings
+from app.missions.settings import ImcSettings, NeptusSettings, ProviderSettings, ServiceSettings, SimulationSettings
 
 PREFIX = "BATHYFLEET_"
 CONFIG_VARIABLE = "BATHYFLEET_CONFIG"
 DEFAULT_CONFIG = Path("bathyfleet.toml")
 
 # Carry the prefix without being settings: the file's place, where the tests find real sea floors, the build's switch.
-_OTHER_VARIABLES = {CONFIG_VARIABLE, "BATHYFLEET_TERRAINS", "BATHYFLEET_SKIP_DASHBOARD"}
+_OTHER_VARIABLES = {CONFIG_VARIABLE, "BATHYFLEET_TOKEN", "BATHYFLEET_TERRAINS", "BATHYFLEET_SKIP_DASHBOARD"}
 
 _DRIVERS = {"sqlite": "sqlite+aiosqlite", "postgresql": "postgresql+asyncpg", "postgres": "postgresql+asyncpg"}
 
@@ -78,6 +78,9 @@ class Settings(BaseSettings):
     )
     output_dir: Path = Field(default=Path("output"), description="Folder for exported files")
     max_body_bytes: int = Field(default=8 * 2**20, ge=1024, le=2**30, description="Largest request body that is taken")
+    max_import_bytes: int = Field(
+        default=64 * 2**20, ge=1024, le=2**30, description="Largest file of soundings or of a map that is taken"
+    )
     max_streams: int = Field(
         default=200, ge=1, le=100_000, description="Most live views and event streams at the same time"
     )
@@ -88,6 +91,9 @@ class Settings(BaseSettings):
     neptus: NeptusSettings = Field(default=NeptusSettings(), description="The gateway for Neptus' ConvCAO panel")
     simulation: SimulationSettings = Field(
         default=SimulationSettings(), description="The world of vehicles of kind sim"
+    )
+    provider: ProviderSettings = Field(
+        default=ProviderSettings(), description="Who hands soundings in as crowdsourced bathymetry"
     )
 
     @field_validator("log_level", "log_format", mode="before")
@@ -136,6 +142,7 @@ class Settings(BaseSettings):
             imc=self.imc,
             neptus=self.neptus,
             simulation=self.simulation,
+            provider=self.provider,
         )
 
 

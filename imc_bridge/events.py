@@ -95,7 +95,11 @@ class StateReport:
 
 @dataclass(frozen=True, slots=True)
 class Sounding:
-    """One measurement of the bottom at its footprint; ``bottom_depth_m`` is below the instantaneous surface."""
+    """One measurement of the bottom at its footprint; ``bottom_depth_m`` is below the instantaneous surface.
+
+    From ``vehicle_lat_deg`` on: the position and attitude that the footprint was computed from, and the beam's
+    direction in the vehicle (None where the range is the height above the bottom whatever the attitude).
+    """
 
     vehicle: str
     time_s: float
@@ -107,6 +111,13 @@ class Sounding:
     source: str
     beam: int = 0
     position_sd_m: float | None = None
+    vehicle_lat_deg: float | None = None
+    vehicle_lon_deg: float | None = None
+    roll_rad: float | None = None
+    pitch_rad: float | None = None
+    yaw_rad: float | None = None
+    beam_azimuth_rad: float | None = None
+    beam_off_nadir_rad: float | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -311,6 +311,13 @@ class SoundingGate:
                 source=ping.source,
                 beam=ping.beam.index,
                 position_sd_m=position_sd_m,
+                vehicle_lat_deg=math.degrees(state.lat_rad),
+                vehicle_lon_deg=math.degrees(state.lon_rad),
+                roll_rad=state.roll_rad,
+                pitch_rad=state.pitch_rad,
+                yaw_rad=state.yaw_rad,
+                beam_azimuth_rad=ping.beam.azimuth_rad if ping.beam.body_fixed else None,
+                beam_off_nadir_rad=ping.beam.off_nadir_rad if ping.beam.body_fixed else None,
             )
 
     def give_up(self) -> Iterator[SoundingRefused]:

@@ -92,7 +92,18 @@ def serving(folder: Path, environment: dict[str, str], *arguments: str) -> Itera
 def test_help_lists_every_command_without_loading_the_service(bathyfleet: Run) -> None:
     shown = bathyfleet("--help")
     assert shown.code == 0
-    for command in ("serve", "demo", "evaluate", "export", "import-log", "doctor", "migrate", "token"):
+    for command in (
+        "serve",
+        "demo",
+        "evaluate",
+        "export",
+        "import",
+        "import-log",
+        "tide",
+        "doctor",
+        "migrate",
+        "token",
+    ):
         assert command in shown.stdout
     imported = subprocess.run(
         [sys.executable, "-X", "importtime", "-c", "import app.cli"],
@@ -113,7 +124,9 @@ def test_help_lists_every_command_without_loading_the_service(bathyfleet: Run) -
         "evaluate",
         "evaluate explore",
         "export",
+        "import",
         "import-log",
+        "tide",
         "doctor",
         "migrate",
         "token",
@@ -137,7 +150,7 @@ def test_every_command_explains_its_options(bathyfleet: Run, command: str) -> No
         (["serve", "--time-scale", "0"], {}, 2, "greater than 0"),
         (["serve", "--host", "192.0.2.77", "--insecure"], {}, 1, "cannot listen on 192.0.2.77:8080"),
         (["export", "nowhere"], {}, 1, "0 missions have ids that begin with 'nowhere'. There are: none"),
-        (["export", "nowhere", "--format", "doc"], {}, 2, "'doc' is not one of tif, xyz"),
+        (["export", "nowhere", "--format", "doc"], {}, 2, "'doc' is not one of tif, nc, bag"),
         (["import-log", "nowhere", "Data.lsf"], {}, 1, "0 missions have ids that begin with 'nowhere'"),
         (["token", "create", "x", "--role", "king"], {}, 2, "king"),
         (["token", "create", "x", "--role", "viewer", "--vehicle", "a"], {}, 2, "only a token of role vehicle"),
@@ -146,6 +159,9 @@ def test_every_command_explains_its_options(bathyfleet: Run, command: str) -> No
         (["demo", "--terrain", "nowhere.npz"], {}, 2, "does not exist"),
         (["demo", "--vehicles", "0"], {}, 2, "--vehicles"),
         (["evaluate", "explore"], {}, 2, "--terrain"),
+        (["import", "nowhere", "absent.xyz"], {}, 2, "does not exist"),
+        (["tide", "nowhere", "--datum", "4326"], {}, 1, "datum_epsg is 4326"),
+        (["tide", "nowhere", "--url", "http://127.0.0.1:9"], {}, 1, "does not answer"),
         (["fly"], {}, 2, "No such command 'fly'"),
     ],
 )
@@ -207,8 +223,21 @@ def test_a_mission_is_served_exported_and_found_again(
     bathyfleet("export", mission["id"], "--format", "png")
     assert (tmp_path / "output" / "harbour-basin.png").stat().st_size > 1000
 
+    (tmp_path / "old.csv").write_text("lon,lat,depth\n-8.7048,41.1852,9.5\n")
+    refused = bathyfleet("import", mission["id"], "old.csv")
+    assert (refused.code, "sd_m: 1 of its depths state no uncertainty" in refused.stderr) == (1, True)
+    (tmp_path / "harbour.tid").write_text("2026/11/20 20:00 1.0\n2026/11/21 02:00 3.0\n2026/11/21 08:00 1.0\n")
+    corrected = bathyfleet("tide", mission["id"], "harbour.tid", "--source", "gauge")
+    assert "depths are below EPSG:5861 LAT depth, by tide table unnamed" in corrected.stdout
+    assert "12 soundings accepted, 0 rejected" in corrected.stdout
+
     with serving(tmp_path, environment) as (process, url), httpx.Client(base_url=f"{url}/api/v1") as client:
         assert client.get(f"/missions/{mission['id']}").json()["progress"]["soundings"] == 32
+        for said in ("1 of 1 depths imported: 9.50", "1 of 1 depths imported, as before: 9.50"):
+            imported = bathyfleet("import", mission["id"][:8], "old.csv", "--order", "1a", "--url", url)
+            assert said in imported.stdout, imported.stderr
+        wrong = bathyfleet("import", mission["id"], "old.csv", "--order", "9", "--url", url)
+        assert (wrong.code, "order is '9'" in wrong.stderr) == (1, True)
         process.terminate()
         assert process.wait(20) == 0
 

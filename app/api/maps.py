@@ -2,18 +2,24 @@
 
 import asyncio
 from email.utils import quote
-from typing import Annotated, Any, Literal
+from enum import StrEnum
+from typing import Annotated, Any
 
 import numpy as np
-from fastapi import APIRouter, Header, Path, Query, Response
+from fastapi import APIRouter, Depends, Header, Path, Query, Response
 
 from app.api.auth import Reader
 from app.api.problems import ProblemError, problems
 from app.api.schemas import API, MissionId
 from app.api.state import EdgeState, Service, State
+from app.mapping.layers import Layer
 from app.mapping.products.overlay import overlay_png
-from app.missions.maps import FORMATS
-from app.missions.views import MapView
+from app.mapping.s44 import Order
+from app.missions.maps import MapSnapshot
+from app.missions.products import MAP, PRODUCTS, SOUNDINGS, TRACKS, ProductOptions, layers_of
+from app.missions.quality import quality_of
+from app.missions.spec import Name
+from app.missions.views import MapView, ProductView, QualityView
 
 router = APIRouter(
     prefix=f"{API}/missions/{{mission_id}}",
@@ -24,14 +30,59 @@ router = APIRouter(
 MAX_VALUE_M = 20_000.0
 """No sea is deeper."""
 
-TEXTS = {
-    "tif": "GeoTIFF: depth, standard deviation and count",
-    "xyz": "longitude, latitude and depth of every cell",
-    "csv": "every sounding, raw and corrected, with its verdict",
-    "geojson": "depth contours, area and tracks",
-    "png": "a picture with axes and legend",
-}
-"""The formats of ``/map.{format}`` in words."""
+_Order = Annotated[Order, Query(description="Order of IHO S-44 that the TVU is compared with")]
+
+
+def _by_extension(resource: str) -> dict[str, str]:
+    """Return the names of a resource's files by their extensions."""
+    return {
+        kind.extension: name
+        for name, kind in PRODUCTS.items()
+        if kind.resource == resource and "." not in kind.extension
+    }
+
+
+def _file_options(
+    order: _Order = Order.ORDER_1A,
+    interval_m: Annotated[
+        float | None, Query(gt=0, le=1000, allow_inf_nan=False, description="Between contours; default: about ten")
+    ] = None,
+    min: Annotated[  # noqa: A002 - the query parameter's name
+        float | None, Query(ge=-MAX_VALUE_M, le=MAX_VALUE_M, allow_inf_nan=False, description="A picture's least depth")
+    ] = None,
+    max: Annotated[  # noqa: A002 - the query parameter's name
+        float | None, Query(ge=-MAX_VALUE_M, le=MAX_VALUE_M, allow_inf_nan=False, description="Its largest depth")
+    ] = None,
+    vehicle: Annotated[
+        Name | None, Query(description="Whose soundings, in crowdsourced bathymetry; default: the only vehicle's")
+    ] = None,
+) -> ProductOptions:
+    if (min is None) != (max is None) or (min is not None and max is not None and not min < max):
+        raise ProblemError("invalid-request", f"the colour range is {min} to {max}", remedy="Give min and a max above")
+    return ProductOptions(order, interval_m, None if min is None or max is None else (min, max), vehicle)
+
+
+class LayerName(StrEnum):
+    """A layer of the map beside those that its JSON always has."""
+
+    UNCERTAINTY = "uncertainty"
+    COUNT = "count"
+    SOUNDED = "sounded"
+    SLOPE = "slope"
+    TVU_FRACTION = "tvu_fraction"
+    DIFFERENCE = "difference"
+
+
+class OverlayLayer(StrEnum):
+    """A layer that can be seen as a picture."""
+
+    DEPTH = "depth"
+    UNCERTAINTY = "uncertainty"
+    COUNT = "count"
+    SLOPE = "slope"
+    TVU_FRACTION = "tvu_fraction"
+    DIFFERENCE = "difference"
+
 
 _NOT_MODIFIED: dict[int | str, dict[str, Any]] = {
     304: {"description": "The map is still the one that `If-None-Match` names"}
@@ -47,15 +98,30 @@ _IfNoneMatch = Annotated[str | None, Header(description="ETag of the map that th
     responses=_NOT_MODIFIED,
 )
 async def get_map(
-    mission_id: MissionId, service: Service, state: State, reader: Reader, if_none_match: _IfNoneMatch = None
+    mission_id: MissionId,
+    service: Service,
+    state: State,
+    reader: Reader,
+    layer: Annotated[
+        list[LayerName] | None,
+        Query(max_length=len(LayerName), description="Further layers, in `layers`; repeat it for several"),
+    ] = None,
+    order: _Order = Order.ORDER_1A,
+    if_none_match: _IfNoneMatch = None,
 ) -> Response:
     """Return depth, standard deviation and count of every cell, with an ETag that changes with every new map."""
     snapshot = await service.map(mission_id)
-    tag = _tag(state, mission_id, snapshot.version)
+    names = sorted(set(layer or ()))
+    tag = _tag(state, snapshot, *names, *([order] if names else []))
     if _matches(tag, if_none_match):
         return _not_modified(tag)
-    content = await asyncio.to_thread(lambda: snapshot.view().model_dump_json())
-    return Response(content, media_type="application/json", headers=_caching(tag))
+
+    def content() -> str:
+        wanted = [_layer(snapshot, name, order) for name in names]
+        return snapshot.view(wanted).model_dump_json()
+
+    content_json = await asyncio.to_thread(content)
+    return Response(content_json, media_type="application/json", headers=_caching(tag))
 
 
 @router.get(
@@ -76,7 +142,8 @@ async def get_overlay(
     service: Service,
     state: State,
     reader: Reader,
-    layer: Annotated[Literal["depth", "uncertainty"], Query(description="Depth, or its standard deviation")] = "depth",
+    layer: Annotated[OverlayLayer, Query(description="What is shown")] = OverlayLayer.DEPTH,
+    order: _Order = Order.ORDER_1A,
     min: Annotated[  # noqa: A002 - the query parameter's name
         float | None,
         Query(
@@ -104,61 +171,116 @@ async def get_overlay(
     if min is not None and max is not None and max <= min:
         raise ProblemError("invalid-request", f"max is {max:g} but min is {min:g}", remedy="Give a max above min")
     snapshot = await service.map(mission_id)
-    tag = _tag(state, mission_id, snapshot.version, layer, min, max)
+    tag = _tag(state, snapshot, layer, order, min, max)
     if _matches(tag, if_none_match):
         return _not_modified(tag)
-    bathymetry = snapshot.built.map
-    values = bathymetry.depth_m if layer == "depth" else bathymetry.sd_m
-    low = float(np.nanmin(values)) if min is None else min
-    high = float(np.nanmax(values)) if max is None else max
-    # A flat map, or one beyond the only end that was given, is all one colour.
-    range_m = (low, high) if low < high else (low, low + 1.0) if max is None else (high - 1.0, high)
-    picture = await asyncio.to_thread(overlay_png, bathymetry, range_m, layer=layer)
-    return Response(picture, media_type="image/png", headers=_caching(tag))
+
+    def picture() -> bytes:
+        values = _layer(snapshot, layer, order).values
+        low = float(np.nanmin(values)) if min is None else min
+        high = float(np.nanmax(values)) if max is None else max
+        # A flat map, or one beyond the only end that was given, is all one colour.
+        range_m = (low, high) if low < high else (low, low + 1.0) if max is None else (high - 1.0, high)
+        return overlay_png(values, snapshot.built.map.sounded, range_m, layer=layer)
+
+    return Response(await asyncio.to_thread(picture), media_type="image/png", headers=_caching(tag))
 
 
-@router.get(
-    "/map.{format}",
-    operation_id="getMapFile",
-    summary="Download the map",
-    response_class=Response,
-    responses=problems("mission-not-found", "map-not-ready", "format-not-found")
-    | {
-        200: {
-            "description": "; ".join(f"`.{name}`: {text}" for name, text in TEXTS.items()),
-            "content": {
-                FORMATS[name].partition(";")[0]: {"schema": {"type": "string", "format": "binary"}} for name in TEXTS
-            },
-        }
-    },
-)
-async def get_map_file(
-    mission_id: MissionId,
-    format: Annotated[str, Path(description="One of " + ", ".join(TEXTS), examples=["tif"])],  # noqa: A002
-    service: Service,
-    reader: Reader,
-) -> Response:
-    """Return the map as a file."""
-    if format not in TEXTS:
-        raise ProblemError(
-            "format-not-found",
-            f"the map is not made as .{format[:20]}",
-            remedy="Use one of " + ", ".join(f".{name}" for name in TEXTS),
+@router.get("/quality", operation_id="getQuality", summary="Judge the map")
+async def get_quality(mission_id: MissionId, service: Service, reader: Reader) -> QualityView:
+    """Say in how many cells the TVU estimate stays within each order of IHO S-44, and how far a reference grid is off.
+
+    No order is claimed by that: an order asks for more than vertical uncertainty.
+    """
+    return await asyncio.to_thread(quality_of, await service.map(mission_id))
+
+
+@router.get("/products", operation_id="listProducts", summary="List the files", responses=problems("mission-not-found"))
+async def list_products(mission_id: MissionId, service: Service, reader: Reader) -> list[ProductView]:
+    """Return every file that can be downloaded, with its path."""
+    mission = await service.mission(mission_id)
+    base = f"{API}/missions/{mission.id}"
+    return [
+        ProductView(
+            name=name,
+            title=kind.title,
+            media_type=kind.media_type,
+            href=f"{base}/{kind.resource}.{kind.extension}",
+            needs_map=MAP in kind.needs,
         )
-    product = await service.export(mission_id, format)
-    return Response(
-        product.content,
-        media_type=product.media_type,
-        headers={
-            "Content-Disposition": f'attachment; filename="{quote(product.filename)}"',
-            "Cache-Control": "no-cache",
+        for name, kind in PRODUCTS.items()
+    ]
+
+
+_FileOptions = Annotated[ProductOptions, Depends(_file_options)]
+
+
+def _add_files(resource: str, operation_id: str, summary: str, description: str) -> None:
+    kinds = _by_extension(resource)
+    formats = ", ".join(kinds)
+
+    async def get_file(
+        mission_id: MissionId,
+        format: Annotated[str, Path(description=f"One of {formats}", examples=[next(iter(kinds))])],  # noqa: A002
+        service: Service,
+        reader: Reader,
+        options: _FileOptions,
+    ) -> Response:
+        if format not in kinds:
+            raise ProblemError(
+                "format-not-found",
+                f"the {resource} {'is' if resource == MAP else 'are'} not made as .{format[:20]}",
+                remedy="Use one of " + ", ".join(f".{name}" for name in kinds),
+            )
+        product = await service.export(mission_id, kinds[format], options)
+        return Response(
+            product.content,
+            media_type=product.media_type,
+            headers={
+                "Content-Disposition": f'attachment; filename="{quote(product.filename)}"',
+                "Cache-Control": "no-cache",
+            },
+        )
+
+    get_file.__doc__ = description
+    media = {PRODUCTS[name].media_type.partition(";")[0] for name in kinds.values()}
+    router.add_api_route(
+        f"/{resource}.{{format}}",
+        get_file,
+        methods=["GET"],
+        operation_id=operation_id,
+        summary=summary,
+        response_class=Response,
+        responses=problems("mission-not-found", "map-not-ready", "format-not-found")
+        | {
+            200: {
+                "description": "; ".join(f"`.{ext}`: {PRODUCTS[name].title}" for ext, name in kinds.items()),
+                "content": {kind: {"schema": {"type": "string", "format": "binary"}} for kind in sorted(media)},
+            }
         },
     )
 
 
-def _tag(state: EdgeState, mission_id: str, version: int, *variant: object) -> str:
+_add_files(MAP, "getMapFile", "Download the map", "Return the map as a file.")
+_add_files(SOUNDINGS, "getSoundingsFile", "Download the soundings", "Return the soundings as a file.")
+_add_files(TRACKS, "getTracksFile", "Download the tracks", "Return where the vehicles were as a file.")
+
+
+def _layer(snapshot: MapSnapshot, name: str, order: Order) -> Layer:
+    """Return a layer. Raises ProblemError when there is no reference grid to differ from."""
+    found = next((layer for layer in layers_of(snapshot, order) if layer.name == name), None)
+    if found is None:
+        raise ProblemError(
+            "invalid-request",
+            "the mission has no reference grid to differ from",
+            remedy="Send one: PUT /api/v1/missions/{id}/reference",
+        )
+    return found
+
+
+def _tag(state: EdgeState, snapshot: MapSnapshot, *variant: object) -> str:
     shown = "".join(f"-{part}" for part in variant)
-    return f'"{mission_id}-{state.run_id}-{version}{shown}"'
+    return f'"{snapshot.facts.mission_id}-{state.run_id}-{snapshot.version}.{snapshot.revision}{shown}"'
 
 
 def _matches(tag: str, if_none_match: str | None) -> bool:

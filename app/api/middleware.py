@@ -18,6 +18,7 @@ from app.api.problems import FieldProblem, instance_of, invalid, make_problem, p
 log = structlog.get_logger("app.api")
 
 _REQUEST_ID = re.compile(r"^[A-Za-z0-9._-]{1,64}$")
+_FILE_PATH = re.compile(r"^/api/v1/missions/[^/]+/(imports|reference)$")
 _SURROGATES = re.compile("[\ud800-\udfff]")
 
 
@@ -78,11 +79,15 @@ class RequestMiddleware:
 
 
 class BodyMiddleware:
-    """Refuses bodies that are too large, of another type than JSON, or with text that no database can store."""
+    """Refuses bodies that are too large, of another type than JSON, or with text that no database can store.
 
-    def __init__(self, app: ASGIApp, max_bytes: int) -> None:
+    Files may be of any type and have a limit of their own; they are read by whom they are for.
+    """
+
+    def __init__(self, app: ASGIApp, max_bytes: int, max_file_bytes: int) -> None:
         self.app = app
         self.max_bytes = max_bytes
+        self.max_file_bytes = max_file_bytes
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Read and check the body of requests that may change something; everything else passes."""
@@ -91,17 +96,24 @@ class BodyMiddleware:
             return
         headers = Headers(scope=scope)
         declared = headers.get("content-length", "")
-        body = b"" if declared.isdigit() and int(declared) > self.max_bytes else await self._read(receive)
+        is_file = _FILE_PATH.match(scope["path"]) is not None
+        limit = self.max_file_bytes if is_file else self.max_bytes
+        too_large = declared.isdigit() and int(declared) > limit
+        body = b"" if too_large else await self._read(receive, limit)
         if body is None:
             return
         problem = None
-        if (declared.isdigit() and int(declared) > self.max_bytes) or len(body) > self.max_bytes:
+        if too_large or len(body) > limit:
+            in_parts = "Send it in several requests; measurements are taken in batches of any size up to the limit"
+            thinned = "Cut it to the mission's area, thin it, or raise max_import_bytes in the settings"
             problem = make_problem(
                 "body-too-large",
-                f"the body has more than {self.max_bytes} bytes",
+                f"the body has more than {limit} bytes",
                 instance=instance_of(scope),
-                remedy="Send it in several requests; measurements are taken in batches of any size up to the limit",
+                remedy=thinned if is_file else in_parts,
             )
+        elif is_file:
+            pass
         elif body and not _is_json(headers.get("content-type", "")):
             problem = make_problem(
                 "unsupported-media-type",
@@ -126,11 +138,11 @@ class BodyMiddleware:
 
         await self.app(scope, replay, send)
 
-    async def _read(self, receive: Receive) -> bytes | None:
+    async def _read(self, receive: Receive, limit: int) -> bytes | None:
         """Return the body, cut off soon after the limit; None when the client went away."""
         chunks: list[bytes] = []
         size = 0
-        while size <= self.max_bytes:
+        while size <= limit:
             message = await receive()
             if message["type"] == "http.disconnect":
                 return None

@@ -16,6 +16,7 @@ from starlette.responses import Response
 
 from app.missions.errors import (
     ConflictError,
+    ImportNotFoundError,
     InvalidRequestError,
     MapNotReadyError,
     MissionNotFoundError,
@@ -64,6 +65,7 @@ TITLES: dict[str, tuple[int, str]] = {
     "mission-not-found": (404, "There is no such mission"),
     "vehicle-not-found": (404, "There is no such vehicle"),
     "format-not-found": (404, "There is no such format"),
+    "import-not-found": (404, "There is no such import"),
     "map-not-ready": (404, "There is no map yet"),
     "method-not-allowed": (405, "The method is not allowed here"),
     "not-acceptable": (406, "None of the accepted media types can be sent"),
@@ -345,6 +347,7 @@ def describe_mission_error(error: Exception) -> tuple[str, str, str]:
     kinds: Iterable[tuple[type[Exception], str]] = (
         (MissionNotFoundError, "mission-not-found"),
         (VehicleNotFoundError, "vehicle-not-found"),
+        (ImportNotFoundError, "import-not-found"),
         (MapNotReadyError, "map-not-ready"),
         (MoveRefusedError, "move-refused"),
         (ConflictError, "conflict"),
@@ -386,6 +389,7 @@ def install(app: FastAPI) -> None:
     for cls in (
         MissionNotFoundError,
         VehicleNotFoundError,
+        ImportNotFoundError,
         MapNotReadyError,
         MoveRefusedError,
         ConflictError,

@@ -88,6 +88,9 @@ class BathymetricMap:
         Relative local variability of the sea floor, mean about 1.
     correlation_length_m
         Fitted length scale.
+    prior
+        True where soundings were imported as prior knowledge; None without any. They are not in ``count`` or
+        ``sounded``.
     """
 
     grid: Grid
@@ -98,3 +101,4 @@ class BathymetricMap:
     roughness: FloatArray
     correlation_length_m: float
     model: str
+    prior: BoolArray | None = None

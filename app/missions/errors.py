@@ -31,5 +31,9 @@ class InvalidRequestError(MissionError):
         self.field = field
 
 
+class ImportNotFoundError(MissionError):
+    """There is no such import, or no reference grid."""
+
+
 class MapNotReadyError(MissionError):
     """No sounding was accepted yet, so there is no map."""

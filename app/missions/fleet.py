@@ -64,6 +64,24 @@ class VehicleReport:
 
 
 @dataclass(frozen=True, slots=True)
+class BeamGeometry:
+    """How a sonar's beam pointed: the raw values that a footprint was computed from.
+
+    Position of the vehicle in WGS84 degrees, its attitude (nose up and starboard down are positive), and the beam's
+    direction in the vehicle: azimuth from the bow to starboard, angle from straight down. None: not known, or not used
+    because the range is vertical whatever the attitude.
+    """
+
+    lat_deg: float
+    lon_deg: float
+    roll_deg: float | None = None
+    pitch_deg: float | None = None
+    heading_deg: float | None = None
+    azimuth_deg: float | None = None
+    off_nadir_deg: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class SoundingReport:
     """One measurement of the sea floor, already placed at its footprint.
 
@@ -80,6 +98,7 @@ class SoundingReport:
     beam: int = 0
     depth_sd_m: float | None = None
     position_sd_m: float | None = None
+    beam_geometry: BeamGeometry | None = None
 
 
 @dataclass(frozen=True, slots=True)

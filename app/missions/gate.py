@@ -4,12 +4,11 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-import numpy as np
 import shapely
 from shapely.geometry import Polygon
 
-from app.mapping.georeference import LocalFrame
-from app.missions.fleet import Position, SoundingReport
+from app.missions.corrections import Corrected, Corrections
+from app.missions.fleet import SoundingReport
 
 MAX_OCEAN_DEPTH_M = 11_100.0
 MAX_VEHICLE_SPEED_MPS = 6.0
@@ -25,7 +24,10 @@ JUMP_ALLOWANCE_M = 10.0
 
 @dataclass(frozen=True, slots=True)
 class GatedSounding:
-    """A sounding in the local frame with its corrected depth; ``reason`` is empty when it was accepted."""
+    """A sounding in the local frame with its corrected depth; ``reason`` is empty when it was accepted.
+
+    ``level_m`` is the water level that was subtracted, None where none is known.
+    """
 
     report: SoundingReport
     east_m: float
@@ -33,6 +35,7 @@ class GatedSounding:
     depth_m: float
     sd_m: float
     reason: str
+    level_m: float | None = None
 
     @property
     def accepted(self) -> bool:
@@ -45,58 +48,45 @@ class Gate:
 
     Parameters
     ----------
-    frame, area
-        The mission's local frame and area polygon in it.
+    corrections
+        They place soundings in the mission's local frame, too.
+    area
+        The mission's area polygon in that frame.
     margin_m
         How far outside the area soundings still help the map's edge.
     noise
         Standard deviation of a range as a fraction of it, used where the vehicle states none.
-    tide_level_m
-        Water level above chart datum, subtracted from every depth.
     """
 
-    def __init__(self, frame: LocalFrame, area: Polygon, *, margin_m: float, noise: float, tide_level_m: float) -> None:
-        self._frame = frame
+    def __init__(self, corrections: Corrections, area: Polygon, *, margin_m: float, noise: float) -> None:
+        self.corrections = corrections
         self._zone = area.buffer(margin_m)
         self._margin_m = margin_m
         self._noise = noise
-        self._tide_level_m = tide_level_m
         self._last: dict[str, tuple[float, float, float]] = {}
         shapely.prepare(self._zone)
 
     def check(self, reports: Iterable[SoundingReport]) -> list[GatedSounding]:
-        """Return one result per report, in their order; depths are corrected for the tide, the report stays raw."""
+        """Return one result per report, in their order; depths are corrected, the report stays raw."""
         listed = [(report, _implausible_value(report)) for report in reports]
-        places = iter(self._places([report.footprint for report, reason in listed if not reason]))
+        corrected = iter(self.corrections.apply([report for report, reason in listed if not reason]))
         return [
-            _refused(report, reason) if reason else self._check_placed(report, next(places))
+            _refused(report, reason) if reason else self._check_corrected(report, next(corrected))
             for report, reason in listed
         ]
 
-    def _places(self, footprints: list[Position]) -> list[tuple[float, float] | str]:
-        """Return east and north of each footprint, or why it has none in the mission's frame."""
-        lat, lon = (np.array([getattr(place, name) for place in footprints]) for name in ("lat_deg", "lon_deg"))
-        try:
-            east, north = self._frame.to_local(lat, lon)
-        except ValueError as error:
-            if len(footprints) == 1:
-                return [f"position: {error}"]
-            # One far-away place must not take the others of its batch with it.
-            return [place for footprint in footprints for place in self._places([footprint])]
-        return list(zip(east.tolist(), north.tolist(), strict=True))
-
-    def _check_placed(self, report: SoundingReport, place: tuple[float, float] | str) -> GatedSounding:
-        if isinstance(place, str):
-            return _refused(report, place)
-        east, north = place
-        depth = report.footprint.depth_m - self._tide_level_m
+    def _check_corrected(self, report: SoundingReport, found: Corrected) -> GatedSounding:
         sd = report.depth_sd_m if report.depth_sd_m is not None else max(self._noise * report.range_m, 0.01)
-        reason = self._outside(east, north) or self._jump(report, east, north)
+        east, north = found.east_m, found.north_m
+        if found.reason:
+            return GatedSounding(report, east, north, found.depth_m, sd, found.reason)
+        reason = self.outside(east, north) or self._jump(report, east, north)
         if not reason:
             self._last[report.vehicle] = (report.time_s, east, north)
-        return GatedSounding(report, east, north, depth, sd, reason)
+        return GatedSounding(report, east, north, found.depth_m, sd, reason, found.level_m)
 
-    def _outside(self, east: float, north: float) -> str:
+    def outside(self, east: float, north: float) -> str:
+        """Return why a place is too far from the area; empty when it is not."""
         if shapely.contains_xy(self._zone, east, north):
             return ""
         return (

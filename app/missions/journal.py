@@ -18,6 +18,7 @@ from sqlalchemy.ext.asyncio import AsyncSession
 from app.missions import metrics
 from app.missions.broadcast import Broadcaster
 from app.missions.clock import now
+from app.missions.corrections import NO_LEVEL
 from app.missions.fleet import SoundingReport, VehicleReport, WaypointReport
 from app.missions.gate import Gate, GatedSounding
 from app.missions.views import EventMessage, EventView, ItemVerdict, Level, Verdict
@@ -71,8 +72,12 @@ class Journal:
         self._soundings: list[SoundingReport] = []
         self._positions: list[dict[str, Any]] = []
         self._statuses: list[WaypointReport] = []
+        self.told_of_missing_level = False
+        """Whether the log has it that no water level is known for soundings; once is enough."""
+        self._untold = ""
         self._track_ends: dict[str, tuple[float, float]] = {}
-        self._writing = asyncio.Lock()
+        self.writing = asyncio.Lock()
+        """Held while soundings are stored, so that corrections do not change under them."""
         self._pump: asyncio.Task[None] | None = None
 
     def sounding(self, report: SoundingReport) -> None:
@@ -102,9 +107,14 @@ class Journal:
     async def flush(self) -> None:
         """Write everything noted so far. What could not be written stays noted."""
         await to_the_end(self._flush())
+        if self._untold:
+            why, self._untold = self._untold, ""
+            await self.log(
+                Level.ALARM, "corrections", f"soundings are rejected: {why}. Send a tide table that covers them"
+            )
 
     async def _flush(self) -> None:
-        async with self._writing:
+        async with self.writing:
             soundings, self._soundings = self._soundings, []
             positions, self._positions = self._positions, []
             statuses, self._statuses = self._statuses, []
@@ -128,7 +138,9 @@ class Journal:
     async def take(
         self, reports: Sequence[SoundingReport], session: AsyncSession, *, gate: Gate | None = None
     ) -> tuple[list[ItemVerdict], Callable[[], None]]:
-        """Store soundings in the caller's transaction; ``gate`` judges them in place of the mission's own.
+        """Store soundings in the caller's transaction; the caller holds ``writing``.
+
+        ``gate`` judges them in place of the mission's own.
 
         Returns
         -------
@@ -163,7 +175,7 @@ class Journal:
     async def count_again(self, read: Callable[[], Awaitable[Counts]]) -> None:
         """Let ``read`` take up what another process has written, while nothing is written here."""
         await self.flush()
-        async with self._writing:
+        async with self.writing:
             self.counts = await read()
 
     async def close(self) -> None:
@@ -199,6 +211,9 @@ class Journal:
         fresh = [item for identity, item in first.items() if identity in new]
         accepted = [item for item in reversed(fresh) if item.accepted]
         rejected = len(fresh) - len(accepted)
+        no_level = next((item.reason for item in fresh if item.reason.startswith(NO_LEVEL)), "")
+        if no_level and not self.told_of_missing_level:
+            self.told_of_missing_level, self._untold = True, no_level.removeprefix(NO_LEVEL)
         self.counts = Counts(self.counts.accepted + len(accepted), self.counts.rejected + rejected)
         metrics.SOUNDINGS.labels(Verdict.ACCEPTED).inc(len(accepted))
         metrics.SOUNDINGS.labels(Verdict.REJECTED).inc(rejected)
@@ -255,6 +270,7 @@ def _storable(item: GatedSounding) -> bool:
 
 def _row(mission_id: str, step: int, received: Any, item: GatedSounding) -> dict[str, Any]:
     report = item.report
+    geometry = report.beam_geometry
     return {
         "mission_id": mission_id,
         "vehicle": report.vehicle,
@@ -273,6 +289,14 @@ def _row(mission_id: str, step: int, received: Any, item: GatedSounding) -> dict
         "depth_m": item.depth_m,
         "sd_m": item.sd_m,
         "position_sd_m": report.position_sd_m,
+        "level_m": item.level_m,
+        "vehicle_lat_deg": geometry and geometry.lat_deg,
+        "vehicle_lon_deg": geometry and geometry.lon_deg,
+        "roll_deg": geometry and geometry.roll_deg,
+        "pitch_deg": geometry and geometry.pitch_deg,
+        "heading_deg": geometry and geometry.heading_deg,
+        "beam_azimuth_deg": geometry and geometry.azimuth_deg,
+        "beam_off_nadir_deg": geometry and geometry.off_nadir_deg,
         "verdict": Verdict.ACCEPTED if item.accepted else Verdict.REJECTED,
         "reason": item.reason,
     }

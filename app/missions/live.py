@@ -11,8 +11,11 @@ import structlog
 from shapely.geometry import Polygon
 
 from app.mapping.georeference import LocalFrame
+from app.mapping.tides import TideTable, parse_tid
+from app.mapping.types import FloatArray
 from app.missions.broadcast import Broadcaster
 from app.missions.clock import now
+from app.missions.corrections import Corrections
 from app.missions.fleet import (
     FleetEvent,
     LinkReport,
@@ -26,6 +29,7 @@ from app.missions.gate import Gate
 from app.missions.hub import FleetHub
 from app.missions.journal import Counts, Journal, track_length_m
 from app.missions.map_builder import BuiltMap, MapBuilder
+from app.missions.maps import MapSnapshot, MissionFacts
 from app.missions.members import Member, Team
 from app.missions.spec import MissionSpec, VehicleSpec
 from app.missions.states import MissionState
@@ -43,7 +47,7 @@ from app.storage import events as event_queries
 from app.storage import missions as mission_queries
 from app.storage import soundings as sounding_queries
 from app.storage.database import Database
-from app.storage.models import MissionRow, PositionRow, WaypointRow
+from app.storage.models import MissionRow, PositionRow, TideTableRow, WaypointRow
 
 LIVE_PERIOD_S = 0.25
 
@@ -75,6 +79,7 @@ class LiveMission:
         row: MissionRow,
         spec: MissionSpec,
         counts: Counts,
+        tide_table: TideTable | None = None,
     ) -> None:
         self.id = row.id
         self.spec = spec
@@ -84,9 +89,15 @@ class LiveMission:
         self.team = Team()
         self.broadcaster = Broadcaster()
         self.builder = MapBuilder(self.area, spec.cell_m, spec.accuracy_m)
-        self.journal = Journal(
-            database, row.id, self.make_gate(), counts, self.broadcaster, lambda rows: self.builder.add(rows)
-        )
+        self.margin_m = 2 * spec.limits.max_step_m
+        """How far outside the area what vehicles measured still belongs to the mission and helps the map's edge."""
+        corrections = Corrections(self.frame, spec.tide, table=tide_table, sound_speed=spec.sound_speed)
+        self.gate = self._gate_with(corrections)
+        self.reference_m: FloatArray | None = None
+        """Depths of the grid that the map is compared with, at the map's cells."""
+        self.revision = 0
+        """Counts changes of what the map is shown with."""
+        self.journal = Journal(database, row.id, self.gate, counts, self.broadcaster, self.builder.add)
         self.changed = asyncio.Event()
         """Set whenever a vehicle reported something that the step loop may be waiting for."""
         self.halted = False
@@ -111,12 +122,21 @@ class LiveMission:
             step = await mission_queries.last_step(session, row.id)
             tracks = await mission_queries.tracks(session, row.id)
             positions = await mission_queries.last_positions(session, row.id)
+            prior = await sounding_queries.imported_arrays(session, row.id)
+            reference = await sounding_queries.reference_grid(session, row.id)
+            tide = await session.get(TideTableRow, row.id)
             imported = await event_queries.last_event_id(session, row.id, kind="import")
         # Building the spec checks geometry, which takes milliseconds: not on the event loop.
-        spec = await asyncio.get_running_loop().run_in_executor(executor, MissionSpec.model_validate, row.spec)
+        loop = asyncio.get_running_loop()
+        spec = await loop.run_in_executor(executor, MissionSpec.model_validate, row.spec)
+        table = None
+        if tide is not None:
+            table = await loop.run_in_executor(executor, partial(parse_tid, tide.text, name=tide.name))
         counts = Counts(counted.get("accepted", 0), counted.get("rejected", 0))
-        live = cls(database, hub, executor, row, spec, counts)
-        live.builder.add(soundings)
+        live = cls(database, hub, executor, row, spec, counts, table)
+        if len(soundings) + len(prior):
+            live.builder.replace(soundings, prior)
+        live.reference_m = reference
         live._imports_noticed = imported
         live.journal.travelled_m = sum(track_length_m(track) for track in tracks.values())
         if step is not None:
@@ -129,19 +149,11 @@ class LiveMission:
         return live
 
     def make_gate(self) -> Gate:
-        """Return a gate as the mission is described, which has seen no sounding yet."""
-        return Gate(
-            self.frame,
-            Polygon(self.area),
-            margin_m=self.track_margin_m,
-            noise=self.spec.sounding_noise,
-            tide_level_m=self.spec.tide.level_m,
-        )
+        """Return a gate with the mission's corrections, which has seen no sounding yet."""
+        return self._gate_with(self.gate.corrections)
 
-    @property
-    def track_margin_m(self) -> float:
-        """How far outside the area what vehicles measured still belongs to the mission."""
-        return 2 * self.spec.limits.max_step_m
+    def _gate_with(self, corrections: Corrections) -> Gate:
+        return Gate(corrections, Polygon(self.area), margin_m=self.margin_m, noise=self.spec.sounding_noise)
 
     async def notice_imports(self) -> None:
         """Take up the soundings of logs that the command line imported while this process had the mission."""
@@ -154,9 +166,8 @@ class LiveMission:
             async with self._database.reading() as session:
                 counted = await sounding_queries.counts(session, self.id)
                 soundings = await sounding_queries.accepted_arrays(session, self.id)
-            versions = self.builder.newest.version if self.builder.newest else 0
-            self.builder = MapBuilder(self.area, self.spec.cell_m, self.spec.accuracy_m, versions)
-            self.builder.add(soundings)
+                prior = await sounding_queries.imported_arrays(session, self.id)
+            self.builder.replace(soundings, prior)
             return Counts(counted.get("accepted", 0), counted.get("rejected", 0))
 
         await self.journal.count_again(read)
@@ -253,6 +264,20 @@ class LiveMission:
         if built is not None and built is not before:
             self.publish_map(built)
         return built
+
+    @property
+    def facts(self) -> MissionFacts:
+        """Return what every product states."""
+        return MissionFacts(self.id, self.spec, self.frame, self.gate.corrections.vertical_datum)
+
+    def show_reference(self, depths_m: FloatArray | None) -> None:
+        """Compare the map with these depths at its cells, or with nothing."""
+        self.reference_m = depths_m
+        self.revision += 1
+
+    def snapshot(self, built: BuiltMap) -> MapSnapshot:
+        """Return a map with what is needed to understand it."""
+        return MapSnapshot(self.facts, built, self.header.step, self.reference_m, self.revision)
 
     def publish_map(self, built: BuiltMap) -> None:
         """Tell everyone who watches that there is a new map."""

@@ -105,7 +105,7 @@ class LogImport:
         self._key = f"{KEY}-{self._digest[:32]}-{settings.imc.altimeter}-{self._log.vehicle}"
         # A gate of its own: the log may lie hours before or after what the vehicle sends now.
         self._gate = live.make_gate()
-        self._zone = Polygon(live.area).buffer(live.track_margin_m)
+        self._zone = Polygon(live.area).buffer(live.margin_m)
         self._tally = Tally()
 
     async def run(self, *, actor: str, progress: Progress | None = None) -> LogImportView:
@@ -161,7 +161,7 @@ class LogImport:
         for report in batch:
             tally.span(report.time_s)
         key = f"{self._key}-{tally.batches}"
-        async with self._database.writing() as session:
+        async with live.journal.writing, self._database.writing() as session:
             known = await sounding_queries.answer_to(session, live.id, key)
             if known is not None:
                 # Read once more all the same: the gate judges jumps from one batch to the next.

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from shapely.geometry import Polygon
 
 from app.exploration.problem import Belief
+from app.mapping.fusion import fuse, prior_map
 from app.mapping.gp import GaussianProcessMap
 from app.mapping.outliers import flag_outliers
 from app.mapping.types import BathymetricMap, BoolArray, FloatArray, Grid, Soundings
@@ -21,6 +22,17 @@ MAX_LANDMARKS = 4000
 
 RELEARN_GROWTH = 1.15
 """Hyperparameters are learned again when the soundings grew by this factor."""
+
+
+@dataclass(frozen=True)
+class _Everything:
+    """Soundings that take the place of all that were there, shape (n, 4), and those that were imported.
+
+    None: the mission's own stay.
+    """
+
+    soundings: NDArray[np.float64] | None
+    prior: NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -48,15 +60,9 @@ class MapBuilder:
     """Collects soundings and makes maps of them.
 
     ``add`` may be called from the event loop at any time; ``build`` and ``learn`` belong in worker threads.
-
-    Parameters
-    ----------
-    versions
-        How many maps a builder before this one made, whose versions must not come again.
     """
 
-    def __init__(self, area: FloatArray, cell_m: float, accuracy_m: float, versions: int = 0) -> None:
-        self._versions = versions
+    def __init__(self, area: FloatArray, cell_m: float, accuracy_m: float) -> None:
         self.grid, self.mask = make_grid(area, cell_m)
         self._accuracy_m = accuracy_m
         stride = int(np.ceil(np.sqrt(max(self.mask.sum(), 1) / MAX_LANDMARKS)))
@@ -67,18 +73,30 @@ class MapBuilder:
             self._nodes = self.mask.copy()
         self._nodes_xy = self.grid.centres_m[self._nodes.ravel()]
         self._accurate = np.zeros(len(self._nodes_xy), dtype=bool)
-        self._pending: deque[NDArray[np.float64]] = deque()
+        self._pending: deque[NDArray[np.float64] | _Everything] = deque()
         self._soundings = np.zeros((0, 4))
+        self._prior: BathymetricMap | None = None
         # The model with its hyperparameters, and for the soundings it was learned on which are outliers.
         self._learned = (GaussianProcessMap(reject_outliers=False), np.zeros(0, dtype=bool))
         self._building = threading.Lock()
         self._learning = threading.Lock()
         self._newest: BuiltMap | None = None
+        self._version = 0
+        # Counts how often all soundings were replaced: what is learned meanwhile of the old ones is void.
+        self._generation = 0
 
     def add(self, soundings: NDArray[np.float64]) -> None:
         """Take in soundings, shape (n, 4): east, north, depth, standard deviation in metres."""
         if len(soundings):
             self._pending.append(soundings)
+
+    def replace(self, soundings: NDArray[np.float64], prior: NDArray[np.float64]) -> None:
+        """Take these in place of all soundings so far; ``prior`` are those that were imported. Shapes (n, 4)."""
+        self._pending.append(_Everything(soundings, prior))
+
+    def replace_prior(self, prior: NDArray[np.float64]) -> None:
+        """Take these, shape (n, 4), in place of all imported soundings so far."""
+        self._pending.append(_Everything(None, prior))
 
     @property
     def newest(self) -> BuiltMap | None:
@@ -97,18 +115,47 @@ class MapBuilder:
         every sounding and learns the model first, as a product should.
         """
         with self._building:
-            arrived = []
-            while self._pending:
-                arrived.append(self._pending.popleft())
-            if arrived:
-                self._soundings = np.concatenate([self._soundings, *arrived])
+            changed = self._take_in()
+            if not len(self._soundings) and self._prior is None:
+                self._newest = None
+                return None
             if thorough:
                 self.learn(always=True)
-            if arrived or (self._newest is not None and thorough):
+            if changed or (self._newest is not None and thorough):
                 self._newest = self._build()
             return self._newest
 
+    def _take_in(self) -> bool:
+        """Add what is pending; tells whether there was anything."""
+        arrived: list[NDArray[np.float64]] = []
+        changed = bool(self._pending)
+        while self._pending:
+            item = self._pending.popleft()
+            if isinstance(item, _Everything):
+                self._prior = prior_map(_as_soundings(item.prior), self.grid, self.mask) if len(item.prior) else None
+                if item.soundings is not None:
+                    self._generation += 1
+                    arrived, self._soundings = [], item.soundings
+                    self._learned = (GaussianProcessMap(reject_outliers=False), np.zeros(0, dtype=bool))
+            else:
+                arrived.append(item)
+        if arrived:
+            self._soundings = np.concatenate([self._soundings, *arrived])
+        return changed
+
     def _build(self) -> BuiltMap:
+        bathymetry = self._prior
+        if len(self._soundings):
+            measured = self._measured()
+            bathymetry = measured if bathymetry is None else fuse(measured, bathymetry)
+        if bathymetry is None:
+            raise ValueError("there is no sounding to make a map of")
+        digest = hashlib.sha256(bathymetry.depth_m.tobytes()).hexdigest()
+        self._version += 1
+        return BuiltMap(self._version, len(self._soundings), bathymetry, digest)
+
+    def _measured(self) -> BathymetricMap:
+        """Return the map of the mission's own soundings."""
         model, rejected = self._learned
         trusted = np.ones(len(self._soundings), dtype=bool)
         trusted[: len(rejected)] = ~rejected
@@ -117,24 +164,25 @@ class MapBuilder:
         if not rejected.size:
             # The first fit had to learn; keep what it found.
             self._learned = (model, rejected)
-        digest = hashlib.sha256(bathymetry.depth_m.tobytes()).hexdigest()
-        version = (self._newest.version if self._newest else self._versions) + 1
-        return BuiltMap(version, len(self._soundings), bathymetry, digest)
+        return bathymetry
 
     def learn(self, *, always: bool = False) -> None:
         """Judge outliers and learn the model's hyperparameters anew when there are enough more soundings.
 
         Slower than a build, so it is done while the vehicles travel. The next ``build`` uses what was found.
         """
-        known = self._soundings
         with self._learning:
+            generation = self._generation
             model, rejected = self._learned
+            known = self._soundings
             if not len(known) or (len(known) < RELEARN_GROWTH * len(rejected) and not always):
                 return
             soundings = _as_soundings(known)
             verdict = flag_outliers(soundings, hyperparameters=getattr(model, "stationary_hyperparameters_", None))
             trusted = ~verdict.rejected
-            self._learned = (copy.copy(model).fit(soundings.take(trusted), learn=True), verdict.rejected)
+            fitted = copy.copy(model).fit(soundings.take(trusted), learn=True)
+            if generation == self._generation:
+                self._learned = (fitted, verdict.rejected)
 
     def coverage_pct(self) -> float:
         """Return the share of the area's cells that are known to the asked accuracy."""

@@ -21,9 +21,11 @@ from app.exploration.planners import ONLY_IN_SIMULATION, PLANNERS, REFUSAL
 from app.exploration.planners import warm_up as planning_warm_up
 from app.mapping.georeference import LocalFrame
 from app.mapping.gp import warm_up as mapping_warm_up
-from app.missions import states
+from app.mapping.products.tracks import Track, TrackPoint
+from app.missions import importing, states
 from app.missions.broadcast import Subscription
 from app.missions.clock import now
+from app.missions.correcting import check_level_is_known, corrections_view, set_sound_speed, set_tide
 from app.missions.doctoring import DoctorView, Examine, doctor_view, switched_off
 from app.missions.errors import (
     ConflictError,
@@ -33,6 +35,7 @@ from app.missions.errors import (
     VehicleNotFoundError,
 )
 from app.missions.fleet import (
+    BeamGeometry,
     FleetLink,
     LinkState,
     Position,
@@ -46,15 +49,28 @@ from app.missions.journal import event_view
 from app.missions.links.rest import RestFleetLink
 from app.missions.links.sim import Launch, SimFleetLink
 from app.missions.live import LiveMission
-from app.missions.maps import MapSnapshot, Product, make_product
+from app.missions.maps import MapSnapshot
+from app.missions.products import (
+    MAP,
+    SOUNDINGS,
+    TRACKS,
+    Material,
+    Product,
+    ProductOptions,
+    make_product,
+    product_kind,
+)
 from app.missions.runner import Runner
 from app.missions.settings import ServiceSettings
-from app.missions.spec import MissionSpec, VehicleKind, VehicleSpec
+from app.missions.spec import MissionSpec, SoundSpeed, VehicleKind, VehicleSpec
 from app.missions.states import ENDED, MissionState
 from app.missions.views import (
     ActionView,
     BatchVerdict,
+    CorrectionsView,
     EventView,
+    ImportOptions,
+    ImportView,
     ItemVerdict,
     Level,
     LiveMessage,
@@ -63,8 +79,10 @@ from app.missions.views import (
     MissionSummary,
     MissionView,
     PlannerView,
+    ReferenceView,
     SnapshotMessage,
     StopView,
+    TideCorrection,
     VehicleView,
     Verdict,
     WaypointView,
@@ -75,6 +93,7 @@ from app.storage import soundings as sounding_queries
 from app.storage.database import Database
 from app.storage.models import BatchRow, MissionRow, MissionVehicleRow, SoundingRow
 from app.storage.shielding import to_the_end
+from imc_bridge.soundings import Beam, StateSample, footprint
 
 Action = Literal["start", "pause", "resume", "abort", "finish"]
 
@@ -129,6 +148,8 @@ class MissionService:
         self._executor = ThreadPoolExecutor(WORKERS, thread_name_prefix="planning")
         self._live: dict[str, LiveMission] = {}
         self._loading = asyncio.Lock()
+        # One file after the other: reading takes memory and a core.
+        self._importing = asyncio.Lock()
         self._runs: dict[str, asyncio.Task[None]] = {}
         self._acting: dict[str, asyncio.Lock] = {}
         self._started = False
@@ -224,6 +245,7 @@ class MissionService:
             stops: list[StopReceipt] = []
             if action in ("start", "resume"):
                 self._check_team(live)
+                check_level_is_known(live)
                 if action == "start":
                     self._check_links(live)
                 self._claim_team(live)
@@ -328,7 +350,7 @@ class MissionService:
         digest = hashlib.sha256(orjson.dumps([item.model_dump() for item in items])).hexdigest()
         strangers = {i: self._stranger(live, item) for i, item in enumerate(items)}
         reports = {i: report for i, item in enumerate(items) if not strangers[i] and (report := _sounding(item))}
-        async with self._database.writing() as session:
+        async with live.journal.writing, self._database.writing() as session:
             if idempotency_key is not None:
                 known = await sounding_queries.answer_to(session, mission_id, idempotency_key)
                 if known is not None:
@@ -433,6 +455,66 @@ class MissionService:
             return live.waypoint_of(vehicle)
         return found
 
+    # Corrections
+
+    async def corrections(self, mission_id: str) -> CorrectionsView:
+        """Return how a mission's soundings are corrected."""
+        return corrections_view(await self._get(mission_id))
+
+    async def set_tide(self, mission_id: str, tide: TideCorrection, *, actor: str = "operator") -> CorrectionsView:
+        """Change the tide and correct every sounding anew. Raises InvalidRequestError for a table that is wrong."""
+        live = await self._get(mission_id)
+        async with self._acting.setdefault(mission_id, asyncio.Lock()):
+            await set_tide(live, self._database, self._executor, tide, actor)
+        return corrections_view(live)
+
+    async def set_sound_speed(
+        self, mission_id: str, sound_speed: SoundSpeed | None, *, actor: str = "operator"
+    ) -> CorrectionsView:
+        """Change the sound speed profile, or take it away, and correct every sounding anew."""
+        live = await self._get(mission_id)
+        async with self._acting.setdefault(mission_id, asyncio.Lock()):
+            await set_sound_speed(live, self._database, self._executor, sound_speed, actor)
+        return corrections_view(live)
+
+    # From elsewhere
+
+    async def imports(self, mission_id: str) -> list[ImportView]:
+        """Return what was imported, oldest first."""
+        return await importing.imports_of(await self._get(mission_id), self._database)
+
+    async def import_soundings(
+        self, mission_id: str, content: bytes, options: ImportOptions, *, actor: str = "operator"
+    ) -> ImportView:
+        """Begin with the soundings of a file; see ``importing.import_soundings``."""
+        live = await self._get(mission_id)
+        async with self._importing:
+            return await importing.import_soundings(live, self._database, self._executor, content, options, actor)
+
+    async def delete_import(self, mission_id: str, import_id: str, *, actor: str = "operator") -> None:
+        """Take an import back. Raises ImportNotFoundError."""
+        live = await self._get(mission_id)
+        async with self._importing:
+            await importing.delete_import(live, self._database, import_id, actor)
+
+    async def reference(self, mission_id: str) -> ReferenceView:
+        """Return what the map is compared with. Raises ImportNotFoundError."""
+        return await importing.reference_of(await self._get(mission_id), self._database)
+
+    async def set_reference(
+        self, mission_id: str, content: bytes, options: ImportOptions, *, actor: str = "operator"
+    ) -> ReferenceView:
+        """Compare the map with the grid in a file from now on. Raises InvalidRequestError."""
+        live = await self._get(mission_id)
+        async with self._importing:
+            return await importing.set_reference(live, self._database, content, options, actor)
+
+    async def delete_reference(self, mission_id: str, *, actor: str = "operator") -> None:
+        """Compare the map with nothing any more. Raises ImportNotFoundError."""
+        live = await self._get(mission_id)
+        async with self._importing:
+            await importing.delete_reference(live, self._database, actor)
+
     # What came of it
 
     async def map(self, mission_id: str) -> MapSnapshot:
@@ -446,17 +528,34 @@ class MissionService:
             raise MapNotReadyError(
                 "no sounding was accepted yet, so there is no map", "start the mission or post measurements"
             )
-        return MapSnapshot(mission_id, live.spec, live.frame, live.area, built, live.header.step)
+        return live.snapshot(built)
 
-    async def export(self, mission_id: str, extension: str, options: Mapping[str, float] | None = None) -> Product:
-        """Return a product file of the mission. Raises InvalidRequestError for an unknown one, MapNotReadyError."""
-        snapshot = await self.map(mission_id)
-        rows = await self.soundings(mission_id)
-        tracks = await self.tracks(mission_id)
-        loop = asyncio.get_running_loop()
-        return await loop.run_in_executor(
-            self._executor, make_product, snapshot, rows, tracks, extension, dict(options or {})
+    async def export(self, mission_id: str, name: str, options: ProductOptions | None = None) -> Product:
+        """Return a product file of the mission, a key of ``PRODUCTS``.
+
+        Raises
+        ------
+        InvalidRequestError, MapNotReadyError
+            For an unknown kind or options that cannot be; where the map is needed and there is none yet.
+        """
+        needs = product_kind(name).needs
+        material = Material(
+            facts=(await self._get(mission_id)).facts,
+            created=now(),
+            provider=self._settings.provider.named(),
+            map=await self.map(mission_id) if MAP in needs else None,
+            soundings=await self.soundings(mission_id) if SOUNDINGS in needs else (),
+            tracks=await self._track_lines(mission_id) if TRACKS in needs else (),
         )
+        loop = asyncio.get_running_loop()
+        return await loop.run_in_executor(self._executor, make_product, name, material, options or ProductOptions())
+
+    async def _track_lines(self, mission_id: str) -> list[Track]:
+        live = await self._get(mission_id)
+        await live.journal.flush()
+        async with self._database.reading() as session:
+            found = await mission_queries.track_points(session, mission_id)
+        return [Track(name, [TrackPoint(*point) for point in points]) for name, points in found.items()]
 
     async def soundings(self, mission_id: str) -> Sequence[SoundingRow]:
         """Return every sounding, rejected ones included, in the order they came."""
@@ -815,17 +914,46 @@ def _impossible_place(item: Measurement, frame: LocalFrame) -> str:
 def _sounding(item: Measurement) -> SoundingReport | None:
     if item.range_m is None:
         return None
+    place, geometry = _footprint(item, item.range_m)
     return SoundingReport(
         vehicle=item.vehicle,
         time_s=item.time_s,
-        footprint=Position(item.lat_deg, item.lon_deg, item.depth_m + item.range_m),
+        footprint=place,
         vehicle_depth_m=item.depth_m,
         range_m=item.range_m,
         source="rest",
         beam=item.beam,
         depth_sd_m=item.range_sd_m,
         position_sd_m=item.position_sd_m,
+        beam_geometry=geometry,
     )
+
+
+def _footprint(item: Measurement, range_m: float) -> tuple[Position, BeamGeometry]:
+    """Return where a beam met the bottom, and how it pointed."""
+    if item.beam_off_nadir_deg is None or item.heading_deg is None:
+        below = Position(item.lat_deg, item.lon_deg, item.depth_m + range_m)
+        return below, BeamGeometry(item.lat_deg, item.lon_deg)
+    state = StateSample(
+        item.time_s,
+        math.radians(item.lat_deg),
+        math.radians(item.lon_deg),
+        item.depth_m,
+        math.radians(item.roll_deg),
+        math.radians(item.pitch_deg),
+        math.radians(item.heading_deg),
+    )
+    beam = Beam(item.beam, math.radians(item.beam_azimuth_deg), math.radians(item.beam_off_nadir_deg))
+    geometry = BeamGeometry(
+        item.lat_deg,
+        item.lon_deg,
+        item.roll_deg,
+        item.pitch_deg,
+        item.heading_deg,
+        item.beam_azimuth_deg,
+        item.beam_off_nadir_deg,
+    )
+    return Position(*footprint(state, beam, range_m)), geometry
 
 
 def _vehicle_report(item: Measurement) -> VehicleReport:

@@ -1,9 +1,12 @@
 """Settings of the mission service. ``app.settings`` composes them with those of the HTTP edge."""
 
 from pathlib import Path
-from typing import Annotated, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+if TYPE_CHECKING:
+    from app.mapping.products.crowdsourced import Provider
 
 
 class Section(BaseModel):
@@ -110,6 +113,32 @@ class SimulationSettings(Section):
     seed: int = Field(default=0, description="Seed of the generated sea floor and of the vehicles' noise")
 
 
+class ProviderSettings(Section):
+    """Who hands soundings in as crowdsourced bathymetry (IHO B-12)."""
+
+    organization: str = Field(default="", max_length=200, description="Name of the organization; B-12 asks for it")
+    email: str = Field(
+        default="",
+        max_length=200,
+        pattern=r"^([A-Za-z0-9._%+-]+@[A-Za-z0-9.-]+\.[A-Za-z]{2,6})?$",
+        description="Where users of the data can ask; B-12 asks for it",
+    )
+    node: str = Field(
+        default="BATHYFLEET",
+        pattern=r"^[a-zA-Z][a-zA-Z0-9]{0,63}$",
+        description="Prefix of the vehicles' identities, given by the data centre (DCDB)",
+    )
+    license: str = Field(default="CC0 1.0", max_length=200, description="Under what the soundings are given")
+
+    def named(self) -> "Provider | None":
+        """Return the provider; None while organization or e-mail address is missing."""
+        from app.mapping.products.crowdsourced import Provider  # settings are read without the mathematics
+
+        if not (self.organization and self.email):
+            return None
+        return Provider(self.organization, self.email, self.node, self.license)
+
+
 class ServiceSettings(Section):
     """Everything the mission service needs to know."""
 
@@ -123,3 +152,4 @@ class ServiceSettings(Section):
     imc: ImcSettings = ImcSettings()
     neptus: NeptusSettings = NeptusSettings()
     simulation: SimulationSettings = SimulationSettings()
+    provider: ProviderSettings = ProviderSettings()

@@ -4,6 +4,7 @@ The REST schema, the command line's help and the dashboard's forms are all made 
 """
 
 from enum import StrEnum
+from itertools import pairwise
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
@@ -13,12 +14,18 @@ from shapely.validation import explain_validity
 
 from app.exploration.options import PlannerOptions
 from app.mapping.georeference import LocalFrame
+from app.mapping.vertical import LOWEST_ASTRONOMICAL_TIDE, check_depth_datum
 
 Latitude = Annotated[float, Field(ge=-90, le=90, description="Latitude, WGS84 degrees")]
 Longitude = Annotated[float, Field(ge=-180, le=180, description="Longitude, WGS84 degrees")]
 Name = Annotated[str, Field(min_length=1, max_length=64, pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$")]
 
+ProfileDepth = Annotated[float, Field(ge=0, le=12_000)]
+ProfileSpeed = Annotated[float, Field(ge=1300, le=1700)]
+
 MAX_GRID_CELLS = 4_000_000
+
+NO_TIDE = "none applied"
 
 
 class Model(BaseModel):
@@ -170,14 +177,75 @@ class PlannerSpec(Model):
 
 
 class Tide(Model):
-    """Water level correction: chart depth = sounded depth - level."""
+    """Water level correction: depth below the datum = sounded depth - level + datum_offset_m."""
 
-    level_m: float = Field(default=0.0, ge=-20, le=20, description="Water level above chart datum, metres")
+    level_m: float = Field(
+        default=0.0,
+        ge=-20,
+        le=20,
+        description="Water level above the zero of the tide gauge or table (chart datum), metres",
+    )
     source: str = Field(
-        default="none applied",
+        default=NO_TIDE,
         max_length=200,
         description="Where the level comes from, kept with the product",
     )
+    sd_m: float = Field(
+        default=0.0,
+        ge=0,
+        le=10,
+        description="Standard deviation of the level; it counts in every cell's TVU estimate",
+    )
+    datum_epsg: int = Field(
+        default=LOWEST_ASTRONOMICAL_TIDE,
+        ge=1024,
+        le=999_999,
+        description="EPSG code of the depth datum that products state once a tide is applied, for example 5861 "
+        "(LAT depth) or 5715 (MSL depth)",
+    )
+    datum_offset_m: float = Field(
+        default=0.0,
+        ge=-100,
+        le=100,
+        description="How far that datum lies above the zero that levels count from; added to every depth",
+    )
+
+    @property
+    def is_unnamed(self) -> bool:
+        """Whether nobody said where the level comes from."""
+        return self.source == NO_TIDE
+
+    @property
+    def is_applied(self) -> bool:
+        """Whether a level was stated, be it zero."""
+        return self.level_m != 0.0 or self.datum_offset_m != 0.0 or not self.is_unnamed
+
+    @field_validator("datum_epsg")
+    @classmethod
+    def _is_a_depth_datum(cls, epsg: int) -> int:
+        check_depth_datum(epsg)
+        return epsg
+
+
+class SoundSpeed(Model):
+    """Sound speed correction: every beam is followed through the profile for the time that its sonar measured."""
+
+    assumed_mps: float = Field(default=1500.0, ge=1300, le=1700, description="Speed that is set in the sonars, m/s")
+    profile: list[tuple[ProfileDepth, ProfileSpeed]] = Field(
+        min_length=1,
+        max_length=2000,
+        description="Measured speeds as [depth in m, speed in m/s], from top to bottom; one pair: the same everywhere",
+        examples=[[[0.0, 1512.3], [5.0, 1509.8], [20.0, 1506.1]]],
+    )
+    source: str = Field(default="", max_length=200, description="Where the profile comes from, kept with the product")
+
+    @field_validator("profile")
+    @classmethod
+    def _depths_ascend(cls, profile: list[tuple[float, float]]) -> list[tuple[float, float]]:
+        for index, (above, below) in enumerate(pairwise(depth for depth, _ in profile)):
+            if below <= above:
+                raise ValueError(f"entry {index + 1} is at {below:g} m, not below the {above:g} m of the one before it")
+        return profile
 
 
 class MissionSpec(Model):
@@ -221,6 +289,9 @@ class MissionSpec(Model):
         description="Standard deviation of a range as a fraction of it, where the vehicle states none",
     )
     tide: Tide = Field(default_factory=Tide)
+    sound_speed: SoundSpeed | None = Field(
+        default=None, description="Sound speed correction; null: the sonars' own ranges are taken"
+    )
     seed: int = Field(default=0, ge=0, lt=2**63, description="Seed of every random decision")
 
     @field_validator("vehicles")

@@ -2,12 +2,13 @@
 
 from datetime import datetime
 from enum import StrEnum
-from typing import Any, Literal
+from typing import Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from app.mapping.s44 import Order
 from app.missions.fleet import LinkState, WaypointStatus
-from app.missions.spec import Latitude, Longitude, MissionSpec, Name, Sensor, VehicleKind
+from app.missions.spec import Latitude, Longitude, MissionSpec, Name, Sensor, SoundSpeed, Tide, VehicleKind
 from app.missions.states import MissionState
 
 
@@ -118,14 +119,128 @@ class Measurement(BaseModel):
     lon_deg: float = Field(description="Longitude of the vehicle, WGS84 degrees")
     depth_m: float = Field(description="Depth of the vehicle below the surface, metres")
     range_m: float | None = Field(
-        default=None, description="Vertical range from the vehicle to the bottom; null: position report only"
+        default=None,
+        description="Range from the vehicle to the bottom: vertical, or along the beam where beam_off_nadir_deg is "
+        "given; null: position report only",
     )
     beam: int = Field(default=0, ge=0, lt=4096)
+    beam_off_nadir_deg: float | None = Field(
+        default=None,
+        ge=0,
+        lt=90,
+        description="Angle of the beam from straight down in the vehicle; the footprint is then computed from it and "
+        "the vehicle's attitude",
+    )
+    beam_azimuth_deg: float = Field(
+        default=0.0, ge=-360, le=360, description="Direction of the beam in the vehicle, from the bow to starboard"
+    )
+    roll_deg: float = Field(default=0.0, ge=-180, le=180, description="Starboard down is positive")
+    pitch_deg: float = Field(default=0.0, ge=-90, le=90, description="Nose up is positive")
     range_sd_m: float | None = Field(default=None, gt=0)
     position_sd_m: float | None = Field(default=None, ge=0)
     heading_deg: float | None = None
     speed_mps: float | None = Field(default=None, ge=0)
     battery_pct: float | None = Field(default=None, ge=0, le=100)
+
+    @model_validator(mode="after")
+    def _slanted_beams_have_a_heading(self) -> Self:
+        if self.beam_off_nadir_deg is not None and self.heading_deg is None:
+            raise ValueError("beam_off_nadir_deg is given but heading_deg is not: a slanted beam needs both")
+        return self
+
+
+class TideCorrection(Tide):
+    """A mission's tide: a constant level, or a table of high and low waters in its place."""
+
+    table: str | None = Field(
+        default=None,
+        max_length=8_000_000,
+        description="Text of a .tid table, UTC: a line 'YYYY/MM/DD hh:mm:ss.sss level' per high or low water. Levels "
+        "between two are a half cosine; soundings beyond the table are rejected until it covers them. Null: level_m",
+    )
+    table_name: str = Field(default="", max_length=200, description="Its name; default: the harbour that it states")
+
+
+class TideTableView(View):
+    """A tide table in short."""
+
+    name: str
+    first: datetime = Field(description="Time of the first entry")
+    last: datetime = Field(description="Time of the last entry")
+    entries: int
+    sha256: str = Field(description="Of the table as it was sent")
+
+
+class CorrectionsView(View):
+    """How soundings are corrected; their raw values stay beside the corrected ones."""
+
+    tide: Tide
+    tide_table: TideTableView | None = Field(description="Its levels count in place of tide.level_m")
+    sound_speed: SoundSpeed | None
+    vertical_datum: str = Field(description="What corrected depths are counted from")
+    accepted: int = Field(description="Soundings accepted under these corrections")
+    rejected: int
+
+
+class ImportOptions(BaseModel):
+    """What a file does not say by itself."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+    filename: str = Field(
+        min_length=1,
+        max_length=200,
+        pattern=r"^[^/\\\x00-\x1f\x7f]+$",
+        description="Its name; the ending says what it is: .xyz, .csv, .txt (also with .gz), .asc, .tif, .nc or .bag",
+        examples=["harbour_2019.xyz"],
+    )
+    source: str = Field(default="", max_length=500, description="Where it comes from, kept with the mission")
+    crs: str | None = Field(
+        default=None,
+        min_length=1,
+        max_length=2000,
+        description="What positions are in where the file does not say: EPSG:4326, EPSG:32629, WKT, or local for the "
+        "mission's own frame",
+    )
+    positive: Literal["down", "up"] | None = Field(
+        default=None, description="Which way values grow: down for depths, up for heights; default: what the file says"
+    )
+    sd_m: float | None = Field(
+        default=None, gt=0, le=1000, description="Standard deviation of the depths that state none, metres"
+    )
+    order: Order | None = Field(
+        default=None, description="In place of sd_m: the S-44 order surveyed to; its largest TVU is assumed"
+    )
+    datum_offset_m: float = Field(
+        default=0.0, ge=-200, le=200, description="Added to every depth to bring it to the mission's datum"
+    )
+
+
+class ImportView(View):
+    """Soundings from elsewhere that a mission began with. They are not among its own."""
+
+    id: str
+    filename: str
+    source: str
+    sha256: str = Field(description="Of the file")
+    created_at: datetime
+    found: int = Field(description="Depths in the file")
+    taken: int = Field(description="Those in or near the area, as they count in the map")
+    min_depth_m: float
+    max_depth_m: float
+    median_sd_m: float
+    notes: list[str] = Field(description="What was assumed or done, in words")
+    replayed: bool = Field(default=False, description="True: the same file was imported before, nothing changed")
+
+
+class ReferenceView(View):
+    """The grid that a mission's map is compared with."""
+
+    filename: str
+    source: str
+    created_at: datetime
+    cells: int = Field(description="Cells of the map's grid that it knows")
+    notes: list[str]
 
 
 class ItemVerdict(View):
@@ -201,6 +316,7 @@ class MapView(View):
     corners: list[tuple[Longitude, Latitude]] = Field(
         description="[longitude, latitude] of the grid's corners: north-west, north-east, south-east, south-west"
     )
+    vertical_datum: str = Field(description="What depths are counted from")
     min_depth_m: float | None
     max_depth_m: float | None
     model: str
@@ -208,6 +324,49 @@ class MapView(View):
     sd_m: list[list[float | None]]
     count: list[list[int]]
     sounded: list[list[bool]]
+    layers: dict[str, list[list[float | None]]] = Field(
+        default_factory=dict, description="Further layers that were asked for, by name"
+    )
+
+
+class ConformityView(View):
+    """How the TVU estimate stands beside one order of IHO S-44; no order is claimed by it."""
+
+    order: Order
+    cells_pct: float = Field(description="Share of the cells whose TVU estimate stays within the order's largest")
+    sounded_pct: float | None = Field(description="The same among the sounded cells; null: none is")
+    statement: str = Field(examples=["TVU estimate meets Order 1a in 83.2 % of cells"])
+
+
+class DifferenceView(View):
+    """Map minus reference grid over the cells that both know."""
+
+    rmse_m: float
+    l2_norm: float = Field(description="Euclidean norm of all differences; grows with the number of cells")
+    bias_m: float
+    p95_m: float = Field(description="95th percentile of the absolute difference")
+    max_m: float
+    cells: int
+
+
+class QualityView(View):
+    """How good the map is, as far as it can be told."""
+
+    version: int = Field(description="Of the map")
+    vertical_datum: str
+    common_sd_m: float = Field(description="Standard deviation of what all soundings share, counted in every TVU")
+    tvu: list[ConformityView]
+    difference: DifferenceView | None = Field(description="To the reference grid; null: there is none that it meets")
+
+
+class ProductView(View):
+    """A file that can be downloaded."""
+
+    name: str = Field(description="Its name for bathyfleet export", examples=["tif"])
+    title: str
+    media_type: str
+    href: str = Field(description="Path on this service")
+    needs_map: bool = Field(description="Whether a first map is needed")
 
 
 class SnapshotMessage(View):

@@ -122,3 +122,16 @@ async def last_positions(session: AsyncSession, mission_id: str) -> dict[str, Po
         .where(PositionRow.mission_id == mission_id)
     )
     return {row.vehicle: row for row in await session.scalars(query)}
+
+
+async def track_points(session: AsyncSession, mission_id: str) -> dict[str, list[tuple[float, float, float, float]]]:
+    """Return each vehicle's places as (longitude, latitude, depth, time), in the order they were heard."""
+    query = (
+        select(PositionRow.vehicle, PositionRow.lon_deg, PositionRow.lat_deg, PositionRow.depth_m, PositionRow.time_s)
+        .where(PositionRow.mission_id == mission_id)
+        .order_by(PositionRow.vehicle, PositionRow.id)
+    )
+    result: dict[str, list[tuple[float, float, float, float]]] = {}
+    for vehicle, lon, lat, depth, time in await session.execute(query):
+        result.setdefault(vehicle, []).append((lon, lat, depth, time))
+    return result

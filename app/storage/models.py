@@ -156,8 +156,59 @@ class SoundingRow(Base):
     depth_m: Mapped[float]
     sd_m: Mapped[float]
     position_sd_m: Mapped[float | None]
+    level_m: Mapped[float | None]
+    vehicle_lat_deg: Mapped[float | None]
+    vehicle_lon_deg: Mapped[float | None]
+    roll_deg: Mapped[float | None]
+    pitch_deg: Mapped[float | None]
+    heading_deg: Mapped[float | None]
+    beam_azimuth_deg: Mapped[float | None]
+    beam_off_nadir_deg: Mapped[float | None]
     verdict: Mapped[str] = mapped_column(String(16))
     reason: Mapped[str] = mapped_column(Text, default="")
+
+
+class TideTableRow(Base):
+    """A mission's table of high and low waters, as it was sent."""
+
+    __tablename__ = "tide_tables"
+
+    mission_id: Mapped[str] = mapped_column(ForeignKey("missions.id", ondelete="CASCADE"), primary_key=True)
+    name: Mapped[str] = mapped_column(String(200))
+    text: Mapped[str] = mapped_column(Text)
+
+
+class ImportRow(Base):
+    """Soundings or a map from elsewhere that a mission started with, all of them or none.
+
+    ``soundings`` holds float64 rows of east, north, depth and standard deviation, compressed by zlib.
+    """
+
+    __tablename__ = "imports"
+    __table_args__ = (UniqueConstraint("mission_id", "digest", name="uq_imports_digest"),)
+
+    id: Mapped[str] = mapped_column(String(36), primary_key=True)
+    mission_id: Mapped[str] = mapped_column(ForeignKey("missions.id", ondelete="CASCADE"), index=True)
+    digest: Mapped[str] = mapped_column(String(64))
+    filename: Mapped[str] = mapped_column(String(200))
+    created_at: Mapped[datetime]
+    count: Mapped[int]
+    summary: Mapped[dict[str, Any]]
+    soundings: Mapped[bytes] = mapped_column(LargeBinary)
+
+
+class ReferenceRow(Base):
+    """The grid that a mission's map is compared with: float64 depths at the map's cells, compressed by zlib."""
+
+    __tablename__ = "reference_grids"
+
+    mission_id: Mapped[str] = mapped_column(ForeignKey("missions.id", ondelete="CASCADE"), primary_key=True)
+    filename: Mapped[str] = mapped_column(String(200))
+    created_at: Mapped[datetime]
+    rows: Mapped[int]
+    cols: Mapped[int]
+    summary: Mapped[dict[str, Any]]
+    depths: Mapped[bytes] = mapped_column(LargeBinary)
 
 
 class PositionRow(Base):

@@ -1,5 +1,6 @@
 """Queries on soundings and on the answers given to batches of them."""
 
+import zlib
 from collections.abc import Sequence
 from typing import Any
 
@@ -9,7 +10,7 @@ from sqlalchemy import func, select
 from sqlalchemy.dialects import postgresql, sqlite
 from sqlalchemy.ext.asyncio import AsyncSession
 
-from app.storage.models import BatchRow, MissionRow, SoundingRow
+from app.storage.models import BatchRow, ImportRow, MissionRow, ReferenceRow, SoundingRow
 
 Identity = tuple[str, float, int]
 """What makes a sounding the same sounding within a mission: vehicle, vehicle's time, beam."""
@@ -60,3 +61,26 @@ async def answer_to(session: AsyncSession, mission_id: str, key: str) -> BatchRo
     """Return the answer once given to an idempotency key; waits for a transaction that is about to answer."""
     await session.execute(select(MissionRow.id).where(MissionRow.id == mission_id).with_for_update(key_share=True))
     return await session.get(BatchRow, (mission_id, key))
+
+
+def pack(values: NDArray[np.float64]) -> bytes:
+    """Return an array's values as they are stored."""
+    return zlib.compress(np.ascontiguousarray(values, dtype="<f8").tobytes(), level=1)
+
+
+def unpack(stored: bytes, *shape: int) -> NDArray[np.float64]:
+    """Return stored values in the given shape; -1 for one length that follows from the others."""
+    return np.frombuffer(zlib.decompress(stored), dtype="<f8").astype(np.float64).reshape(shape)
+
+
+async def imported_arrays(session: AsyncSession, mission_id: str) -> NDArray[np.float64]:
+    """Return what was imported, in that order, shape (n, 4): east, north, depth, deviation (metres)."""
+    query = select(ImportRow.soundings).where(ImportRow.mission_id == mission_id)
+    stored = (await session.scalars(query.order_by(ImportRow.created_at, ImportRow.id))).all()
+    return np.concatenate([np.zeros((0, 4)), *(unpack(soundings, -1, 4) for soundings in stored)])
+
+
+async def reference_grid(session: AsyncSession, mission_id: str) -> NDArray[np.float64] | None:
+    """Return the depths of a mission's reference grid at the map's cells, (rows, cols); None without one."""
+    row = await session.get(ReferenceRow, mission_id)
+    return None if row is None else unpack(row.depths, row.rows, row.cols)

@@ -22,8 +22,21 @@ from app.storage.database import Database
 from tests.api.conftest import mission_spec, running_in_thread, soundings
 from tests.api.test_openapi import CONTRACT
 
-# What the schema cannot say, the answer does: rings are closed, planners exist, max is above min.
-BEYOND_THE_SCHEMA = {"createMission", "addVehicle", "getMapOverlay"}
+# What the schema cannot say, the answer does: rings are closed, planners exist, max is above min, tables and files are
+# what they are called, profiles go down, there is a reference grid to differ from.
+BEYOND_THE_SCHEMA = {
+    "createMission",
+    "addVehicle",
+    "getMap",
+    "getMapOverlay",
+    "getMapFile",
+    "getSoundingsFile",
+    "getTracksFile",
+    "importSoundings",
+    "setReference",
+    "setTide",
+    "setSoundSpeed",
+}
 
 
 @dataclass

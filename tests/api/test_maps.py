@@ -10,6 +10,7 @@ import pytest
 import rasterio
 from PIL import Image
 
+from app.missions.settings import ProviderSettings
 from app.missions.views import MapView
 from app.settings import Settings
 from tests.api.conftest import make_client, mission_spec, running, soundings
@@ -70,7 +71,7 @@ async def test_tags_of_another_run_of_the_process_do_not_match(make_settings: Ca
     assert tags[0] != tags[1]
 
 
-@pytest.mark.parametrize("layer", ["depth", "uncertainty"])
+@pytest.mark.parametrize("layer", ["depth", "uncertainty", "slope", "tvu_fraction", "count"])
 async def test_the_overlay_has_a_pixel_per_cell(client: httpx.AsyncClient, measured: str, layer: str) -> None:
     shown = (await client.get(f"{measured}/map")).json()
     answer = await client.get(f"{measured}/map.overlay.png", params={"layer": layer})
@@ -101,29 +102,89 @@ async def test_an_empty_colour_range_is_refused(client: httpx.AsyncClient, measu
 
 
 FILES = {
-    "tif": ("image/tiff", b"II*\0"),
-    "xyz": ("text/plain", b"#"),
-    "csv": ("text/csv", b"#"),
-    "geojson": ("application/geo+json", b"{"),
-    "png": ("image/png", b"\x89PNG"),
+    "map.tif": ("image/tiff", b"II*\0"),
+    "map.nc": ("application/x-netcdf", b"\x89HDF"),
+    "map.bag": ("application/x-bag", b"\x89HDF"),
+    "map.xyz": ("text/plain", b"#"),
+    "map.csv": ("text/csv", b"#"),
+    "map.geojson": ("application/geo+json", b"{"),
+    "map.kml": ("application/vnd.google-earth.kml+xml", b"<?xml"),
+    "map.png": ("image/png", b"\x89PNG"),
+    "soundings.csv": ("text/csv", b"#"),
+    "soundings.xyz": ("text/plain", b"#"),
+    "tracks.geojson": ("application/geo+json", b"{"),
+    "tracks.kml": ("application/vnd.google-earth.kml+xml", b"<?xml"),
+    "tracks.gpx": ("application/gpx+xml", b"<?xml"),
 }
 
 
-async def test_the_map_is_downloaded_as_a_file(client: httpx.AsyncClient, measured: str) -> None:
+async def test_every_file_is_downloaded_under_its_name(client: httpx.AsyncClient, measured: str) -> None:
     shown = (await client.get(f"{measured}/map")).json()
-    for extension, (media, begin) in FILES.items():
-        answer = await client.get(f"{measured}/map.{extension}")
+    for name, (media, begin) in FILES.items():
+        answer = await client.get(f"{measured}/{name}")
         assert answer.status_code == 200, answer.text
         assert answer.headers["content-type"].startswith(media)
-        assert answer.headers["content-disposition"] == f'attachment; filename="harbour-basin.{extension}"'
+        resource, _, extension = name.partition(".")
+        saved = f"harbour-basin.{extension}" if resource == "map" else f"harbour-basin-{resource}.{extension}"
+        assert answer.headers["content-disposition"] == f'attachment; filename="{saved}"'
         assert answer.content.startswith(begin)
         if extension == "tif":
             with rasterio.MemoryFile(answer.content) as file, file.open() as raster:
                 assert (raster.height, raster.width) == (shown["rows"], shown["cols"])
 
 
+async def test_the_list_of_files_is_complete_and_every_path_answers(client: httpx.AsyncClient, measured: str) -> None:
+    listed = {entry["href"].rpartition("/")[2]: entry for entry in (await client.get(f"{measured}/products")).json()}
+    assert set(FILES) | {"map.overlay.png", "soundings.geojson"} == set(listed)
+    for entry in listed.values():
+        answer = await client.get(entry["href"].removeprefix("/api/v1"))
+        assert answer.status_code == (422 if entry["name"] == "soundings.geojson" else 200)
+
+
+async def test_tracks_and_soundings_need_no_map(client: httpx.AsyncClient, mission: dict[str, Any]) -> None:
+    for name in FILES:
+        answer = await client.get(f"/missions/{mission['id']}/{name}")
+        assert answer.status_code == (200 if name.startswith(("tracks", "soundings", "map.csv")) else 404), name
+
+
+async def test_crowdsourced_soundings_name_their_provider(make_settings: Callable[..., Settings]) -> None:
+    named = make_settings(provider=ProviderSettings(organization="Harbour office", email="map@example.org"))
+    async with running(named) as server, make_client(server) as client:
+        vehicles = [{"name": name, "kind": "rest"} for name in ("rover", "diver")]
+        path = f"/missions/{(await client.post('/missions', json=mission_spec(vehicles=vehicles))).json()['id']}"
+        await client.post(f"{path}/measurements", json={"items": soundings(3) + soundings(2, vehicle="diver")})
+        unclear = await client.get(f"{path}/soundings.geojson")
+        assert (unclear.status_code, unclear.json()["remedy"]) == (422, "name one of diver, rover")
+        answer = await client.get(f"{path}/soundings.geojson", params={"vehicle": "diver"})
+        assert answer.headers["content-disposition"] == 'attachment; filename="harbour-basin-diver.geojson"'
+        collection = answer.json()
+    assert len(collection["features"]) == 2
+    assert collection["properties"]["trustedNode"]["providerOrganizationName"] == "Harbour office"
+
+
+async def test_further_layers_come_when_asked_for(client: httpx.AsyncClient, measured: str) -> None:
+    shown = (await client.get(f"{measured}/map", params={"layer": ["slope", "tvu_fraction"], "order": "2"})).json()
+    assert sorted(shown["layers"]) == ["slope", "tvu_fraction"]
+    stricter = (await client.get(f"{measured}/map", params={"layer": "tvu_fraction", "order": "exclusive"})).json()
+    shape = (shown["rows"], shown["cols"])
+    lax, strict = (np.array(m["layers"]["tvu_fraction"], float) for m in (shown, stricter))
+    assert lax.shape == strict.shape == shape
+    assert np.all(lax[np.isfinite(lax)] < strict[np.isfinite(strict)])
+    answer = await client.get(f"{measured}/map", params={"layer": "difference"})
+    assert (answer.status_code, answer.json()["detail"]) == (422, "the mission has no reference grid to differ from")
+
+
+async def test_quality_counts_cells_and_claims_no_order(client: httpx.AsyncClient, measured: str) -> None:
+    shown = (await client.get(f"{measured}/quality")).json()
+    assert [one["order"] for one in shown["tvu"]] == ["exclusive", "special", "1a", "1b", "2"]
+    shares = [one["cells_pct"] for one in shown["tvu"]]
+    assert shares == sorted(shares)
+    assert all(one["statement"].startswith("TVU estimate meets ") for one in shown["tvu"])
+    assert shown["difference"] is None
+
+
 async def test_a_format_that_is_not_made_lists_those_that_are(client: httpx.AsyncClient, measured: str) -> None:
-    for extension in ("bag", "nc", "kml", "exe", "t" * 300):
+    for extension in ("shp", "exe", "t" * 300):
         answer = await client.get(f"{measured}/map.{extension}")
         assert (answer.status_code, answer.json()["type"]) == (404, "urn:bathyfleet:problem:format-not-found")
-        assert answer.json()["remedy"] == "Use one of .tif, .xyz, .csv, .geojson, .png"
+        assert answer.json()["remedy"] == "Use one of .tif, .nc, .bag, .xyz, .csv, .geojson, .kml, .png"

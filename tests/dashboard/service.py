@@ -83,6 +83,10 @@ class Service:
         answer = httpx.get(f"{self.url}/api/v1{path}", timeout=60)
         return answer.raise_for_status().json()
 
+    def post(self, path: str, content: dict[str, Any]) -> Any:
+        answer = httpx.post(f"{self.url}/api/v1{path}", json=content, timeout=60)
+        return answer.raise_for_status().json()
+
     def create(self, **changes: Any) -> str:
         """Describe a mission over the API and return its id."""
         spec = {

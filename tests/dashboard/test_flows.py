@@ -250,3 +250,26 @@ def test_the_link_doctor_says_what_is_missing_and_what_to_do(page: Page) -> None
     expect(dialog).to_contain_text("Set imc.enabled = true")
     by_id(page, "links-close").click()
     expect(dialog).not_to_be_visible()
+
+
+def test_the_files_of_a_mission_are_downloaded_from_a_list(page: Page, service: Service) -> None:
+    mission = service.create(vehicles=[{"name": "rover", "kind": "rest"}])
+    items = [
+        {"vehicle": "rover", "time_s": 1.79e9 + i, "lat_deg": 41.1851 + 1e-5 * i, "lon_deg": -8.7049 + 2e-5 * i}
+        | {"depth_m": 2.0, "range_m": 8.0 + 0.1 * i}
+        for i in range(12)
+    ]
+    show(page, mission)
+    by_id(page, "toggle-files").click()
+    expect(by_id(page, "file-tif")).to_be_disabled()
+    service.post(f"/missions/{mission}/measurements", {"items": items})
+    service.get(f"/missions/{mission}/map")
+    expect(by_id(page, "file-tif")).to_be_enabled()
+    expect(by_id(page, "quality")).to_contain_text("TVU estimate meets Order 1a in")
+    for name, begin in (("tif", b"II*\0"), ("soundings.csv", b"#"), ("bag", b"\x89HDF")):
+        with page.expect_download() as waited:
+            by_id(page, f"file-{name}").click()
+        assert waited.value.suggested_filename.endswith(name.rpartition(".")[2])
+        assert waited.value.path().read_bytes().startswith(begin)
+    by_id(page, "file-soundings.geojson").click()
+    expect(by_id(page, "file-fault")).to_contain_text("set provider.organization and provider.email")

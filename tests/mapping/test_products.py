@@ -5,25 +5,31 @@ import json
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
+import pyproj
 import pytest
 from matplotlib import pyplot as plt
 from PIL import Image
+from rasterio.crs import CRS
 from rasterio.errors import NotGeoreferencedWarning
 from rasterio.io import MemoryFile
 from rasterio.warp import transform
 
 from app.mapping.georeference import LocalFrame
+from app.mapping.layers import make_layers
 from app.mapping.products.colours import depth_range, palette
-from app.mapping.products.contours import contours_geojson
+from app.mapping.products.contours import contours_geojson, find_contours
 from app.mapping.products.geotiff import NODATA, geotiff
 from app.mapping.products.overlay import overlay_corners, overlay_png
 from app.mapping.products.picture import picture_png
-from app.mapping.products.text import map_xyz, soundings_csv, soundings_xyz
+from app.mapping.products.text import map_xyz, soundings_xyz
+from app.mapping.s44 import Order
 from app.mapping.types import BathymetricMap, Grid, Soundings
+from app.mapping.vertical import VerticalDatum
 
 FRAME = LocalFrame(41.1850, -8.7040)
 GRID = Grid(west_m=-10.0, south_m=20.0, cell_m=2.0, rows=30, cols=40)
 DATUM = "EPSG:5861 (lowest astronomical tide)"
+LAT = VerticalDatum(5861, DATUM)
 
 
 @pytest.fixture
@@ -51,9 +57,15 @@ def soundings() -> Soundings:
     return Soundings(rng.uniform(0, 50, 12), rng.uniform(20, 60, 12), rng.uniform(4, 9, 12), np.full(12, 0.07))
 
 
+def cog(bathymetry: BathymetricMap, reference_m: np.ndarray | None = None) -> bytes:
+    layers = make_layers(bathymetry, order=Order.SPECIAL, reference_m=reference_m)
+    return geotiff(bathymetry, layers, FRAME, vertical_datum=LAT)
+
+
 def test_geotiff_holds_all_layers_north_up(bathymetry: BathymetricMap) -> None:
-    with MemoryFile(geotiff(bathymetry, FRAME, vertical_datum=DATUM)) as memory, memory.open() as file:
-        assert file.descriptions == ("depth", "uncertainty", "count", "sounded")
+    with MemoryFile(cog(bathymetry, bathymetry.depth_m - 0.5)) as memory, memory.open() as file:
+        names = ("depth", "uncertainty", "count", "sounded", "slope", "tvu_fraction", "difference")
+        assert file.descriptions == names
         assert file.units[0] == "metre"
         assert file.nodata == NODATA
         assert file.tags()["VERTICAL_DATUM"] == DATUM
@@ -64,14 +76,20 @@ def test_geotiff_holds_all_layers_north_up(bathymetry: BathymetricMap) -> None:
         np.testing.assert_allclose(depth[::-1].filled(np.nan), bathymetry.depth_m, rtol=1e-6)
         np.testing.assert_array_equal(file.read(3)[::-1, 10], np.full(30, 3))
         assert set(np.unique(file.read(4))) == {NODATA, 0.0, 1.0}
+        np.testing.assert_allclose(
+            file.read(5, masked=True).compressed(), np.degrees(np.arctan(np.hypot(0.1, 0.02))), rtol=1e-5
+        )
+        np.testing.assert_allclose(file.read(7, masked=True).compressed(), 0.5, rtol=1e-5)
 
 
-def test_geotiff_lies_where_the_frame_says(bathymetry: BathymetricMap) -> None:
-    with MemoryFile(geotiff(bathymetry, FRAME, vertical_datum=DATUM)) as memory, memory.open() as file:
+def test_geotiff_lies_where_the_frame_says_below_the_stated_datum(bathymetry: BathymetricMap) -> None:
+    with MemoryFile(cog(bathymetry)) as memory, memory.open() as file:
         east, north = file.xy(29, 0)  # south-western cell
-        (lon,), (lat,) = transform(file.crs, "EPSG:4326", [east], [north])
+        horizontal, vertical = pyproj.CRS.from_wkt(file.crs.to_wkt()).sub_crs_list
+        (lon,), (lat,) = transform(CRS.from_wkt(horizontal.to_wkt()), "EPSG:4326", [east], [north])
     assert (east, north) == (pytest.approx(-9.0), pytest.approx(21.0))
     assert (lat, lon) == pytest.approx(tuple(map(float, FRAME.to_geographic(-9.0, 21.0))), abs=1e-9)
+    assert vertical.to_epsg() == 5861
 
 
 def test_xyz_holds_the_known_cells(bathymetry: BathymetricMap) -> None:
@@ -93,20 +111,14 @@ def test_xyz_of_sounded_cells_only_in_degrees(bathymetry: BathymetricMap) -> Non
     np.testing.assert_allclose(north, GRID.north_m, atol=2e-3)
 
 
-def test_soundings_come_back_from_csv_and_xyz(soundings: Soundings) -> None:
-    table = np.genfromtxt(io.BytesIO(soundings_csv(soundings, FRAME)), delimiter=",", names=True)
-    np.testing.assert_allclose(table["depth_m"], soundings.depth_m, atol=5e-4)
-    east, north = FRAME.to_local(table["lat_deg"], table["lon_deg"])
-    np.testing.assert_allclose(
-        np.column_stack([east, north]), np.column_stack([table["east_m"], table["north_m"]]), atol=2e-3
-    )
+def test_soundings_come_back_from_xyz(soundings: Soundings) -> None:
     rows = np.loadtxt(io.BytesIO(soundings_xyz(soundings, FRAME, vertical_datum=DATUM)), comments="#")
     np.testing.assert_allclose(rows[:, 0], soundings.east_m, atol=5e-4)
     np.testing.assert_allclose(rows[:, 2], soundings.depth_m, atol=5e-4)
 
 
 def test_overlay_pixels_are_the_cells_north_up(bathymetry: BathymetricMap) -> None:
-    image = np.asarray(Image.open(io.BytesIO(overlay_png(bathymetry, (4.0, 14.0)))))
+    image = np.asarray(Image.open(io.BytesIO(overlay_png(bathymetry.depth_m, bathymetry.sounded, (4.0, 14.0)))))
     assert image.shape == (30, 40, 4)
     assert np.all(image[:5, :5, 3] == 0)
     assert np.all(image[5:, 10, 3] == 255)
@@ -116,7 +128,7 @@ def test_overlay_pixels_are_the_cells_north_up(bathymetry: BathymetricMap) -> No
 
 
 def test_overlay_opens_as_a_raster_too(bathymetry: BathymetricMap) -> None:
-    png = overlay_png(bathymetry, (0.0, 1.0), layer="uncertainty")
+    png = overlay_png(bathymetry.sd_m, bathymetry.sounded, (0.0, 1.0), layer="uncertainty")
     with MemoryFile(png) as memory, pytest.warns(NotGeoreferencedWarning), memory.open() as file:
         assert (file.count, file.width, file.height) == (4, 40, 30)
 
@@ -124,7 +136,7 @@ def test_overlay_opens_as_a_raster_too(bathymetry: BathymetricMap) -> None:
 @pytest.mark.parametrize("range_m", [(5.0, 5.0), (9.0, 4.0), (0.0, float("inf"))])
 def test_an_empty_colour_range_is_refused(bathymetry: BathymetricMap, range_m: tuple[float, float]) -> None:
     with pytest.raises(ValueError, match="range_m"):
-        overlay_png(bathymetry, range_m)
+        overlay_png(bathymetry.depth_m, bathymetry.sounded, range_m)
 
 
 def test_overlay_corners_run_clockwise_from_north_west() -> None:
@@ -161,7 +173,7 @@ def test_a_map_without_depth_has_no_colour_range(bathymetry: BathymetricMap) -> 
 
 
 def test_contours_of_a_plane_are_straight_and_at_their_depth(bathymetry: BathymetricMap) -> None:
-    collection = json.loads(contours_geojson(bathymetry, FRAME, interval_m=1.0, vertical_datum=DATUM))
+    collection = json.loads(contours_geojson(find_contours(bathymetry, FRAME, 1.0), vertical_datum=DATUM))
     depths = [feature["properties"]["depth_m"] for feature in collection["features"]]
     assert depths == [6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0, 13.0, 14.0]
     for feature in collection["features"]:
@@ -175,4 +187,4 @@ def test_contours_of_a_plane_are_straight_and_at_their_depth(bathymetry: Bathyme
 
 def test_too_many_contours_are_refused_with_a_suggestion(bathymetry: BathymetricMap) -> None:
     with pytest.raises(ValueError, match="choose at least"):
-        contours_geojson(bathymetry, FRAME, interval_m=1e-4, vertical_datum=DATUM)
+        find_contours(bathymetry, FRAME, 1e-4)

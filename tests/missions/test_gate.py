@@ -8,8 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely.geometry import Point, Polygon
 
+from app.missions.corrections import Corrections
 from app.missions.fleet import Position, SoundingReport
 from app.missions.gate import JUMP_ALLOWANCE_M, MAX_VEHICLE_SPEED_MPS, Gate
+from app.missions.spec import Tide
 from tests.missions.builders import FRAME, lon_lat
 
 AREA = Polygon([(0, 0), (100, 0), (100, 100), (0, 100)])
@@ -18,7 +20,8 @@ TIDE_M = 1.5
 
 
 def make_gate() -> Gate:
-    return Gate(FRAME, AREA, margin_m=MARGIN_M, noise=0.01, tide_level_m=TIDE_M)
+    corrections = Corrections(FRAME, Tide(level_m=TIDE_M))
+    return Gate(corrections, AREA, margin_m=MARGIN_M, noise=0.01)
 
 
 def sounding(east_m: float = 50.0, north_m: float = 50.0, time_s: float = 1000.0, **changes: object) -> SoundingReport:

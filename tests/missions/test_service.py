@@ -27,7 +27,7 @@ from app.missions.errors import (
     VehicleNotFoundError,
 )
 from app.missions.fleet import LinkState, WaypointStatus
-from app.missions.maps import FORMATS
+from app.missions.products import PRODUCTS
 from app.missions.service import MissionService
 from app.missions.settings import ServiceSettings
 from app.missions.spec import MissionSpec, VehicleKind, VehicleSpec
@@ -98,9 +98,11 @@ async def test_a_mission_from_start_to_products(service: MissionService, databas
     assert snapshot.built.soundings == len(soundings)
     view = snapshot.view()
     assert (view.rows, view.cols, view.step) == (15, 15, 6)
-    for extension, media_type in FORMATS.items():
+    for extension, kind in PRODUCTS.items():
+        if kind.resource != "map":
+            continue
         product = await service.export(created.id, extension)
-        assert (product.filename, product.media_type) == (f"quay.{extension}", media_type)
+        assert (product.filename, product.media_type) == (f"quay.{extension}", kind.media_type)
         if extension == "tif":
             with rasterio.open(io.BytesIO(product.content)) as image:
                 assert image.shape == (15, 15)
@@ -114,7 +116,7 @@ async def test_a_mission_from_start_to_products(service: MissionService, databas
         elif extension == "csv":
             rows = product.content.decode().splitlines()
             assert len(rows) == 2 + ended.progress.soundings + ended.progress.rejected
-        else:
+        elif extension == "xyz":
             cells = [row for row in product.content.decode().splitlines() if row and not row.startswith("#")]
             assert len(cells) >= 225
     with pytest.raises(InvalidRequestError, match="there is no format 'doc'") as caught:

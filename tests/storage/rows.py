@@ -3,17 +3,23 @@
 from datetime import UTC, datetime
 from typing import Any
 
+import numpy as np
+
 from app.storage.models import (
     BatchRow,
     EventRow,
+    ImportRow,
     MissionRow,
     MissionVehicleRow,
     PositionRow,
+    ReferenceRow,
     SoundingRow,
     StepRow,
+    TideTableRow,
     TokenRow,
     WaypointRow,
 )
+from app.storage.soundings import pack
 
 TIME = datetime(2026, 6, 1, 12, 30, 15, 250_000, tzinfo=UTC)
 
@@ -117,6 +123,26 @@ def one_of_each() -> list[list[Any]]:
             PositionRow(**position()),
             BatchRow(mission_id="m1", key="k", digest="d", answer={"accepted": 1}, created_at=TIME),
             EventRow(mission_id="m1", time=TIME, level="info", kind="state", message="made", data={"by": "me"}),
+            TideTableRow(mission_id="m1", name="Leixoes", text="2026/01/01 00:00 1.0"),
+            ImportRow(
+                id="i1",
+                mission_id="m1",
+                digest="d" * 64,
+                filename="old.xyz",
+                created_at=TIME,
+                count=1,
+                summary={"source": "survey of 2019"},
+                soundings=pack(np.array([[1.0, 2.0, 3.0, 0.5]])),
+            ),
+            ReferenceRow(
+                mission_id="m1",
+                filename="truth.tif",
+                created_at=TIME,
+                rows=1,
+                cols=2,
+                summary={},
+                depths=pack(np.array([[3.0, np.nan]])),
+            ),
             TokenRow(
                 id="t1",
                 name="Ana",

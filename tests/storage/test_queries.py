@@ -8,8 +8,8 @@ from app.storage import events as event_queries
 from app.storage import missions as mission_queries
 from app.storage import soundings as sounding_queries
 from app.storage.database import Database
-from app.storage.models import EventRow
-from tests.storage.rows import TIME, mission, position, sounding, step, vehicle, waypoint
+from app.storage.models import EventRow, ImportRow, ReferenceRow
+from tests.storage.rows import TIME, mission, one_of_each, position, sounding, step, vehicle, waypoint
 
 
 async def _two_missions(database: Database) -> None:
@@ -133,3 +133,15 @@ async def test_events_resume_after_any_of_them(database: Database) -> None:
         assert [e.message for e in rest] == ["3"]
         assert await event_queries.last_event_id(session, "m1") == every[-1].id
         assert await event_queries.last_event_id(session, "m3") == 0
+
+
+async def test_imports_and_the_reference_grid_come_back_as_they_were(database: Database) -> None:
+    await _two_missions(database)
+    async with database.writing() as session:
+        for rows in one_of_each()[-1:]:
+            session.add_all(row for row in rows if isinstance(row, ImportRow | ReferenceRow))
+    async with database.reading() as session:
+        np.testing.assert_array_equal(await sounding_queries.imported_arrays(session, "m1"), [[1.0, 2.0, 3.0, 0.5]])
+        assert (await sounding_queries.imported_arrays(session, "m2")).shape == (0, 4)
+        np.testing.assert_array_equal(await sounding_queries.reference_grid(session, "m1"), [[3.0, np.nan]])
+        assert await sounding_queries.reference_grid(session, "m2") is None

@@ -11,11 +11,11 @@ if TYPE_CHECKING:
 
 
 def palette(layer: str) -> "Colormap":
-    """Return the colours of a layer: depths, or amounts of something."""
+    """Return the colours of a layer: depths, differences of either sign, or amounts of something."""
     # They bring all of Matplotlib: a quarter of the service's start, before anyone has asked for a picture.
     import cmocean
 
-    colours: Colormap = {"depth": cmocean.cm.deep}.get(layer, cmocean.cm.amp)
+    colours: Colormap = {"depth": cmocean.cm.deep, "difference": cmocean.cm.balance}.get(layer, cmocean.cm.amp)
     return colours
 
 

@@ -1,6 +1,8 @@
-"""Depth contours as GeoJSON."""
+"""Depth contours as GeoJSON (KML: see ``kml``)."""
 
 import json
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import cast
 
 import numpy as np
@@ -12,10 +14,16 @@ from app.mapping.types import BathymetricMap, FloatArray
 MAX_LEVELS = 500
 
 
-def contours_geojson(bathymetry: BathymetricMap, frame: LocalFrame, *, interval_m: float, vertical_datum: str) -> bytes:
-    """Return a feature collection: one MultiLineString per depth with property ``depth_m``.
+@dataclass(frozen=True)
+class Contour:
+    """The lines of one depth, each of (longitude, latitude) points."""
 
-    Depths are the multiples of ``interval_m`` within the map.
+    depth_m: float
+    lines: list[list[tuple[float, float]]]
+
+
+def find_contours(bathymetry: BathymetricMap, frame: LocalFrame, interval_m: float) -> list[Contour]:
+    """Return the contours at the multiples of ``interval_m`` within the map, shallow ones first.
 
     Raises
     ------
@@ -26,31 +34,38 @@ def contours_geojson(bathymetry: BathymetricMap, frame: LocalFrame, *, interval_
         raise ValueError(f"interval_m is {interval_m}; it must be positive")
     grid = bathymetry.grid
     known = bathymetry.depth_m[np.isfinite(bathymetry.depth_m)]
-    features = []
-    if known.size and min(grid.rows, grid.cols) >= 2:
-        first, last = np.ceil(known.min() / interval_m), np.floor(known.max() / interval_m)
-        if last - first >= MAX_LEVELS:
-            least = (known.max() - known.min()) / MAX_LEVELS
-            raise ValueError(
-                f"interval_m is {interval_m}, which would make more than {MAX_LEVELS} contours; "
-                f"choose at least {least:.3g}"
-            )
-        generator = contour_generator(
-            grid.east_m, grid.north_m, np.ma.masked_invalid(bathymetry.depth_m), line_type=LineType.Separate
+    if not known.size or min(grid.rows, grid.cols) < 2:
+        return []
+    first, last = np.ceil(known.min() / interval_m), np.floor(known.max() / interval_m)
+    if last - first >= MAX_LEVELS:
+        least = (known.max() - known.min()) / MAX_LEVELS
+        raise ValueError(
+            f"interval_m is {interval_m}, which would make more than {MAX_LEVELS} contours; choose at least {least:.3g}"
         )
-        for multiple in np.arange(first, last + 1.0):
-            level = float(multiple * interval_m)
-            lines = []
-            for line in cast("list[FloatArray]", generator.lines(level)):
-                if len(line) >= 2:
-                    lat, lon = frame.to_geographic(line[:, 0], line[:, 1])
-                    lines.append(np.round(np.column_stack([lon, lat]), 8).tolist())
-            if lines:
-                features.append(
-                    {
-                        "type": "Feature",
-                        "properties": {"depth_m": round(level, 6), "vertical_datum": vertical_datum},
-                        "geometry": {"type": "MultiLineString", "coordinates": lines},
-                    }
-                )
+    generator = contour_generator(
+        grid.east_m, grid.north_m, np.ma.masked_invalid(bathymetry.depth_m), line_type=LineType.Separate
+    )
+    contours = []
+    for multiple in np.arange(first, last + 1.0):
+        level = float(multiple * interval_m)
+        lines = []
+        for line in cast("list[FloatArray]", generator.lines(level)):
+            if len(line) >= 2:
+                lat, lon = frame.to_geographic(line[:, 0], line[:, 1])
+                lines.append(list(zip(np.round(lon, 8).tolist(), np.round(lat, 8).tolist(), strict=True)))
+        if lines:
+            contours.append(Contour(round(level, 6), lines))
+    return contours
+
+
+def contours_geojson(contours: Sequence[Contour], *, vertical_datum: str) -> bytes:
+    """Return a feature collection: one MultiLineString per depth with property ``depth_m``."""
+    features = [
+        {
+            "type": "Feature",
+            "properties": {"depth_m": contour.depth_m, "vertical_datum": vertical_datum},
+            "geometry": {"type": "MultiLineString", "coordinates": contour.lines},
+        }
+        for contour in contours
+    ]
     return json.dumps({"type": "FeatureCollection", "features": features}).encode()

@@ -1,35 +1,32 @@
 """Map as a bare picture to lay over a web map."""
 
 import io
-from typing import Literal
 
 import numpy as np
 from PIL import Image
 
 from app.mapping.georeference import LocalFrame
 from app.mapping.products.colours import palette, scaled
-from app.mapping.types import BathymetricMap, Grid
+from app.mapping.types import BoolArray, FloatArray, Grid
 
 INTERPOLATED_ALPHA = 0.72
 """Opacity of cells that were not sounded, so that sounded tracks show."""
 
 
-def overlay_png(
-    bathymetry: BathymetricMap,
-    range_m: tuple[float, float],
-    *,
-    layer: Literal["depth", "uncertainty"] = "depth",
-) -> bytes:
-    """Return an RGBA PNG, one pixel per cell, north up, no axes; cells without depth are transparent.
+def overlay_png(values: FloatArray, sounded: BoolArray, range_m: tuple[float, float], *, layer: str = "depth") -> bytes:
+    """Return an RGBA PNG, one pixel per cell, north up, no axes; cells without a value are transparent.
 
     Parameters
     ----------
+    values, sounded
+        Of a layer and which cells were sounded, shape (rows, cols), row 0 south.
     range_m
         Values of the first and the last colour. Fixed by the caller: a range that follows the data would make
         successive pictures of a mission incomparable.
+    layer
+        Its name, which chooses the palette.
     """
-    values = bathymetry.depth_m if layer == "depth" else bathymetry.sd_m
-    alpha = np.where(bathymetry.sounded, 1.0, INTERPOLATED_ALPHA)
+    alpha = np.where(sounded, 1.0, INTERPOLATED_ALPHA)
     fractions = scaled(values, range_m)
     pixels = palette(layer)(np.nan_to_num(fractions), bytes=True)
     pixels[..., 3] = np.where(np.isfinite(fractions), np.round(255 * alpha), 0)

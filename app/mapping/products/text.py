@@ -54,16 +54,6 @@ def soundings_xyz(soundings: Soundings, frame: LocalFrame, *, vertical_datum: st
     return _text(rows, header, [digits, digits, "%.3f", "%.3f"], " ")
 
 
-def soundings_csv(soundings: Soundings, frame: LocalFrame) -> bytes:
-    """Return the soundings as CSV with one header line; positions both local and geographic."""
-    lat, lon = frame.to_geographic(soundings.east_m, soundings.north_m)
-    rows = np.column_stack([soundings.east_m, soundings.north_m, soundings.depth_m, soundings.sd_m, lat, lon])
-    stream = io.StringIO()
-    stream.write("east_m,north_m,depth_m,sd_m,lat_deg,lon_deg\n")
-    np.savetxt(stream, rows, fmt=["%.3f", "%.3f", "%.3f", "%.3f", "%.8f", "%.8f"], delimiter=",")
-    return stream.getvalue().encode()
-
-
 def _positions(
     east: FloatArray, north: FloatArray, frame: LocalFrame, geographic: bool
 ) -> tuple[FloatArray, FloatArray, str, str]:

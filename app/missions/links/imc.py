@@ -1,8 +1,10 @@
 """Vehicles on the IMC network (DUNE on board), through :class:`imc_bridge.Bridge`."""
 
+import math
 from collections.abc import Sequence
 
 from app.missions.fleet import (
+    BeamGeometry,
     EventSink,
     FleetEvent,
     LinkReport,
@@ -189,6 +191,20 @@ def _translate(event: BridgeEvent) -> FleetEvent | None:
             return None
 
 
+def _beam_geometry(sounding: Sounding) -> BeamGeometry | None:
+    if sounding.vehicle_lat_deg is None or sounding.vehicle_lon_deg is None:
+        return None
+    angles = (
+        sounding.roll_rad,
+        sounding.pitch_rad,
+        sounding.yaw_rad,
+        sounding.beam_azimuth_rad,
+        sounding.beam_off_nadir_rad,
+    )
+    degrees = (None if angle is None else math.degrees(angle) for angle in angles)
+    return BeamGeometry(sounding.vehicle_lat_deg, sounding.vehicle_lon_deg, *degrees)
+
+
 def _link_state(state: NodeState, engaged: bool, ours: bool) -> LinkState:
     """``ours``: it executes our plan. One of an earlier run is replaced when the vehicle is engaged."""
     if engaged and state not in _SILENT:
@@ -209,6 +225,7 @@ def sounding_report(event: Sounding) -> SoundingReport:
         source=event.source,
         beam=event.beam,
         position_sd_m=event.position_sd_m,
+        beam_geometry=_beam_geometry(event),
     )
 
 

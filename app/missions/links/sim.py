@@ -9,6 +9,7 @@ import numpy as np
 
 from app.missions.clock import now
 from app.missions.fleet import (
+    BeamGeometry,
     EventSink,
     FleetEvent,
     LinkReport,
@@ -260,6 +261,7 @@ class SimFleetLink:
 def _sounding(swimmer: _Swimmer, measurement: Measurement) -> SoundingReport:
     if measurement.footprint is None:
         raise ValueError("a measurement without a return has no footprint")
+    sonar = swimmer.position(measurement.position)
     return SoundingReport(
         vehicle=measurement.vehicle,
         time_s=measurement.time_s,
@@ -269,4 +271,5 @@ def _sounding(swimmer: _Swimmer, measurement: Measurement) -> SoundingReport:
         source=measurement.source,
         beam=measurement.beam,
         position_sd_m=math.sqrt(swimmer.body.state.position_variance_m2),
+        beam_geometry=BeamGeometry(sonar.lat_deg, sonar.lon_deg),
     )

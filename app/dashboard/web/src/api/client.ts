@@ -11,6 +11,8 @@ import type {
   NewMission,
   PlannerView,
   Problem,
+  ProductView,
+  QualityView,
   VehicleView,
 } from "./types";
 
@@ -51,12 +53,19 @@ export async function toServiceError(response: Response): Promise<ServiceError> 
 }
 
 async function request<T>(path: string, init: RequestInit = {}): Promise<T> {
+  const headers = new Headers(init.headers);
+  headers.set("Accept", "application/json");
+  const response = await ask(`${BASE}${path}`, { ...init, headers });
+  return (await response.json()) as T;
+}
+
+/** The answer to a request; throws what the service refused, or that it does not answer. */
+async function ask(address: string, init: RequestInit): Promise<Response> {
   let response: Response;
   try {
     const headers = new Headers(init.headers);
-    headers.set("Accept", "application/json");
     if (token.value) headers.set("Authorization", `Bearer ${token.value}`);
-    response = await fetch(`${BASE}${path}`, { ...init, headers });
+    response = await fetch(address, { ...init, headers });
   } catch {
     throw new ServiceError(
       "The service does not answer",
@@ -65,7 +74,14 @@ async function request<T>(path: string, init: RequestInit = {}): Promise<T> {
     );
   }
   if (!response.ok) throw await toServiceError(response);
-  return (await response.json()) as T;
+  return response;
+}
+
+/** A file, fetched rather than linked to: links cannot carry the access token. */
+async function file(address: string): Promise<{ name: string; content: Blob }> {
+  const response = await ask(address, {});
+  const name = /filename="([^"]+)"/.exec(response.headers.get("Content-Disposition") ?? "")?.[1];
+  return { name: name ?? "bathyfleet", content: await response.blob() };
 }
 
 function post<T>(path: string, body?: unknown): Promise<T> {
@@ -88,6 +104,9 @@ export const api = {
   act: (id: string, action: MissionAction) => post<ActionView>(`${missionPath(id)}/${action}`),
   log: readLog,
   map: (id: string) => request<MapView>(`${missionPath(id)}/map`),
+  products: (id: string) => request<ProductView[]>(`${missionPath(id)}/products`),
+  quality: (id: string) => request<QualityView>(`${missionPath(id)}/quality`),
+  file,
 };
 
 /** The log between two of its lines, however long. */

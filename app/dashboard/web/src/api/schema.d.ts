@@ -231,6 +231,147 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/missions/{mission_id}/corrections": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * See how soundings are corrected
+         * @description Return tide, sound speed and the datum that depths are counted from.
+         */
+        get: operations["getCorrections"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/missions/{mission_id}/tide": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        /**
+         * Correct the tide
+         * @description Set the water level or a tide table, at any time: every sounding is corrected anew from its raw depth.
+         */
+        put: operations["setTide"];
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/missions/{mission_id}/sound-speed": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        /**
+         * Correct the sound speed
+         * @description Set the measured sound speed, at any time: every sounding is corrected anew from its raw range.
+         */
+        put: operations["setSoundSpeed"];
+        post?: never;
+        /**
+         * Take the sonars' own ranges
+         * @description Correct no sound speed any more.
+         */
+        delete: operations["deleteSoundSpeed"];
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/missions/{mission_id}/imports": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * List what was imported
+         * @description Return what the mission began with, oldest first.
+         */
+        get: operations["listImports"];
+        put?: never;
+        /**
+         * Begin with soundings or a map from elsewhere
+         * @description Take all of a file's soundings near the area, or nothing when any of it is wrong.
+         *
+         *     They count in the map by their own uncertainty, and are told apart from the mission's own. Sending the same file
+         *     again changes nothing.
+         */
+        post: operations["importSoundings"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/missions/{mission_id}/imports/{import_id}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        post?: never;
+        /**
+         * Take an import back
+         * @description Leave the soundings of a file out of the map again.
+         */
+        delete: operations["deleteImport"];
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/missions/{mission_id}/reference": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * See what the map is compared with
+         * @description Return the reference grid in short.
+         */
+        get: operations["getReference"];
+        /**
+         * Compare the map with a grid
+         * @description Sample a file's depths at the map's cells, to see how far off the map is.
+         *
+         *     Shown by `quality`, the layer `difference` and the GeoTIFF; never used for the map or for planning.
+         */
+        put: operations["setReference"];
+        post?: never;
+        /**
+         * Compare the map with nothing
+         * @description Forget the reference grid.
+         */
+        delete: operations["deleteReference"];
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/missions/{mission_id}/map": {
         parameters: {
             query?: never;
@@ -273,6 +414,48 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/missions/{mission_id}/quality": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Judge the map
+         * @description Say in how many cells the TVU estimate stays within each order of IHO S-44, and how far a reference grid is off.
+         *
+         *     No order is claimed by that: an order asks for more than vertical uncertainty.
+         */
+        get: operations["getQuality"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/missions/{mission_id}/products": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * List the files
+         * @description Return every file that can be downloaded, with its path.
+         */
+        get: operations["listProducts"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/missions/{mission_id}/map.{format}": {
         parameters: {
             query?: never;
@@ -285,6 +468,46 @@ export interface paths {
          * @description Return the map as a file.
          */
         get: operations["getMapFile"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/missions/{mission_id}/soundings.{format}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Download the soundings
+         * @description Return the soundings as a file.
+         */
+        get: operations["getSoundingsFile"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/missions/{mission_id}/tracks.{format}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Download the tracks
+         * @description Return where the vehicles were as a file.
+         */
+        get: operations["getTracksFile"];
         put?: never;
         post?: never;
         delete?: never;
@@ -325,26 +548,6 @@ export interface paths {
          * @description Return every vehicle that was heard or takes part in a mission: its link and what is missing, its position.
          */
         get: operations["listVehicles"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
-    "/api/v1/doctor": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        /**
-         * Say what is missing
-         * @description Return what keeps IMC vehicles from working with this service, each finding with its cause and what to do.
-         */
-        get: operations["examineLinks"];
         put?: never;
         post?: never;
         delete?: never;
@@ -502,12 +705,6 @@ export interface components {
             replayed: boolean;
         };
         /**
-         * Cause
-         * @description What a finding is about; the first of a node's problems is the one to look at.
-         * @enum {string}
-         */
-        Cause: "sound" | "switched_off" | "port_in_use" | "no_interface" | "no_vehicle" | "not_heard" | "no_announce" | "no_service" | "announces_ceased" | "no_traffic" | "unreachable" | "blocked_port" | "stale_port" | "foreign_address" | "wrong_version" | "same_id_twice" | "our_id_taken" | "clock_off" | "clock_rate" | "silent" | "low_rate" | "no_entities" | "no_soundings" | "soundings_refused" | "foreign_control" | "not_ready" | "send_errors" | "bad_packets" | "unknown_messages";
-        /**
          * ComponentHealth
          * @description Whether the service can do its work.
          */
@@ -536,29 +733,72 @@ export interface components {
             };
         };
         /**
-         * DoctorView
-         * @description What keeps vehicles on the IMC network from working with this service.
+         * ConformityView
+         * @description How the TVU estimate stands beside one order of IHO S-44; no order is claimed by it.
          */
-        DoctorView: {
+        ConformityView: {
+            order: components["schemas"]["Order"];
             /**
-             * Healthy
-             * @description At least one vehicle is there, and nothing stands in any one's way
+             * Cells Pct
+             * @description Share of the cells whose TVU estimate stays within the order's largest
              */
-            healthy: boolean;
+            cells_pct: number;
             /**
-             * Seconds
-             * @description For how long was listened
+             * Sounded Pct
+             * @description The same among the sounded cells; null: none is
              */
-            seconds: number;
-            /** Causes */
-            causes: components["schemas"]["Cause"][];
+            sounded_pct: number | null;
             /**
-             * Own
-             * @description On this machine's side
+             * Statement
+             * @example TVU estimate meets Order 1a in 83.2 % of cells
              */
-            own: components["schemas"]["Finding"][];
-            /** Vehicles */
-            vehicles: components["schemas"]["VehicleDiagnosis"][];
+            statement: string;
+        };
+        /**
+         * CorrectionsView
+         * @description How soundings are corrected; their raw values stay beside the corrected ones.
+         */
+        CorrectionsView: {
+            tide: components["schemas"]["Tide"];
+            /** @description Its levels count in place of tide.level_m */
+            tide_table: components["schemas"]["TideTableView"] | null;
+            sound_speed: components["schemas"]["SoundSpeed"] | null;
+            /**
+             * Vertical Datum
+             * @description What corrected depths are counted from
+             */
+            vertical_datum: string;
+            /**
+             * Accepted
+             * @description Soundings accepted under these corrections
+             */
+            accepted: number;
+            /** Rejected */
+            rejected: number;
+        };
+        /**
+         * DifferenceView
+         * @description Map minus reference grid over the cells that both know.
+         */
+        DifferenceView: {
+            /** Rmse M */
+            rmse_m: number;
+            /**
+             * L2 Norm
+             * @description Euclidean norm of all differences; grows with the number of cells
+             */
+            l2_norm: number;
+            /** Bias M */
+            bias_m: number;
+            /**
+             * P95 M
+             * @description 95th percentile of the absolute difference
+             */
+            p95_m: number;
+            /** Max M */
+            max_m: number;
+            /** Cells */
+            cells: number;
         };
         /**
          * EventMessage
@@ -632,27 +872,54 @@ export interface components {
             expected: string;
         };
         /**
-         * Finding
-         * @description One observation, and what to do about it.
+         * ImportView
+         * @description Soundings from elsewhere that a mission began with. They are not among its own.
          */
-        Finding: {
-            severity: components["schemas"]["Severity"];
-            /** @description For programs; the texts may change */
-            cause: components["schemas"]["Cause"];
-            /** Text */
-            text: string;
+        ImportView: {
+            /** Id */
+            id: string;
+            /** Filename */
+            filename: string;
+            /** Source */
+            source: string;
             /**
-             * Remedy
-             * @default
+             * Sha256
+             * @description Of the file
              */
-            remedy: string;
+            sha256: string;
+            /**
+             * Created At
+             * Format: date-time
+             */
+            created_at: string;
+            /**
+             * Found
+             * @description Depths in the file
+             */
+            found: number;
+            /**
+             * Taken
+             * @description Those in or near the area, as they count in the map
+             */
+            taken: number;
+            /** Min Depth M */
+            min_depth_m: number;
+            /** Max Depth M */
+            max_depth_m: number;
+            /** Median Sd M */
+            median_sd_m: number;
+            /**
+             * Notes
+             * @description What was assumed or done, in words
+             */
+            notes: string[];
+            /**
+             * Replayed
+             * @description True: the same file was imported before, nothing changed
+             * @default false
+             */
+            replayed: boolean;
         };
-        /**
-         * Guidance
-         * @description How a vehicle of kind ``imc`` is led.
-         * @enum {string}
-         */
-        Guidance: "follow" | "legs" | "acoustic";
         /**
          * ItemVerdict
          * @description The verdict on one item of a batch.
@@ -667,6 +934,12 @@ export interface components {
              */
             reason: string;
         };
+        /**
+         * LayerName
+         * @description A layer of the map beside those that its JSON always has.
+         * @enum {string}
+         */
+        LayerName: "uncertainty" | "count" | "sounded" | "slope" | "tvu_fraction" | "difference";
         /**
          * Level
          * @description How much an event matters.
@@ -719,28 +992,6 @@ export interface components {
              * @default 1
              */
             min_vertical_separation_m: number;
-        };
-        /**
-         * LinkRecord
-         * @description One change of a vehicle's link.
-         */
-        LinkRecord: {
-            /**
-             * At
-             * Format: date-time
-             */
-            at: string;
-            state: components["schemas"]["NodeState"];
-            /**
-             * Engaged
-             * @description Whether the vehicle followed us
-             */
-            engaged: boolean;
-            /**
-             * Reason
-             * @default
-             */
-            reason: string;
         };
         /**
          * LinkState
@@ -813,6 +1064,11 @@ export interface components {
                 number,
                 number
             ][];
+            /**
+             * Vertical Datum
+             * @description What depths are counted from
+             */
+            vertical_datum: string;
             /** Min Depth M */
             min_depth_m: number | null;
             /** Max Depth M */
@@ -827,6 +1083,13 @@ export interface components {
             count: number[][];
             /** Sounded */
             sounded: boolean[][];
+            /**
+             * Layers
+             * @description Further layers that were asked for, by name
+             */
+            layers: {
+                [key: string]: (number | null)[][];
+            };
         };
         /**
          * Measurement
@@ -858,7 +1121,7 @@ export interface components {
             depth_m: number;
             /**
              * Range M
-             * @description Vertical range from the vehicle to the bottom; null: position report only
+             * @description Range from the vehicle to the bottom: vertical, or along the beam where beam_off_nadir_deg is given; null: position report only
              */
             range_m?: number | null;
             /**
@@ -866,6 +1129,29 @@ export interface components {
              * @default 0
              */
             beam: number;
+            /**
+             * Beam Off Nadir Deg
+             * @description Angle of the beam from straight down in the vehicle; the footprint is then computed from it and the vehicle's attitude
+             */
+            beam_off_nadir_deg?: number | null;
+            /**
+             * Beam Azimuth Deg
+             * @description Direction of the beam in the vehicle, from the bow to starboard
+             * @default 0
+             */
+            beam_azimuth_deg: number;
+            /**
+             * Roll Deg
+             * @description Starboard down is positive
+             * @default 0
+             */
+            roll_deg: number;
+            /**
+             * Pitch Deg
+             * @description Nose up is positive
+             * @default 0
+             */
+            pitch_deg: number;
             /** Range Sd M */
             range_sd_m?: number | null;
             /** Position Sd M */
@@ -962,6 +1248,8 @@ export interface components {
              */
             sounding_noise: number;
             tide?: components["schemas"]["Tide"];
+            /** @description Sound speed correction; null: the sonars' own ranges are taken */
+            sound_speed?: components["schemas"]["SoundSpeed"] | null;
             /**
              * Seed
              * @description Seed of every random decision
@@ -1048,11 +1336,17 @@ export interface components {
             waypoints: components["schemas"]["WaypointView"][];
         };
         /**
-         * NodeState
-         * @description How far the acquaintance with a node has come.
+         * Order
+         * @description An order of survey.
          * @enum {string}
          */
-        NodeState: "heard" | "announced" | "active" | "ready" | "in_plan" | "lost" | "expected_offline";
+        Order: "exclusive" | "special" | "1a" | "1b" | "2";
+        /**
+         * OverlayLayer
+         * @description A layer that can be seen as a picture.
+         * @enum {string}
+         */
+        OverlayLayer: "depth" | "uncertainty" | "count" | "slope" | "tvu_fraction" | "difference";
         /**
          * PlannerOptions
          * @description Settings of the planners. Every planner reads those that concern it.
@@ -1116,8 +1410,8 @@ export interface components {
             alpha_floor: number;
             /**
              * Search
-             * @description Changes tried when a survey plan is made anew.
-             * @default 4000
+             * @description Most changes to the survey plan tried in a step.
+             * @default 1500
              */
             search: number;
             /**
@@ -1268,6 +1562,32 @@ export interface components {
             errors: components["schemas"]["FieldProblem"][];
         };
         /**
+         * ProductView
+         * @description A file that can be downloaded.
+         */
+        ProductView: {
+            /**
+             * Name
+             * @description Its name for bathyfleet export
+             * @example tif
+             */
+            name: string;
+            /** Title */
+            title: string;
+            /** Media Type */
+            media_type: string;
+            /**
+             * Href
+             * @description Path on this service
+             */
+            href: string;
+            /**
+             * Needs Map
+             * @description Whether a first map is needed
+             */
+            needs_map: boolean;
+        };
+        /**
          * Progress
          * @description How far a mission has come.
          */
@@ -1326,17 +1646,55 @@ export interface components {
             eta_s: number | null;
         };
         /**
+         * QualityView
+         * @description How good the map is, as far as it can be told.
+         */
+        QualityView: {
+            /**
+             * Version
+             * @description Of the map
+             */
+            version: number;
+            /** Vertical Datum */
+            vertical_datum: string;
+            /**
+             * Common Sd M
+             * @description Standard deviation of what all soundings share, counted in every TVU
+             */
+            common_sd_m: number;
+            /** Tvu */
+            tvu: components["schemas"]["ConformityView"][];
+            /** @description To the reference grid; null: there is none that it meets */
+            difference: components["schemas"]["DifferenceView"] | null;
+        };
+        /**
+         * ReferenceView
+         * @description The grid that a mission's map is compared with.
+         */
+        ReferenceView: {
+            /** Filename */
+            filename: string;
+            /** Source */
+            source: string;
+            /**
+             * Created At
+             * Format: date-time
+             */
+            created_at: string;
+            /**
+             * Cells
+             * @description Cells of the map's grid that it knows
+             */
+            cells: number;
+            /** Notes */
+            notes: string[];
+        };
+        /**
          * Sensor
          * @description How a vehicle sounds the bottom.
          * @enum {string}
          */
         Sensor: "single_beam" | "dvl" | "multibeam";
-        /**
-         * Severity
-         * @description How much a finding matters.
-         * @enum {string}
-         */
-        Severity: "ok" | "note" | "problem";
         /**
          * SnapshotMessage
          * @description First message on the live socket: everything needed to draw the picture.
@@ -1365,6 +1723,46 @@ export interface components {
             last_event_id: number;
         };
         /**
+         * SoundSpeed
+         * @description Sound speed correction: every beam is followed through the profile for the time that its sonar measured.
+         */
+        SoundSpeed: {
+            /**
+             * Assumed Mps
+             * @description Speed that is set in the sonars, m/s
+             * @default 1500
+             */
+            assumed_mps: number;
+            /**
+             * Profile
+             * @description Measured speeds as [depth in m, speed in m/s], from top to bottom; one pair: the same everywhere
+             * @example [
+             *       [
+             *         0,
+             *         1512.3
+             *       ],
+             *       [
+             *         5,
+             *         1509.8
+             *       ],
+             *       [
+             *         20,
+             *         1506.1
+             *       ]
+             *     ]
+             */
+            profile: [
+                number,
+                number
+            ][];
+            /**
+             * Source
+             * @description Where the profile comes from, kept with the product
+             * @default
+             */
+            source: string;
+        };
+        /**
          * StateMessage
          * @description The mission's state or progress changed.
          */
@@ -1391,12 +1789,12 @@ export interface components {
         };
         /**
          * Tide
-         * @description Water level correction: chart depth = sounded depth - level.
+         * @description Water level correction: depth below the datum = sounded depth - level + datum_offset_m.
          */
         Tide: {
             /**
              * Level M
-             * @description Water level above chart datum, metres
+             * @description Water level above the zero of the tide gauge or table (chart datum), metres
              * @default 0
              */
             level_m: number;
@@ -1406,38 +1804,105 @@ export interface components {
              * @default none applied
              */
             source: string;
+            /**
+             * Sd M
+             * @description Standard deviation of the level; it counts in every cell's TVU estimate
+             * @default 0
+             */
+            sd_m: number;
+            /**
+             * Datum Epsg
+             * @description EPSG code of the depth datum that products state once a tide is applied, for example 5861 (LAT depth) or 5715 (MSL depth)
+             * @default 5861
+             */
+            datum_epsg: number;
+            /**
+             * Datum Offset M
+             * @description How far that datum lies above the zero that levels count from; added to every depth
+             * @default 0
+             */
+            datum_offset_m: number;
         };
         /**
-         * VehicleDiagnosis
-         * @description What was found of one vehicle.
+         * TideCorrection
+         * @description A mission's tide: a constant level, or a table of high and low waters in its place.
          */
-        VehicleDiagnosis: {
+        TideCorrection: {
+            /**
+             * Level M
+             * @description Water level above the zero of the tide gauge or table (chart datum), metres
+             * @default 0
+             */
+            level_m: number;
+            /**
+             * Source
+             * @description Where the level comes from, kept with the product
+             * @default none applied
+             */
+            source: string;
+            /**
+             * Sd M
+             * @description Standard deviation of the level; it counts in every cell's TVU estimate
+             * @default 0
+             */
+            sd_m: number;
+            /**
+             * Datum Epsg
+             * @description EPSG code of the depth datum that products state once a tide is applied, for example 5861 (LAT depth) or 5715 (MSL depth)
+             * @default 5861
+             */
+            datum_epsg: number;
+            /**
+             * Datum Offset M
+             * @description How far that datum lies above the zero that levels count from; added to every depth
+             * @default 0
+             */
+            datum_offset_m: number;
+            /**
+             * Table
+             * @description Text of a .tid table, UTC: a line 'YYYY/MM/DD hh:mm:ss.sss level' per high or low water. Levels between two are a half cosine; soundings beyond the table are rejected until it covers them. Null: level_m
+             */
+            table?: string | null;
+            /**
+             * Table Name
+             * @description Its name; default: the harbour that it states
+             * @default
+             */
+            table_name: string;
+        };
+        /**
+         * TideTableView
+         * @description A tide table in short.
+         */
+        TideTableView: {
             /** Name */
             name: string;
-            /** Imc Id */
-            imc_id: number;
-            state: components["schemas"]["NodeState"];
-            /** Healthy */
-            healthy: boolean;
             /**
-             * Causes
-             * @description Of its problems, the one to look at first in front
+             * First
+             * Format: date-time
+             * @description Time of the first entry
              */
-            causes: components["schemas"]["Cause"][];
-            /** Findings */
-            findings: components["schemas"]["Finding"][];
+            first: string;
             /**
-             * History
-             * @description The last changes of its link, oldest first
+             * Last
+             * Format: date-time
+             * @description Time of the last entry
              */
-            history: components["schemas"]["LinkRecord"][];
+            last: string;
+            /** Entries */
+            entries: number;
+            /**
+             * Sha256
+             * @description Of the table as it was sent
+             */
+            sha256: string;
         };
         /**
          * VehicleKind
          * @description Which link reaches a vehicle.
          * @enum {string}
          */
-        VehicleKind: "imc" | "rest" | "sim" | "neptus";
+        VehicleKind: "imc" | "rest" | "sim";
         /**
          * VehicleSpec
          * @description A vehicle that takes part in a mission.
@@ -1450,7 +1915,7 @@ export interface components {
              */
             name: string;
             /**
-             * @description imc: DUNE over UDP; rest: polls and posts by itself; sim: simulated inside the service; neptus: of a session of Neptus' ConvCAO panel, which makes its mission itself
+             * @description imc: DUNE over UDP; rest: polls and posts by itself; sim: simulated inside the service
              * @default imc
              */
             kind: components["schemas"]["VehicleKind"];
@@ -1461,16 +1926,6 @@ export interface components {
              * @description Depth it travels at where the bottom leaves room; null: the first vehicle of a mission at limits.min_depth_m, each further one limits.min_vertical_separation_m deeper
              */
             depth_m?: number | null;
-            /**
-             * @description How a vehicle of kind imc is led. follow: by references, one a second; legs: by a plan for each whole leg, where radio ends at the surface; acoustic: by legs, and by sound while radio is silent
-             * @default follow
-             */
-            guidance: components["schemas"]["Guidance"];
-            /**
-             * Gateway
-             * @description With guidance acoustic: the name that the node with the modem announces
-             */
-            gateway?: string | null;
             /**
              * Start
              * @description Where a simulated vehicle starts, [longitude, latitude]; default: a corner of the area
@@ -2666,9 +3121,749 @@ export interface operations {
             };
         };
     };
-    getMap: {
+    getCorrections: {
         parameters: {
             query?: never;
+            header?: never;
+            path: {
+                /** @description The mission's id */
+                mission_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["CorrectionsView"];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such mission */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    setTide: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description The mission's id */
+                mission_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["TideCorrection"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["CorrectionsView"];
+                };
+            };
+            /** @description The body cannot be read */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such mission */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body is too large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body's media type is not supported */
+            415: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    setSoundSpeed: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description The mission's id */
+                mission_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["SoundSpeed"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["CorrectionsView"];
+                };
+            };
+            /** @description The body cannot be read */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such mission */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body is too large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body's media type is not supported */
+            415: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    deleteSoundSpeed: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description The mission's id */
+                mission_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["CorrectionsView"];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such mission */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    listImports: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description The mission's id */
+                mission_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ImportView"][];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such mission */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    importSoundings: {
+        parameters: {
+            query: {
+                /** @description Its name; the ending says what it is: .xyz, .csv, .txt (also with .gz), .asc, .tif, .nc or .bag */
+                filename: string;
+                /** @description Where it comes from, kept with the mission */
+                source?: string;
+                /** @description What positions are in where the file does not say: EPSG:4326, EPSG:32629, WKT, or local for the mission's own frame */
+                crs?: string;
+                /** @description Which way values grow: down for depths, up for heights; default: what the file says */
+                positive?: "down" | "up";
+                /** @description Standard deviation of the depths that state none, metres */
+                sd_m?: number;
+                /** @description In place of sd_m: the S-44 order surveyed to; its largest TVU is assumed */
+                order?: components["schemas"]["Order"];
+                /** @description Added to every depth to bring it to the mission's datum */
+                datum_offset_m?: number;
+            };
+            header?: never;
+            path: {
+                /** @description The mission's id */
+                mission_id: string;
+            };
+            cookie?: never;
+        };
+        /** @description The file as it is, whatever its media type */
+        requestBody: {
+            content: {
+                "application/octet-stream": string;
+            };
+        };
+        responses: {
+            /** @description The same file was imported before: nothing changed */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ImportView"];
+                };
+            };
+            /** @description Successful Response */
+            201: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ImportView"];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such mission */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description It contradicts the present state */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body is too large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    deleteImport: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description The mission's id */
+                mission_id: string;
+                /** @description The import's id */
+                import_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            204: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such mission; there is no such import */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    getReference: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description The mission's id */
+                mission_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ReferenceView"];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such mission; there is no such import */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    setReference: {
+        parameters: {
+            query: {
+                /** @description Its name; the ending says what it is: .xyz, .csv, .txt (also with .gz), .asc, .tif, .nc or .bag */
+                filename: string;
+                /** @description Where it comes from, kept with the mission */
+                source?: string;
+                /** @description What positions are in where the file does not say: EPSG:4326, EPSG:32629, WKT, or local for the mission's own frame */
+                crs?: string;
+                /** @description Which way values grow: down for depths, up for heights; default: what the file says */
+                positive?: "down" | "up";
+                /** @description Standard deviation of the depths that state none, metres */
+                sd_m?: number;
+                /** @description In place of sd_m: the S-44 order surveyed to; its largest TVU is assumed */
+                order?: components["schemas"]["Order"];
+                /** @description Added to every depth to bring it to the mission's datum */
+                datum_offset_m?: number;
+            };
+            header?: never;
+            path: {
+                /** @description The mission's id */
+                mission_id: string;
+            };
+            cookie?: never;
+        };
+        /** @description The file as it is, whatever its media type */
+        requestBody: {
+            content: {
+                "application/octet-stream": string;
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ReferenceView"];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such mission */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description It contradicts the present state */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body is too large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    deleteReference: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description The mission's id */
+                mission_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            204: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such mission; there is no such import */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    getMap: {
+        parameters: {
+            query?: {
+                /** @description Further layers, in `layers`; repeat it for several */
+                layer?: components["schemas"]["LayerName"][];
+                /** @description Order of IHO S-44 that the TVU is compared with */
+                order?: components["schemas"]["Order"];
+            };
             header?: {
                 /** @description ETag of the map that the client has */
                 "if-none-match"?: string;
@@ -2738,8 +3933,10 @@ export interface operations {
     getMapOverlay: {
         parameters: {
             query?: {
-                /** @description Depth, or its standard deviation */
-                layer?: "depth" | "uncertainty";
+                /** @description What is shown */
+                layer?: components["schemas"]["OverlayLayer"];
+                /** @description Order of IHO S-44 that the TVU is compared with */
+                order?: components["schemas"]["Order"];
                 /** @description Value at the palette's begin, m; default: the map's least */
                 min?: number;
                 /** @description Value at the palette's end, m; default: the map's largest */
@@ -2811,31 +4008,311 @@ export interface operations {
             };
         };
     };
-    getMapFile: {
+    getQuality: {
         parameters: {
             query?: never;
             header?: never;
             path: {
                 /** @description The mission's id */
                 mission_id: string;
-                /** @description One of tif, xyz, csv, geojson, png */
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["QualityView"];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such mission; there is no map yet */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    listProducts: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description The mission's id */
+                mission_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ProductView"][];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such mission */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    getMapFile: {
+        parameters: {
+            query?: {
+                /** @description Order of IHO S-44 that the TVU is compared with */
+                order?: components["schemas"]["Order"];
+                /** @description Between contours; default: about ten */
+                interval_m?: number;
+                /** @description A picture's least depth */
+                min?: number;
+                /** @description Its largest depth */
+                max?: number;
+                /** @description Whose soundings, in crowdsourced bathymetry; default: the only vehicle's */
+                vehicle?: string;
+            };
+            header?: never;
+            path: {
+                /** @description The mission's id */
+                mission_id: string;
+                /** @description One of tif, nc, bag, xyz, csv, geojson, kml, png */
                 format: string;
             };
             cookie?: never;
         };
         requestBody?: never;
         responses: {
-            /** @description `.tif`: GeoTIFF: depth, standard deviation and count; `.xyz`: longitude, latitude and depth of every cell; `.csv`: every sounding, raw and corrected, with its verdict; `.geojson`: depth contours, area and tracks; `.png`: a picture with axes and legend */
+            /** @description `.tif`: Cloud-Optimized GeoTIFF with every layer; `.nc`: CF-NetCDF with every layer; `.bag`: Bathymetric Attributed Grid: elevation and uncertainty; `.xyz`: longitude, latitude and depth of every cell; `.csv`: every sounding, raw and corrected, with its verdict; `.geojson`: depth contours, area and tracks; `.kml`: depth contours; `.png`: a picture with axes, colour bar and scale */
             200: {
                 headers: {
                     [name: string]: unknown;
                 };
                 content: {
-                    "image/tiff": string;
-                    "text/plain": string;
-                    "text/csv": string;
                     "application/geo+json": string;
+                    "application/vnd.google-earth.kml+xml": string;
+                    "application/x-bag": string;
+                    "application/x-netcdf": string;
                     "image/png": string;
+                    "image/tiff": string;
+                    "text/csv": string;
+                    "text/plain": string;
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such mission; there is no map yet; there is no such format */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    getSoundingsFile: {
+        parameters: {
+            query?: {
+                /** @description Order of IHO S-44 that the TVU is compared with */
+                order?: components["schemas"]["Order"];
+                /** @description Between contours; default: about ten */
+                interval_m?: number;
+                /** @description A picture's least depth */
+                min?: number;
+                /** @description Its largest depth */
+                max?: number;
+                /** @description Whose soundings, in crowdsourced bathymetry; default: the only vehicle's */
+                vehicle?: string;
+            };
+            header?: never;
+            path: {
+                /** @description The mission's id */
+                mission_id: string;
+                /** @description One of csv, xyz, geojson */
+                format: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description `.csv`: every sounding, raw and corrected, with its verdict; `.xyz`: longitude, latitude and corrected depth of accepted soundings; `.geojson`: raw soundings of one vehicle as crowdsourced bathymetry (IHO B-12) */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/geo+json": string;
+                    "text/csv": string;
+                    "text/plain": string;
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such mission; there is no map yet; there is no such format */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    getTracksFile: {
+        parameters: {
+            query?: {
+                /** @description Order of IHO S-44 that the TVU is compared with */
+                order?: components["schemas"]["Order"];
+                /** @description Between contours; default: about ten */
+                interval_m?: number;
+                /** @description A picture's least depth */
+                min?: number;
+                /** @description Its largest depth */
+                max?: number;
+                /** @description Whose soundings, in crowdsourced bathymetry; default: the only vehicle's */
+                vehicle?: string;
+            };
+            header?: never;
+            path: {
+                /** @description The mission's id */
+                mission_id: string;
+                /** @description One of geojson, kml, gpx */
+                format: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description `.geojson`: the vehicles' tracks with times and depths; `.kml`: the vehicles' tracks; `.gpx`: the vehicles' tracks with times and depths */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/geo+json": string;
+                    "application/gpx+xml": string;
+                    "application/vnd.google-earth.kml+xml": string;
                 };
             };
             /** @description An access token is needed */
@@ -2978,44 +4455,6 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["VehicleView"][];
-                };
-            };
-            /** @description An access token is needed */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["Problem"];
-                };
-            };
-            /** @description Not allowed */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["Problem"];
-                };
-            };
-        };
-    };
-    examineLinks: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        requestBody?: never;
-        responses: {
-            /** @description Successful Response */
-            200: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["DoctorView"];
                 };
             };
             /** @description An access token is needed */

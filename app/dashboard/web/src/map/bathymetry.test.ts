@@ -21,6 +21,7 @@ function mapOf(depth_m: (number | null)[][], sounded: boolean[][]): MapView {
       [1, 0],
       [0, 0],
     ],
+    vertical_datum: "",
     min_depth_m: null,
     max_depth_m: null,
     model: "gp",
@@ -28,6 +29,7 @@ function mapOf(depth_m: (number | null)[][], sounded: boolean[][]): MapView {
     sd_m: depth_m.map((row) => row.map((value) => (value === null ? null : 0.37))),
     count: sounded.map((row) => row.map(Number)),
     sounded,
+    layers: {},
   };
 }
 

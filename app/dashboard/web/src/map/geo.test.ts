@@ -28,6 +28,7 @@ const map: MapView = {
     [4, 1],
     [1, 1],
   ],
+  vertical_datum: "",
   min_depth_m: 5,
   max_depth_m: 9,
   model: "gp",
@@ -43,6 +44,7 @@ const map: MapView = {
     [1, 0, 0],
     [0, 4, 0],
   ],
+  layers: {},
   sounded: [
     [true, false, false],
     [false, true, false],

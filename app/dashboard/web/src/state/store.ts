@@ -111,3 +111,4 @@ export const abortDialogOpen = signal(false);
 /** Whether the link doctor is shown. */
 export const linksOpen = signal(false);
 export const logOpen = signal(false);
+export const filesOpen = signal(false);

@@ -1,6 +1,7 @@
 import { count, distance, metres, percent } from "../state/format";
-import { logOpen, mission, view } from "../state/store";
+import { filesOpen, logOpen, mission, view } from "../state/store";
 import { EventLog } from "./EventLog";
+import { Files } from "./Files";
 
 export function BottomStrip() {
   const present = mission.value;
@@ -10,6 +11,7 @@ export function BottomStrip() {
   return (
     <section class="bottom" aria-label="Progress and log">
       {logOpen.value ? <EventLog /> : null}
+      {filesOpen.value ? <Files /> : null}
       <div class="strip">
         <div class="steps">
           <span>
@@ -38,10 +40,23 @@ export function BottomStrip() {
           data-testid="toggle-log"
           onClick={() => {
             logOpen.value = !logOpen.value;
+            filesOpen.value = false;
           }}
         >
           <b>Log {logOpen.value ? "▾" : "▴"}</b>{" "}
           <span class="newest">{newest?.message ?? "nothing yet"}</span>
+        </button>
+        <button
+          type="button"
+          class="command"
+          aria-expanded={filesOpen.value}
+          data-testid="toggle-files"
+          onClick={() => {
+            filesOpen.value = !filesOpen.value;
+            logOpen.value = false;
+          }}
+        >
+          Files {filesOpen.value ? "▾" : "▴"}
         </button>
       </div>
     </section>

@@ -1,0 +1,116 @@
+"""Files from elsewhere: soundings and maps to begin with, and a grid to compare the map with."""
+
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Path, Query, Request, Response
+
+from app.api.auth import Operator, Reader
+from app.api.problems import problems
+from app.api.schemas import API, MissionId
+from app.api.state import Service
+from app.missions.views import ImportOptions, ImportView, ReferenceView
+
+router = APIRouter(
+    prefix=f"{API}/missions/{{mission_id}}", tags=["imports"], responses=problems("unauthenticated", "forbidden")
+)
+
+_FILE: dict[str, Any] = {
+    "requestBody": {
+        "required": True,
+        "description": "The file as it is, whatever its media type",
+        "content": {"application/octet-stream": {"schema": {"type": "string", "format": "binary"}}},
+    }
+}
+_SENT = problems("mission-not-found", "conflict", "body-too-large", "invalid-request")
+_FOUND = problems("mission-not-found", "import-not-found", "invalid-request")
+
+ImportId = Annotated[str, Path(min_length=1, max_length=64, pattern=r"^[A-Za-z0-9_-]+$", description="The import's id")]
+
+
+@router.post(
+    "/imports",
+    operation_id="importSoundings",
+    summary="Begin with soundings or a map from elsewhere",
+    status_code=201,
+    openapi_extra=_FILE,
+    responses=_SENT | {200: {"description": "The same file was imported before: nothing changed", "model": ImportView}},
+)
+async def import_soundings(
+    mission_id: MissionId,
+    options: Annotated[ImportOptions, Query()],
+    request: Request,
+    response: Response,
+    service: Service,
+    operator: Operator,
+) -> ImportView:
+    """Take all of a file's soundings near the area, or nothing when any of it is wrong.
+
+    They count in the map by their own uncertainty, and are told apart from the mission's own. Sending the same file
+    again changes nothing.
+    """
+    view = await service.import_soundings(mission_id, await request.body(), options, actor=operator.name)
+    if view.replayed:
+        response.status_code = 200
+    return view
+
+
+@router.get(
+    "/imports",
+    operation_id="listImports",
+    summary="List what was imported",
+    responses=problems("mission-not-found", "invalid-request"),
+)
+async def list_imports(mission_id: MissionId, service: Service, reader: Reader) -> list[ImportView]:
+    """Return what the mission began with, oldest first."""
+    return await service.imports(mission_id)
+
+
+@router.delete(
+    "/imports/{import_id}",
+    operation_id="deleteImport",
+    summary="Take an import back",
+    status_code=204,
+    responses=_FOUND,
+)
+async def delete_import(mission_id: MissionId, import_id: ImportId, service: Service, operator: Operator) -> None:
+    """Leave the soundings of a file out of the map again."""
+    await service.delete_import(mission_id, import_id, actor=operator.name)
+
+
+@router.put(
+    "/reference",
+    operation_id="setReference",
+    summary="Compare the map with a grid",
+    openapi_extra=_FILE,
+    responses=_SENT,
+)
+async def set_reference(
+    mission_id: MissionId,
+    options: Annotated[ImportOptions, Query()],
+    request: Request,
+    service: Service,
+    operator: Operator,
+) -> ReferenceView:
+    """Sample a file's depths at the map's cells, to see how far off the map is.
+
+    Shown by `quality`, the layer `difference` and the GeoTIFF; never used for the map or for planning.
+    """
+    return await service.set_reference(mission_id, await request.body(), options, actor=operator.name)
+
+
+@router.get("/reference", operation_id="getReference", summary="See what the map is compared with", responses=_FOUND)
+async def get_reference(mission_id: MissionId, service: Service, reader: Reader) -> ReferenceView:
+    """Return the reference grid in short."""
+    return await service.reference(mission_id)
+
+
+@router.delete(
+    "/reference",
+    operation_id="deleteReference",
+    summary="Compare the map with nothing",
+    status_code=204,
+    responses=_FOUND,
+)
+async def delete_reference(mission_id: MissionId, service: Service, operator: Operator) -> None:
+    """Forget the reference grid."""
+    await service.delete_reference(mission_id, actor=operator.name)

@@ -1,0 +1,207 @@
+"""``bathyfleet export``, ``import`` and ``tide``: what goes into a mission and what comes out of it."""
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from app.commands.common import (
+    CommandError,
+    Database,
+    ask_service,
+    checked,
+    command_settings,
+    meant_mission,
+    resting_mission,
+    with_missions,
+)
+
+if TYPE_CHECKING:
+    from app.missions.service import MissionService
+
+
+def export(
+    mission: Annotated[str, typer.Argument(metavar="MISSION", help="Its id, or the begin of it.")],
+    format: Annotated[  # noqa: A002 - the option's name
+        str,
+        typer.Option(
+            "--format",
+            "-f",
+            help="Of the map tif, nc, bag, xyz, csv (soundings), geojson, kml (contours) or png; soundings.csv, "
+            "soundings.xyz, soundings.geojson (IHO B-12); tracks.geojson, tracks.kml, tracks.gpx.",
+        ),
+    ] = "tif",
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", help="File to write; '-' is stdout [default: in output_dir]")
+    ] = None,
+    order: Annotated[
+        str, typer.Option(help="IHO S-44 order that the TVU is compared with: exclusive, special, 1a, 1b or 2.")
+    ] = "1a",
+    interval: Annotated[
+        float | None, typer.Option(min=0.01, max=1000, help="Metres between contours [default: about ten contours]")
+    ] = None,
+    vehicle: Annotated[
+        str | None, typer.Option(help="Whose soundings, for soundings.geojson [default: the only vehicle's]")
+    ] = None,
+    database: Database = None,
+) -> None:
+    """Write a mission's map, soundings or tracks to a file, from the database; no service has to run."""
+    settings = command_settings(database_url=database)
+    from app.mapping.s44 import Order
+    from app.missions.products import PRODUCTS, Product, ProductOptions
+    from app.missions.service import MissionService
+
+    if format not in PRODUCTS:
+        raise typer.BadParameter(f"{format!r} is not one of {', '.join(PRODUCTS)}", param_hint="--format")
+    if order not in list(Order):
+        raise typer.BadParameter(f"{order!r} is not one of {', '.join(Order)}", param_hint="--order")
+    options = ProductOptions(Order(order), interval, vehicle=vehicle)
+
+    async def run(service: MissionService) -> Product:
+        return await service.export(await meant_mission(service, mission), format, options)
+
+    product = with_missions(settings, run)
+    if out == Path("-"):
+        sys.stdout.buffer.write(product.content)
+        return
+    path = out or settings.output_dir / product.filename
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(product.content)
+    except OSError as error:
+        raise CommandError(f"{path} cannot be written: {error.strerror}") from None
+    typer.echo(f"{path}: {len(product.content)} bytes")
+
+
+Url = Annotated[
+    str | None,
+    typer.Option(help="A running service to send it to, for example http://127.0.0.1:8080 [default: the database]"),
+]
+Token = Annotated[str | None, typer.Option(envvar="BATHYFLEET_TOKEN", help="Access token for the service at --url.")]
+
+
+def import_file(
+    mission: Annotated[str, typer.Argument(metavar="MISSION", help="Its id, or the begin of it.")],
+    file: Annotated[
+        Path,
+        typer.Argument(
+            exists=True,
+            dir_okay=False,
+            readable=True,
+            help="Soundings or a map: .xyz, .csv, .txt (also with .gz), .asc, .tif, .nc or .bag.",
+        ),
+    ],
+    reference: Annotated[
+        bool, typer.Option("--reference", help="Compare the map with it, instead of beginning with it.")
+    ] = False,
+    source: Annotated[str, typer.Option(help="Where it comes from, kept with the mission.")] = "",
+    sd: Annotated[float | None, typer.Option(help="Standard deviation of depths that state none, metres.")] = None,
+    order: Annotated[
+        str | None, typer.Option(help="In place of --sd: the S-44 order surveyed to, whose largest TVU is assumed.")
+    ] = None,
+    crs: Annotated[
+        str | None, typer.Option(help="What positions are in where the file does not say: EPSG:32629, …, or local.")
+    ] = None,
+    positive: Annotated[
+        str | None, typer.Option(help="Which way values grow: down or up [default: what the file says]")
+    ] = None,
+    datum_offset: Annotated[
+        float, typer.Option(help="Metres added to every depth to bring it to the mission's datum.")
+    ] = 0.0,
+    url: Url = None,
+    token: Token = None,
+    database: Database = None,
+) -> None:
+    """Begin a mission with soundings or a map from elsewhere. The same file again changes nothing."""
+    from app.missions.views import ImportOptions, ImportView, ReferenceView
+
+    given = {
+        "filename": file.name,
+        "source": source,
+        "crs": crs,
+        "positive": positive,
+        "sd_m": sd,
+        "order": order,
+        "datum_offset_m": datum_offset,
+    }
+    options = checked(ImportOptions, given)
+    content = file.read_bytes()
+    view: ImportView | ReferenceView
+    if url is not None:
+        path, method = ("reference", "PUT") if reference else ("imports", "POST")
+        answer = ask_service(
+            url,
+            token,
+            mission,
+            method,
+            path,
+            content=content,
+            params=options.model_dump(exclude_none=True, mode="json"),
+        )
+        view = (ReferenceView if reference else ImportView).model_validate(answer)
+    else:
+
+        async def run(service: "MissionService") -> ImportView | ReferenceView:
+            mission_id = await resting_mission(service, mission)
+            if reference:
+                return await service.set_reference(mission_id, content, options, actor="command line")
+            return await service.import_soundings(mission_id, content, options, actor="command line")
+
+        view = with_missions(command_settings(database_url=database), run)
+    for note in view.notes:
+        typer.echo(f"note: {note}", err=True)
+    if isinstance(view, ReferenceView):
+        typer.echo(f"the map is compared with {view.filename} in {view.cells} cells")
+    else:
+        known = ", as before" if view.replayed else ""
+        typer.echo(
+            f"{view.taken} of {view.found} depths imported{known}: {view.min_depth_m:.2f} to {view.max_depth_m:.2f} m, "
+            f"standard deviation {view.median_sd_m:.2f} m"
+        )
+
+
+def tide(
+    mission: Annotated[str, typer.Argument(metavar="MISSION", help="Its id, or the begin of it.")],
+    table: Annotated[
+        Path | None,
+        typer.Argument(
+            exists=True, dir_okay=False, readable=True, help="Table of high and low waters (.tid); default: --level."
+        ),
+    ] = None,
+    level: Annotated[float, typer.Option(help="Constant water level, metres, where there is no table.")] = 0.0,
+    source: Annotated[str | None, typer.Option(help="Where it comes from, kept with the product.")] = None,
+    sd: Annotated[float, typer.Option(help="Standard deviation of the level, metres.")] = 0.0,
+    datum: Annotated[int, typer.Option(help="EPSG code of the depth datum.")] = 5861,
+    datum_offset: Annotated[
+        float, typer.Option(help="How far that datum lies above the zero of the levels, metres.")
+    ] = 0.0,
+    url: Url = None,
+    token: Token = None,
+    database: Database = None,
+) -> None:
+    """Correct a mission's tide, also afterwards: every sounding is corrected anew from its raw depth."""
+    from app.missions.views import CorrectionsView, TideCorrection
+
+    try:
+        text = None if table is None else table.read_text(encoding="utf-8")
+    except UnicodeDecodeError:
+        raise CommandError(f"{table} is not text", "send a .tid table") from None
+    given: dict[str, Any] = {
+        "level_m": level,
+        "sd_m": sd,
+        "datum_epsg": datum,
+        "datum_offset_m": datum_offset,
+        "table": text,
+    }
+    wanted = checked(TideCorrection, given if source is None else given | {"source": source})
+    if url is not None:
+        answer = ask_service(url, token, mission, "PUT", "tide", json=wanted.model_dump(mode="json"))
+        view = CorrectionsView.model_validate(answer)
+    else:
+
+        async def run(service: "MissionService") -> CorrectionsView:
+            return await service.set_tide(await resting_mission(service, mission), wanted, actor="command line")
+
+        view = with_missions(command_settings(database_url=database), run)
+    typer.echo(f"depths are below {view.vertical_datum}; {view.accepted} soundings accepted, {view.rejected} rejected")

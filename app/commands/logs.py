@@ -1,0 +1,79 @@
+"""``bathyfleet import-log``: what vehicles wrote down themselves."""
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from app.commands.common import Database, command_settings, meant_mission, with_missions
+
+if TYPE_CHECKING:
+    from app.missions.service import MissionService
+    from app.missions.views import LogImportView
+
+
+def import_logs(
+    mission: Annotated[str, typer.Argument(metavar="MISSION", help="Its id, or the begin of it.")],
+    logs: Annotated[list[Path], typer.Argument(metavar="LOG...", help="DUNE logs: Data.lsf or Data.lsf.gz.")],
+    vehicle: Annotated[
+        str | None, typer.Option(help="Name of the vehicle [default: the one that the log announces]")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+    database: Database = None,
+) -> None:
+    """Take the soundings of vehicles' own logs into a mission. Begun again after a crash, nothing is stored twice."""
+    settings = command_settings(database_url=database)
+    import getpass
+
+    from rich.console import Console
+    from rich.progress import BarColumn, DownloadColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
+
+    from app.missions.views import LogImportView
+
+    console = Console(stderr=True)
+    columns = (TextColumn("{task.description}"), BarColumn(), DownloadColumn(), TimeRemainingColumn())
+
+    views: list[LogImportView] = []
+
+    async def run(service: "MissionService") -> None:
+        mission_id = await meant_mission(service, mission)
+        for path in logs:
+            task = bar.add_task(path.name, total=None)
+
+            def show(done: int, total: int, task: TaskID = task) -> None:
+                bar.update(task, completed=done, total=total)
+
+            views.append(
+                await service.import_log(
+                    mission_id, path, vehicle=vehicle, actor=f"{getpass.getuser()} at the console", progress=show
+                )
+            )
+
+    try:
+        with Progress(*columns, console=console, disable=not console.is_terminal) as bar:
+            with_missions(settings, run)
+    finally:
+        # What one log brought is told also when the next one cannot be read.
+        if as_json:
+            typer.echo(json.dumps([view.model_dump() for view in views], indent=2))
+        else:
+            typer.echo("\n".join(line for view in views for line in _import_lines(view)), nl=bool(views))
+
+
+def _import_lines(view: "LogImportView") -> Iterator[str]:
+    yield (
+        f"{view.file}: {view.vehicle}, {view.soundings} soundings accepted, {view.rejected} rejected, "
+        f"{view.duplicate} there before" + (" (imported before, nothing new)" if view.known else "")
+    )
+    for reason, count in sorted(view.reasons.items(), key=lambda item: -item[1]):
+        yield f"  {count} rejected: {reason}"
+    for reason, count in sorted(view.refused.items(), key=lambda item: -item[1]):
+        yield f"  {count} ranges refused: {reason}"
+    for reason, count in view.unreadable.items():
+        yield f"  {count} packets unreadable: {reason}"
+    if view.skipped_bytes:
+        yield f"  {view.skipped_bytes} bytes skipped that are no packet"
+    if view.cut_off:
+        yield "  the file ends in the middle; what came before is used"

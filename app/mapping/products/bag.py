@@ -1,0 +1,51 @@
+"""Map as Bathymetric Attributed Grid (BAG 1.6), the exchange format of hydrographic offices."""
+
+import tempfile
+from pathlib import Path
+
+import numpy as np
+import rasterio
+from rasterio.crs import CRS
+
+from app.mapping.georeference import LocalFrame
+from app.mapping.products.geotiff import north_up_transform
+from app.mapping.types import BathymetricMap
+from app.mapping.vertical import VerticalDatum
+
+NODATA = 1_000_000.0
+"""What the format prescribes for cells without a value."""
+
+
+def bag(bathymetry: BathymetricMap, frame: LocalFrame, *, vertical_datum: VerticalDatum, title: str) -> bytes:
+    """Return a BAG with elevation (positive up: minus the depth) and its standard deviation.
+
+    The vertical datum stands in the metadata; the library would call it unknown.
+    """
+    grid = bathymetry.grid
+    layers = [
+        np.where(np.isfinite(layer), layer, NODATA).astype(np.float32)[::-1]
+        for layer in (-bathymetry.depth_m, bathymetry.sd_m)
+    ]
+    # HDF5 writes to real files only.
+    with tempfile.TemporaryDirectory(prefix="bathyfleet-") as folder:
+        path = Path(folder) / "map.bag"
+        with rasterio.open(
+            path,
+            "w",
+            driver="BAG",
+            width=grid.cols,
+            height=grid.rows,
+            count=len(layers),
+            dtype="float32",
+            crs=CRS.from_wkt(frame.crs.to_wkt("WKT1_GDAL")),
+            transform=north_up_transform(bathymetry),
+            nodata=NODATA,
+            VAR_VERT_WKT=vertical_datum.crs.to_wkt("WKT1_GDAL"),
+            VAR_ABSTRACT=f"{title}. Elevations are minus the depth below {vertical_datum.statement}. "
+            f"Uncertainty is one standard deviation. {bathymetry.model}",
+            VAR_INDIVIDUAL_NAME="bathyfleet",
+            VAR_PROCESS_STEP_DESCRIPTION=f"Interpolated from soundings: {bathymetry.model}",
+        ) as file:
+            for number, layer in enumerate(layers, start=1):
+                file.write(layer, number)
+        return path.read_bytes()

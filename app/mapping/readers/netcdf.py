@@ -1,0 +1,113 @@
+"""Grids in NetCDF: one variable of depths or heights over two regular axes."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyproj
+from affine import Affine
+from netCDF4 import Dataset
+
+from app.mapping.readers.types import MAX_RASTER_CELLS, Positive, Raster, ReadError
+from app.mapping.types import FloatArray
+
+DEPTH_NAMES = ("depth", "elevation", "bathymetry", "z", "height", "topo", "band1")
+SD_NAMES = ("uncertainty", "sd", "depth_uncertainty", "standard_deviation")
+REGULAR = 1e-3
+"""Largest deviation of an axis from even spacing, in cells."""
+
+
+def read_netcdf(path: Path) -> Raster:
+    """Return the grid of depths in a file.
+
+    Raises
+    ------
+    ReadError
+        When there is no such variable, or its axes are not regular.
+    """
+    try:
+        file = Dataset(path)
+    except OSError as error:
+        raise ReadError("file", f"it cannot be read as NetCDF: {error.strerror}", "send a NetCDF file") from None
+    try:
+        return _read(file)
+    finally:
+        file.close()
+
+
+def _read(file: Any) -> Raster:
+    variable = _depth_variable(file)
+    name = f"variable {variable.name}"
+    rows, cols = variable.shape
+    if rows * cols > MAX_RASTER_CELLS:
+        raise ReadError(name, f"{cols} x {rows} cells are more than {MAX_RASTER_CELLS}", "cut it to the mission's area")
+    y_name, x_name = variable.dimensions
+    y, x = _axis(file, y_name), _axis(file, x_name)
+    z = _values(variable)
+    if not np.isfinite(z).any():
+        raise ReadError(name, "no cell of it has a value", "check its _FillValue")
+    sd = next((file.variables[n] for n in SD_NAMES if n in file.variables), None)
+    sd_values = _values(sd) if sd is not None and sd.shape == variable.shape else np.full(z.shape, np.nan)
+    step_x, step_y = (x[-1] - x[0]) / (len(x) - 1), (y[-1] - y[0]) / (len(y) - 1)
+    transform = Affine(step_x, 0.0, x[0] - 0.5 * step_x, 0.0, step_y, y[0] - 0.5 * step_y)
+    return Raster(z, sd_values, transform, _crs(file, variable, x_name, y_name), _direction(variable))
+
+
+def _depth_variable(file: Any) -> Any:
+    flat = [v for v in file.variables.values() if v.ndim == 2 and np.issubdtype(v.dtype, np.number)]
+    for variable in flat:
+        standard = str(getattr(variable, "standard_name", ""))
+        if standard.startswith("sea_floor_depth") and " " not in standard:
+            return variable
+    lower = {variable.name.lower(): variable for variable in flat}
+    found = next((lower[name] for name in DEPTH_NAMES if name in lower), None)
+    if found is None:
+        there = ", ".join(sorted(lower)) or "none of two dimensions"
+        raise ReadError(
+            "variable", f"none of its variables is a grid of depths ({there})", "name it depth or elevation"
+        )
+    return found
+
+
+def _axis(file: Any, name: str) -> FloatArray:
+    variable = file.variables.get(name)
+    if variable is None or variable.ndim != 1 or len(variable) < 2:
+        raise ReadError(
+            f"variable {name}", "it is not an axis of at least two values", "give each axis its coordinates"
+        )
+    values = _values(variable)
+    even = np.linspace(values[0], values[-1], len(values))
+    step = (values[-1] - values[0]) / (len(values) - 1)
+    if not np.all(np.isfinite(values)) or step == 0 or np.max(np.abs(values - even)) > REGULAR * abs(step):
+        raise ReadError(f"variable {name}", "its values are not evenly spaced", "regrid the file, or send it as XYZ")
+    return values
+
+
+def _values(variable: Any) -> FloatArray:
+    values = np.ma.filled(np.ma.asarray(variable[:]).astype(np.float64), np.nan)
+    return np.where(np.isfinite(values), values, np.nan)
+
+
+def _crs(file: Any, variable: Any, x_name: str, y_name: str) -> pyproj.CRS | None:
+    mapping = file.variables.get(str(getattr(variable, "grid_mapping", "")).partition(":")[0].strip())
+    if mapping is not None:
+        attributes = {key: mapping.getncattr(key) for key in mapping.ncattrs()}
+        try:
+            wkt = attributes.get("crs_wkt") or attributes.get("spatial_ref")
+            return pyproj.CRS.from_wkt(wkt) if wkt else pyproj.CRS.from_cf(attributes)
+        except (pyproj.exceptions.CRSError, KeyError):
+            raise ReadError(f"variable {mapping.name}", "it describes no known projection", "write crs_wkt") from None
+    geographic = x_name.lower().startswith("lon") and y_name.lower().startswith("lat")
+    return pyproj.CRS.from_epsg(4326) if geographic else None
+
+
+def _direction(variable: Any) -> Positive | None:
+    stated = str(getattr(variable, "positive", "")).lower()
+    if stated in ("down", "up"):
+        return "down" if stated == "down" else "up"
+    standard = str(getattr(variable, "standard_name", ""))
+    if "depth" in standard:
+        return "down"
+    if standard.startswith(("altitude", "height", "surface_altitude")):
+        return "up"
+    return {"depth": "down", "elevation": "up", "height": "up", "topo": "up"}.get(variable.name.lower())  # type: ignore[return-value]

@@ -1,0 +1,73 @@
+"""Grids by GDAL: GeoTIFF, ESRI ASCII and BAG."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyproj
+import rasterio
+from rasterio.errors import RasterioError
+
+from app.mapping.readers.types import MAX_RASTER_CELLS, Positive, Raster, ReadError
+from app.mapping.types import FloatArray
+
+DRIVERS = {".tif": "GTiff", ".tiff": "GTiff", ".asc": "AAIGrid", ".bag": "BAG"}
+"""Which library reads which ending; whatever else a file pretends to be is refused."""
+
+DEPTH_BANDS = ("depth", "elevation", "height", "z")
+SD_BANDS = ("uncertainty", "sd", "standard deviation", "standard_deviation")
+
+
+def read_raster(path: Path) -> Raster:
+    """Return the grid in a file: its depths and, if it has such a band, their standard deviations.
+
+    Raises
+    ------
+    ReadError
+        When the file cannot be read, is too large or has no band with a value.
+    """
+    try:
+        with rasterio.open(path, driver=DRIVERS[path.suffix], sharing=False) as file:
+            return _read(file)
+    except RasterioError as error:
+        what = {".tif": "GeoTIFF", ".tiff": "GeoTIFF", ".asc": "ESRI ASCII grid", ".bag": "BAG"}[path.suffix]
+        reason = str(error).replace(str(path), "it").partition("\n")[0]
+        raise ReadError("file", f"it cannot be read as {what}: {reason}", f"send a {what}") from None
+
+
+def _read(file: Any) -> Raster:
+    if file.width * file.height > MAX_RASTER_CELLS:
+        raise ReadError(
+            "file",
+            f"{file.width} x {file.height} cells are more than {MAX_RASTER_CELLS}",
+            "cut it to the mission's area or make it coarser",
+        )
+    names = [(name or "").lower() for name in file.descriptions]
+    depth = next((names.index(name) for name in DEPTH_BANDS if name in names), 0) + 1
+    sd = next((names.index(name) for name in SD_BANDS if name in names), None)
+    z = _band(file, depth)
+    if not np.isfinite(z).any():
+        raise ReadError(f"band {depth}", "no cell of it has a value", "check the file's nodata value")
+    return Raster(
+        z,
+        np.full(z.shape, np.nan) if sd is None else _band(file, sd + 1),
+        file.transform,
+        None if file.crs is None else pyproj.CRS.from_wkt(file.crs.to_wkt()),
+        _direction(file, names[depth - 1]),
+    )
+
+
+def _band(file: Any, number: int) -> FloatArray:
+    if np.issubdtype(np.dtype(file.dtypes[number - 1]), np.complexfloating):
+        raise ReadError(f"band {number}", f"its values are {file.dtypes[number - 1]}", "depths are real numbers")
+    values = np.ma.filled(np.ma.asarray(file.read(number, masked=True)).astype(np.float64), np.nan)
+    return np.where(np.isfinite(values), values, np.nan)
+
+
+def _direction(file: Any, name: str) -> Positive | None:
+    if file.driver == "BAG":
+        return "up"  # whatever its vertical system says, the format holds elevations
+    stated = file.tags().get("DEPTH_POSITIVE")
+    if stated in ("down", "up"):
+        return "down" if stated == "down" else "up"
+    return {"depth": "down", "elevation": "up", "height": "up"}.get(name)  # type: ignore[return-value]

@@ -1,0 +1,96 @@
+"""What is asked of a reader and what it finds."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import pyproj
+from affine import Affine
+
+from app.mapping.georeference import LocalFrame
+from app.mapping.types import FloatArray, Grid, IntArray
+
+MAX_SOUNDINGS = 2_000_000
+MAX_RASTER_CELLS = 30_000_000
+
+LOCAL: Literal["local"] = "local"
+"""Stands for the mission's own frame where a coordinate reference system is asked for."""
+
+MIN_DEPTH_M, MAX_DEPTH_M = -100.0, 11_100.0
+MIN_SD_M, MAX_SD_M = 0.001, 1000.0
+
+UNUSABLE = 3
+"""Exit code of the reading process when the file, not the program, is wrong."""
+
+Positive = Literal["down", "up"]
+
+
+class ReadError(ValueError):
+    """A file that cannot be used. ``field`` names the line, band, variable or option that is wrong."""
+
+    def __init__(self, field: str, message: str, remedy: str) -> None:
+        super().__init__(message)
+        self.field = field
+        self.remedy = remedy
+
+
+@dataclass(frozen=True)
+class ReadOptions:
+    """What a file does not say by itself.
+
+    Attributes
+    ----------
+    crs
+        Anything that names a coordinate reference system, for example ``EPSG:32629``, or ``local``.
+    positive
+        Which way values grow.
+    sd_m, order
+        Uncertainty where the file states none: a standard deviation, or the S-44 order that was surveyed to.
+    datum_offset_m
+        Added to every depth to bring it to the mission's datum.
+    """
+
+    crs: str | None = None
+    positive: Positive | None = None
+    sd_m: float | None = None
+    order: str | None = None
+    datum_offset_m: float = 0.0
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where the mission maps: its frame, its grid, and how far outside that still helps."""
+
+    frame: LocalFrame
+    grid: Grid
+    margin_m: float
+
+
+@dataclass(frozen=True)
+class Points:
+    """Soundings. Arrays have shape (n,); ``z`` is as in the file, ``sd_m`` NaN where the file states none.
+
+    ``lines`` are their numbers in the file, for messages.
+    ``crs`` is None where the file does not say; then ``x`` and ``y`` are in what the options name.
+    """
+
+    x: FloatArray
+    y: FloatArray
+    z: FloatArray
+    sd_m: FloatArray
+    crs: pyproj.CRS | Literal["local"] | None
+    positive: Positive | None
+    lines: IntArray
+
+
+@dataclass(frozen=True)
+class Raster:
+    """A grid. Arrays have shape (rows, cols), row 0 first in the file; NaN is unknown.
+
+    ``transform`` takes columns and rows to x and y of ``crs``.
+    """
+
+    z: FloatArray
+    sd_m: FloatArray
+    transform: Affine
+    crs: pyproj.CRS | None
+    positive: Positive | None

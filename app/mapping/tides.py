@@ -1,0 +1,139 @@
+"""Water levels from a table of high and low waters (``.tid`` files, as Neptus and DUNE users have them)."""
+
+import hashlib
+import re
+from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from app.mapping.types import FloatArray
+
+MAX_LEVEL_M = 20.0
+MAX_GAP_S = 24.0 * 3600.0
+"""Where the sea has one tide a day its extremes are half a day apart; a larger gap is a hole in the table."""
+
+MAX_LINES = 200_000
+_LINE = re.compile(
+    r"(\d{4})/(\d{2})/(\d{2})\s+(\d{2}):(\d{2})(?::(\d{2})(?:\.(\d{1,6}))?)?\s+([-+]?\d+(?:\.\d*)?)\s*\Z"
+)
+
+
+class TideTableError(ValueError):
+    """A table that cannot be used; the message names the line, the value and what would be right."""
+
+
+@dataclass(frozen=True)
+class TideTable:
+    """High and low waters in the order of time.
+
+    Attributes
+    ----------
+    times_s
+        Unix seconds, strictly ascending, shape (n,).
+    levels_m
+        Above the table's zero (chart datum), shape (n,).
+    """
+
+    name: str
+    times_s: FloatArray
+    levels_m: FloatArray
+    digest: str
+
+    @property
+    def first(self) -> datetime:
+        """Return the time of the first entry."""
+        return datetime.fromtimestamp(float(self.times_s[0]), UTC)
+
+    @property
+    def last(self) -> datetime:
+        """Return the time of the last entry."""
+        return datetime.fromtimestamp(float(self.times_s[-1]), UTC)
+
+    def levels_at(self, time_s: ArrayLike) -> FloatArray:
+        """Return the level at each time, a half cosine between two extremes; NaN where the table says nothing.
+
+        That is before the first entry, after the last, and in a hole of more than ``MAX_GAP_S``.
+        """
+        times = np.asarray(time_s, float)
+        after = np.clip(np.searchsorted(self.times_s, times, side="right"), 1, len(self.times_s) - 1)
+        begin, end = self.times_s[after - 1], self.times_s[after]
+        low, high = self.levels_m[after - 1], self.levels_m[after]
+        phase = np.pi * (times - begin) / (end - begin)
+        level = 0.5 * (low + high) + 0.5 * (low - high) * np.cos(phase)
+        known = (times >= self.times_s[0]) & (times <= self.times_s[-1])
+        known &= (end - begin <= MAX_GAP_S) | (times == begin) | (times == end)
+        return np.where(known, level, np.nan)
+
+    def why_not(self, time_s: float) -> str:
+        """Return why there is no level at a time, for an operator; empty when there is one."""
+        if np.isfinite(self.levels_at(time_s)):
+            return ""
+        if self.times_s[0] <= time_s <= self.times_s[-1]:
+            return f"the tide table {self.name!r} has a hole at {_minute(time_s)}"
+        begin, end = (_minute(float(self.times_s[i])) for i in (0, -1))
+        return f"{_minute(time_s)} is not within the tide table {self.name!r}, {begin} to {end}"
+
+
+def parse_tid(text: str, *, name: str = "") -> TideTable:
+    """Read a ``.tid`` table: ``YYYY/MM/DD hh:mm:ss.sss level`` per line, UTC, ``#`` before comments.
+
+    Parameters
+    ----------
+    name
+        What it is called in messages; by default the harbour that its comments name.
+
+    Raises
+    ------
+    TideTableError
+        For a line that cannot be read, is out of order or has an impossible level, for another time zone than UTC,
+        and for fewer than two entries.
+    """
+    times: list[float] = []
+    levels: list[float] = []
+    harbour = ""
+    for number, line in enumerate(text.splitlines(), start=1):
+        if number > MAX_LINES:
+            raise TideTableError(f"the table has more than {MAX_LINES} lines; send the years that are needed")
+        entry = line.strip().removeprefix("\ufeff")
+        if not entry:
+            continue
+        if entry.startswith("#"):
+            key, _, value = entry.lstrip("# ").partition(":")
+            if key.strip().lower() == "harbor":
+                harbour = value.strip()[:100]
+            if key.strip().lower() == "time zone" and value.strip().upper() not in ("UTC", "GMT", "Z", "UTC+0"):
+                raise TideTableError(f"line {number}: the time zone is {value.strip()[:40]!r}; times must be UTC")
+            continue
+        time_s, level = _entry(entry, number)
+        if times and time_s <= times[-1]:
+            raise TideTableError(f"line {number}: {entry[:40]!r} is not later than the entry before it")
+        times.append(time_s)
+        levels.append(level)
+    if len(times) < 2:
+        raise TideTableError(f"the table has {len(times)} entries; a level lies between two, so at least 2 are needed")
+    digest = hashlib.sha256(text.encode()).hexdigest()
+    return TideTable(name or harbour or "unnamed", np.array(times), np.array(levels), digest)
+
+
+def _entry(entry: str, number: int) -> tuple[float, float]:
+    match = _LINE.match(entry)
+    if match is None:
+        raise TideTableError(f"line {number}: {entry[:60]!r} is not of the form '2021/01/31 05:20:00.000 1.1'")
+    year, month, day, hour, minute, second, fraction, level = match.groups()
+    try:
+        time = datetime(int(year), int(month), int(day), int(hour), int(minute), int(second or 0), tzinfo=UTC)
+    except ValueError as error:
+        raise TideTableError(f"line {number}: {entry[:60]!r} is no date and time ({error})") from None
+    time += timedelta(microseconds=int((fraction or "0").ljust(6, "0")))
+    if abs(float(level)) > MAX_LEVEL_M:
+        raise TideTableError(f"line {number}: the level {level} is not between -{MAX_LEVEL_M:g} and {MAX_LEVEL_M:g} m")
+    return time.timestamp(), float(level)
+
+
+def _minute(time_s: float) -> str:
+    try:
+        return f"{datetime.fromtimestamp(time_s, UTC):%Y-%m-%d %H:%M} UTC"
+    except (OverflowError, ValueError, OSError):
+        return f"{time_s:g} s"

@@ -1,0 +1,47 @@
+"""What depths are counted from, as a coordinate reference system and in words."""
+
+from dataclasses import dataclass
+
+import pyproj
+from pyproj.crs import CompoundCRS
+from pyproj.exceptions import CRSError
+
+INSTANTANEOUS_WATER_LEVEL = 5831
+LOWEST_ASTRONOMICAL_TIDE = 5861
+
+
+@dataclass(frozen=True)
+class VerticalDatum:
+    """A depth datum: its EPSG code, and a sentence that also says how depths were brought to it."""
+
+    epsg: int
+    statement: str
+
+    @property
+    def crs(self) -> pyproj.CRS:
+        """The vertical coordinate reference system, depth positive down."""
+        return pyproj.CRS.from_epsg(self.epsg)
+
+    def compound_with(self, horizontal: pyproj.CRS) -> pyproj.CRS:
+        """Return the horizontal system with this datum as its third axis."""
+        return CompoundCRS(f"{horizontal.name} + {self.crs.name}", [horizontal, self.crs])
+
+
+def check_depth_datum(epsg: int) -> str:
+    """Return the name of a depth datum.
+
+    Raises
+    ------
+    ValueError
+        When the code names no vertical system, or one whose axis points up.
+    """
+    try:
+        crs = pyproj.CRS.from_epsg(epsg)
+    except CRSError:
+        raise ValueError(f"there is no EPSG:{epsg}; EPSG:5861 is LAT depth, EPSG:5715 MSL depth") from None
+    if not crs.is_vertical or crs.axis_info[0].direction != "down" or crs.axis_info[0].unit_name != "metre":
+        raise ValueError(
+            f"EPSG:{epsg} ({crs.name}) is not a depth in metres, positive down; use for example 5861 (LAT depth), "
+            "5715 (MSL depth) or 5866 (MLLW depth) and state the offset to it in datum_offset_m"
+        )
+    return str(crs.name)
