@@ -556,6 +556,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/doctor": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Say what is missing
+         * @description Return what keeps IMC vehicles from working with this service, each finding with its cause and what to do.
+         */
+        get: operations["examineLinks"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/planners": {
         parameters: {
             query?: never;
@@ -705,6 +725,12 @@ export interface components {
             replayed: boolean;
         };
         /**
+         * Cause
+         * @description What a finding is about; the first of a node's problems is the one to look at.
+         * @enum {string}
+         */
+        Cause: "sound" | "switched_off" | "port_in_use" | "no_interface" | "no_vehicle" | "not_heard" | "no_announce" | "no_service" | "announces_ceased" | "no_traffic" | "unreachable" | "blocked_port" | "stale_port" | "foreign_address" | "wrong_version" | "same_id_twice" | "our_id_taken" | "clock_off" | "clock_rate" | "silent" | "low_rate" | "no_entities" | "no_soundings" | "soundings_refused" | "foreign_control" | "not_ready" | "send_errors" | "bad_packets" | "unknown_messages";
+        /**
          * ComponentHealth
          * @description Whether the service can do its work.
          */
@@ -801,6 +827,31 @@ export interface components {
             cells: number;
         };
         /**
+         * DoctorView
+         * @description What keeps vehicles on the IMC network from working with this service.
+         */
+        DoctorView: {
+            /**
+             * Healthy
+             * @description At least one vehicle is there, and nothing stands in any one's way
+             */
+            healthy: boolean;
+            /**
+             * Seconds
+             * @description For how long was listened
+             */
+            seconds: number;
+            /** Causes */
+            causes: components["schemas"]["Cause"][];
+            /**
+             * Own
+             * @description On this machine's side
+             */
+            own: components["schemas"]["Finding"][];
+            /** Vehicles */
+            vehicles: components["schemas"]["VehicleDiagnosis"][];
+        };
+        /**
          * EventMessage
          * @description A new line of the log.
          */
@@ -871,6 +922,28 @@ export interface components {
              */
             expected: string;
         };
+        /**
+         * Finding
+         * @description One observation, and what to do about it.
+         */
+        Finding: {
+            severity: components["schemas"]["Severity"];
+            /** @description For programs; the texts may change */
+            cause: components["schemas"]["Cause"];
+            /** Text */
+            text: string;
+            /**
+             * Remedy
+             * @default
+             */
+            remedy: string;
+        };
+        /**
+         * Guidance
+         * @description How a vehicle of kind ``imc`` is led.
+         * @enum {string}
+         */
+        Guidance: "follow" | "legs" | "acoustic";
         /**
          * ImportView
          * @description Soundings from elsewhere that a mission began with. They are not among its own.
@@ -992,6 +1065,28 @@ export interface components {
              * @default 1
              */
             min_vertical_separation_m: number;
+        };
+        /**
+         * LinkRecord
+         * @description One change of a vehicle's link.
+         */
+        LinkRecord: {
+            /**
+             * At
+             * Format: date-time
+             */
+            at: string;
+            state: components["schemas"]["NodeState"];
+            /**
+             * Engaged
+             * @description Whether the vehicle followed us
+             */
+            engaged: boolean;
+            /**
+             * Reason
+             * @default
+             */
+            reason: string;
         };
         /**
          * LinkState
@@ -1336,6 +1431,12 @@ export interface components {
             waypoints: components["schemas"]["WaypointView"][];
         };
         /**
+         * NodeState
+         * @description How far the acquaintance with a node has come.
+         * @enum {string}
+         */
+        NodeState: "heard" | "announced" | "active" | "ready" | "in_plan" | "lost" | "expected_offline";
+        /**
          * Order
          * @description An order of survey.
          * @enum {string}
@@ -1410,8 +1511,8 @@ export interface components {
             alpha_floor: number;
             /**
              * Search
-             * @description Most changes to the survey plan tried in a step.
-             * @default 1500
+             * @description Changes tried when a survey plan is made anew.
+             * @default 4000
              */
             search: number;
             /**
@@ -1696,6 +1797,12 @@ export interface components {
          */
         Sensor: "single_beam" | "dvl" | "multibeam";
         /**
+         * Severity
+         * @description How much a finding matters.
+         * @enum {string}
+         */
+        Severity: "ok" | "note" | "problem";
+        /**
          * SnapshotMessage
          * @description First message on the live socket: everything needed to draw the picture.
          */
@@ -1898,11 +2005,36 @@ export interface components {
             sha256: string;
         };
         /**
+         * VehicleDiagnosis
+         * @description What was found of one vehicle.
+         */
+        VehicleDiagnosis: {
+            /** Name */
+            name: string;
+            /** Imc Id */
+            imc_id: number;
+            state: components["schemas"]["NodeState"];
+            /** Healthy */
+            healthy: boolean;
+            /**
+             * Causes
+             * @description Of its problems, the one to look at first in front
+             */
+            causes: components["schemas"]["Cause"][];
+            /** Findings */
+            findings: components["schemas"]["Finding"][];
+            /**
+             * History
+             * @description The last changes of its link, oldest first
+             */
+            history: components["schemas"]["LinkRecord"][];
+        };
+        /**
          * VehicleKind
          * @description Which link reaches a vehicle.
          * @enum {string}
          */
-        VehicleKind: "imc" | "rest" | "sim";
+        VehicleKind: "imc" | "rest" | "sim" | "neptus";
         /**
          * VehicleSpec
          * @description A vehicle that takes part in a mission.
@@ -1915,7 +2047,7 @@ export interface components {
              */
             name: string;
             /**
-             * @description imc: DUNE over UDP; rest: polls and posts by itself; sim: simulated inside the service
+             * @description imc: DUNE over UDP; rest: polls and posts by itself; sim: simulated inside the service; neptus: of a session of Neptus' ConvCAO panel, which makes its mission itself
              * @default imc
              */
             kind: components["schemas"]["VehicleKind"];
@@ -1926,6 +2058,16 @@ export interface components {
              * @description Depth it travels at where the bottom leaves room; null: the first vehicle of a mission at limits.min_depth_m, each further one limits.min_vertical_separation_m deeper
              */
             depth_m?: number | null;
+            /**
+             * @description How a vehicle of kind imc is led. follow: by references, one a second; legs: by a plan for each whole leg, where radio ends at the surface; acoustic: by legs, and by sound while radio is silent
+             * @default follow
+             */
+            guidance: components["schemas"]["Guidance"];
+            /**
+             * Gateway
+             * @description With guidance acoustic: the name that the node with the modem announces
+             */
+            gateway?: string | null;
             /**
              * Start
              * @description Where a simulated vehicle starts, [longitude, latitude]; default: a corner of the area
@@ -4455,6 +4597,44 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["VehicleView"][];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    examineLinks: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["DoctorView"];
                 };
             };
             /** @description An access token is needed */
