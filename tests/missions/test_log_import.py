@@ -14,7 +14,7 @@ from typing import Any
 
 import pytest
 
-from app.missions import importing
+from app.missions import log_import
 from app.missions.errors import InvalidRequestError
 from app.missions.service import MissionService
 from app.missions.settings import ServiceSettings
@@ -61,7 +61,7 @@ def log(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def small_batches(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(importing, "BATCH", 50)
+    monkeypatch.setattr(log_import, "BATCH", 50)
 
 
 async def take(service: MissionService, mission_id: str, log: Path, **options: Any) -> LogImportView:
