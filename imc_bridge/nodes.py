@@ -307,11 +307,12 @@ class Node:
 
     def can_start(self, now: float) -> bool:
         """In service and ready for a plan, by messages that are not old."""
+        limit = max(STATE_MESSAGES_FRESH_S, self._settings.lost_after_wall_s * self._settings.time_scale)
         return (
             self.operation_mode == OperationMode.SERVICE
             and self.plan_state == PlanState.READY
-            and _fresh(self.operation_mode_at, now)
-            and _fresh(self.plan_state_at, now)
+            and _fresh(self.operation_mode_at, now, limit)
+            and _fresh(self.plan_state_at, now, limit)
         )
 
     def executing(self, plan_id: str) -> bool:
@@ -414,8 +415,8 @@ def listed_entities(message: Message) -> dict[int, str]:
     return entities
 
 
-def _fresh(at: float | None, now: float) -> bool:
-    return at is not None and now - at <= STATE_MESSAGES_FRESH_S
+def _fresh(at: float | None, now: float, limit_s: float) -> bool:
+    return at is not None and now - at <= limit_s
 
 
 def _enum_name(kind: type[IntEnum], value: int | None) -> str:
