@@ -219,7 +219,7 @@ class NeptusFleetLink:
         return session in self._fleets
 
     def locate(self, data: StepData, host: str) -> None:
-        """Note where the vehicles are: from now on they can take part."""
+        """Note where the vehicles are."""
         fleet = self._fleets[data.session]
         fleet.host = host
         now_s = time.time()
@@ -227,8 +227,6 @@ class NeptusFleetLink:
             lat, lon = self.gateway.area.to_geographic(place.row, place.col)
             craft.place = place
             craft.report = VehicleReport(craft.name, now_s, Position(lat, lon, place.depth_m))
-            if craft.state is not LinkState.ENGAGED:
-                self._set_state(craft, LinkState.READY)
 
     def take(self, data: StepData) -> None:
         """Tell of a step: what was sounded, where the vehicles are, and that they arrived."""
@@ -242,6 +240,9 @@ class NeptusFleetLink:
         for craft in fleet.crafts:
             if craft.report is not None:
                 self._sink(craft.report)
+            if craft.state is not LinkState.ENGAGED:
+                # Not before the soundings are in, or the first decision would be made without them.
+                self._set_state(craft, LinkState.READY)
         for craft in fleet.crafts:
             if craft.order is not None and craft.published and craft.status is not WaypointStatus.REACHED:
                 self._report(craft, WaypointStatus.REACHED)
