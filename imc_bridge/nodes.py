@@ -376,7 +376,8 @@ class Node:
                 NodeState.EXPECTED_OFFLINE,
                 f"silent for {seconds:.0f} s on a leg of ours, expected back within {left:.0f} s",
             )
-        if self.submerged and self.plan_state == PlanState.EXECUTING and silence <= self.patience_s:
+        away = self.expected_back is None and self.plan_state == PlanState.EXECUTING
+        if away and self.submerged and silence <= self.patience_s:
             whose = "our plan" if self.executing(self._settings.plan_id) else f"plan {self.plan_id!r}"
             comes_up = "; without references that ends and it comes up" if self.references_needed else ""
             return Status(
