@@ -76,6 +76,15 @@ class Corrections:
         name = VerticalDatum(tide.datum_epsg, "").crs.name
         return VerticalDatum(tide.datum_epsg, f"EPSG:{tide.datum_epsg} {name}, by {how}{sound})")
 
+    def water_level_m(self, time_s: float) -> float:
+        """How high the water stands above the datum of corrected depths; the table's lowest where it has no level."""
+        level = self._tide.level_m
+        if self.table is not None:
+            level = float(self.table.levels_at(time_s))
+            if not np.isfinite(level):
+                level = float(self.table.levels_m.min())
+        return level - self._tide.datum_offset_m
+
     def apply(self, reports: Sequence[SoundingReport]) -> list[Corrected]:
         """Return one result per report, in their order. Every number in a report is finite."""
         if not reports:

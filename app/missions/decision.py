@@ -85,8 +85,13 @@ def decide(
     places: list[Place],
     belief: Belief,
     soundings_en_m: FloatArray,
+    water_level_m: float = 0.0,
 ) -> Decision:
-    """Decide one step for the vehicles at ``places``; vehicles far outside the area are sent to its border."""
+    """Decide one step for the vehicles at ``places``; vehicles far outside the area are sent to its border.
+
+    ``water_level_m`` is how high the water stands above the datum of the belief's depths. Vehicles count their depth
+    from the water level: below the datum it leaves them less room; above it the room to spare is not used.
+    """
     polygon = Polygon(constraints.area)
     notes: list[str] = []
     team: list[Place] = []
@@ -108,10 +113,11 @@ def decide(
         return Decision(legs, None, {}, planner.snapshot(), notes)
 
     names = tuple(place.vehicle for place in team)
-    bottom = Bottom.from_landmarks(belief.xy_m, belief.depth_m)
+    below_level_m = belief.depth_m + min(water_level_m, 0.0)
+    bottom = Bottom.from_landmarks(belief.xy_m, below_level_m)
     cautious = Bottom.from_landmarks(
         belief.xy_m,
-        np.where(np.isfinite(belief.sd_m), belief.depth_m - safety.UNCERTAINTY_FACTOR * belief.sd_m, np.nan),
+        np.where(np.isfinite(belief.sd_m), below_level_m - safety.UNCERTAINTY_FACTOR * belief.sd_m, np.nan),
     )
     origin = np.array(
         [

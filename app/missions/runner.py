@@ -266,6 +266,7 @@ class Runner:
                 places,
                 live.builder.belief(),
                 live.builder.sounded_at_m(),
+                live.gate.corrections.water_level_m(now().timestamp()),
             )
 
         with metrics.PLANNING_SECONDS.time():

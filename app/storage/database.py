@@ -1,13 +1,17 @@
 """The database behind the service: connections, transactions, SQLite's settings."""
 
+import asyncio
 from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, nullcontext
 from typing import Any
 
 from sqlalchemy import Connection, event, make_url, text
 from sqlalchemy.ext.asyncio import AsyncConnection, AsyncEngine, AsyncSession, create_async_engine
 
 from app.storage.shielding import to_the_end
+
+BUSY_TIMEOUT_MS = 30_000
+"""How long a writer waits for one of another process."""
 
 
 def make_engine(url: str) -> AsyncEngine:
@@ -32,7 +36,7 @@ def make_engine(url: str) -> AsyncEngine:
         # The driver's own implicit transactions would begin too late for BEGIN IMMEDIATE.
         connection.isolation_level = None
         cursor = connection.cursor()
-        for pragma in ("journal_mode=WAL", "synchronous=FULL", "foreign_keys=ON", "busy_timeout=10000"):
+        for pragma in ("journal_mode=WAL", "synchronous=FULL", "foreign_keys=ON", f"busy_timeout={BUSY_TIMEOUT_MS}"):
             cursor.execute(f"PRAGMA {pragma}")
         cursor.close()
 
@@ -51,6 +55,9 @@ class Database:
     def __init__(self, url: str) -> None:
         self.url = url
         self._engine = make_engine(url)
+        # SQLite's writers wait for each other by asking again and again, and the unlucky one gives up ("database is
+        # locked"). Those of this process stand in line instead; the timeout is left for other processes.
+        self._turn = asyncio.Lock() if self._engine.dialect.name == "sqlite" else None
 
     @asynccontextmanager
     async def reading(self) -> AsyncIterator[AsyncSession]:
@@ -61,7 +68,7 @@ class Database:
     @asynccontextmanager
     async def writing(self) -> AsyncIterator[AsyncSession]:
         """Yield a session whose changes are committed together, or not at all when the block raises."""
-        async with self._connected() as connection:
+        async with self._turn or nullcontext(), self._connected() as connection:
             await connection.execution_options(bathyfleet_writes=True)
             async with connection.begin(), _session_on(connection) as session:
                 yield session

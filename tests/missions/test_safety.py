@@ -174,12 +174,17 @@ def place(name: str, east_m: float, north_m: float, depth_m: float = 2.0) -> Pla
 
 
 def decide_for(
-    places: list[Place], wishes: list[list[float]], belief: Belief | None = None, **changes: Any
+    places: list[Place],
+    wishes: list[list[float]],
+    belief: Belief | None = None,
+    water_level_m: float = 0.0,
+    **changes: Any,
 ) -> tuple[Decision, Wishes, MissionSpec]:
     spec = make_spec(60.0, **({"limits": {"max_step_m": 12.0, "max_depth_m": 20.0}} | changes))
     planner = Wishes(wishes)
     belief = belief or belief_of()
-    return decide(1, spec, make_constraints(spec), planner, places, belief, np.zeros((0, 2))), planner, spec
+    decision = decide(1, spec, make_constraints(spec), planner, places, belief, np.zeros((0, 2)), water_level_m)
+    return decision, planner, spec
 
 
 def test_waypoints_are_as_proposed_at_each_vehicles_depth() -> None:
@@ -196,6 +201,15 @@ def test_waypoints_are_as_proposed_at_each_vehicles_depth() -> None:
 def test_the_bottom_is_taken_to_be_shallower_than_estimated() -> None:
     decision, _, _ = decide_for([place("a", 10, 10, 5.0)], [[12.0, 12.0, 5.0]], belief_of(6.0, 0.75))
     assert decision.legs[0].target_m[2] == pytest.approx(6.0 - 2 * 0.75 - 1.0)
+
+
+@pytest.mark.parametrize(("water_level_m", "room_m"), [(-0.8, 5.2), (0.0, 6.0), (3.0, 6.0)])
+def test_water_below_the_datum_leaves_less_room_and_water_above_it_is_not_relied_on(
+    water_level_m: float, room_m: float
+) -> None:
+    decision, _, _ = decide_for([place("a", 10, 10, 5.0)], [[12.0, 12.0, 5.0]], belief_of(6.0, 0.75), water_level_m)
+    assert decision.legs[0].target_m[2] == pytest.approx(room_m - 2 * 0.75 - 1.0)
+    assert decision.bottom.at(np.array([12.0, 12.0])) == pytest.approx(room_m - 2 * 0.75)
 
 
 def test_a_proposal_of_nan_holds_and_is_told() -> None:

@@ -118,6 +118,32 @@ async def test_a_mission_takes_everything_of_its_own_with_it(database: Database)
         assert await _count(database, model) == 0
 
 
+async def test_writers_of_one_process_stand_in_line_however_long_each_takes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("app.storage.database.BUSY_TIMEOUT_MS", 0)  # nobody who finds it locked would wait
+    database = Database(f"sqlite+aiosqlite:///{tmp_path / 'line.db'}")
+    entered: list[str] = []
+    inside, leave = asyncio.Event(), asyncio.Event()
+
+    async def write(name: str) -> None:
+        async with database.writing() as session:
+            await session.execute(text("CREATE TABLE IF NOT EXISTS names (name TEXT)"))
+            entered.append(name)
+            inside.set()
+            await leave.wait()
+
+    try:
+        tasks = [asyncio.create_task(write(name)) for name in "abc"]
+        await inside.wait()
+        assert entered == ["a"]
+        leave.set()
+        await asyncio.gather(*tasks)
+        assert entered == ["a", "b", "c"]
+    finally:
+        await database.close()
+
+
 async def test_many_writers_at_once_all_succeed(database: Database) -> None:
     async with database.writing() as session:
         session.add(mission())
