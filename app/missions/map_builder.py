@@ -77,7 +77,7 @@ class MapBuilder:
         self._soundings = np.zeros((0, 4))
         self._prior: BathymetricMap | None = None
         # The model with its hyperparameters, and for the soundings it was learned on which are outliers.
-        self._learned = (GaussianProcessMap(reject_outliers=False), np.zeros(0, dtype=bool))
+        self._learned = (_new_model(), np.zeros(0, dtype=bool))
         self._building = threading.Lock()
         self._learning = threading.Lock()
         self._newest: BuiltMap | None = None
@@ -136,7 +136,7 @@ class MapBuilder:
                 if item.soundings is not None:
                     self._generation += 1
                     arrived, self._soundings = [], item.soundings
-                    self._learned = (GaussianProcessMap(reject_outliers=False), np.zeros(0, dtype=bool))
+                    self._learned = (_new_model(), np.zeros(0, dtype=bool))
             else:
                 arrived.append(item)
         if arrived:
@@ -220,6 +220,12 @@ class MapBuilder:
     def sounded_at_m(self) -> FloatArray:
         """Return where the soundings of the newest map were taken, shape (n, 2)."""
         return self._soundings[:, :2].copy()
+
+
+def _new_model() -> GaussianProcessMap:
+    # Smoother kernels predict better between soundings, but are far too sure of the ground beyond them, where vehicles
+    # are sent next and the safety check goes by the deviation. Outliers are judged by ``learn``.
+    return GaussianProcessMap("matern32", reject_outliers=False)
 
 
 def _as_soundings(rows: NDArray[np.float64]) -> Soundings:
