@@ -41,8 +41,9 @@ def test_one_speed_stretches_every_ray(speed: float, across_m: float, down_m: fl
     assert (across[0], down[0]) == pytest.approx((across_m * speed / 1500, down_m * speed / 1500), rel=1e-9)
 
 
-@given(st.floats(0, 70), st.floats(0, 30), st.floats(0.1, 50))
-def test_the_ray_arrives_when_the_sonar_heard_it(sonar_m: float, across_m: float, down_m: float) -> None:
+@given(st.floats(0, 70), st.floats(0, 3), st.floats(0.1, 50))
+def test_the_ray_arrives_when_the_sonar_heard_it(sonar_m: float, slant: float, down_m: float) -> None:
+    across_m = slant * down_m  # a beam that grazes may really be bent upwards again
     across, down = PROFILE.trace(np.array([sonar_m]), np.array([across_m]), np.array([down_m]))
     way = np.hypot(across[0], down[0])
     heard = np.hypot(across_m, down_m) / 1500.0
