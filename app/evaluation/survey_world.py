@@ -178,13 +178,18 @@ def along(start: FloatArray, end: FloatArray, sampling: Sampling) -> FloatArray:
 
 
 def default_map(soundings: Soundings, grid: Grid) -> BathymetricMap:
-    """Return the map that the service makes by default."""
+    """Return the default map, its kernel chosen by the likelihood."""
     return GaussianProcessMap().fit(soundings).predict(grid)
 
 
 def stationary_map(soundings: Soundings, grid: Grid) -> BathymetricMap:
     """Return what a Gaussian process with a Matern 3/2 kernel and learned hyperparameters makes of the soundings."""
-    return GaussianProcessMap(nonstationary=False).fit(soundings).predict(grid)
+    return GaussianProcessMap("matern32", nonstationary=False).fit(soundings).predict(grid)
+
+
+def mission_map(soundings: Soundings, grid: Grid) -> BathymetricMap:
+    """Return the map that a mission makes, which keeps to one kernel (see ``app.missions.map_builder``)."""
+    return GaussianProcessMap("matern32").fit(soundings).predict(grid)
 
 
 def rmse_m(estimate: BathymetricMap, terrain: Terrain) -> tuple[float, float]:
