@@ -3,13 +3,13 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from scipy.spatial import cKDTree
 
 from app.mapping.kernels import KERNEL_CODES, KernelName
 from app.mapping.kriging import krige_holes
 from app.mapping.likelihood import Hyperparameters, RestrictedLikelihood, Trend, spread_subset
 from app.mapping.neighbours import nearest
+from app.mapping.planes import LEAST_COMPANY, SUSPICION, judge_squares, plane_residuals
 from app.mapping.scales import uniform_scales
 from app.mapping.supersoundings import merge_soundings
 from app.mapping.threads import each
@@ -17,9 +17,6 @@ from app.mapping.types import BoolArray, FloatArray, IntArray, Soundings
 
 PLANE_NEIGHBOURS = 16
 KRIGING_NEIGHBOURS = 24
-SUSPICION = 4.0
-"""Robust standard deviations from a local plane that make a sounding suspect."""
-
 CONVICTION = 5.0
 """Standard deviations from what its unsuspected neighbours predict that make a suspect an outlier."""
 
@@ -30,6 +27,11 @@ EXCUSE_PRIOR_WEIGHT = 2.0
 NORMAL_99 = 2.576
 CHUNK = 30_000
 """Planes are fitted to so many soundings at a time: bounds the memory, and threads share the chunks."""
+
+MANY = 50_000
+"""From so many soundings on, those of one square share a plane: each a plane of its own would take minutes."""
+
+PER_SQUARE = 24
 
 
 @dataclass(frozen=True)
@@ -66,10 +68,10 @@ def flag_outliers(
 
     First look: a sounding is suspect when it lies more than ``SUSPICION`` robust standard deviations from a
     plane through its neighbours (the neighbours' own scatter about their planes sets the scale, so that
-    steep or rough places do not raise suspicion). Second look: a suspect is rejected when it also lies more
-    than ``CONVICTION`` standard deviations from what kriging predicts from unsuspected neighbours. How well
-    leave-one-out prediction works nearby, and how heavy the tail of its errors is, scale the standard
-    deviation.
+    steep or rough places do not raise suspicion); of very many soundings those in one small square are
+    neighbours. Second look: a suspect is rejected when it also lies more than ``CONVICTION`` standard
+    deviations from what kriging predicts from unsuspected neighbours. How well leave-one-out prediction works
+    nearby, and how heavy the tail of its errors is, scale the standard deviation.
 
     Parameters
     ----------
@@ -92,7 +94,7 @@ def flag_outliers(
         trusted = np.arange(n)
         suspect = np.zeros(n, np.bool_)
     extent = max(float(np.ptp(points, axis=0).max()), 1e-3)
-    merged, _ = merge_soundings(soundings.take(trusted), extent / 100.0)
+    merged, _ = merge_soundings(soundings.take(trusted), extent / max(100.0, 0.5 * np.sqrt(n)))
     merged_points = np.column_stack([merged.east_m, merged.north_m])
     subset = spread_subset(merged_points, LEARNING_POINTS)
     likelihood = RestrictedLikelihood(
@@ -184,7 +186,37 @@ def _excuse(
 
 def _suspects(points: FloatArray, soundings: Soundings) -> BoolArray:
     n = len(points)
-    if n < 8:  # too few neighbours to tell an outlier from the sea floor
+    if n <= MANY:
+        return _suspects_by_neighbours(points, soundings)
+    suspect, alone = _suspects_by_square(points, soundings)
+    rows = np.flatnonzero(alone)
+    if len(rows):
+        suspect[rows] = _suspects_by_neighbours(points[rows], soundings.take(rows))
+    return suspect
+
+
+def _suspects_by_square(points: FloatArray, soundings: Soundings) -> tuple[BoolArray, BoolArray]:
+    """Hold soundings against one robust plane per square; also return which have too few beside them, (n,) each."""
+    n = len(points)
+    low = points.min(axis=0)
+    extent = np.maximum(np.ptp(points, axis=0), 1e-9)
+    side = float(np.sqrt(extent.prod() * PER_SQUARE / n))
+    side = max(side, float(extent.max()) / n)  # a straight track has no area
+    at = ((points - low) / side).astype(np.int64)
+    square = at[:, 1] * (int(at[:, 0].max()) + 1) + at[:, 0]
+    order = np.argsort(square, kind="stable")
+    first = np.append(np.flatnonzero(np.diff(square[order], prepend=-1)), n)
+    suspect, alone = np.zeros(n, np.bool_), np.zeros(n, np.bool_)
+    per_chunk = max(1, CHUNK // PER_SQUARE)
+    parts = [first[i : i + per_chunk + 1] for i in range(0, len(first) - 1, per_chunk)]
+    each(lambda part: judge_squares(points, soundings.depth_m, soundings.sd_m, order, part, suspect, alone), parts)
+    return suspect, alone
+
+
+def _suspects_by_neighbours(points: FloatArray, soundings: Soundings) -> BoolArray:
+    """Hold each sounding against a robust plane through its neighbours, (n,)."""
+    n = len(points)
+    if n < LEAST_COMPANY:  # too few neighbours to tell an outlier from the sea floor
         return np.zeros(n, np.bool_)
     tree = cKDTree(points)
     chunks = [slice(i, min(i + CHUNK, n)) for i in range(0, n, CHUNK)]
@@ -194,7 +226,7 @@ def _suspects(points: FloatArray, soundings: Soundings) -> BoolArray:
     def fit_planes(chunk: slice) -> None:
         index = nearest(tree, points[chunk], PLANE_NEIGHBOURS + 1)[1]
         near[chunk] = index
-        residual[chunk] = _plane_residuals(points, soundings.depth_m, chunk.start, index)
+        residual[chunk] = plane_residuals(points, soundings.depth_m, chunk.start, index)
 
     each(fit_planes, chunks)
     suspect = np.empty(n, np.bool_)
@@ -206,65 +238,3 @@ def _suspects(points: FloatArray, soundings: Soundings) -> BoolArray:
 
     each(judge, chunks)
     return suspect
-
-
-@njit(cache=True, nogil=True)
-def _plane_residuals(points: FloatArray, depth: FloatArray, first: int, near: IntArray) -> FloatArray:
-    """Depth minus a robust plane through the neighbours (Huber; slopes damped for collinear tracks).
-
-    Row i of ``near`` holds the neighbours of point ``first + i``.
-    """
-    n, k = near.shape
-    result = np.zeros(n)
-    z = np.empty(k)
-    weight = np.empty(k)
-    size = np.empty(k)
-    for t in range(n):
-        i = first + t
-        m = 0
-        radius2 = 1e-12
-        for c in range(k):
-            j = near[t, c]
-            if j != i:
-                z[m] = depth[j]
-                dx, dy = points[j, 0] - points[i, 0], points[j, 1] - points[i, 1]
-                radius2 = max(radius2, dx * dx + dy * dy)
-                m += 1
-        centre = np.median(z[:m])
-        slope_e = slope_n = 0.0
-        for _ in range(8):
-            c = 0
-            for q in range(k):
-                j = near[t, q]
-                if j != i:
-                    dx, dy = points[j, 0] - points[i, 0], points[j, 1] - points[i, 1]
-                    size[c] = abs(z[c] - centre - slope_e * dx - slope_n * dy)
-                    c += 1
-            bound = 1.345 * 1.4826 * np.median(size[:m]) + 1e-9
-            for c in range(m):
-                weight[c] = 1.0 if size[c] <= bound else bound / size[c]
-            a = np.zeros((3, 3))
-            b = np.zeros(3)
-            c = 0
-            for q in range(k):
-                j = near[t, q]
-                if j != i:
-                    w = weight[c]
-                    dx, dy = points[j, 0] - points[i, 0], points[j, 1] - points[i, 1]
-                    a[0, 0] += w
-                    a[0, 1] += w * dx
-                    a[0, 2] += w * dy
-                    a[1, 1] += w * dx * dx
-                    a[1, 2] += w * dx * dy
-                    a[2, 2] += w * dy * dy
-                    b[0] += w * z[c]
-                    b[1] += w * z[c] * dx
-                    b[2] += w * z[c] * dy
-                    c += 1
-            a[1, 1] += 0.05 * radius2
-            a[2, 2] += 0.05 * radius2
-            a[1, 0], a[2, 0], a[2, 1] = a[0, 1], a[0, 2], a[1, 2]
-            solution = np.linalg.solve(a, b)
-            centre, slope_e, slope_n = solution[0], solution[1], solution[2]
-        result[t] = depth[i] - centre
-    return result

@@ -2,9 +2,12 @@
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from app.mapping.gp import GaussianProcessMap
-from app.mapping.outliers import flag_outliers
+from app.mapping.outliers import MANY, flag_outliers
+from app.mapping.planes import LEAST_COMPANY, robust_plane
 from app.mapping.types import Grid, Soundings
 
 
@@ -73,3 +76,43 @@ def test_outliers_do_not_bend_the_map() -> None:
 def test_a_handful_of_soundings_can_be_judged(n: int) -> None:
     s = survey(0).take(np.arange(n))
     assert flag_outliers(s).rejected.shape == (n,)
+
+
+def large_survey(seed: int) -> Soundings:
+    """Many soundings, four to a square metre, beside a cliff; and one lonely track."""
+    rng = np.random.default_rng(seed)
+    n = MANY + 4000
+    side = np.sqrt(n / 4)
+    east, north = rng.uniform(0, side, (2, n))
+    east, north = np.append(east, np.linspace(side, 3 * side, 400)), np.append(north, np.linspace(0, side, 400))
+    depth = 20 + 0.05 * east + np.sin(north / 6) + np.where(north > 0.4 * side + 0.2 * east, 4.0, 0.0)
+    sd = 0.01 * depth
+    return Soundings(east, north, depth + sd * rng.standard_normal(len(east)), sd)
+
+
+def test_very_many_soundings_are_judged_as_well_as_few() -> None:
+    spoiled, bad = spoil(large_survey(0), 1)
+    report = flag_outliers(spoiled)
+    assert np.mean(report.rejected[bad]) >= 0.9
+    assert np.mean(report.rejected[~bad]) <= 1e-4
+    assert report.rejected[-400:][bad[-400:]].mean() >= 0.5, "a lonely track is looked at too"
+
+
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    n=st.integers(LEAST_COMPANY, 60),
+    slope=st.tuples(st.floats(-2, 2), st.floats(-2, 2)),
+    scale_m=st.floats(0.1, 100),
+)
+def test_a_plane_is_found_through_a_fifth_of_gross_errors(
+    seed: int, n: int, slope: tuple[float, float], scale_m: float
+) -> None:
+    rng = np.random.default_rng(seed)
+    dx, dy = rng.uniform(-scale_m, scale_m, (2, n))
+    z = 5.0 + slope[0] * dx + slope[1] * dy + 0.01 * scale_m * rng.standard_normal(n)
+    truth = z.copy()
+    wrong = rng.choice(n, n // 5, replace=False)
+    z[wrong] += rng.choice([-1, 1], len(wrong)) * 20.0 * scale_m
+    centre, east, north = robust_plane(dx, dy, z, np.empty(n))
+    misses = np.abs(centre + east * dx + north * dy - truth)
+    assert np.median(misses) < 3.0 * scale_m, "far less than the errors of 20"
