@@ -12,7 +12,7 @@ from app.mapping.fields import Field
 from app.mapping.kernels import KERNEL_CODES
 from app.mapping.kriging import Conditioned, krige_holes
 from app.mapping.neighbours import nearest
-from app.mapping.types import FloatArray, Grid, IntArray, Soundings
+from app.mapping.types import FloatArray, Grid, IntArray
 
 STEEPNESS_EXPONENT = 0.25
 """Variance grows with this power of the squared slope: a process that is right on average errs at edges."""
@@ -62,23 +62,24 @@ class Calibration:
         return np.asarray(np.sqrt(variance * np.exp(log_steepness + 2.0 * self.log_scale) + common**2))
 
 
-def uncalibrated(grid: Grid, relief_m: FloatArray, soundings: Soundings) -> Calibration:
+def uncalibrated(grid: Grid, relief_m: FloatArray, tree: cKDTree, sd_m: FloatArray) -> Calibration:
     """Return the calibration before any check: steep places and common errors.
 
     Parameters
     ----------
     grid, relief_m : (rows, cols)
         A coarse map, depth minus trend.
-    soundings
-        Whose stated deviations tell the common error.
+    tree
+        Positions of the soundings.
+    sd_m : (n,)
+        Their stated deviations, which tell the common error.
     """
     d_north, d_east = np.gradient(relief_m, grid.cell_m)
     square = gaussian_filter(d_north**2 + d_east**2, 1.0, mode="nearest")
     typical = float(square.mean()) + 1e-30
-    tree = cKDTree(np.column_stack([soundings.east_m, soundings.north_m]))
     _, closest = nearest(tree, grid.centres_m, 1)
     relative = (square + STEEPNESS_FLOOR * typical) / (typical * (1.0 + STEEPNESS_FLOOR))
-    common = COMMON_ERROR * soundings.sd_m[closest[:, 0]].reshape(grid.rows, grid.cols)
+    common = COMMON_ERROR * sd_m[closest[:, 0]].reshape(grid.rows, grid.cols)
     return Calibration(Field(grid, np.array([STEEPNESS_EXPONENT * np.log(relative), common])), 0.0)
 
 
@@ -102,11 +103,11 @@ class HeldOut:
     map_variance: FloatArray
 
 
-def gaps(points: FloatArray) -> FloatArray:
-    """Distance to the nearest of ``points`` (n, 2) from an even lattice of places over their rectangle, metres."""
-    low, high = points.min(axis=0), points.max(axis=0)
+def gaps(tree: cKDTree) -> FloatArray:
+    """Distance to the nearest point of ``tree`` from an even lattice of places over their rectangle, metres."""
+    low, high = tree.mins, tree.maxes
     east, north = np.meshgrid(*(np.linspace(low[i], high[i], GAP_CELLS) for i in (0, 1)))
-    return nearest(cKDTree(points), np.column_stack([east.ravel(), north.ravel()]), 1)[0][:, 0]
+    return nearest(tree, np.column_stack([east.ravel(), north.ravel()]), 1)[0][:, 0]
 
 
 def hold_out(process: Conditioned, rows: IntArray, neighbours: tuple[int, int]) -> HeldOut:
@@ -114,7 +115,7 @@ def hold_out(process: Conditioned, rows: IntArray, neighbours: tuple[int, int]) 
     points = process.levels.points
     # steps of the golden ratio: even over the gaps, and unrelated to the order of the soundings
     chosen = (0.5 + GOLDEN * np.arange(len(rows))) % 1.0
-    radius = np.maximum(np.quantile(gaps(points[: process.levels.n_fine]), chosen), 1e-6)
+    radius = np.maximum(np.quantile(gaps(process.levels.fine_tree), chosen), 1e-6)
     error, noise_part, model_part = krige_holes(
         KERNEL_CODES[process.kernel],
         points,

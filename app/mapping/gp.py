@@ -34,8 +34,8 @@ CHECK_POINTS = 800
 
 SMALL_GRID_CELLS = 60_000
 NEIGHBOURS_OF_SMALL_GRIDS = (32, 64)
-NEIGHBOURS_OF_LARGE_GRIDS = (24, 40)
-SOUNDINGS_PER_TILE = 6
+NEIGHBOURS_OF_LARGE_GRIDS = (32, 24)
+SOUNDINGS_PER_TILE_OF_SMALL_GRIDS, SOUNDINGS_PER_TILE_OF_LARGE_GRIDS = 6, 10
 TILE_RANGE = (4, 16)
 
 KERNEL_LADDER: tuple[KernelName, ...] = ("matern32", "matern52", "gaussian")
@@ -158,7 +158,7 @@ class GaussianProcessMap:
         self._depth = fine.depth_m
         self._variance = fine.sd_m**2
         learn = learn or not hasattr(self, "hyperparameters_")
-        subset = spread_subset(self._points, self.learning_points)
+        subset = spread_subset(self._levels.fine_tree, self.learning_points)
         uniform = uniform_scales(len(self._levels.soundings))
         if learn:
             self.kernel_ = self._choose_kernel() if self.kernel == "auto" else self.kernel
@@ -183,7 +183,7 @@ class GaussianProcessMap:
                 self._refined = self._condition(self._refined_hyperparameters, likelihood, scales)
         self._calibration: Calibration | None = None
         if self.calibrate:
-            self._calibration = uncalibrated(*relief, fine)
+            self._calibration = uncalibrated(*relief, self._levels.fine_tree, fine.sd_m)
         if learn:
             self._check()
         if self._calibration is not None:
@@ -197,7 +197,7 @@ class GaussianProcessMap:
 
     def _choose_kernel(self) -> KernelName:
         """Climb from the roughest kernel to smoother ones while the likelihood gains enough by it."""
-        subset = spread_subset(self._points, CHOICE_OF_KERNEL_POINTS)
+        subset = spread_subset(self._levels.fine_tree, CHOICE_OF_KERNEL_POINTS)
         best = KERNEL_LADDER[0]
         least = math.inf
         hyper: Hyperparameters | None = None
@@ -234,7 +234,7 @@ class GaussianProcessMap:
         cell = max(RELIEF_UNITS * self._unit_m, extent / MOST_RELIEF_CELLS)
         grid = coarse_grid(self._points.min(axis=0), self._points.max(axis=0), cell)
         everywhere = np.ones((grid.rows, grid.cols), np.bool_)
-        first, _ = self._plain.predict(grid, _uniform_over, everywhere, NEIGHBOURS_OF_LARGE_GRIDS, 2)
+        first, _ = self._plain.predict(grid, None, everywhere, NEIGHBOURS_OF_LARGE_GRIDS, 2)
         return grid, first - self._plain.trend(grid.centres_m).reshape(grid.rows, grid.cols)
 
     def _lengthen(
@@ -246,12 +246,12 @@ class GaussianProcessMap:
         back to the trend between the lines. Amplitude grows with length: the variance of short differences stays.
         """
         n = len(self._points)
-        gap = gaps(self._points)
+        gap = gaps(self._levels.fine_tree)
         gap = gap[gap < REACH_UNITS * self._unit_m]
         if n < LENGTHEN_FROM or len(gap) == 0:
             return hyper
         rows = np.unique(np.linspace(0, n - 1, min(n, CHOICE_POINTS)).astype(np.int64))
-        near = neighbours_beyond(self._points, rows, GAP_FACTOR * float(np.median(gap)), HOLE_NEIGHBOURS)
+        near = neighbours_beyond(self._levels.fine_tree, rows, GAP_FACTOR * float(np.median(gap)), HOLE_NEIGHBOURS)
         own = scales.take(np.arange(n))
         best, least = hyper, np.inf
         for factor in LENGTH_FACTORS:
@@ -281,7 +281,7 @@ class GaussianProcessMap:
         count = self.hole_points or min(max(LEAST_HOLES, n // SOUNDINGS_PER_HOLE), MOST_HOLES)
         errors = hole_errors(
             KERNEL_CODES[self.kernel_],
-            self._points,
+            self._levels.fine_tree,
             self._depth - self._plain.trend(self._points),
             hyper.noise_scale * self._variance,
             uniform_scales(n).scaled_metric(hyper.length_m),
@@ -326,8 +326,7 @@ class GaussianProcessMap:
         wanted = np.ones(shape, np.bool_) if mask is None else np.asarray(mask, np.bool_)
         if wanted.shape != shape:
             raise ValueError(f"mask has shape {wanted.shape}; the grid has {shape}")
-        few = grid.rows * grid.cols <= SMALL_GRID_CELLS
-        neighbours = self.neighbours or (NEIGHBOURS_OF_SMALL_GRIDS if few else NEIGHBOURS_OF_LARGE_GRIDS)
+        neighbours = self.neighbours or (NEIGHBOURS_OF_SMALL_GRIDS if _small(grid) else NEIGHBOURS_OF_LARGE_GRIDS)
         depth, variance = self._predict(grid, wanted, neighbours)
         deviation = np.sqrt(variance) if self._calibration is None else self._calibration.deviation(grid, variance)
         count = count_per_cell(grid, self.soundings_)
@@ -348,10 +347,10 @@ class GaussianProcessMap:
         """Depth and variance, (rows, cols): of one process, or averaged over both as far as each is trusted."""
         side, weight = self._tile_cells(grid), self.refinement_
         if self._refined is None or weight == 0.0:
-            return self._plain.predict(grid, _uniform_over, wanted, neighbours, side)
+            return self._plain.predict(grid, None, wanted, neighbours, side)
         depth, variance = self._refined.predict(grid, self._scales_over, wanted, neighbours, side)
         if weight < 1.0:
-            plain, plain_variance = self._plain.predict(grid, _uniform_over, wanted, neighbours, side)
+            plain, plain_variance = self._plain.predict(grid, None, wanted, neighbours, side)
             apart = depth - plain
             depth = plain + weight * apart
             variance = weight * variance + (1.0 - weight) * (plain_variance + weight * apart**2)
@@ -359,7 +358,8 @@ class GaussianProcessMap:
 
     def _tile_cells(self, grid: Grid) -> int:
         """Side of the tiles: few soundings in each, so that all its cells have much the same nearest ones."""
-        side = math.sqrt(SOUNDINGS_PER_TILE) * self._unit_m / grid.cell_m
+        soundings = SOUNDINGS_PER_TILE_OF_SMALL_GRIDS if _small(grid) else SOUNDINGS_PER_TILE_OF_LARGE_GRIDS
+        side = math.sqrt(soundings) * self._unit_m / grid.cell_m
         return int(np.clip(round(side), *TILE_RANGE))
 
 
@@ -370,8 +370,8 @@ def _scale_fields(ratio: Field, points: FloatArray, log_stretch: Field) -> Field
     return Field(ratio.grid, np.concatenate([log_ratio, log_stretch.over(ratio.grid)]))
 
 
-def _uniform_over(grid: Grid) -> LocalScales:
-    return uniform_scales(grid.rows * grid.cols)
+def _small(grid: Grid) -> bool:
+    return grid.rows * grid.cols <= SMALL_GRID_CELLS
 
 
 def _scales(fields: FloatArray) -> LocalScales:

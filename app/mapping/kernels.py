@@ -47,17 +47,26 @@ def exp_minus(t: float) -> float:
 
 
 @njit(cache=True, nogil=True, fastmath=_FAST)
-def covariance_row(kind: int, place: FloatArray, others: FloatArray, n: int, out: FloatArray) -> None:
+def covariance_row(kind: int, uniform: bool, place: FloatArray, others: FloatArray, n: int, out: FloatArray) -> None:
     """Covariance between one place and the first ``n`` of ``others``, written to ``out``.
 
     Parameters
     ----------
+    uniform
+        Amplitude and length are the same everywhere, no direction is preferred.
     place : (7,), others : (7, m)
         East, north, amplitude, and the four numbers of the squared-length matrix as in ``paciorek``.
     """
     x, y, amplitude, a0, a1, a2, a3 = place[0], place[1], place[2], place[3], place[4], place[5], place[6]
     distance = np.empty(n)
-    for c in range(n):
+    if uniform:
+        shrink = 1.0 / math.sqrt(a0)
+        for c in range(n):
+            dx = others[0, c] - x
+            dy = others[1, c] - y
+            distance[c] = math.sqrt(dx * dx + dy * dy) * shrink
+            out[c] = amplitude * amplitude
+    for c in range(0 if uniform else n):
         dx = others[0, c] - x
         dy = others[1, c] - y
         xx = 0.5 * (others[3, c] + a0)

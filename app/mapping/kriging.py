@@ -17,7 +17,7 @@ from app.mapping.kernels import (
 )
 from app.mapping.levels import TwoLevels
 from app.mapping.likelihood import Trend
-from app.mapping.scales import LocalScales
+from app.mapping.scales import LocalScales, uniform_scales
 from app.mapping.threads import each
 from app.mapping.types import BoolArray, FloatArray, Grid, IntArray
 
@@ -28,6 +28,7 @@ STRIP_CELLS = 60_000
 @njit(cache=True, nogil=True)
 def krige_tiles(
     kind: int,
+    uniform: bool,
     points: FloatArray,
     residual: FloatArray,
     noise: FloatArray,
@@ -49,6 +50,8 @@ def krige_tiles(
     ----------
     kind
         Code of the correlation function.
+    uniform
+        ``metric`` and ``amplitude`` are the same everywhere and no direction is preferred: quicker.
     points : (n, 2), residual : (n,), noise : (n,), metric : (n, 4), amplitude : (n,), basis : (n, p)
         Soundings: position, depth minus trend, noise variance, squared-length matrix as in ``LocalScales``,
         local standard deviation and trend functions.
@@ -103,9 +106,9 @@ def krige_tiles(
             k += 1
         for i in range(k):
             place[:] = near[:, i]
-            covariance_row(kind, place, near, i, a[i])
+            covariance_row(kind, uniform, place, near, i, a[i])
             a[i, i] = place[2] * place[2] * (1.0 + 1e-9) + noise[neighbours[t, i]]
-            covariance_row(kind, place, cells, m, v[i])
+            covariance_row(kind, uniform, place, cells, m, v[i])
         if not cholesky_in_place(a, k):
             continue
         solve_lower_in_place(a, k, y)
@@ -284,7 +287,7 @@ class Conditioned:
     def predict(
         self,
         grid: Grid,
-        scales_over: Callable[[Grid], LocalScales],
+        scales_over: Callable[[Grid], LocalScales] | None,
         wanted: BoolArray,
         neighbours: tuple[int, int],
         side: int,
@@ -294,7 +297,7 @@ class Conditioned:
         Parameters
         ----------
         scales_over
-            Scales of all cells of a grid, row-major.
+            Scales of all cells of a grid, row-major; None: the process is stationary, its own scales are uniform.
         neighbours
             Fine and coarse soundings used per tile.
         side
@@ -314,9 +317,10 @@ class Conditioned:
             )
             tiles, middle = tile_rows(part, side)
             targets = part.centres_m
-            scales = scales_over(part)
+            scales = uniform_scales(len(targets)) if scales_over is None else scales_over(part)
             mean, spread = krige_tiles(
                 KERNEL_CODES[self.kernel],
+                scales_over is None,
                 points,
                 residual,
                 self.noise_variance,

@@ -1,6 +1,7 @@
 """Soundings at two levels of detail: single ones nearby, merged ones farther away."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numba import njit
@@ -35,6 +36,11 @@ class TwoLevels:
     start: IntArray
     coarse_tree: cKDTree
     coarse_m: float
+
+    @cached_property
+    def fine_tree(self) -> cKDTree:
+        """The fine soundings' positions, for looking up neighbours."""
+        return cKDTree(self.points[: self.n_fine])
 
     @property
     def points(self) -> FloatArray:

@@ -190,15 +190,15 @@ class RestrictedLikelihood:
         return Trend(self._centre, coefficients, covariance)
 
 
-def spread_subset(points: FloatArray, size: int) -> IntArray:
-    """Choose at most ``size`` rows of ``points`` (n, 2), deterministically.
+def spread_subset(tree: cKDTree, size: int) -> IntArray:
+    """Choose at most ``size`` of the points of ``tree``, deterministically.
 
     Two thirds are every so-manieth in the given order (spatial order gives an even spread), one third the
     nearest neighbours of those: short distances tell noise and fine detail, long ones the large scales. Of very many
     points neighbours are too far from each other in such a choice to tell one from the other; then two thirds are
     clusters of neighbours.
     """
-    n = len(points)
+    n = tree.n
     if n <= size:
         return np.arange(n)
     many = n > MANY_TO_CHOOSE_FROM
@@ -206,5 +206,5 @@ def spread_subset(points: FloatArray, size: int) -> IntArray:
     together = CLUSTER if many else 1
     spread = ((np.arange(n_spread) + 0.5) * (n / n_spread)).astype(np.int64)
     anchors = spread[:: max(1, -(-n_spread * together // (size - n_spread)))]
-    _, near = nearest(cKDTree(points), points[anchors], together + 1)
+    _, near = nearest(tree, tree.data[anchors], together + 1)
     return np.union1d(spread, near[:, 1:])[:size]

@@ -96,7 +96,8 @@ def flag_outliers(
     extent = max(float(np.ptp(points, axis=0).max()), 1e-3)
     merged, _ = merge_soundings(soundings.take(trusted), extent / max(100.0, 0.5 * np.sqrt(n)))
     merged_points = np.column_stack([merged.east_m, merged.north_m])
-    subset = spread_subset(merged_points, LEARNING_POINTS)
+    tree = cKDTree(merged_points)
+    subset = spread_subset(tree, LEARNING_POINTS)
     likelihood = RestrictedLikelihood(
         kernel,
         merged_points[subset],
@@ -112,7 +113,7 @@ def flag_outliers(
     rows = np.flatnonzero(suspect)
     if len(rows):
         trend = likelihood.trend(hyperparameters)
-        _, near = nearest(cKDTree(merged_points), points[rows], KRIGING_NEIGHBOURS)
+        _, near = nearest(tree, points[rows], KRIGING_NEIGHBOURS)
         # suspects go behind the trusted ones, so that one call predicts them from those
         m = len(merged_points)
         variance = np.concatenate([merged.sd_m, soundings.sd_m[rows]]) ** 2 * hyperparameters.noise_scale
@@ -130,7 +131,7 @@ def flag_outliers(
         )
         predicted[rows] = soundings.depth_m[rows] - error
         deviations[rows] = np.abs(error) / np.sqrt(noise_part + model_part)
-        deviations[rows] /= _excuse(kernel, hyperparameters, merged_points, merged, trend, points[rows])
+        deviations[rows] /= _excuse(kernel, hyperparameters, tree, merged, trend, points[rows])
     rejected = np.nan_to_num(deviations) > CONVICTION
     reasons = [""] * n
     for i in np.flatnonzero(rejected):
@@ -144,7 +145,7 @@ def flag_outliers(
 def _excuse(
     kernel: KernelName,
     hyper: Hyperparameters,
-    points: FloatArray,
+    tree: cKDTree,
     merged: Soundings,
     trend: Trend,
     at: FloatArray,
@@ -154,9 +155,10 @@ def _excuse(
     The local root mean square of leave-one-out deviations, times the excess of their tail over the normal
     one.
     """
-    n = len(points)
+    points = np.asarray(tree.data)
+    n = tree.n
     rows = np.unique(np.linspace(0, n - 1, min(n, EXCUSE_POINTS)).astype(np.int64))
-    _, near = nearest(cKDTree(points), points[rows], KRIGING_NEIGHBOURS + 1)
+    _, near = nearest(tree, points[rows], KRIGING_NEIGHBOURS + 1)
     near[near == rows[:, None]] = -1
     error, noise_part, model_part = krige_holes(
         KERNEL_CODES[kernel],
@@ -173,15 +175,15 @@ def _excuse(
     if known.sum() <= EXCUSE_NEIGHBOURS:
         return np.ones(len(at))
     square, places = square[known], points[rows[known]]
-    tree = cKDTree(places)
+    sampled = cKDTree(places)
 
     def local(near: IntArray) -> FloatArray:
         total = EXCUSE_PRIOR_WEIGHT * square.mean() + square[near].sum(axis=1)
         return np.asarray(np.sqrt(total / (EXCUSE_PRIOR_WEIGHT + near.shape[1])))
 
-    others = nearest(tree, places, EXCUSE_NEIGHBOURS + 1)[1][:, 1:]
+    others = nearest(sampled, places, EXCUSE_NEIGHBOURS + 1)[1][:, 1:]
     tail = float(np.percentile(np.sqrt(square) / local(others), 99.0)) / NORMAL_99
-    return max(1.0, tail) * local(nearest(tree, at, EXCUSE_NEIGHBOURS)[1])
+    return max(1.0, tail) * local(nearest(sampled, at, EXCUSE_NEIGHBOURS)[1])
 
 
 def _suspects(points: FloatArray, soundings: Soundings) -> BoolArray:

@@ -26,7 +26,7 @@ def robust_plane(dx: FloatArray, dy: FloatArray, z: FloatArray, size: FloatArray
     radius2 = 1e-12
     for c in range(m):
         radius2 = max(radius2, dx[c] * dx[c] + dy[c] * dy[c])
-    centre = np.median(z)
+    centre = float(np.median(z))
     east = north = 0.0
     for _ in range(ROUNDS):
         for c in range(m):

@@ -37,10 +37,9 @@ class HoleErrors:
     weight: FloatArray
 
 
-def neighbours_beyond(points: FloatArray, rows: IntArray, radius_m: float, k: int) -> IntArray:
-    """Return the ``k`` nearest points of ``rows`` at distance ``radius_m`` or more: (h, k), -1 for none."""
-    tree = cKDTree(points)
-    n = len(points)
+def neighbours_beyond(tree: cKDTree, rows: IntArray, radius_m: float, k: int) -> IntArray:
+    """Return the ``k`` points of ``tree`` nearest to each of ``rows`` at ``radius_m`` or more: (h, k), -1 for none."""
+    n, points = tree.n, tree.data
     result = np.full((len(rows), k), -1, np.int64)
     todo = np.arange(len(rows))
     ask = min(n, 4 * k)
@@ -60,7 +59,7 @@ def neighbours_beyond(points: FloatArray, rows: IntArray, radius_m: float, k: in
 
 def hole_errors(
     kind: int,
-    points: FloatArray,
+    tree: cKDTree,
     residual: FloatArray,
     noise: FloatArray,
     metric: FloatArray,
@@ -69,7 +68,8 @@ def hole_errors(
     radius_m: float,
 ) -> HoleErrors:
     """Predict the soundings ``rows`` from those at distance ``radius_m`` or more and compare."""
-    neighbours = neighbours_beyond(points, rows, radius_m, HOLE_NEIGHBOURS)
+    points = np.asarray(tree.data)
+    neighbours = neighbours_beyond(tree, rows, radius_m, HOLE_NEIGHBOURS)
     error, noise_part, model_part = krige_holes(kind, points, residual, noise, metric, amplitude, rows, neighbours)
     known = np.isfinite(error)
     error, noise_part, model_part = error[known], noise_part[known], model_part[known]

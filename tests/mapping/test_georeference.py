@@ -26,8 +26,8 @@ def test_distance_and_direction_agree_with_the_geodesic(
 ) -> None:
     to_lon, to_lat, _ = pyproj.Geod(ellps="WGS84").fwd(lon, lat, bearing_deg, distance_m)
     east, north = LocalFrame(lat, lon).to_local(to_lat, to_lon)
-    assert np.hypot(east, north) == pytest.approx(distance_m, rel=1e-6, abs=1e-4)
-    assert east == pytest.approx(distance_m * np.sin(np.radians(bearing_deg)), abs=2e-3 * distance_m + 1e-4)
+    assert np.hypot(east, north) == pytest.approx(distance_m, rel=1e-6, abs=2e-4)  # PROJ knows degrees to 1e-9
+    assert east == pytest.approx(distance_m * np.sin(np.radians(bearing_deg)), abs=2e-3 * distance_m + 2e-4)
 
 
 @settings(deadline=None)

@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import approx_fprime
+from scipy.spatial import cKDTree
 from scipy.stats import multivariate_normal
 
 from app.mapping.kernels import KERNEL_CODES, KernelName, paciorek
@@ -98,7 +99,7 @@ def test_known_hyperparameters_are_found_again() -> None:
 
 @given(n=st.integers(1, 400), size=st.integers(3, 60))
 def test_a_subset_is_bounded_and_without_repetition(n: int, size: int) -> None:
-    rows = spread_subset(np.random.default_rng(n).uniform(0, 1, (n, 2)), size)
+    rows = spread_subset(cKDTree(np.random.default_rng(n).uniform(0, 1, (n, 2))), size)
     assert len(rows) <= size
     assert len(set(rows.tolist())) == len(rows)
     assert len(rows) >= min(n, size // 2)

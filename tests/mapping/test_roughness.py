@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.spatial import cKDTree
 
 from app.mapping.kernels import KERNEL_CODES
 from app.mapping.roughness import HoleErrors, hole_errors, local_ratio, neighbours_beyond
@@ -15,7 +16,7 @@ from app.mapping.scales import uniform_scales
 def test_neighbours_beyond_a_radius_are_the_nearest_ones_there(seed: int, radius: float, k: int) -> None:
     points = np.random.default_rng(seed).uniform(0, 10, (60, 2))
     rows = np.array([0, 7, 59])
-    found = neighbours_beyond(points, rows, radius, k)
+    found = neighbours_beyond(cKDTree(points), rows, radius, k)
     for row, near in zip(rows, found, strict=True):
         distance = np.linalg.norm(points - points[row], axis=1)
         expected = [i for i in np.argsort(distance) if distance[i] >= radius][:k]
@@ -30,7 +31,7 @@ def test_scores_are_about_one_when_the_model_holds() -> None:
     residual = np.linalg.cholesky(covariance) @ rng.standard_normal(500)
     errors = hole_errors(
         KERNEL_CODES["matern32"],
-        points,
+        cKDTree(points),
         residual,
         np.full(500, 0.05**2),
         uniform_scales(500).scaled_metric(8.0),
@@ -47,7 +48,7 @@ def test_noise_hides_relief() -> None:
     quiet, loud = (
         hole_errors(
             0,
-            points,
+            cKDTree(points),
             rng.standard_normal(200),
             np.full(200, v),
             uniform_scales(200).scaled_metric(8.0),
