@@ -68,6 +68,8 @@ LINK_HISTORY = 32
 STOP_ESCALATION = 0.5
 """Share of a stop's patience after which Abort is sent too."""
 CLOSE_TIMEOUT_WALL_S = 3.0
+HELD_UP_WALL_S = 0.4
+"""A tick that is later than this shows that we were held up ourselves."""
 MAX_PLAUSIBLE_VEHICLE_TIME_S = 4e9
 
 
@@ -305,11 +307,24 @@ class Bridge:
         return self._clock() * self.settings.time_scale
 
     async def _run(self) -> None:
+        last = self._clock()
         while True:
+            last, held_up = self._clock(), self._clock() - last - self._tick_wall_s
+            if held_up > HELD_UP_WALL_S:
+                self._excuse(held_up * self.settings.time_scale)
             self.pass_time()
             turn, self._turn = self._turn, asyncio.Event()
             turn.set()
             await asyncio.sleep(self._tick_wall_s)
+
+    def _excuse(self, seconds: float) -> None:
+        """Blame nobody for a silence that is ours: this process, or its machine, was busy with something else."""
+        now = self._now()
+        log.warning("The IMC bridge was held up for %.1f s", seconds / self.settings.time_scale)
+        for node in self._roster:
+            node.excuse(seconds, now)
+        for follower in self._followers.values():
+            follower.excuse(seconds, now)
 
     def pass_time(self) -> None:
         """Do whatever is due by now; runs by itself in a started bridge, a replay calls it after every packet."""

@@ -548,7 +548,7 @@ class Follower:
             return
         status = node.status(now)
         if status.state is NodeState.IN_PLAN and not self._ours_or_none():
-            self._release(status.reason, "Stop that plan on its console, then engage again", now)
+            self._release(status.reason, "Stop that plan on its console, then engage again", now, wanted=True)
         elif now - self._since > self._waiting_limit_s():
             reason = status.reason or "does not report being in service and ready"
             self._release(f"not ready within {now - self._since:.0f} s: {reason}", "Clear that, then engage again", now)
@@ -585,7 +585,6 @@ class Follower:
                 f"silent for {silence / settings.time_scale:.0f} s: its plan has ended by itself",
                 "Engage it again when it is heard",
                 now,
-                abandoned=True,
             )
             return
         reference = self._reference(now)
@@ -623,6 +622,12 @@ class Follower:
             self._request_due = now + ABANDONED_STOP_RETRY_S
             self._request_id = self._next_request_id()
             self._send(plan_control(OPERATION_STOP, self._request_id, self._settings))
+
+    def excuse(self, seconds: float, now: float) -> None:
+        """Take out of every wait the time in which we were held up ourselves and could hear nothing."""
+        self._since = min(self._since + seconds, now)
+        self._answered_at = min(self._answered_at + seconds, now)
+        self._following_since = min(self._following_since + seconds, now)
 
     # References
 
@@ -715,35 +720,36 @@ class Follower:
                 f"another console took over with plan {node.plan_id!r}",
                 "Engage it again when that is done",
                 now,
+                wanted=True,
             )
         elif seen.taken_by is not None:
             self._release(
                 f"console 0x{seen.taken_by:04X} took over with a plan of the same name",
                 "Engage it again when that is done; two consoles need different plan ids",
                 now,
+                wanted=True,
             )
         elif seen.rebooted:
             self._restart("the vehicle has rebooted", now)
         elif seen.aborted_by is not None:
-            self._release(f"aborted by console 0x{seen.aborted_by:04X}", "Engage it again when that is cleared", now)
+            self._let_go(f"aborted by console 0x{seen.aborted_by:04X}", now)
         elif self._starved():
             self._restart("references did not reach it in time", now)
         elif seen.error is not None or seen.blocked:
-            self._release(
-                f"aborted elsewhere or by itself: {self._error_text()}",
-                "Engage it again when that is cleared",
-                now,
-            )
+            self._let_go(f"aborted elsewhere or by itself: {self._error_text()}", now)
         elif seen.stopped_by is not None:
-            self._release(f"stopped by console 0x{seen.stopped_by:04X}", "Engage it again when that is cleared", now)
+            self._let_go(f"stopped by console 0x{seen.stopped_by:04X}", now)
         elif seen.completed:
-            self._release("its plan was completed by another console", "Engage it again when that is cleared", now)
+            self._let_go("its plan was completed by another console", now)
         elif seen.timed_out:
             self._restart("references did not reach it in time", now)
         elif seen.unanswered:
             self._restart("it does not answer our references", now)
         else:
-            self._restart(seen.failure or "its plan ended without a reason", now)
+            self._restart(seen.failure or "its plan ended without a reason", now, own=bool(seen.failure))
+
+    def _let_go(self, reason: str, now: float) -> None:
+        self._release(reason, "Engage it again when that is cleared", now, wanted=True)
 
     def _error_text(self) -> str:
         seen = self._evidence
@@ -756,7 +762,8 @@ class Follower:
             return False
         return STARVED_TEXT in text or self._since - self._answered_at > STARVED_S
 
-    def _restart(self, cause: str, now: float) -> None:
+    def _restart(self, cause: str, now: float, *, own: bool = False) -> None:
+        """Start the plan again, unless it fails again and again; ``own``: by the vehicle's own account."""
         self._again = True
         if self._gap:
             self._gap = False
@@ -767,16 +774,22 @@ class Follower:
                 f"plan failed {self._restarts} times, last: {cause}",
                 "Look at the vehicle's own log and its link, then engage again",
                 now,
+                wanted=own,
             )
             return
         self._evidence = Evidence()
         self._request_due = now
         self._enter(Phase.WAITING, now)
 
-    def _release(self, reason: str, remedy: str, now: float, *, abandoned: bool = False) -> None:
+    def _release(self, reason: str, remedy: str, now: float, *, wanted: bool = False) -> None:
+        """Let the vehicle go.
+
+        ``wanted``: someone else, or the vehicle itself, will have it so, and it is left alone. Otherwise it may be
+        engaged again at any time, and is stopped meanwhile wherever it shows up in our plan.
+        """
         self.refusal = Refusal(reason, remedy)
-        self.intervention = "" if abandoned else reason
-        self._abandoned = abandoned
+        self.intervention = reason if wanted else ""
+        self._abandoned = not wanted
         self._enter(Phase.IDLE, now)
         order = self._order
         if order is not None and order.status not in (WaypointStatus.REACHED, WaypointStatus.REFUSED):

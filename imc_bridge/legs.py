@@ -260,7 +260,6 @@ class LegFollower(Follower):
                     + (f"; {self.sound.last_problem}" if self.sound and self.sound.last_problem else ""),
                     "It may be under water or out of reach; engage it again when it is heard",
                     now,
-                    abandoned=True,
                 )
             elif now >= self._request_due:
                 self._send_leg(order, leg, now)
@@ -269,7 +268,6 @@ class LegFollower(Follower):
                 f"not heard since it left on a leg of {leg.expected_s:.0f} s",
                 "Look for it at its waypoint; engage it again when it is heard",
                 now,
-                abandoned=True,
             )
 
     def _watch_idle(self, now: float) -> None:
@@ -282,7 +280,6 @@ class LegFollower(Follower):
                 f"silent for {silence / self._settings.time_scale:.0f} s between two legs",
                 "Engage it again when it is heard",
                 now,
-                abandoned=True,
             )
 
     @property
@@ -356,6 +353,12 @@ class LegFollower(Follower):
     def _forget_leg(self) -> None:
         self._leg = None
         self.node.expected_back = None
+
+    def excuse(self, seconds: float, now: float) -> None:
+        """Take out of every wait the time in which we were held up ourselves and could hear nothing."""
+        super().excuse(seconds, now)
+        if self._leg is not None:
+            self._leg.sent_at = min(self._leg.sent_at + seconds, now)
 
     def _starved(self) -> bool:
         return False

@@ -195,6 +195,17 @@ class Node:
         self.heard_at = now
         self.address = address
 
+    def excuse(self, seconds: float, now: float) -> None:
+        """Take out of its silence the time in which we were held up ourselves and could hear nothing."""
+
+        def later(at: float | None) -> float | None:
+            return None if at is None else min(at + seconds, now)
+
+        self.heard_at, self.announced_at = later(self.heard_at), later(self.announced_at)
+        self.operation_mode_at, self.plan_state_at = later(self.operation_mode_at), later(self.plan_state_at)
+        if self.expected_back is not None:
+            self.expected_back += seconds
+
     def in_order(self, name: str, timestamp: float) -> bool:
         """Whether a message is newer, by the vehicle's clock, than the last of its kind."""
         if timestamp <= self._latest.get(name, -math.inf):
