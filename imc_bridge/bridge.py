@@ -70,6 +70,7 @@ STOP_ESCALATION = 0.5
 CLOSE_TIMEOUT_WALL_S = 3.0
 HELD_UP_WALL_S = 0.4
 """A tick that is later than this shows that we were held up ourselves."""
+WORTH_TELLING_WALL_S = 2.0
 MAX_PLAUSIBLE_VEHICLE_TIME_S = 4e9
 
 
@@ -320,7 +321,8 @@ class Bridge:
     def _excuse(self, seconds: float) -> None:
         """Blame nobody for a silence that is ours: this process, or its machine, was busy with something else."""
         now = self._now()
-        log.warning("The IMC bridge was held up for %.1f s", seconds / self.settings.time_scale)
+        if seconds > WORTH_TELLING_WALL_S * self.settings.time_scale:
+            log.warning("The IMC bridge was held up for %.1f s", seconds / self.settings.time_scale)
         for node in self._roster:
             node.excuse(seconds, now)
         for follower in self._followers.values():
@@ -532,7 +534,7 @@ class Bridge:
         if tick is Tick.DOUBTFUL:
             return
         if tick is Tick.JUMPED and follower is not None:
-            follower.guard.clear()
+            follower.clock_jumped()
         match name:
             case "EstimatedState":
                 self._take_state(node, follower, message, now)
@@ -750,4 +752,5 @@ class Bridge:
             clock_rate=node.clock.rate(scale),
             history=tuple(self._links.get(node.imc_id, ())),
             rate_limiters=rates.text if rates is not None else "as the vehicle has them",
+            radio_gaps=node.radio_gaps,
         )

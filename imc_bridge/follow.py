@@ -248,6 +248,8 @@ class Follower:
         """Why it was released though heard, until we stop it: someone, or the vehicle itself, wanted that."""
         self._hold: SentReference | None = None
         self._since = 0.0
+        self._plan_since_s = -math.inf
+        """Since when the vehicle has had our plan, by its own clock and word."""
         self._request_id = -1
         self._request_due = 0.0
         self._started_unseen = False
@@ -347,6 +349,11 @@ class Follower:
         self._enter(Phase.STOPPING, now)
         self.tick(now)
 
+    def clock_jumped(self) -> None:
+        """Forget what goes by the vehicle's clock, which was set."""
+        self.guard.clear()
+        self._plan_since_s = -math.inf
+
     def escalate_stop(self) -> None:
         """Send Abort beside STOP from now on: the vehicle does not answer."""
         self._abort = True
@@ -369,6 +376,8 @@ class Follower:
             return
         info = str(message.info)
         operation = int(message.op)
+        if operation == OPERATION_START and kind == PLAN_CONTROL_SUCCESS and "completed" not in info:
+            self._plan_since_s = float(message.timestamp)
         if operation == OPERATION_STOP and self.phase is Phase.STOPPING:
             if kind == PLAN_CONTROL_SUCCESS or not self.node.executing(self._settings.plan_id):
                 self._stopped(info or "plan stopped", now)
@@ -389,6 +398,9 @@ class Follower:
     def plan_state_changed(self, now: float) -> None:
         """PlanControlState has been taken in by the node."""
         node = self.node
+        if node.plan_state_time_s < self._plan_since_s:
+            # It waited in some queue while our plan was loaded, and tells of the time before.
+            return
         ours = node.executing(self._settings.plan_id)
         if self.phase is Phase.STARTING and node.plan_state == PlanState.EXECUTING and ours:
             self._running(now)
@@ -605,6 +617,8 @@ class Follower:
 
     def _note_gap(self) -> None:
         """The radio ended under water, so its plan ends for want of references, which is nobody's fault."""
+        if not self._gap:
+            self.node.radio_gaps += 1
         self._gap = True
         if self._order is not None and self._order.status is WaypointStatus.ACKNOWLEDGED:
             self._order.unseen = True

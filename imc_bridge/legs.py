@@ -45,7 +45,6 @@ MANEUVER_TIMEOUT_S = 0xFFFF
 END_WITHIN_M = 25.0
 """A leg that ended farther from its waypoint did not lead there: Goto ends some 7 m before, and the vehicle floats."""
 OUTCOME_FAILURE = 2
-PLAN_SETTLES_S = 5.0
 RADIO_SILENT_S = 3.0
 """After this long without a packet sound is tried."""
 SOUND_START_TIMEOUT_S = 90.0
@@ -62,8 +61,6 @@ class Leg:
     depth_m: float
     expected_s: float
     acknowledged: bool = False
-    running: bool = False
-    """Seen in execution."""
     ended: bool = False
     sent_at: float = 0.0
 
@@ -152,13 +149,10 @@ class LegFollower(Follower):
         self._forget_leg()
         return super().engage(now)
 
-    def order(self, waypoint: Waypoint, now: float) -> None:
-        """Send the vehicle off to a waypoint. Repeating one is harmless unless it had been refused."""
-        before = self._order
-        super().order(waypoint, now)
-        if self._order is not before:
-            self._forget_leg()
-            self.tick(now)
+    def _make_order(self, waypoint: Waypoint) -> Order:
+        """Begin anew: a plan for another waypoint replaces the one under way."""
+        self._forget_leg()
+        return super()._make_order(waypoint)
 
     def begin_stop(self, now: float) -> None:
         """Stop the leg: STOP is repeated until the vehicle acknowledges, and again when it comes back."""
@@ -178,8 +172,10 @@ class LegFollower(Follower):
             return
         kind, info = int(message.type), str(message.info)
         if kind == PLAN_CONTROL_SUCCESS and "completed" in info:
+            self._plan_since_s = float(message.timestamp)
             self._leg_over()
         elif kind == PLAN_CONTROL_SUCCESS:
+            self._plan_since_s = float(message.timestamp)
             self._acknowledged(now)
         elif kind == PLAN_CONTROL_FAILURE and not leg.acknowledged:
             reason = f"plan refused: {info or 'no reason given'}"
@@ -191,6 +187,9 @@ class LegFollower(Follower):
     def plan_state_changed(self, now: float) -> None:
         """PlanControlState has been taken in by the node."""
         leg, node = self._leg, self.node
+        if node.plan_state_time_s < self._plan_since_s:
+            # It waited in some queue while our plan was loaded, and tells of the time before.
+            return
         if self.phase is not Phase.FOLLOWING:
             if self.phase is not Phase.ENDED or not node.executing(self._settings.plan_id):
                 super().plan_state_changed(now)
@@ -202,12 +201,8 @@ class LegFollower(Follower):
             return
         if node.executing(self._settings.plan_id):
             if node.plan_state == PlanState.EXECUTING:
-                leg.running = True
                 self._acknowledged(now)
         elif node.plan_state != PlanState.INITIALIZING and leg.acknowledged and not leg.ended:
-            if not leg.running and now - leg.sent_at < PLAN_SETTLES_S:
-                # A state from before the plan that overtook its acknowledgement.
-                return
             if node.plan_state == PlanState.READY and node.plan_outcome != OUTCOME_FAILURE:
                 self._leg_over()
             else:

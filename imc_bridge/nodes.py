@@ -137,6 +137,10 @@ class Node:
         self.plan_state_at: float | None = None
         self.plan_id = ""
         self.plan_outcome: int | None = None
+        self.plan_state_time_s = -math.inf
+        """When it was in that state, by the vehicle's clock."""
+        self.radio_gaps = 0
+        """How often radio ended under water while it was led by references."""
         self.expected_back: float | None = None
         """Until when its silence is part of a plan of ours, seconds of the bridge's clock."""
         self.controller: int | None = None
@@ -278,6 +282,7 @@ class Node:
         self.plan_state_at = now
         self.plan_id = str(message.plan_id)
         self.plan_outcome = int(message.last_outcome)
+        self.plan_state_time_s = float(message.timestamp)
         if self.plan_state not in (PlanState.EXECUTING, PlanState.INITIALIZING):
             self.controller = None
 

@@ -56,6 +56,7 @@ class Engaging:
         self._asking: dict[str, asyncio.Task[None]] = {}
         self._refused: dict[str, _Refused] = {}
         self._lost: set[str] = set()
+        self._advised: set[str] = set()
 
     async def keep(self) -> None:
         """Go on until cancelled."""
@@ -75,6 +76,7 @@ class Engaging:
             if info.state in (LinkState.HEARD, LinkState.READY):
                 member.engaged = False
             await self._tell_of_loss(member, info)
+            await self._advise(member, info)
             if member.report is None:
                 member.report = info.report
             if not member.engaged and member.name not in self._asking and self._due(member):
@@ -95,6 +97,12 @@ class Engaging:
             message = f"{member.name} is heard again"
         level = Level.ALARM if lost else Level.INFO
         await self._live.journal.log(level, "vehicle", message, vehicle=member.name)
+
+    async def _advise(self, member: Member, info: VehicleInfo) -> None:
+        if info.advice and member.name not in self._advised:
+            self._advised.add(member.name)
+            message = f"{member.name}: {info.advice}"
+            await self._live.journal.log(Level.WARNING, "vehicle", message, vehicle=member.name)
 
     def _done(self, name: str, _task: asyncio.Task[None]) -> None:
         self._asking.pop(name, None)

@@ -31,11 +31,13 @@ from app.missions.fleet import (
 from app.missions.hub import FleetHub
 from app.missions.live import LiveMission
 from app.missions.members import SETTLED, Member
+from app.missions.spec import Guidance
 from app.missions.views import Level
 from app.storage import missions as mission_queries
 from app.storage.database import Database
 from app.storage.models import StepRow, WaypointRow
 from app.storage.shielding import to_the_end
+from imc_bridge.legs import leg_time_s
 
 ELAPSED_PERIOD_S = 5.0
 PACE_MEMORY = 0.9
@@ -43,6 +45,9 @@ PACE_MEMORY = 0.9
 
 EXPECTED_DECISION_S = 0.3
 """How long a decision is taken to last before the first was made."""
+
+SOUND_S = 60.0
+"""What commands and reports take by sound, at the most."""
 
 LEAD_M = 25.0
 """How far beyond a waypoint a vehicle may be sent to pass it straight; more than the 15 m from which DUNE circles."""
@@ -351,7 +356,7 @@ class Runner:
             return
         late = [member for member in self._live.team if member.busy]
         for member in late:
-            self._settle(member, WaypointStatus.MISSED, f"not reached within {self._spec.step_deadline_s:g} s")
+            self._settle(member, WaypointStatus.MISSED, f"not reached within {self._step_time_s():.0f} s")
         await self._live.journal.log(
             Level.WARNING,
             "straggler",
@@ -362,7 +367,21 @@ class Runner:
 
     def _deadline_s(self) -> float:
         """Return the event loop's time at which a step that begins now goes on without stragglers."""
-        return asyncio.get_running_loop().time() + self._spec.step_deadline_s / self._time_scale
+        return asyncio.get_running_loop().time() + self._step_time_s() / self._time_scale
+
+    def _step_time_s(self) -> float:
+        """Return how long a step may take: longer than asked for where a vehicle is silent until its leg is over."""
+        legs_s = [
+            leg_time_s(
+                float(np.linalg.norm(self._target_m(member.order) - member.place_m(self._live.frame))),
+                member.order.position.depth_m,
+                member.order.speed_mps,
+            )
+            + (SOUND_S if member.spec.guidance is Guidance.ACOUSTIC else 0.0)
+            for member in self._live.team
+            if member.spec.guidance is not Guidance.FOLLOW and member.order is not None and member.report is not None
+        ]
+        return max(self._spec.step_deadline_s, *legs_s) if legs_s else self._spec.step_deadline_s
 
     async def _wait(self, condition: Callable[[], bool], deadline_s: float | None) -> bool:
         """Wait until ``condition`` holds; False when the deadline passed first."""
