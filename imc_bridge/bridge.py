@@ -16,6 +16,7 @@ import imcpy
 from imc_bridge.acoustics import SoundPath
 from imc_bridge.codec import BROADCAST_ID, Decoder, Header, Message, encode
 from imc_bridge.consoles import Board
+from imc_bridge.control import Control, Phase
 from imc_bridge.discovery import Announcement, own_announce, read_announce
 from imc_bridge.events import (
     BridgeEvent,
@@ -29,7 +30,7 @@ from imc_bridge.events import (
     StopResult,
     Waypoint,
 )
-from imc_bridge.follow import Follower, Phase
+from imc_bridge.follow import Follower
 from imc_bridge.legs import LegFollower
 from imc_bridge.nodes import Node
 from imc_bridge.rates import RateRequest
@@ -125,7 +126,7 @@ class Bridge:
         self._seabed = Seabed()
         self.board = Board(settings.name)
         """What other consoles are shown."""
-        self._followers: dict[int, Follower] = {}
+        self._followers: dict[int, Control] = {}
         self._guidance: dict[int, Guidance] = {}
         self._rates: dict[int, RateRequest] = {}
         self._links: dict[int, deque[LinkChange]] = {}
@@ -567,7 +568,7 @@ class Bridge:
             case "EntityParameters" if node.imc_id in self._rates:
                 self._rates[node.imc_id].answered(message, now)
 
-    def _take_state(self, node: Node, follower: Follower | None, message: Message, now: float) -> None:
+    def _take_state(self, node: Node, follower: Control | None, message: Message, now: float) -> None:
         report = node.take_state(message)
         if report is not None:
             if follower is not None:
@@ -603,7 +604,7 @@ class Bridge:
         # A console announces, too, but has nothing to tell us.
         return node.name in wanted if wanted else node.announcement.system_type != int(imcpy.SystemType.CCU)
 
-    def _controlled(self) -> list[tuple[Node, Follower]]:
+    def _controlled(self) -> list[tuple[Node, Control]]:
         return [(self._roster[imc_id], follower) for imc_id, follower in self._followers.items()]
 
     def _guide(self, node: Node, guidance: Guidance) -> None:
@@ -615,7 +616,7 @@ class Bridge:
             self._guidance[node.imc_id] = guidance
             self._followers.pop(node.imc_id, None)
 
-    def _attach_sound(self, node: Node, follower: Follower, gateway: str) -> None:
+    def _attach_sound(self, node: Node, follower: Control, gateway: str) -> None:
         via = self._roster.named(gateway)
         if via is None or via.address is None:
             known = ", ".join(other.name for other in self._roster if not other.is_vehicle) or "none"
@@ -652,7 +653,7 @@ class Bridge:
                 if report is not None:
                     follower.reported_by_sound(report, now)
 
-    def _follower(self, node: Node) -> Follower:
+    def _follower(self, node: Node) -> Control:
         follower = self._followers.get(node.imc_id)
         if follower is None:
             kind = Follower if self._guidance.get(node.imc_id, Guidance.FOLLOW) is Guidance.FOLLOW else LegFollower

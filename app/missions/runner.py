@@ -37,7 +37,7 @@ from app.storage import missions as mission_queries
 from app.storage.database import Database
 from app.storage.models import StepRow, WaypointRow
 from app.storage.shielding import to_the_end
-from imc_bridge.legs import leg_time_s
+from imc_bridge.plans import leg_time_s
 
 ELAPSED_PERIOD_S = 5.0
 PACE_MEMORY = 0.9
