@@ -130,6 +130,7 @@ class Node:
         self.clock = VehicleClock()
 
         self.entities: dict[int, str] | None = None
+        self.entities_asked_at = -math.inf
         self.operation_mode: int | None = None
         self.operation_mode_at: float | None = None
         self.error_text = ""
@@ -184,6 +185,7 @@ class Node:
 
     def _forget_plan(self) -> None:
         self.entities = None
+        self.entities_asked_at = -math.inf
         self.operation_mode = self.plan_state = None
         self.operation_mode_at = self.plan_state_at = None
         self.telemetry_at = None
@@ -335,6 +337,11 @@ class Node:
         """Whether it executes a plan of this name, as far as it says, and not at another console's behest."""
         running = self.plan_state in (PlanState.EXECUTING, PlanState.INITIALIZING)
         return running and self.plan_id == plan_id and self.foreign_controller is None
+
+    @property
+    def ours(self) -> bool:
+        """Whether it executes our plan."""
+        return self.executing(self._settings.plan_id)
 
     def status(self, now: float) -> Status:
         """The link's state and the reason for it."""
