@@ -25,8 +25,8 @@ import imcpy
 import numpy as np
 
 from imc_bridge import Bridge, BridgeSettings, RefusedError, Sounding, StateReport, Waypoint
-from imc_bridge.bridge import WANTED
 from imc_bridge.codec import message_ids
+from imc_bridge.hearing import WANTED
 from imc_bridge.transport import Address
 
 VEHICLE_ID, VEHICLE = 0x1E, ("127.0.0.1", 6002)

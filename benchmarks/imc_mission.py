@@ -1,15 +1,19 @@
 """A whole mission over IMC: ``python benchmarks/imc_mission.py [--steps 100] [--loss 0.05] [--kill-at 50]``.
 
-The mission service, its database and planner run as they do for real vehicles; two fake DUNE nodes on real sockets are
-the vehicles. ``--radio-range 5000`` ends their radio at the surface, as in the recorded session ``wifi_gap_x5``;
-``--kill-at`` kills one vehicle's DUNE at that step and starts it again where it was. Printed is one JSON object;
-exit code 1 when the mission did not complete, a waypoint was refused, or soundings are off by more than 0.2 m.
+The mission service, its database and planner run as they do for real vehicles; two fake DUNE nodes in processes of
+their own are the vehicles. ``--radio-range 5000`` ends their radio at the surface, as in the recorded session
+``wifi_gap_x5``, for which ``--guidance legs`` is made; ``--kill-at`` kills one vehicle's DUNE at that step and starts
+it again where it was. Afterwards the vehicles' own logs are imported, as an operator does: ``soundings`` came by
+radio, ``soundings_with_logs`` is what the map has in the end, and ``measured_on_board`` what the vehicles measured in
+all. Printed is one JSON object, ``--write`` puts it into a page; exit code 1 when the mission did not complete, a
+waypoint was refused or missed, or soundings are off by more than 0.2 m.
 """
 
 import argparse
 import asyncio
 import json
 import statistics
+import subprocess
 import sys
 import tempfile
 import time
@@ -17,7 +21,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from imc_report import write_section
 
+from app.api import logs
 from app.mapping.georeference import LocalFrame
 from app.missions.fleet import WaypointStatus
 from app.missions.service import MissionService
@@ -27,49 +33,60 @@ from app.missions.states import ENDED
 from app.storage.database import Database
 from app.storage.missions import waypoints_of_step
 from app.storage.prepare import prepare_database
-from simulator.dune import DuneFleet, DuneOptions, VehicleSpec
-from simulator.network import NetworkFaults
+from imc_bridge import BridgeSettings, Sounding
+from imc_bridge.logs import VehicleLog
 from simulator.seafloors import generate
 from simulator.terrain import Terrain
 
 ORIGIN = (41.185, -8.705)
 SIDE_M = 120.0
 PORT, ANNOUNCE_PORTS = 32210, (32200, 32201, 32202, 32203, 32204)
+GATEWAY = "manta-1"
 NAMES = ("lauv-xplore-1", "lauv-xplore-2")
 BACK_AFTER_WALL_S = 1.0
 
 
 class Vehicle:
-    """One vehicle of its own, which can be killed and started again."""
+    """One vehicle's DUNE in a process of its own, which can be killed and started again."""
 
-    def __init__(self, number: int, floor: Terrain, speed: float, options: DuneOptions) -> None:
-        place = (SIDE_M * (number + 1) / 3.0, 10.0, 0.0)
-        self._spec = VehicleSpec(NAMES[number], 0x1E + number, 32220 + 10 * number, place)
-        self._floor, self._speed, self._options = floor, speed, options
-        self.fleet: DuneFleet | None = None
+    def __init__(self, number: int, options: argparse.Namespace, logs: Path) -> None:
+        self.name = NAMES[number]
+        self._start_m = (SIDE_M * (number + 1) / 3.0, 10.0)
+        self._command = [
+            *(sys.executable, "-m", "simulator", "--vehicles", "1", "--names", self.name, "--ids", f"{0x1E + number}"),
+            *("--family", options.family, "--size", f"{SIDE_M:g}", "--seed", f"{options.seed}"),
+            *("--origin", ",".join(map(str, ORIGIN)), "--base-port", f"{32220 + 10 * number}"),
+            *("--announce-ports", f"{ANNOUNCE_PORTS[0]}-{ANNOUNCE_PORTS[-1]}", "--speed", f"{options.speed:g}"),
+            *("--loss", f"{options.loss:g}", "--radio-range", f"{options.radio_range:g}", "--log-dir", str(logs)),
+            *(["--chatter"] if options.chatter else []),
+        ]
+        self._process: subprocess.Popen[str] | None = None
+        self.collisions = 0
 
-    async def start(self) -> None:
-        """Start its DUNE."""
-        self.fleet = DuneFleet(self._floor, [self._spec], speed=self._speed, options=self._options)
-        await self.fleet.start()
+    def start(self, at_m: tuple[float, float] | None = None) -> None:
+        """Start its DUNE, at the surface of a place or where the mission begins."""
+        place = ",".join(f"{value:.2f}" for value in at_m or self._start_m)
+        command = [*self._command, "--start", place]
+        self._process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
 
-    async def kill(self) -> None:
-        """End its DUNE without a word; it will start again where it is, at the surface."""
-        if self.fleet is not None:
-            here = self.fleet.nodes[0].vehicle.true_position
-            spec = self._spec
-            self._spec = VehicleSpec(spec.name, spec.imc_id, spec.port, (here.east_m, here.north_m, 0.0))
-            await self.fleet.stop()
-            self.fleet = None
+    def kill(self) -> None:
+        """End its DUNE without a word."""
+        if self._process is not None:
+            self._process.kill()
+            self._process.communicate()
+            self._process = None
 
-    @property
-    def collisions(self) -> int:
-        """How often it touched the bottom in its present life."""
-        return len(self.fleet.nodes[0].vehicle.collisions) if self.fleet is not None else 0
+    def end(self) -> None:
+        """End its DUNE in peace, and note how often it touched the bottom."""
+        if self._process is not None:
+            self._process.terminate()
+            self.collisions += self._process.communicate()[1].count("hit the bottom")
+            self._process = None
 
 
-def mission(steps: int, planner: str) -> MissionSpec:
+def mission(options: argparse.Namespace) -> MissionSpec:
     """Two vehicles that map a square of 100 m."""
+    led = {"guidance": options.guidance} | ({"gateway": GATEWAY} if options.guidance == "acoustic" else {})
     frame = LocalFrame(*ORIGIN)
     corners = [(10, 10), (110, 10), (110, 110), (10, 110), (10, 10)]
     ring = [[float(x) for x in reversed(frame.to_geographic(float(e), float(n)))] for e, n in corners]
@@ -77,59 +94,56 @@ def mission(steps: int, planner: str) -> MissionSpec:
         {
             "name": "IMC benchmark",
             "area": {"type": "Polygon", "coordinates": [ring]},
-            "vehicles": [{"name": name, "kind": "imc", "depth_m": 2.0 + k} for k, name in enumerate(NAMES)],
-            "steps": steps,
+            "vehicles": [{"name": name, "kind": "imc", "depth_m": 2.0 + k} | led for k, name in enumerate(NAMES)],
+            "steps": options.steps,
             "cell_m": 2.0,
             "limits": {"max_step_m": 20.0, "min_vertical_separation_m": 1.0, "min_altitude_m": 2.0},
-            "planner": {"name": planner},
+            "planner": {"name": options.planner},
         }
     )
 
 
-async def fly(options: argparse.Namespace) -> dict[str, Any]:
+async def fly(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
     """Fly the mission; what came of it."""
     floor = generate(options.family, options.seed, width_m=SIDE_M, height_m=SIDE_M, origin=ORIGIN)
-    dune = DuneOptions(
-        announce_ports=ANNOUNCE_PORTS,
-        faults=NetworkFaults(loss=options.loss),
-        radio_range_m=options.radio_range,
-        chatter=options.chatter,
-    )
-    vehicles = [Vehicle(number, floor, options.speed, dune) for number in range(len(NAMES))]
-    with tempfile.TemporaryDirectory() as folder:
-        url = f"sqlite+aiosqlite:///{Path(folder) / 'mission.db'}"
-        imc = ImcSettings(port=PORT, announce_ports=ANNOUNCE_PORTS, loopback_only=True)
-        await prepare_database(url, may_upgrade=True)
-        database = Database(url)
-        service = MissionService(ServiceSettings(database_url=url, imc=imc, time_scale=options.speed), database)
-        begun = time.monotonic()
+    logs = folder / "logs"
+    vehicles = [Vehicle(number, options, logs) for number in range(len(NAMES))]
+    url = f"sqlite+aiosqlite:///{folder / 'mission.db'}"
+    imc = ImcSettings(port=PORT, announce_ports=ANNOUNCE_PORTS, loopback_only=True)
+    await prepare_database(url, may_upgrade=True)
+    database = Database(url)
+    service = MissionService(ServiceSettings(database_url=url, imc=imc, time_scale=options.speed), database)
+    begun = time.monotonic()
+    for vehicle in vehicles:
+        vehicle.start()
+    await service.startup()
+    try:
+        identity = (await service.create(mission(options))).id
+        while sum(view.link == "ready" for view in await service.vehicles()) < len(NAMES):  # noqa: ASYNC110
+            await asyncio.sleep(0.1)
+        await service.act(identity, "start", actor="benchmark")
+        killed = options.kill_at is None
+        while (view := await service.mission(identity)).state not in ENDED:
+            if not killed and view.progress.step >= options.kill_at:
+                killed = True
+                [place] = [v for v in view.vehicles if v.name == vehicles[0].name]
+                vehicles[0].kill()
+                await asyncio.sleep(BACK_AFTER_WALL_S)
+                vehicles[0].start(floor.frame.to_local(place.lat_deg, place.lon_deg))
+            if options.progress and sys.stderr.isatty():
+                print(f"\rstep {view.progress.step}", end="", file=sys.stderr)
+            await asyncio.sleep(0.2)
+        result = await summary(service, database, identity, floor, begun)
+        result["idle_at_the_end"] = all(view.link == "ready" for view in await service.vehicles())
         for vehicle in vehicles:
-            await vehicle.start()
-        await service.startup()
-        try:
-            identity = (await service.create(mission(options.steps, options.planner))).id
-            while sum(view.link == "ready" for view in await service.vehicles()) < len(NAMES):  # noqa: ASYNC110
-                await asyncio.sleep(0.1)
-            await service.act(identity, "start", actor="benchmark")
-            killed = options.kill_at is None
-            while (view := await service.mission(identity)).state not in ENDED:
-                if not killed and view.progress.step >= options.kill_at:
-                    killed = True
-                    await vehicles[0].kill()
-                    await asyncio.sleep(BACK_AFTER_WALL_S)
-                    await vehicles[0].start()
-                if options.progress and sys.stderr.isatty():
-                    print(f"\rstep {view.progress.step}", end="", file=sys.stderr)
-                await asyncio.sleep(0.2)
-            return await summary(service, database, identity, floor, begun) | {
-                "collisions": sum(vehicle.collisions for vehicle in vehicles),
-                "idle_at_the_end": all(v.fleet is None or v.fleet.nodes[0].plan.maneuver is None for v in vehicles),
-            }
-        finally:
-            await service.shutdown()
-            await database.close()
-            for vehicle in vehicles:
-                await vehicle.kill()
+            vehicle.end()
+        result["collisions"] = sum(vehicle.collisions for vehicle in vehicles)
+        return result | await with_logs(service, identity, floor, sorted(logs.glob("*/*/Data.lsf")))
+    finally:
+        await service.shutdown()
+        await database.close()
+        for vehicle in vehicles:
+            vehicle.kill()
 
 
 async def summary(
@@ -142,12 +156,7 @@ async def summary(
         for step in range(1, view.progress.step + 1):
             for row in await waypoints_of_step(session, identity, step):
                 statuses[row.status] = statuses.get(row.status, 0) + 1
-    errors, rejected = [], 0
-    for row in await service.soundings(identity):
-        east, north = floor.frame.to_local(row.lat_deg, row.lon_deg)
-        rejected += row.verdict != "accepted"
-        if row.verdict == "accepted" and floor.contains(east, north):
-            errors.append(row.depth_m - floor.depth_at_point(east, north))
+    errors, rejected = await errors_m(service, identity, floor)
     log = await service.events(identity, limit=1000)
     details = {view.name: view.reason for view in await service.vehicles()}
     return {
@@ -165,6 +174,43 @@ async def summary(
     }
 
 
+async def errors_m(service: MissionService, identity: str, floor: Terrain) -> tuple[list[float], int]:
+    """Sounded minus true depth of every accepted sounding, and how many were rejected."""
+    errors, rejected = [], 0
+    for row in await service.soundings(identity):
+        east, north = floor.frame.to_local(row.lat_deg, row.lon_deg)
+        rejected += row.verdict != "accepted"
+        if row.verdict == "accepted" and floor.contains(east, north):
+            errors.append(row.depth_m - floor.depth_at_point(east, north))
+    return errors, rejected
+
+
+async def with_logs(service: MissionService, identity: str, floor: Terrain, logs: list[Path]) -> dict[str, Any]:
+    """What the mission has once the vehicles' own logs are in it, beside what they measured."""
+    measured = 0
+    for path in logs:
+        await service.import_log(identity, path, actor="benchmark")
+        log = VehicleLog(path, BridgeSettings())
+        measured += sum(isinstance(event, Sounding) for event in log.events())
+    errors, rejected = await errors_m(service, identity, floor)
+    return {
+        "measured_on_board": measured,
+        "soundings_with_logs": len(errors),
+        "rejected_with_logs": rejected,
+        "mean_abs_error_with_logs_m": round(statistics.mean(map(abs, errors)), 4) if errors else None,
+    }
+
+
+def title(options: argparse.Namespace) -> str:
+    """What a run is called in the page of results."""
+    parts = [f"A mission of {options.steps} steps"]
+    parts += [f"{100 * options.loss:g} % of the packets lost"] if options.loss else []
+    parts += [f"one vehicle killed at step {options.kill_at}"] if options.kill_at is not None else []
+    parts += ["radio ends at the surface"] if options.radio_range else []
+    parts += [f"led by {options.guidance}"] if options.guidance != "follow" else []
+    return ", ".join(parts)
+
+
 def main() -> None:
     """Run and print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -177,12 +223,19 @@ def main() -> None:
     parser.add_argument("--planner", default="cao")
     parser.add_argument("--family", default="harbour")
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--guidance", choices=("follow", "legs", "acoustic"), default="follow")
     parser.add_argument("--progress", action="store_true")
+    parser.add_argument("--write", type=Path, help="page of results in which this run gets a section")
     options = parser.parse_args()
-    result = asyncio.run(fly(options))
+    logs.configure("warning", "console", sys.stderr)
+    with tempfile.TemporaryDirectory() as folder:
+        result = asyncio.run(fly(options, Path(folder)))
     print(json.dumps(result))
+    if options.write is not None:
+        write_section(options.write, title(options), result, {})
     accurate = result["mean_abs_error_m"] is not None and result["mean_abs_error_m"] <= 0.2
-    whole = result["steps"] == options.steps and not result["waypoints"].get(WaypointStatus.REFUSED)
+    astray = [result["waypoints"].get(status, 0) for status in (WaypointStatus.REFUSED, WaypointStatus.MISSED)]
+    whole = result["steps"] == options.steps and not any(astray)
     sys.exit(0 if accurate and whole else 1)
 
 

@@ -46,6 +46,8 @@ class Cause(StrEnum):
     CLOCK_RATE = "clock_rate"
     """Its clock runs faster or slower than the settings say: a simulation."""
     SILENT = "silent"
+    RADIO_GAPS = "radio_gaps"
+    """Radio ends under water, and the vehicle is led by references, which need it."""
     LOW_RATE = "low_rate"
     NO_ENTITIES = "no_entities"
     NO_SOUNDINGS = "no_soundings"
@@ -114,6 +116,16 @@ class Diagnosis:
             lines.append(f"{node.name} (0x{node.imc_id:04X}): {node.state.value}")
             lines += [f"  {_line(finding)}" for finding in node.findings]
         return "\n".join(lines)
+
+
+def radio_gap_words(gaps: int) -> tuple[str, str]:
+    """What is said of a vehicle that is led by references where radio does not reach, and what to do about it."""
+    times = "once" if gaps == 1 else f"{gaps} times"
+    return (
+        f"radio ended {times} while it was under water and led by references, which ends its plan on board each time",
+        "Take it out of the mission and add it again with guidance 'legs', which needs no radio under water; "
+        "what it measures there is in its own log (import-log)",
+    )
 
 
 def ok(text: str) -> Finding:

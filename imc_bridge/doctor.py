@@ -7,7 +7,17 @@ from collections.abc import Mapping
 
 from imc_bridge.bridge import Bridge
 from imc_bridge.codec import PacketFault
-from imc_bridge.diagnosis import Cause, Diagnosis, Finding, NodeDiagnosis, Severity, note, ok, problem
+from imc_bridge.diagnosis import (
+    Cause,
+    Diagnosis,
+    Finding,
+    NodeDiagnosis,
+    Severity,
+    note,
+    ok,
+    problem,
+    radio_gap_words,
+)
 from imc_bridge.events import NodeState, NodeView
 from imc_bridge.ports import holder_of_udp_port
 from imc_bridge.probe import Answer, probe
@@ -213,6 +223,8 @@ def _node_findings(node: NodeView, bridge: Bridge, answers: Mapping[int, Answer]
     if node.age_s * settings.time_scale > SILENT_HEARTBEAT_S:
         findings.append(problem(Cause.SILENT, f"last packet {node.age_s:.0f} s ago", node.reason))
     findings += _state_findings(node)
+    if node.radio_gaps:
+        findings.append(problem(Cause.RADIO_GAPS, *radio_gap_words(node.radio_gaps)))
     findings += _sounding_findings(node, live=live)
     findings += _clock_findings(node, settings)
     findings += _plan_findings(node, settings)

@@ -211,6 +211,8 @@ class NodeView:
     history: tuple[LinkChange, ...] = ()
     """The last changes of its link, oldest first."""
     rate_limiters: str = ""
+    radio_gaps: int = 0
+    """How often radio ended under water while it was led by references, which ends their plan each time."""
 
 
 class RefusedError(Exception):

@@ -12,9 +12,8 @@ from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from imcpy.coordinates import WGS84
-
 from imc_bridge.events import BottomPoint
+from imc_bridge.places import Place, distance_m, offset_m
 from imc_bridge.seabed import Seabed
 
 MAX_KEPT = 120
@@ -29,9 +28,6 @@ TREND_BACK_M = 8.0
 TREND_AHEAD_M = 12.0
 """A bottom that rises is expected to go on rising for this long; the vehicle needs it to climb."""
 STEEPEST = 1.0
-
-Place = tuple[float, float]
-"""Latitude and longitude, degrees."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -159,19 +155,6 @@ class AltitudeGuard:
         return DepthLimit(asked) if asked <= deepest else DepthLimit(deepest, f"held at {deepest:.1f} m: {reason}")
 
 
-def distance_m(a: Place, b: Place) -> float:
-    """Metres between two places."""
-    return math.hypot(*_offset_m(a, b))
-
-
-def _offset_m(a: Place, b: Place) -> tuple[float, float]:
-    """North and east from one place to another."""
-    north, east, _ = WGS84.displacement(
-        math.radians(a[0]), math.radians(a[1]), 0.0, math.radians(b[0]), math.radians(b[1]), 0.0
-    )
-    return float(north), float(east)
-
-
 def _shortened(way: list[Place]) -> list[Place]:
     """The first metres of a way, as far as anyone looks."""
     short, left = way[:1], FARTHEST_M
@@ -189,7 +172,7 @@ def _off_way_m(way: list[Place], place: Place) -> float:
     """How far a place lies from a way."""
     nearest = distance_m(way[0], place)
     for a, b in itertools.pairwise(way):
-        leg, to = _offset_m(a, b), _offset_m(a, place)
+        leg, to = offset_m(a, b), offset_m(a, place)
         square = leg[0] ** 2 + leg[1] ** 2
         share = 0.0 if square == 0.0 else min(max((to[0] * leg[0] + to[1] * leg[1]) / square, 0.0), 1.0)
         nearest = min(nearest, math.hypot(to[0] - share * leg[0], to[1] - share * leg[1]))

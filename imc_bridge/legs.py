@@ -2,7 +2,7 @@
 
 Each waypoint becomes a plan of Goto maneuvers: there, then up. Once the vehicle has acknowledged it, silence is
 expected until the leg should be over; what became of it shows when the vehicle is heard again. Between legs it has
-no plan and floats. Everything else, engaging, stopping and what ended a plan, is the :class:`Follower`'s.
+no plan and floats. Everything else, engaging, stopping and what ended a plan, is the :class:`Control`'s.
 """
 
 from __future__ import annotations
@@ -15,42 +15,30 @@ import imcpy
 
 from imc_bridge.acoustics import SoundPath, SoundReport
 from imc_bridge.codec import Message
+from imc_bridge.control import Control, Phase
 from imc_bridge.events import StateReport, Waypoint, WaypointStatus
-from imc_bridge.follow import (
+from imc_bridge.nodes import PlanState
+from imc_bridge.orders import Order
+from imc_bridge.places import distance_m
+from imc_bridge.plans import (
     OPERATION_START,
     OPERATION_STOP,
     PLAN_CONTROL_FAILURE,
     PLAN_CONTROL_SUCCESS,
-    SPEED_METERS_PS,
-    START_RETRY_S,
-    Z_DEPTH,
-    Evidence,
-    Follower,
-    Order,
-    Phase,
+    goto_maneuver,
+    leg_plan,
+    leg_time_s,
 )
-from imc_bridge.guard import distance_m
-from imc_bridge.nodes import PlanState
-from imc_bridge.settings import BridgeSettings
 
-THERE, UP = "there", "up"
-DONE = "ManeuverIsDone"
-SLOWEST_SHARE = 0.6
-"""A leg may take as long as at this share of the speed asked for."""
-CLIMB_MPS = 0.15
-"""At the least, when floating up."""
-TURNING_S = 45.0
-"""For turning, diving and reporting."""
-MANEUVER_TIMEOUT_S = 0xFFFF
 END_WITHIN_M = 25.0
 """A leg that ended farther from its waypoint did not lead there: Goto ends some 7 m before, and the vehicle floats."""
 OUTCOME_FAILURE = 2
-PLAN_SETTLES_S = 5.0
 RADIO_SILENT_S = 3.0
 """After this long without a packet sound is tried."""
 SOUND_START_TIMEOUT_S = 90.0
 START_TIMEOUT_WALLS = 3.0
 """In units of the silence on the wall clock that is never a loss, however fast the vehicles live."""
+START_RETRY_S = 2.0
 REPORT_KEEPS_S = 90.0
 """A vehicle that was heard by sound is expected for at least this much longer."""
 
@@ -62,52 +50,12 @@ class Leg:
     depth_m: float
     expected_s: float
     acknowledged: bool = False
-    running: bool = False
-    """Seen in execution."""
     ended: bool = False
     sent_at: float = 0.0
 
 
-def leg_plan(settings: BridgeSettings, waypoint: Waypoint, depth_m: float) -> Message:
-    """A plan that leads to a waypoint at a depth and then up to the surface, with no further contact."""
-    plan = imcpy.PlanSpecification()
-    plan.plan_id = settings.plan_id
-    plan.start_man_id = THERE
-    for name, depth in ((THERE, depth_m), (UP, 0.0)):
-        step = imcpy.PlanManeuver()
-        step.maneuver_id = name
-        step.data = goto_maneuver(waypoint, depth)
-        plan.maneuvers.append(step)
-    transition = imcpy.PlanTransition()
-    transition.source_man = THERE
-    transition.dest_man = UP
-    transition.conditions = DONE
-    plan.transitions.append(transition)
-    return plan
-
-
-def goto_maneuver(waypoint: Waypoint, depth_m: float) -> Message:
-    """A Goto to a waypoint at a depth."""
-    goto = imcpy.Goto()
-    goto.timeout = MANEUVER_TIMEOUT_S
-    goto.lat = math.radians(waypoint.lat_deg)
-    goto.lon = math.radians(waypoint.lon_deg)
-    goto.z = depth_m
-    goto.z_units = imcpy.ZUnits(Z_DEPTH)
-    goto.speed = waypoint.speed_mps
-    goto.speed_units = imcpy.SpeedUnits(SPEED_METERS_PS)
-    # DUNE takes attitudes only where they are finite; these say that none is asked for.
-    goto.roll = goto.pitch = goto.yaw = -1.0
-    return goto
-
-
-def leg_time_s(length_m: float, depth_m: float, speed_mps: float) -> float:
-    """How long a leg may take until the vehicle is heard again."""
-    return length_m / (SLOWEST_SHARE * max(speed_mps, 0.1)) + depth_m / CLIMB_MPS + TURNING_S
-
-
-class LegFollower(Follower):
-    """The control of one vehicle by whole legs; see :class:`Follower` for the parameters."""
+class LegFollower(Control):
+    """The control of one vehicle by whole legs; see :class:`imc_bridge.control.Control` for the parameters."""
 
     unheard_stop = "it flies its leg to the end and is told to stop when it is heard"
 
@@ -140,7 +88,7 @@ class LegFollower(Follower):
         leg, order = self._leg, self._order
         if self.phase is not Phase.FOLLOWING or leg is None or not leg.acknowledged or order is None:
             return
-        distance = distance_m((report.lat_deg, report.lon_deg), (order.waypoint.lat_deg, order.waypoint.lon_deg))
+        distance = distance_m((report.lat_deg, report.lon_deg), order.place)
         self.node.expected_back = max(self.node.expected_back or 0.0, now + REPORT_KEEPS_S)
         if distance <= END_WITHIN_M:
             self._forget_leg()
@@ -152,13 +100,10 @@ class LegFollower(Follower):
         self._forget_leg()
         return super().engage(now)
 
-    def order(self, waypoint: Waypoint, now: float) -> None:
-        """Send the vehicle off to a waypoint. Repeating one is harmless unless it had been refused."""
-        before = self._order
-        super().order(waypoint, now)
-        if self._order is not before:
-            self._forget_leg()
-            self.tick(now)
+    def _make_order(self, waypoint: Waypoint) -> Order:
+        """Begin anew: a plan for another waypoint replaces the one under way."""
+        self._forget_leg()
+        return super()._make_order(waypoint)
 
     def begin_stop(self, now: float) -> None:
         """Stop the leg: STOP is repeated until the vehicle acknowledges, and again when it comes back."""
@@ -178,8 +123,10 @@ class LegFollower(Follower):
             return
         kind, info = int(message.type), str(message.info)
         if kind == PLAN_CONTROL_SUCCESS and "completed" in info:
+            self._plan_since_s = float(message.timestamp)
             self._leg_over()
         elif kind == PLAN_CONTROL_SUCCESS:
+            self._plan_since_s = float(message.timestamp)
             self._acknowledged(now)
         elif kind == PLAN_CONTROL_FAILURE and not leg.acknowledged:
             reason = f"plan refused: {info or 'no reason given'}"
@@ -191,9 +138,10 @@ class LegFollower(Follower):
     def plan_state_changed(self, now: float) -> None:
         """PlanControlState has been taken in by the node."""
         leg, node = self._leg, self.node
+        if self._outdated():
+            return
         if self.phase is not Phase.FOLLOWING:
-            if self.phase is not Phase.ENDED or not node.executing(self._settings.plan_id):
-                super().plan_state_changed(now)
+            super().plan_state_changed(now)
             return
         if leg is None:
             # Between two legs it is idle, unless someone else gave it a plan.
@@ -202,12 +150,8 @@ class LegFollower(Follower):
             return
         if node.executing(self._settings.plan_id):
             if node.plan_state == PlanState.EXECUTING:
-                leg.running = True
                 self._acknowledged(now)
         elif node.plan_state != PlanState.INITIALIZING and leg.acknowledged and not leg.ended:
-            if not leg.running and now - leg.sent_at < PLAN_SETTLES_S:
-                # A state from before the plan that overtook its acknowledgement.
-                return
             if node.plan_state == PlanState.READY and node.plan_outcome != OUTCOME_FAILURE:
                 self._leg_over()
             else:
@@ -222,7 +166,7 @@ class LegFollower(Follower):
         leg, order = self._leg, self._order
         if self.phase is not Phase.FOLLOWING or leg is None or not leg.ended or order is None:
             return
-        distance = distance_m((report.lat_deg, report.lon_deg), (order.waypoint.lat_deg, order.waypoint.lon_deg))
+        distance = distance_m((report.lat_deg, report.lon_deg), order.place)
         self._forget_leg()
         if distance <= max(END_WITHIN_M, order.waypoint.arrival_radius_m):
             words = "" if distance <= order.waypoint.arrival_radius_m else f"its leg ended {distance:.0f} m from it"
@@ -232,15 +176,14 @@ class LegFollower(Follower):
 
     # The passing of time
 
-    def _tick_waiting(self, now: float) -> None:
-        if self.node.can_start(now):
-            self._evidence = Evidence()
-            self._forget_leg()
-            self._enter(Phase.FOLLOWING, now)
-            self._following_since = now
-            self._tick_following(now)
-        else:
-            super()._tick_waiting(now)
+    def _begin(self, now: float) -> None:
+        self._forget_leg()
+        self._enter(Phase.FOLLOWING, now)
+        self._following_since = now
+        self._tick_following(now)
+
+    def _tick_starting(self, now: float) -> None:
+        """There is no plan before the first waypoint."""
 
     def _tick_following(self, now: float) -> None:
         order, leg = self._order, self._leg
@@ -260,7 +203,6 @@ class LegFollower(Follower):
                     + (f"; {self.sound.last_problem}" if self.sound and self.sound.last_problem else ""),
                     "It may be under water or out of reach; engage it again when it is heard",
                     now,
-                    abandoned=True,
                 )
             elif now >= self._request_due:
                 self._send_leg(order, leg, now)
@@ -269,7 +211,6 @@ class LegFollower(Follower):
                 f"not heard since it left on a leg of {leg.expected_s:.0f} s",
                 "Look for it at its waypoint; engage it again when it is heard",
                 now,
-                abandoned=True,
             )
 
     def _watch_idle(self, now: float) -> None:
@@ -282,7 +223,6 @@ class LegFollower(Follower):
                 f"silent for {silence / self._settings.time_scale:.0f} s between two legs",
                 "Engage it again when it is heard",
                 now,
-                abandoned=True,
             )
 
     @property
@@ -311,11 +251,11 @@ class LegFollower(Follower):
                 report.lat_deg,
                 report.lon_deg,
                 now=now,
-                towards=((waypoint.lat_deg, waypoint.lon_deg),),
+                towards=(order.place,),
                 mapped=waypoint.bottom,
             )
             depth, order.limited = limit.depth_m, limit.reason
-            length = distance_m((report.lat_deg, report.lon_deg), (waypoint.lat_deg, waypoint.lon_deg))
+            length = distance_m((report.lat_deg, report.lon_deg), order.place)
         leg = self._leg = Leg(depth, leg_time_s(length, depth, waypoint.speed_mps), sent_at=now)
         self._request_id = self._next_request_id()
         self._send_leg(order, leg, now)
@@ -357,8 +297,11 @@ class LegFollower(Follower):
         self._leg = None
         self.node.expected_back = None
 
-    def _starved(self) -> bool:
-        return False
+    def excuse(self, seconds: float, now: float) -> None:
+        """Take out of every wait the time in which we were held up ourselves and could hear nothing."""
+        super().excuse(seconds, now)
+        if self._leg is not None:
+            self._leg.sent_at = min(self._leg.sent_at + seconds, now)
 
     def _plan_ended(self, now: float) -> None:
         self._forget_leg()

@@ -130,6 +130,7 @@ class Node:
         self.clock = VehicleClock()
 
         self.entities: dict[int, str] | None = None
+        self.entities_asked_at = -math.inf
         self.operation_mode: int | None = None
         self.operation_mode_at: float | None = None
         self.error_text = ""
@@ -137,6 +138,10 @@ class Node:
         self.plan_state_at: float | None = None
         self.plan_id = ""
         self.plan_outcome: int | None = None
+        self.plan_state_time_s = -math.inf
+        """When it was in that state, by the vehicle's clock."""
+        self.radio_gaps = 0
+        """How often radio ended under water while it was led by references."""
         self.expected_back: float | None = None
         """Until when its silence is part of a plan of ours, seconds of the bridge's clock."""
         self.controller: int | None = None
@@ -180,6 +185,7 @@ class Node:
 
     def _forget_plan(self) -> None:
         self.entities = None
+        self.entities_asked_at = -math.inf
         self.operation_mode = self.plan_state = None
         self.operation_mode_at = self.plan_state_at = None
         self.telemetry_at = None
@@ -194,6 +200,17 @@ class Node:
         self.packets += 1
         self.heard_at = now
         self.address = address
+
+    def excuse(self, seconds: float, now: float) -> None:
+        """Take out of its silence the time in which we were held up ourselves and could hear nothing."""
+
+        def later(at: float | None) -> float | None:
+            return None if at is None else min(at + seconds, now)
+
+        self.heard_at, self.announced_at = later(self.heard_at), later(self.announced_at)
+        self.operation_mode_at, self.plan_state_at = later(self.operation_mode_at), later(self.plan_state_at)
+        if self.expected_back is not None:
+            self.expected_back += seconds
 
     def in_order(self, name: str, timestamp: float) -> bool:
         """Whether a message is newer, by the vehicle's clock, than the last of its kind."""
@@ -267,6 +284,7 @@ class Node:
         self.plan_state_at = now
         self.plan_id = str(message.plan_id)
         self.plan_outcome = int(message.last_outcome)
+        self.plan_state_time_s = float(message.timestamp)
         if self.plan_state not in (PlanState.EXECUTING, PlanState.INITIALIZING):
             self.controller = None
 
@@ -319,6 +337,11 @@ class Node:
         """Whether it executes a plan of this name, as far as it says, and not at another console's behest."""
         running = self.plan_state in (PlanState.EXECUTING, PlanState.INITIALIZING)
         return running and self.plan_id == plan_id and self.foreign_controller is None
+
+    @property
+    def ours(self) -> bool:
+        """Whether it executes our plan."""
+        return self.executing(self._settings.plan_id)
 
     def status(self, now: float) -> Status:
         """The link's state and the reason for it."""

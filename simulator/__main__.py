@@ -69,6 +69,12 @@ def main(
     jitter: Annotated[float, typer.Option(help="Additional random delay up to this, wall seconds.")] = 0.0,
     duplicate: Annotated[float, typer.Option(help="Share of packets that arrive twice, 0 to 1.")] = 0.0,
     reorder: Annotated[float, typer.Option(help="Share of packets that arrive late, 0 to 1.")] = 0.0,
+    radio_range: Annotated[
+        float, typer.Option(help="Metres at which radio ends, and at the surface; 0: it does not end.", min=0.0)
+    ] = 0.0,
+    log_dir: Annotated[
+        Path | None, typer.Option(help="Folder in which every vehicle keeps its log (Data.lsf), as DUNE does on board.")
+    ] = None,
     json_ready: Annotated[
         bool, typer.Option(help="Print one JSON line with names, ids and ports when all vehicles are up.")
     ] = False,
@@ -106,6 +112,8 @@ def main(
                 announce_ports=_ports(announce_ports),
                 faults=NetworkFaults(loss=loss, delay_s=delay, jitter_s=jitter, duplicate=duplicate, reorder=reorder),
                 chatter=chatter,
+                radio_range_m=radio_range,
+                log_dir=log_dir,
             ),
             seed=seed,
         )

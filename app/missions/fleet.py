@@ -160,6 +160,8 @@ class VehicleInfo:
     imc_id: int | None = None
     report: VehicleReport | None = None
     details: dict[str, str] = field(default_factory=dict)
+    advice: str = ""
+    """What the operator should change about how it is used; told once in the mission's log."""
 
 
 @dataclass(frozen=True, slots=True)

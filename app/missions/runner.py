@@ -20,6 +20,7 @@ from app.exploration.problem import Planner
 from app.missions import metrics, safety
 from app.missions.clock import now
 from app.missions.decision import Decision, Place, decide, make_constraints
+from app.missions.engaging import Engaging
 from app.missions.fleet import (
     Position,
     VehicleRefusedError,
@@ -30,14 +31,13 @@ from app.missions.fleet import (
 from app.missions.hub import FleetHub
 from app.missions.live import LiveMission
 from app.missions.members import SETTLED, Member
+from app.missions.spec import Guidance
 from app.missions.views import Level
 from app.storage import missions as mission_queries
 from app.storage.database import Database
 from app.storage.models import StepRow, WaypointRow
 from app.storage.shielding import to_the_end
-
-ENGAGE_PERIOD_S = 2.0
-"""A vehicle that refused to follow is asked again after this time (of the vehicles' clock)."""
+from imc_bridge.plans import leg_time_s
 
 ELAPSED_PERIOD_S = 5.0
 PACE_MEMORY = 0.9
@@ -45,6 +45,9 @@ PACE_MEMORY = 0.9
 
 EXPECTED_DECISION_S = 0.3
 """How long a decision is taken to last before the first was made."""
+
+SOUND_S = 60.0
+"""What commands and reports take by sound, at the most."""
 
 LEAD_M = 25.0
 """How far beyond a waypoint a vehicle may be sent to pass it straight; more than the 15 m from which DUNE circles."""
@@ -85,7 +88,7 @@ class Runner:
         live.running_since_s = asyncio.get_running_loop().time()
         metrics.RUNNING.inc()
         keepers = [
-            asyncio.create_task(self._keep_engaged()),
+            asyncio.create_task(Engaging(live, self._hub, self._time_scale, self._send_to).keep()),
             asyncio.create_task(self._keep_time()),
         ]
         try:
@@ -136,42 +139,6 @@ class Runner:
             await self._send()
             await self._arrive(self._deadline_s())
         return planner
-
-    async def _keep_engaged(self) -> None:
-        """Ask every vehicle that does not follow us to do so, again and again; each new reason is told once."""
-        while True:
-            for member in self._live.team:
-                info = self._hub.info(member.key)
-                member.link = info.state
-                if member.report is None:
-                    member.report = info.report
-            waiting = [member for member in self._live.team if not member.engaged]
-            results = await asyncio.gather(*(self._engage(member) for member in waiting), return_exceptions=True)
-            for member, error in zip(waiting, results, strict=True):
-                if error is not None:
-                    log.error("a vehicle could not be engaged, trying again", vehicle=member.name, exc_info=error)
-            await asyncio.sleep(ENGAGE_PERIOD_S / self._time_scale)
-
-    async def _engage(self, member: Member) -> None:
-        if self._live.halted:
-            return
-        try:
-            await self._hub.engage(member.key)
-        except VehicleRefusedError as error:
-            if str(error) != member.refusal:
-                member.refusal = str(error)
-                level = Level.ALARM if member.followed else Level.WARNING
-                await self._live.journal.log(level, "vehicle", str(error), vehicle=member.name)
-            return
-        member.engaged = True
-        member.followed = True
-        member.refusal = ""
-        member.link = self._hub.info(member.key).state
-        member.report = self._hub.info(member.key).report or member.report
-        await self._live.journal.log(Level.INFO, "vehicle", f"{member.name} follows", vehicle=member.name)
-        self._live.changed.set()
-        if member.busy and member.order is not None:
-            await self._send_to(member)
 
     async def _gather_team(self, *, patient: bool) -> None:
         """Wait until a vehicle can be planned for; patient: until all of them can, or the step's time is over."""
@@ -389,7 +356,7 @@ class Runner:
             return
         late = [member for member in self._live.team if member.busy]
         for member in late:
-            self._settle(member, WaypointStatus.MISSED, f"not reached within {self._spec.step_deadline_s:g} s")
+            self._settle(member, WaypointStatus.MISSED, f"not reached within {self._step_time_s():.0f} s")
         await self._live.journal.log(
             Level.WARNING,
             "straggler",
@@ -400,7 +367,21 @@ class Runner:
 
     def _deadline_s(self) -> float:
         """Return the event loop's time at which a step that begins now goes on without stragglers."""
-        return asyncio.get_running_loop().time() + self._spec.step_deadline_s / self._time_scale
+        return asyncio.get_running_loop().time() + self._step_time_s() / self._time_scale
+
+    def _step_time_s(self) -> float:
+        """Return how long a step may take: longer than asked for where a vehicle is silent until its leg is over."""
+        legs_s = [
+            leg_time_s(
+                float(np.linalg.norm(self._target_m(member.order) - member.place_m(self._live.frame))),
+                member.order.position.depth_m,
+                member.order.speed_mps,
+            )
+            + (SOUND_S if member.spec.guidance is Guidance.ACOUSTIC else 0.0)
+            for member in self._live.team
+            if member.spec.guidance is not Guidance.FOLLOW and member.order is not None and member.report is not None
+        ]
+        return max(self._spec.step_deadline_s, *legs_s) if legs_s else self._spec.step_deadline_s
 
     async def _wait(self, condition: Callable[[], bool], deadline_s: float | None) -> bool:
         """Wait until ``condition`` holds; False when the deadline passed first."""

@@ -8,6 +8,7 @@ import struct
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from ipaddress import ip_address
+from pathlib import Path
 
 import imcpy
 import numpy as np
@@ -15,6 +16,7 @@ import numpy as np
 from simulator.clock import SimulationClock
 from simulator.dune.contacts import REFRESH_PERIOD_S, Contacts
 from simulator.dune.entities import ANY, HARDWARE_DVL, HARDWARE_MULTIBEAM, SIMULATION, entity_list
+from simulator.dune.log_book import LogBook
 from simulator.dune.plan import PLAN_ENGINE, SUPERVISOR, PlanEngine
 from simulator.dune.radio import Radio
 from simulator.dune.rates import DEFAULT_LIMITS_HZ, Periodic, RateLimiter, RateLimiterError, parse_limits
@@ -78,6 +80,8 @@ class DuneOptions:
         Also serve consoles by TCP.
     radio_range_m
         Above 0 the radio ends there, and at the surface.
+    log_dir
+        Where vehicles keep their logs, each in a folder of its name; none by default.
     """
 
     bind_address: str = "127.0.0.1"
@@ -90,6 +94,7 @@ class DuneOptions:
     imc_version: str = IMC_VERSION
     tcp: bool = False
     radio_range_m: float = 0.0
+    log_dir: Path | None = None
 
     def __post_init__(self) -> None:
         try:
@@ -162,6 +167,7 @@ class FakeDune:
         self._entities |= self._extra
         self._radio = Radio(options.radio_range_m)
         self._tcp = TcpServer(self._receive_by_tcp) if options.tcp else None
+        self._log: LogBook | None = None
         self._endpoint: Endpoint | None = None
         self._announcer: Endpoint | None = None
         self._telemetry: Telemetry | None = None
@@ -232,6 +238,9 @@ class FakeDune:
         )
         self._telemetry = Telemetry(self.vehicle, self.vehicle.terrain.frame, self.name, services)
         self._schedule = self._periodic_messages(self._telemetry)
+        if self._options.log_dir is not None:
+            self._log = LogBook(self._options.log_dir / self.name, self._now_s)
+            self._report_entities()
 
     def stop(self) -> None:
         """Release the sockets."""
@@ -239,6 +248,8 @@ class FakeDune:
             if endpoint is not None:
                 endpoint.close()
         self._endpoint = self._announcer = None
+        if self._log is not None:
+            self._log.close()
         if self._tcp is not None:
             self._tcp.close()
 
@@ -249,16 +260,22 @@ class FakeDune:
         dst: int = _BROADCAST,
         dst_ent: int = ANY,
         src: int | None = None,
+        *,
+        by_radio: bool = True,
     ) -> None:
-        """Send a message of this node to every active system."""
-        if not self._has_listeners:
+        """Send a message of this node to every active system, and note it in the log; or only that."""
+        if not self._has_listeners and self._log is None:
             return
         message.timestamp = self._now_s
         message.src = self.imc_id if src is None else src
         message.src_ent = entity
         message.dst = dst
         message.dst_ent = dst_ent
-        self._put(message.serialize(), message.msg_id)
+        data = bytes(message.serialize())
+        if self._log is not None:
+            self._log.write(data)
+        if by_radio:
+            self._put(data, message.msg_id)
 
     @property
     def _has_listeners(self) -> bool:
@@ -298,7 +315,7 @@ class FakeDune:
             for contact, active in self.contacts.refresh(now_s):
                 doing = "activating" if active else "deactivating"
                 self._log_book(f"{doing} transmission to node '{contact.name}'")
-        if not self._has_listeners:
+        if not self._has_listeners and self._log is None:
             return
         for periodic, emit in self._schedule:
             if periodic.due(now_s):
@@ -313,8 +330,10 @@ class FakeDune:
 
         def limited(name: str, entity: int, build: Callable[[], imcpy.Message]) -> Callable[[], None]:
             def emit() -> None:
-                if self.limiter.passes(name, entity, self._now_s):
-                    self.send(build(), entity)
+                # Rates are limited for radio's sake: the log takes every message.
+                by_radio = self.limiter.passes(name, entity, self._now_s)
+                if by_radio or self._log is not None:
+                    self.send(build(), entity, by_radio=by_radio)
 
             return emit
 
@@ -341,7 +360,9 @@ class FakeDune:
         message.src_ent = SIMULATION["Service Announcer"]
         message.dst = 0
         message.dst_ent = ANY
-        data = message.serialize()
+        data = bytes(message.serialize())
+        if self._log is not None:
+            self._log.write(data)
         for host in self._options.announce_addresses:
             for port in self._options.announce_ports:
                 self._announcer.send(data, (host, port))
@@ -364,11 +385,12 @@ class FakeDune:
                 if vehicle.sonar.kind is SensorKind.DVL
                 else [self._entities["Altimeter"]]
             )
-            wanted = [passes("Distance", entity, now_s) for entity in entities]
-            if any(wanted):
-                for entity, send, measurement in zip(entities, wanted, vehicle.measure(), strict=True):
-                    if send:
-                        self.send(t.distance(measurement), entity)
+            by_radio = [passes("Distance", entity, now_s) for entity in entities]
+            logged = self._log is not None
+            if logged or any(by_radio):
+                for entity, send, measurement in zip(entities, by_radio, vehicle.measure(), strict=True):
+                    if send or logged:
+                        self.send(t.distance(measurement), entity, by_radio=send)
         forward = self._entities["Echo Sounder"]
         if passes("Distance", forward, now_s):
             self.send(t.forward_distance(self._forward_range_m()), forward)
@@ -460,10 +482,13 @@ class FakeDune:
         if not isinstance(message, imcpy.EntityList) or message.dst not in (self.imc_id, _BROADCAST):
             return
         if message.op == imcpy.EntityList.OperationEnum.QUERY:
-            report = imcpy.EntityList()
-            report.op = imcpy.EntityList.OperationEnum.REPORT
-            report.list = entity_list(self._extra)
-            self.send(report, 0, message.src)
+            self._report_entities(int(message.src))
+
+    def _report_entities(self, to: int = _BROADCAST) -> None:
+        report = imcpy.EntityList()
+        report.op = imcpy.EntityList.OperationEnum.REPORT
+        report.list = entity_list(self._extra)
+        self.send(report, 0, to)
 
     def _on_set_parameters(self, message: imcpy.Message, now_s: float) -> None:
         if not isinstance(message, imcpy.SetEntityParameters) or message.dst != self.imc_id:

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from imc_bridge.bridge import WANTED
 from imc_bridge.codec import Decoder, Header, PacketFault, encode, message_name, peek
+from imc_bridge.hearing import WANTED
 from tests.imc_bridge.conftest import read_capture
 
 SESSIONS = ["udp_session", "acoustic_session", "wifi_gap_x5"]

@@ -6,9 +6,11 @@ import math
 import imcpy
 import pytest
 
+from imc_bridge.control import Phase
 from imc_bridge.discovery import Announcement
 from imc_bridge.events import Waypoint, WaypointStatus
-from imc_bridge.follow import Follower, Phase
+from imc_bridge.follow import Follower
+from imc_bridge.legs import LegFollower
 from imc_bridge.nodes import Node, OperationMode, PlanState
 from imc_bridge.settings import BridgeSettings
 
@@ -19,7 +21,7 @@ WAYPOINT = Waypoint("m", 0, 41.186, -8.705, 1.5)
 class Script:
     """A vehicle whose every message is written by the test; one tick is 0.2 s."""
 
-    def __init__(self, **settings):
+    def __init__(self, kind=Follower, **settings):
         self.settings = BridgeSettings(**settings)
         self.now = 100.0
         self.time_s = 1.7e9
@@ -27,11 +29,11 @@ class Script:
         self.changes = []
         self.node = Node(0x1E, "v", self.settings, self.now)
         self.node.announced(Announcement(0x1E, "v", 2, (ADDRESS,)), (ADDRESS,), self.now)
-        self.follower = Follower(self.node, self.settings, self.sent.append, self.changes.append, itertools.count(7))
+        self.follower = kind(self.node, self.settings, self.sent.append, self.changes.append, itertools.count(7))
         self.mode, self.plan = OperationMode.SERVICE, PlanState.READY
         self.alive = True
 
-    def report(self, *, mode=None, plan=None, plan_id=None, error=""):
+    def report(self, *, mode=None, plan=None, plan_id=None, error="", time_s=0.0):
         self.mode = self.mode if mode is None else mode
         self.plan = self.plan if plan is None else plan
         vehicle, control = imcpy.VehicleState(), imcpy.PlanControlState()
@@ -39,6 +41,7 @@ class Script:
         vehicle.last_error = error
         control.state = imcpy.PlanControlState.StateEnum(int(self.plan))
         control.plan_id = self.settings.plan_id if plan_id is None else plan_id
+        control.timestamp = time_s
         self.node.heard(self.now, ADDRESS)
         self.node.take_vehicle_state(vehicle, self.now)
         self.follower.vehicle_state_changed(self.now)
@@ -61,13 +64,14 @@ class Script:
             message.reference = reference or sent[-1]
         self.follower.follow_state(message, self.now)
 
-    def reply(self, *, ok, info, operation=0, request_id=None):
+    def reply(self, *, ok, info, operation=0, request_id=None, time_s=0.0):
         message = imcpy.PlanControl()
         kinds = imcpy.PlanControl.TypeEnum
         message.type = kinds.SUCCESS if ok else kinds.FAILURE
         message.op = imcpy.PlanControl.OperationEnum(operation)
         message.request_id = self.of("PlanControl")[-1].request_id if request_id is None else request_id
         message.info = info
+        message.timestamp = time_s
         self.follower.plan_control_reply(message, self.now)
 
     def run(self, seconds, echoing=True):
@@ -272,6 +276,27 @@ def test_plan_state_that_comes_late_does_not_end_a_running_plan():
     script.run(3.0)
     assert script.follower.phase is Phase.FOLLOWING
     assert script.operations() == [0]
+
+
+@pytest.mark.parametrize("kind", [Follower, LegFollower])
+def test_plan_state_from_before_the_plan_that_was_held_up_on_its_way_ends_nothing(kind):
+    script = Script(kind)
+    script.report()
+    script.move()
+    script.follower.engage(script.now)
+    script.follower.tick(script.now)
+    script.follower.order(WAYPOINT, script.now)
+    script.reply(ok=True, info="plan loaded", time_s=50.0)
+    script.report(mode=OperationMode.MANEUVER, plan=PlanState.EXECUTING, time_s=51.0)
+    script.echo()
+    script.alive = False
+    for late_s in (48.0, 49.0):
+        script.now += 30.0
+        script.report(mode=OperationMode.SERVICE, plan=PlanState.READY, time_s=late_s)
+    script.move()
+    assert script.follower.phase is Phase.FOLLOWING
+    assert script.statuses() == [WaypointStatus.SENT, WaypointStatus.ACKNOWLEDGED]
+    assert script.operations() == [0], "it is neither stopped nor started again"
 
 
 def test_unanswered_references_of_a_live_vehicle_restart_its_plan():

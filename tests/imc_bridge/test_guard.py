@@ -7,7 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from imc_bridge.events import BottomPoint
-from imc_bridge.guard import AltitudeGuard, distance_m
+from imc_bridge.guard import AltitudeGuard
+from imc_bridge.places import distance_m
 from imc_bridge.seabed import CELL_M, Seabed
 
 LAT, LON = 41.185, -8.705

@@ -2,6 +2,7 @@
 
 import asyncio
 from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 from pydantic import ValidationError
@@ -11,19 +12,21 @@ from app.missions.settings import ImcSettings, ServiceSettings
 from app.missions.spec import MissionSpec, VehicleSpec
 from app.missions.states import MissionState
 from app.storage.database import Database
+from imc_bridge import Sounding
+from imc_bridge.logs import VehicleLog
 from tests.imc_bridge.conftest import open_sea
 from tests.missions.conftest import database_path, empty_database, make_settings
 from tests.missions.fleet import until
 
-SPEED = 10.0
+SPEED = 20.0
 
 __all__ = ["database_path", "empty_database", "make_settings"]
 
 
-async def test_a_mission_by_legs_finishes_without_contact_under_water(
-    make_settings: Callable[..., ServiceSettings],
+async def test_a_mission_by_legs_finishes_without_contact_under_water_and_has_every_sounding_in_the_end(
+    make_settings: Callable[..., ServiceSettings], tmp_path: Path
 ) -> None:
-    async with open_sea(vehicles=1, radio_range_m=2000.0, connected=False, speed=SPEED) as sea:
+    async with open_sea(radio_range_m=2000.0, connected=False, speed=SPEED, log_dir=tmp_path / "logs") as sea:
         imc = ImcSettings(
             port=sea.settings.port,
             announce_ports=sea.settings.announce_ports,
@@ -48,7 +51,8 @@ async def test_a_mission_by_legs_finishes_without_contact_under_water(
                     "cell_m": 5.0,
                     "limits": {"max_step_m": 25.0, "min_depth_m": 2.0, "max_depth_m": 2.0},
                     "planner": {"name": "random"},
-                    "step_deadline_s": 600.0,
+                    # Legs take longer: that is seen to.
+                    "step_deadline_s": 5.0,
                 }
             )
             mission = await service.create(spec)
@@ -74,10 +78,24 @@ async def test_a_mission_by_legs_finishes_without_contact_under_water(
             assert "lost" not in links
             warnings = [e.message for e in await service.events(mission.id) if e.level != "info"]
             assert not [message for message in warnings if "straggler" in message or "goes on without" in message]
+            by_radio = await service.soundings(mission.id)
+            await sea.vanish()
+            [log] = list_logs(tmp_path)
+            imported = await service.import_log(mission.id, log, actor="tester")
+            measured = [event for event in VehicleLog(log, sea.settings).events() if isinstance(event, Sounding)]
+            accepted = [s for s in await service.soundings(mission.id) if s.verdict == "accepted"]
+            assert len(by_radio) < 0.7 * len(measured), "radio carried only what was measured at the surface"
+            assert imported.duplicate == len(by_radio), "which the log holds as well"
+            assert len(accepted) == len(measured), "nothing that was measured is missing"
         finally:
             await service.shutdown()
             await database.close()
             await asyncio.sleep(0)
+
+
+def list_logs(folder: Path) -> list[Path]:
+    """The logs that the vehicles kept on board."""
+    return sorted(folder.glob("logs/*/*/Data.lsf"))
 
 
 @pytest.mark.parametrize(

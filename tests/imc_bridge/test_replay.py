@@ -9,11 +9,12 @@ import imcpy
 import pytest
 
 from imc_bridge import Bridge, BridgeEvent, BridgeSettings, LinkChange, NodeState, Sounding, StateReport
-from imc_bridge.bridge import entity_query
 from imc_bridge.codec import encode
 from imc_bridge.discovery import own_announce
-from imc_bridge.follow import OPERATION_START, REFERENCE_FLAGS, SentReference, plan_control
+from imc_bridge.plans import OPERATION_START, plan_control
+from imc_bridge.references import REFERENCE_FLAGS, SentReference
 from imc_bridge.replay import read_recording, replay
+from imc_bridge.speaking import entity_query
 
 CONSOLE = ("127.0.0.1", 6101)
 

@@ -36,6 +36,7 @@ from imc_bridge import (
     WaypointChange,
 )
 from imc_bridge.consoles import Mark
+from imc_bridge.diagnosis import radio_gap_words
 from imc_bridge.doctor import Diagnosis, judge
 
 _UNENGAGED = {
@@ -266,4 +267,6 @@ def _info(node: NodeView) -> VehicleInfo:
         imc_id=node.imc_id,
         report=None if node.report is None else vehicle_report(node.report),
         details={key: value for key, value in details.items() if value is not None},
+        # Only a vehicle that came back shows that it was radio that ended.
+        advice=". ".join(radio_gap_words(node.radio_gaps)) if node.radio_gaps and node.state not in _SILENT else "",
     )

@@ -1,0 +1,44 @@
+"""Puts a benchmark's figures into a page of results: one section each, which the next run replaces."""
+
+import re
+import shlex
+import sys
+from pathlib import Path
+from typing import Any
+
+from app.evaluation.tables.facts import made
+
+HEAD = """# The IMC bridge: what was measured
+
+Every section is written by the command that stands in it (`--write` with this page's path). Vehicles are the
+simulator's fake DUNE nodes on real UDP sockets of the same machine, which take part of its processor themselves.
+"""
+
+
+def command_line(hidden: dict[Path | None, str]) -> str:
+    """How this program was called; paths of this machine by the names given."""
+    words = [Path(sys.argv[0]).name, *sys.argv[1:]]
+    shown = {str(path): name for path, name in hidden.items() if path is not None}
+    return "python benchmarks/" + " ".join(shown.get(word, shlex.quote(word)) for word in words)
+
+
+def write_section(page: Path, title: str, figures: dict[str, Any], hidden: dict[Path | None, str]) -> None:
+    """Write the section ``title`` of a page, in the place of an older one."""
+    facts = made(command_line({page: page.as_posix().rpartition("docs/")[2], **hidden}), 1)
+    lines = [f"## {title}", "", *(f"- {name}: {facts[name]}" for name in ("command", "date", "machine", "versions"))]
+    lines += ["", "| | |", "| --- | --- |", *(f"| {name} | {_shown(value)} |" for name, value in figures.items()), ""]
+    text = page.read_text(encoding="utf-8") if page.exists() else HEAD
+    head, *sections = re.split(r"(?m)^(?=## )", text)
+    kept = [section for section in sections if not section.startswith(f"## {title}\n")]
+    place = next((i for i, section in enumerate(sections) if section.startswith(f"## {title}\n")), len(kept))
+    kept.insert(place, "\n".join(lines))
+    page.parent.mkdir(parents=True, exist_ok=True)
+    page.write_text("\n\n".join(part.strip() for part in (head, *kept)) + "\n", encoding="utf-8")
+
+
+def _shown(value: Any) -> str:
+    if isinstance(value, dict):
+        return ", ".join(f"{name}: {_shown(item)}" for name, item in value.items()) or "none"
+    if isinstance(value, list):
+        return "; ".join(map(_shown, value)) or "none"
+    return str(value).replace("|", "/").replace("\n", " ")

@@ -1,0 +1,52 @@
+"""A node as the bridge's user sees it."""
+
+from __future__ import annotations
+
+from imc_bridge.events import LinkChange, NodeView
+from imc_bridge.nodes import Node
+
+
+def view_of(
+    node: Node, now: float, scale: float, *, engaged: bool, history: tuple[LinkChange, ...], rate_limiters: str
+) -> NodeView:
+    """All that is known of a node at ``now``; ``scale``: seconds of the bridge's clock per second of the wall's."""
+    status = node.status(now)
+
+    def age(at: float | None) -> float | None:
+        return None if at is None else (now - at) / scale
+
+    return NodeView(
+        name=node.name,
+        imc_id=node.imc_id,
+        is_vehicle=node.is_vehicle,
+        state=status.state,
+        engaged=engaged,
+        reason=status.reason,
+        ours=node.ours,
+        age_s=age(node.heard_at),
+        announce_age_s=age(node.announced_at),
+        telemetry_overdue=node.telemetry_overdue(now),
+        address=f"{node.address[0]}:{node.address[1]}" if node.address else None,
+        addresses=node.addresses,
+        imc_version=node.announcement.imc_version if node.announcement else None,
+        operation_mode=node.operation_mode_name,
+        plan_id=node.plan_id or None,
+        plan_state=node.plan_state_name,
+        report=node.report,
+        clock_offset_s=node.clock.offset_s,
+        entities=None if node.entities is None else len(node.entities),
+        controller=node.controller,
+        bottom_sensors=tuple(sorted(node.gate.heard)),
+        rates_hz=node.rates.rates_hz(now),
+        soundings=node.gate.accepted,
+        refused=dict(node.gate.refused),
+        echoes=node.echoes,
+        relayed=sum(node.relayed.values()),
+        foreign_address=node.foreign_address,
+        foreign_from=f"{node.last_foreign[0]}:{node.last_foreign[1]}" if node.last_foreign else None,
+        conflict=node.conflict,
+        clock_rate=node.clock.rate(scale),
+        history=history,
+        rate_limiters=rate_limiters,
+        radio_gaps=node.radio_gaps,
+    )
