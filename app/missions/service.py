@@ -36,6 +36,7 @@ from app.missions.fleet import (
     FleetLink,
     StopReceipt,
 )
+from app.missions.history import map_at_step, steps_after
 from app.missions.hub import FleetHub
 from app.missions.journal import event_view
 from app.missions.links.rest import RestFleetLink
@@ -44,6 +45,7 @@ from app.missions.live import LiveMission
 from app.missions.maps import MapSnapshot
 from app.missions.measuring import measure
 from app.missions.polling import waypoint
+from app.missions.preflight import preflight
 from app.missions.products import (
     MAP,
     SOUNDINGS,
@@ -54,6 +56,7 @@ from app.missions.products import (
     make_product,
     product_kind,
 )
+from app.missions.reviewing import rule, soundings_page
 from app.missions.settings import ServiceSettings
 from app.missions.spec import MissionSpec, SoundSpeed, VehicleKind, VehicleSpec
 from app.missions.states import ENDED, MissionState
@@ -71,8 +74,14 @@ from app.missions.views import (
     MissionSummary,
     MissionView,
     PlannerView,
+    PreflightView,
     ReferenceView,
+    Ruling,
     SnapshotMessage,
+    SoundingPage,
+    SoundingState,
+    SoundingView,
+    StepView,
     StopView,
     TideCorrection,
     VehicleView,
@@ -86,7 +95,7 @@ from app.storage.models import MissionRow, MissionVehicleRow, SoundingRow
 
 Action = Literal["start", "pause", "resume", "abort", "finish"]
 
-MAX_TRACK_POINTS = 2000
+MAX_TRACK_POINTS = 5000
 ENDED_MISSIONS_IN_MEMORY = 8
 WORKERS = 2
 
@@ -138,7 +147,12 @@ class MissionService:
         self._conductor = Conductor(database, self._hub, self._claims, self._executor, settings.time_scale)
         self._runs = self._conductor.runs
         self._live: dict[str, LiveMission] = {}
+        # As they were when they left memory.
+        self._left: dict[str, MissionSummary] = {}
         self._loading = asyncio.Lock()
+        # Maps of missions that were taken up; one at a time, so that planning has a thread.
+        self._mapping = asyncio.Lock()
+        self._mapped: dict[str, asyncio.Task[None]] = {}
         # One file after the other: reading takes memory and a core.
         self._importing = asyncio.Lock()
         self._started = False
@@ -166,6 +180,8 @@ class MissionService:
     async def shutdown(self) -> None:
         """Stop every vehicle and write everything down; running missions stay running and go on at the next start."""
         self._started = False
+        for task in list(self._mapped.values()):
+            task.cancel()
         for mission_id in list(self._runs):
             await self._conductor.halt(await self._get(mission_id))
         await self._hub.close()
@@ -213,7 +229,11 @@ class MissionService:
         """Return every mission, newest first."""
         async with self._database.reading() as session:
             rows = await mission_queries.all_missions(session)
-        return [(await self._get(row.id)).summary() for row in rows]
+        # One that ended and left memory is as it was then: taking it up again for every list would be slow.
+        return [self._left[row.id] if self._is_away(row.id) else (await self._get(row.id)).summary() for row in rows]
+
+    def _is_away(self, mission_id: str) -> bool:
+        return mission_id in self._left and mission_id not in self._live
 
     async def mission(self, mission_id: str) -> MissionView:
         """Return one mission. Raises MissionNotFoundError."""
@@ -248,7 +268,7 @@ class MissionService:
                     self._claims.release_team(live)
                     await live.build_map()
                 live.publish_summary()
-        return ActionView(mission=live.summary(), stops=[StopView(**receipt(stop)) for stop in stops])
+        return _action_view(live, stops)
 
     async def add_vehicle(self, mission_id: str, vehicle: VehicleSpec, *, actor: str = "operator") -> MissionView:
         """Let a vehicle join, while the mission runs too. Raises ConflictError, InvalidRequestError."""
@@ -288,7 +308,13 @@ class MissionService:
 
     async def remove_vehicle(self, mission_id: str, name: str, *, actor: str = "operator") -> MissionView:
         """Stop a vehicle and take it out of the mission. Raises VehicleNotFoundError."""
+        await self.abort_vehicle(mission_id, name, actor=actor)
+        return self._view(await self._get(mission_id))
+
+    async def abort_vehicle(self, mission_id: str, name: str, *, actor: str = "operator") -> ActionView:
+        """Stop a vehicle and take it out of the mission; returns whether it acknowledged that."""
         live = await self._get(mission_id)
+        stops: list[StopReceipt] = []
         async with self._conductor.acting(mission_id):
             self._refuse_ended(live, "keeps its vehicles")
             member = live.team.get(name)
@@ -306,13 +332,23 @@ class MissionService:
             live.changed.set()
             live.publish_summary()
             if claimed:
-                await self._conductor.log_stops(live, [await self._hub.stop(member.key)])
+                stops = [await self._hub.stop(member.key)]
+                await self._conductor.log_stops(live, stops)
                 self._hub.release(member.key, mission_id)
             if live.header.state is MissionState.READY and not list(live.team):
                 move = states.move(MissionState.READY, "reopen_draft")
                 await self._conductor.set_state(live, move, "no vehicle left", actor)
             await live.journal.log(Level.INFO, "vehicle", f"{name} left", vehicle=name, actor=actor)
-        return self._view(live)
+        return _action_view(live, stops)
+
+    async def preflight(self, mission_id: str) -> PreflightView:
+        """Return what stands before a mission's start."""
+        return preflight(await self._get(mission_id), self._hub)
+
+    async def write_note(self, mission_id: str, text: str, *, actor: str) -> EventView:
+        """Keep an operator's words in a mission's log."""
+        live = await self._get(mission_id)
+        return event_view(await live.journal.log(Level.INFO, "note", text, actor=actor))
 
     async def note(self, mission_id: str, level: Level, kind: str, message: str, **data: str | float) -> None:
         """Write a line of a mission's log."""
@@ -356,6 +392,26 @@ class MissionService:
         live = await self._get(mission_id)
         work = await asyncio.to_thread(LogImport, live, self._database, self._settings, path, vehicle)
         return await work.run(actor=actor, progress=progress)
+
+    # Soundings that are not in the map
+
+    async def review(
+        self,
+        mission_id: str,
+        states: Sequence[SoundingState],
+        *,
+        vehicle: str | None = None,
+        after: int = 0,
+        limit: int = 200,
+    ) -> SoundingPage:
+        """Return soundings in any of the states, a page of them."""
+        return await soundings_page(await self._get(mission_id), self._database, states, vehicle, after, limit)
+
+    async def rule(
+        self, mission_id: str, sounding_id: int, ruling: Ruling, *, note: str = "", actor: str = "operator"
+    ) -> SoundingView:
+        """Restore a sounding or reject it; see ``reviewing.rule``."""
+        return await rule(await self._get(mission_id), self._database, sounding_id, ruling, note, actor)
 
     # Corrections
 
@@ -418,6 +474,26 @@ class MissionService:
             await importing.delete_reference(live, self._database, actor)
 
     # What came of it
+
+    async def steps(self, mission_id: str, *, after: int = 0, limit: int = 1000) -> list[StepView]:
+        """Return up to ``limit`` steps with a number above ``after``."""
+        return await steps_after(await self._get(mission_id), self._database, after, limit)
+
+    async def map_tiles(
+        self, mission_id: str, run: str, since: str, further: Sequence[str] = (), step: int | None = None
+    ) -> bytes:
+        """Return what changed in the map; see ``TileCache.changes``. ``step``: the map as it was at that step's end.
+
+        ``run`` tells this process from others, whose versions begin at 1, too.
+        """
+        live = await self._get(mission_id)
+        if step is None:
+            snapshot = await self.map(mission_id)
+        else:
+            snapshot = await map_at_step(live, self._database, step)
+        at = "" if step is None else f"@{step}"
+        tag = f"{run}.{snapshot.version}.{snapshot.revision}{at}"
+        return await asyncio.to_thread(live.tiles.changes, snapshot, tag, since, tuple(sorted(set(further))))
 
     async def map(self, mission_id: str) -> MapSnapshot:
         """Return the newest map. Raises MapNotReadyError when there is no sounding yet."""
@@ -543,12 +619,36 @@ class MissionService:
             live = await LiveMission.load(self._database, self._hub, self._executor, row)
             await self._make_room()
             self._live[mission_id] = live
+            self._map_soon(live)
             return live
 
+    def _map_soon(self, live: LiveMission) -> None:
+        """Make the map of what was stored; nobody waits for it, and one is made at a time."""
+        if not live.builder.stale:
+            return
+
+        async def make() -> None:
+            async with self._mapping:
+                await live.map_what_is_stored()
+
+        def done(task: asyncio.Task[None]) -> None:
+            self._mapped.pop(live.id, None)
+            error = None if task.cancelled() else task.exception()
+            if error is not None:
+                log.error("the map is not made yet; it is when it is asked for", mission=live.id, exc_info=error)
+
+        self._mapped[live.id] = task = asyncio.create_task(make(), name=f"map of {live.id}")
+        task.add_done_callback(done)
+
     async def _make_room(self) -> None:
-        idle = [m for m in self._live.values() if m.header.state in ENDED and not m.broadcaster.watched]
+        idle = [
+            m
+            for m in self._live.values()
+            if m.header.state in ENDED and not m.broadcaster.watched and m.id not in self._mapped
+        ]
         for live in idle[: max(0, len(idle) - ENDED_MISSIONS_IN_MEMORY + 1)]:
             del self._live[live.id]
+            self._left[live.id] = live.summary()
             await live.close()
 
     def _view(self, live: LiveMission) -> MissionView:
@@ -598,6 +698,10 @@ class MissionService:
     def _refuse_ended(self, live: LiveMission, words: str) -> None:
         if live.header.state in ENDED:
             raise ConflictError(f"the mission is {live.header.state} and {words}", "create a new mission")
+
+
+def _action_view(live: LiveMission, stops: Sequence[StopReceipt]) -> ActionView:
+    return ActionView(mission=live.summary(), stops=[StopView(**receipt(stop)) for stop in stops])
 
 
 async def _nobody(_password: str, _host: str) -> str | None:

@@ -166,6 +166,8 @@ class SoundingRow(Base):
     beam_off_nadir_deg: Mapped[float | None]
     verdict: Mapped[str] = mapped_column(String(16))
     reason: Mapped[str] = mapped_column(Text, default="")
+    ruling: Mapped[str | None] = mapped_column(String(16))
+    """What an operator said of it, whatever gate and map think: restored or rejected."""
 
 
 class TideTableRow(Base):
