@@ -26,6 +26,7 @@ async def steps_after(live: LiveMission, database: Database, after: int, limit: 
             committed_at=step.committed_at,
             objective=step.objective,
             terms=step.terms,
+            figures=step.figures or {},
             soundings=step.soundings,
             waypoints=waypoints.get(step.number, []),
         )

@@ -305,6 +305,16 @@ class LiveMission:
             )
         )
 
+    def figures(self) -> dict[str, float]:
+        """Return how far the mission has come, as each step keeps it."""
+        built = self.builder.newest
+        found = {
+            "coverage_pct": self.builder.coverage_pct(),
+            "remaining_pct": self.builder.remaining_pct(),
+            "distance_m": self.journal.travelled_m,
+        }
+        return found | ({} if built is None else {"mean_sd_m": float(np.nanmean(built.map.sd_m))})
+
     def progress(self) -> Progress:
         """Return how far the mission has come."""
         built = self.builder.newest
@@ -319,6 +329,7 @@ class LiveMission:
             rejected=self.journal.counts.rejected,
             distance_m=self.journal.travelled_m,
             coverage_pct=self.builder.coverage_pct(),
+            remaining_pct=self.builder.remaining_pct(),
             mean_sd_m=float(np.nanmean(built.map.sd_m)) if built is not None else None,
             objective=header.objective,
             terms=header.terms or {},

@@ -243,6 +243,13 @@ class MapBuilder:
         sd = self._newest.map.sd_m[self.mask]
         return float(100.0 * np.mean(sd <= self._accuracy_m))
 
+    def remaining_pct(self) -> float:
+        """Return the share of the landmarks that were never known to the asked accuracy, in a belief or now."""
+        known = self._accurate
+        if self._newest is not None:
+            known = known | (self._newest.map.sd_m[self._nodes] <= self._accuracy_m)
+        return float(100.0 * np.mean(~known))
+
     def belief(self) -> Belief:
         """Return what is known at the landmarks (a lattice of the grid's cells)."""
         n = len(self._nodes_xy)

@@ -70,6 +70,7 @@ class Progress(View):
     rejected: int = Field(description="Soundings kept but not used")
     distance_m: float = Field(description="Distance travelled by all vehicles, along their tracks")
     coverage_pct: float = Field(description="Share of the area's cells known to accuracy_m")
+    remaining_pct: float = Field(default=100.0, description="Share of the landmarks never known to accuracy_m")
     mean_sd_m: float | None = Field(default=None, description="Mean standard deviation of the map")
     objective: float | None = Field(default=None, description="The planner's objective at the last step")
     terms: dict[str, float] = Field(default_factory=dict)
@@ -416,6 +417,10 @@ class StepView(View):
     committed_at: datetime
     objective: float | None
     terms: dict[str, float]
+    figures: dict[str, float] = Field(
+        description="How far the mission had come: coverage_pct, remaining_pct, mean_sd_m, distance_m; empty in steps "
+        "of before they were kept"
+    )
     soundings: int = Field(description="Soundings that its map was made of")
     waypoints: list[WaypointView]
 

@@ -1942,6 +1942,12 @@ export interface components {
              */
             coverage_pct: number;
             /**
+             * Remaining Pct
+             * @description Share of the landmarks never known to accuracy_m
+             * @default 100
+             */
+            remaining_pct: number;
+            /**
              * Mean Sd M
              * @description Mean standard deviation of the map
              */
@@ -2186,6 +2192,13 @@ export interface components {
             objective: number | null;
             /** Terms */
             terms: {
+                [key: string]: number;
+            };
+            /**
+             * Figures
+             * @description How far the mission had come: coverage_pct, remaining_pct, mean_sd_m, distance_m; empty in steps of before they were kept
+             */
+            figures: {
                 [key: string]: number;
             };
             /**

@@ -1,4 +1,4 @@
-"""Keep what operators say of single soundings."""
+"""Keep what operators say of single soundings, and how far a mission had come at each step."""
 
 from collections.abc import Sequence
 
@@ -13,8 +13,11 @@ depends_on: str | Sequence[str] | None = None
 
 def upgrade() -> None:
     op.add_column("soundings", sa.Column("ruling", sa.String(length=16), nullable=True))
+    op.add_column("steps", sa.Column("figures", sa.JSON(), nullable=True))
 
 
 def downgrade() -> None:
+    with op.batch_alter_table("steps", schema=None) as batch_op:
+        batch_op.drop_column("figures")
     with op.batch_alter_table("soundings", schema=None) as batch_op:
         batch_op.drop_column("ruling")
