@@ -15,7 +15,19 @@ from fastapi_offline import FastAPIOffline
 from starlette.middleware.cors import CORSMiddleware
 
 from app import __version__
-from app.api import corrections, fleet, imports, logs, maps, measurements, missions, openapi, problems, streams
+from app.api import (
+    corrections,
+    fleet,
+    imports,
+    logs,
+    maps,
+    measurements,
+    missions,
+    openapi,
+    problems,
+    soundings,
+    streams,
+)
 from app.api.auth import console_log_in
 from app.api.health import health_router
 from app.api.middleware import BodyMiddleware, RequestMiddleware
@@ -93,6 +105,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         corrections.router,
         imports.router,
         maps.router,
+        soundings.router,
         streams.router,
         fleet.router,
         health_router(API),

@@ -186,6 +186,47 @@ async def get_overlay(
     return Response(await asyncio.to_thread(picture), media_type="image/png", headers=_caching(tag))
 
 
+class FurtherLayer(StrEnum):
+    """A layer that the tiles hold on request."""
+
+    SLOPE = "slope"
+    TVU_FRACTION = "tvu_fraction"
+    DIFFERENCE = "difference"
+
+
+@router.get(
+    "/map/tiles",
+    operation_id="getMapTiles",
+    summary="Follow the map",
+    response_class=Response,
+    responses={
+        200: {
+            "description": "The tiles that changed, in a binary form that the guide to REST describes",
+            "content": {"application/octet-stream": {"schema": {"type": "string", "format": "binary"}}},
+        }
+    },
+)
+async def get_tiles(
+    mission_id: MissionId,
+    service: Service,
+    state: State,
+    reader: Reader,
+    since: Annotated[
+        str, Query(max_length=80, pattern=r"^[A-Za-z0-9.@]*$", description="`tag` of the map that the client has")
+    ] = "",
+    layer: Annotated[
+        list[FurtherLayer] | None, Query(max_length=len(FurtherLayer), description="Layers beside the usual ones")
+    ] = None,
+    step: Annotated[
+        int | None, Query(ge=0, lt=2**31, description="The map as it was at the end of this step; default: the newest")
+    ] = None,
+) -> Response:
+    """Return what changed in the map since the client last asked; all of it when that map is not known any more."""
+    content = await service.map_tiles(mission_id, state.run_id, since, layer or (), step)
+    headers = {"Content-Encoding": "deflate", "Cache-Control": "no-store"}
+    return Response(content, media_type="application/octet-stream", headers=headers)
+
+
 @router.get("/quality", operation_id="getQuality", summary="Judge the map")
 async def get_quality(mission_id: MissionId, service: Service, reader: Reader) -> QualityView:
     """Say in how many cells the TVU estimate stays within each order of IHO S-44, and how far a reference grid is off.

@@ -3,14 +3,14 @@
 from enum import StrEnum
 from typing import Annotated
 
-from fastapi import APIRouter, Body, Response
+from fastapi import APIRouter, Body, Query, Response
 
 from app.api.auth import Operator, Reader
 from app.api.problems import problems
-from app.api.schemas import API, ActionRequest, MissionId, VehicleName
+from app.api.schemas import API, ActionRequest, MissionId, NoteRequest, VehicleName
 from app.api.state import Service
 from app.missions.spec import MissionSpec, VehicleSpec
-from app.missions.views import ActionView, MissionSummary, MissionView
+from app.missions.views import ActionView, EventView, MissionSummary, MissionView, PreflightView, StepView
 
 router = APIRouter(prefix=f"{API}/missions", tags=["missions"], responses=problems("unauthenticated", "forbidden"))
 
@@ -132,6 +132,60 @@ def _add_action(action: Action) -> None:
 
 for _action in Action:
     _add_action(_action)
+
+
+@router.get(
+    "/{mission_id}/preflight",
+    operation_id="checkMission",
+    summary="See what stands before the start",
+    responses=problems("mission-not-found", "invalid-request"),
+)
+async def check_mission(mission_id: MissionId, service: Service, reader: Reader) -> PreflightView:
+    """Return the checklist: links, batteries, places, depths, area, tide, and how long it takes at most."""
+    return await service.preflight(mission_id)
+
+
+@router.get(
+    "/{mission_id}/steps",
+    operation_id="listSteps",
+    summary="See what was decided",
+    responses=problems("mission-not-found", "invalid-request"),
+)
+async def list_steps(
+    mission_id: MissionId,
+    service: Service,
+    reader: Reader,
+    after: Annotated[int, Query(ge=0, lt=2**31, description="Only steps with a larger number")] = 0,
+    limit: Annotated[int, Query(ge=1, le=1000, description="Most steps in the answer")] = 1000,
+) -> list[StepView]:
+    """Return the steps with their figures and with what became of their waypoints, first to last."""
+    return await service.steps(mission_id, after=after, limit=limit)
+
+
+@router.post(
+    "/{mission_id}/notes",
+    operation_id="writeNote",
+    summary="Write into the log",
+    status_code=201,
+    responses=problems(
+        "malformed-body", "mission-not-found", "body-too-large", "unsupported-media-type", "invalid-request"
+    ),
+)
+async def write_note(mission_id: MissionId, note: NoteRequest, service: Service, operator: Operator) -> EventView:
+    """Keep an operator's words in the mission's log, for the next watch."""
+    return await service.write_note(mission_id, note.text.strip(), actor=operator.name)
+
+
+@router.post(
+    "/{mission_id}/vehicles/{name}/abort",
+    operation_id="abortVehicle",
+    summary="Stop one vehicle",
+    responses=problems("mission-not-found", "vehicle-not-found", "conflict", "invalid-request"),
+    tags=["vehicles"],
+)
+async def abort_vehicle(mission_id: MissionId, name: VehicleName, service: Service, operator: Operator) -> ActionView:
+    """Stop a vehicle now and go on without it; the answer tells whether it acknowledged."""
+    return await service.abort_vehicle(mission_id, name, actor=operator.name)
 
 
 @router.post(

@@ -20,6 +20,7 @@ from app.missions.errors import (
     InvalidRequestError,
     MapNotReadyError,
     MissionNotFoundError,
+    SoundingNotFoundError,
     VehicleNotFoundError,
 )
 from app.missions.states import MoveRefusedError
@@ -65,6 +66,7 @@ TITLES: dict[str, tuple[int, str]] = {
     "mission-not-found": (404, "There is no such mission"),
     "vehicle-not-found": (404, "There is no such vehicle"),
     "format-not-found": (404, "There is no such format"),
+    "sounding-not-found": (404, "There is no such sounding"),
     "import-not-found": (404, "There is no such import"),
     "map-not-ready": (404, "There is no map yet"),
     "method-not-allowed": (405, "The method is not allowed here"),
@@ -347,6 +349,7 @@ def describe_mission_error(error: Exception) -> tuple[str, str, str]:
     kinds: Iterable[tuple[type[Exception], str]] = (
         (MissionNotFoundError, "mission-not-found"),
         (VehicleNotFoundError, "vehicle-not-found"),
+        (SoundingNotFoundError, "sounding-not-found"),
         (ImportNotFoundError, "import-not-found"),
         (MapNotReadyError, "map-not-ready"),
         (MoveRefusedError, "move-refused"),
@@ -389,6 +392,7 @@ def install(app: FastAPI) -> None:
     for cls in (
         MissionNotFoundError,
         VehicleNotFoundError,
+        SoundingNotFoundError,
         ImportNotFoundError,
         MapNotReadyError,
         MoveRefusedError,

@@ -34,6 +34,14 @@ class ActionRequest(BaseModel):
     note: str = Field(default="", max_length=2000, description="Kept in the mission's log beside the action")
 
 
+class NoteRequest(BaseModel):
+    """What the next watch should know."""
+
+    model_config = ConfigDict(extra="forbid", json_schema_extra={"examples": [{"text": "Ferry passes at 14:10"}]})
+
+    text: str = Field(min_length=1, max_length=2000, pattern=r"\S", description="Kept in the mission's log")
+
+
 def _item(value: object) -> Measurement | str:
     """Return the measurement, or in words why ``value`` is none."""
     try:

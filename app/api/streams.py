@@ -1,6 +1,7 @@
 """What a mission does, as it happens: the log as server-sent events, everything over a WebSocket."""
 
 import asyncio
+from collections import OrderedDict
 from collections.abc import AsyncIterator
 from typing import Annotated
 
@@ -24,6 +25,7 @@ router = APIRouter(prefix=f"{API}/missions/{{mission_id}}", tags=["live"])
 
 PAGE = 500
 KEEP_ALIVE_S = 15
+KEPT_TEXTS = 64
 RECONNECT_MS = 2000
 
 CLOSE_UNAUTHENTICATED = 4401
@@ -37,6 +39,7 @@ log = structlog.get_logger(__name__)
 
 _events = TypeAdapter(list[EventView])
 _message: TypeAdapter[LiveMessage] = TypeAdapter(LiveMessage)
+_texts: OrderedDict[int, tuple[LiveMessage, str]] = OrderedDict()
 
 
 @router.get(
@@ -202,7 +205,20 @@ async def _serve(websocket: WebSocket, state: EdgeState, mission_id: str) -> Non
 
 async def _send_all(websocket: WebSocket, messages: AsyncIterator[LiveMessage]) -> None:
     async for message in messages:
-        await websocket.send_text(_message.dump_json(message).decode())
+        await websocket.send_text(_text(message))
+
+
+def _text(message: LiveMessage) -> str:
+    """Return a message as JSON; one that goes to many viewers is written once."""
+    if isinstance(message, SnapshotMessage):
+        return _message.dump_json(message).decode()
+    known = _texts.get(id(message))
+    if known is None:
+        # The message is kept beside its text, so that no other one gets its id.
+        known = _texts[id(message)] = (message, _message.dump_json(message).decode())
+        while len(_texts) > KEPT_TEXTS:
+            _texts.popitem(last=False)
+    return known[1]
 
 
 async def _until_left(websocket: WebSocket) -> None:

@@ -1,14 +1,20 @@
 """Serves the built dashboard: one page and its hashed assets."""
 
+import mimetypes
 from pathlib import Path
 
 from fastapi import FastAPI
 from fastapi.responses import FileResponse, HTMLResponse
+from starlette.datastructures import Headers
 from starlette.responses import Response
 from starlette.staticfiles import StaticFiles
 from starlette.types import Scope
 
 STATIC = Path(__file__).with_name("static")
+
+# Some machines know no type for modules, and browsers run only what is called JavaScript.
+mimetypes.add_type("text/javascript", ".mjs")
+mimetypes.add_type("text/javascript", ".js")
 
 CONTENT_SECURITY_POLICY = "; ".join(
     [
@@ -51,9 +57,15 @@ class HashedFiles(StaticFiles):
     """Files whose names change with their contents, so that browsers may keep them for good."""
 
     async def get_response(self, path: str, scope: Scope) -> Response:
-        """Answer with the file and the permission to keep it."""
-        response = await super().get_response(path, scope)
+        """Answer with the file, compressed where the browser takes that, and the permission to keep it."""
+        packed = Path(f"{self.directory}") / f"{path}.gz"
+        takes = "gzip" in Headers(scope=scope).get("accept-encoding", "")
+        response = await super().get_response(f"{path}.gz" if takes and packed.is_file() else path, scope)
         if response.status_code == 200:
+            if takes and packed.is_file():
+                response.headers["Content-Encoding"] = "gzip"
+                response.headers["Content-Type"] = mimetypes.guess_type(path)[0] or "application/octet-stream"
+            response.headers["Vary"] = "Accept-Encoding"
             response.headers["Cache-Control"] = "public, max-age=31536000, immutable"
             response.headers["X-Content-Type-Options"] = "nosniff"
         return response

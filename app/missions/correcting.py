@@ -18,7 +18,7 @@ from app.missions.gate import Gate
 from app.missions.journal import Counts
 from app.missions.live import LiveMission
 from app.missions.spec import MissionSpec, SoundSpeed, Tide
-from app.missions.views import CorrectionsView, Level, TideCorrection, TideTableView, Verdict
+from app.missions.views import CorrectionsView, Level, Ruling, TideCorrection, TideTableView, Verdict
 from app.storage import soundings as sounding_queries
 from app.storage.database import Database
 from app.storage.models import MissionRow, SoundingRow, TideTableRow
@@ -111,7 +111,7 @@ async def _recorrect(
         live.spec = spec
         live.gate.corrections = corrections
         live.journal.counts = Counts(counted.get("accepted", 0), counted.get("rejected", 0))
-        live.builder.replace(accepted, prior)
+        live.builder.replace(accepted.table, prior, accepted.trusted)
         live.journal.told_of_missing_level = False
         live.revision += 1
     live.changed.set()
@@ -124,19 +124,21 @@ def recorrected(rows: Sequence[SoundingRow], corrections: Corrections, gate: Gat
     Verdicts stay, but for soundings that had no water level and have one now, or the other way round.
     """
     changes = []
-    for row, found in zip(rows, corrections.apply([_report(row) for row in rows]), strict=True):
+    for row, found in zip(rows, corrections.apply([report_of(row) for row in rows]), strict=True):
         change: dict[str, Any] = {"id": row.id, "level_m": found.level_m, "verdict": row.verdict, "reason": row.reason}
         change |= {"east_m": found.east_m, "north_m": found.north_m, "depth_m": found.depth_m}
         if row.verdict == Verdict.ACCEPTED and found.reason:
             change |= {"verdict": Verdict.REJECTED, "reason": found.reason}
         elif row.reason.startswith(NO_LEVEL):
-            reason = found.reason or gate.outside(found.east_m, found.north_m)
+            outside = "" if row.ruling == Ruling.RESTORED else gate.outside(found.east_m, found.north_m)
+            reason = found.reason or outside
             change |= {"verdict": Verdict.REJECTED if reason else Verdict.ACCEPTED, "reason": reason}
         changes.append(change)
     return changes
 
 
-def _report(row: SoundingRow) -> SoundingReport:
+def report_of(row: SoundingRow) -> SoundingReport:
+    """Return a stored sounding as it came from the vehicle."""
     geometry = None
     if row.vehicle_lat_deg is not None and row.vehicle_lon_deg is not None:
         geometry = BeamGeometry(

@@ -35,5 +35,9 @@ class ImportNotFoundError(MissionError):
     """There is no such import, or no reference grid."""
 
 
+class SoundingNotFoundError(MissionError):
+    """There is no such sounding in the mission."""
+
+
 class MapNotReadyError(MissionError):
     """No sounding was accepted yet, so there is no map."""

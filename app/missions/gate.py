@@ -68,7 +68,7 @@ class Gate:
 
     def check(self, reports: Iterable[SoundingReport]) -> list[GatedSounding]:
         """Return one result per report, in their order; depths are corrected, the report stays raw."""
-        listed = [(report, _implausible_value(report)) for report in reports]
+        listed = [(report, implausible_value(report)) for report in reports]
         corrected = iter(self.corrections.apply([report for report, reason in listed if not reason]))
         return [
             _refused(report, reason) if reason else self._check_corrected(report, next(corrected))
@@ -76,7 +76,7 @@ class Gate:
         ]
 
     def _check_corrected(self, report: SoundingReport, found: Corrected) -> GatedSounding:
-        sd = report.depth_sd_m if report.depth_sd_m is not None else max(self._noise * report.range_m, 0.01)
+        sd = report.depth_sd_m if report.depth_sd_m is not None else self.deviation_m(report.range_m)
         east, north = found.east_m, found.north_m
         if found.reason:
             return GatedSounding(report, east, north, found.depth_m, sd, found.reason)
@@ -84,6 +84,10 @@ class Gate:
         if not reason:
             self._last[report.vehicle] = (report.time_s, east, north)
         return GatedSounding(report, east, north, found.depth_m, sd, reason, found.level_m)
+
+    def deviation_m(self, range_m: float) -> float:
+        """Return the standard deviation of a range for which the vehicle states none."""
+        return max(self._noise * range_m, 0.01)
 
     def outside(self, east: float, north: float) -> str:
         """Return why a place is too far from the area; empty when it is not."""
@@ -115,7 +119,8 @@ def _refused(report: SoundingReport, reason: str) -> GatedSounding:
     return GatedSounding(report, 0.0, 0.0, 0.0, 0.0, reason)
 
 
-def _implausible_value(report: SoundingReport) -> str:
+def implausible_value(report: SoundingReport) -> str:
+    """Return which value of a sounding cannot be; empty when all can."""
     place = report.footprint
     values = {
         "time_s": report.time_s,

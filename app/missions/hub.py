@@ -64,12 +64,10 @@ class FleetHub:
         for info in link.vehicles():
             if info.name == name:
                 return info
-        return VehicleInfo(
-            name,
-            kind,
-            LinkState.UNKNOWN,
-            "never heard of: is it switched on, and does it reach this service?",
-        )
+        reason = "never heard of: is it switched on, and does it reach this service?"
+        if kind is VehicleKind.SIM:
+            reason = "simulated: it is launched when its mission starts"
+        return VehicleInfo(name, kind, LinkState.UNKNOWN, reason)
 
     def claimed_by(self, key: VehicleKey) -> str | None:
         """Return the id of the mission a vehicle takes part in."""

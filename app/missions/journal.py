@@ -160,12 +160,22 @@ class Journal:
             verdicts.append(ItemVerdict(index=index, verdict=verdict, reason=item.reason))
         return verdicts, lambda: self._count(gated, new)
 
-    async def log(self, level: Level, kind: str, message: str, **data: Any) -> None:
+    async def log(self, level: Level, kind: str, message: str, **data: Any) -> EventRow:
         """Write a line of the mission's log and show it to everyone who watches."""
-        row = EventRow(mission_id=self._mission_id, time=now(), level=level, kind=kind, message=message, data=data)
+        row = self.line(level, kind, message, **data)
         await to_the_end(self._add(row))
-        metrics.EVENTS.labels(level).inc()
-        log.info("mission event", mission=self._mission_id, level=str(level), kind=kind, message=message, **data)
+        self.tell(row)
+        return row
+
+    def line(self, level: Level, kind: str, message: str, **data: Any) -> EventRow:
+        """Return a line of the mission's log for a transaction of the caller's; ``tell`` of it once that is done."""
+        return EventRow(mission_id=self._mission_id, time=now(), level=level, kind=kind, message=message, data=data)
+
+    def tell(self, row: EventRow) -> None:
+        """Show a line that was written to everyone who watches."""
+        metrics.EVENTS.labels(row.level).inc()
+        said = {"mission": self._mission_id, "level": str(row.level), "kind": row.kind, "message": row.message}
+        log.info("mission event", **(row.data | said))
         self._broadcaster.publish(EventMessage(event=event_view(row)))
 
     async def _add(self, row: EventRow) -> None:

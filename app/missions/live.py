@@ -1,10 +1,11 @@
 """The side of a mission that lives in memory: its map, its journal, its vehicles' reports and its watchers."""
 
 import asyncio
+from collections.abc import Callable
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import structlog
@@ -29,6 +30,7 @@ from app.missions.gate import Gate
 from app.missions.hub import FleetHub
 from app.missions.journal import Counts, Journal, track_length_m
 from app.missions.map_builder import BuiltMap, MapBuilder
+from app.missions.map_tiles import TileCache
 from app.missions.maps import MapSnapshot, MissionFacts
 from app.missions.members import Member, Team
 from app.missions.spec import MissionSpec, VehicleSpec
@@ -49,9 +51,11 @@ from app.storage import soundings as sounding_queries
 from app.storage.database import Database
 from app.storage.models import MissionRow, PositionRow, TideTableRow, WaypointRow
 
-LIVE_PERIOD_S = 0.25
+LIVE_PERIOD_S = 0.2
 
 log = structlog.get_logger(__name__)
+
+Made = TypeVar("Made")
 
 
 @dataclass
@@ -97,6 +101,7 @@ class LiveMission:
         """Depths of the grid that the map is compared with, at the map's cells."""
         self.revision = 0
         """Counts changes of what the map is shown with."""
+        self.tiles = TileCache()
         self.journal = Journal(database, row.id, self.gate, counts, self.broadcaster, self.builder.add)
         self.changed = asyncio.Event()
         """Set whenever a vehicle reported something that the step loop may be waiting for."""
@@ -116,7 +121,7 @@ class LiveMission:
         """Take a mission up from the database, as it was last committed."""
         async with database.reading() as session:
             counted = await sounding_queries.counts(session, row.id)
-            soundings = await sounding_queries.accepted_arrays(session, row.id)
+            accepted = await sounding_queries.accepted_arrays(session, row.id)
             vehicles = await mission_queries.vehicles_of(session, row.id)
             waypoints = await mission_queries.newest_waypoints(session, row.id)
             step = await mission_queries.last_step(session, row.id)
@@ -134,8 +139,8 @@ class LiveMission:
             table = await loop.run_in_executor(executor, partial(parse_tid, tide.text, name=tide.name))
         counts = Counts(counted.get("accepted", 0), counted.get("rejected", 0))
         live = cls(database, hub, executor, row, spec, counts, table)
-        if len(soundings) + len(prior):
-            live.builder.replace(soundings, prior)
+        if len(accepted.table) + len(prior):
+            live.builder.replace(accepted.table, prior, accepted.trusted)
         live.reference_m = reference
         live._imports_noticed = imported
         live.journal.travelled_m = sum(track_length_m(track) for track in tracks.values())
@@ -165,9 +170,9 @@ class LiveMission:
         async def read() -> Counts:
             async with self._database.reading() as session:
                 counted = await sounding_queries.counts(session, self.id)
-                soundings = await sounding_queries.accepted_arrays(session, self.id)
+                accepted = await sounding_queries.accepted_arrays(session, self.id)
                 prior = await sounding_queries.imported_arrays(session, self.id)
-            self.builder.replace(soundings, prior)
+            self.builder.replace(accepted.table, prior, accepted.trusted)
             return Counts(counted.get("accepted", 0), counted.get("rejected", 0))
 
         await self.journal.count_again(read)
@@ -259,11 +264,20 @@ class LiveMission:
     async def build_map(self) -> BuiltMap | None:
         """Make the map of everything accepted so far as thoroughly as for a product, in a worker thread."""
         before = self.builder.newest
-        build = partial(self.builder.build, thorough=True)
-        built = await asyncio.get_running_loop().run_in_executor(self._executor, build)
+        built = await self.in_thread(partial(self.builder.build, thorough=True))
         if built is not None and built is not before:
             self.publish_map(built)
         return built
+
+    async def map_what_is_stored(self) -> None:
+        """Make the map of a mission that was just taken up, and tell everyone who watches how far it has come."""
+        if self.builder.stale:
+            await self.build_map()
+            self.publish_summary()
+
+    async def in_thread(self, work: Callable[..., Made], *arguments: Any) -> Made:
+        """Compute something in a worker thread."""
+        return await asyncio.get_running_loop().run_in_executor(self._executor, work, *arguments)
 
     @property
     def facts(self) -> MissionFacts:
@@ -291,6 +305,16 @@ class LiveMission:
             )
         )
 
+    def figures(self) -> dict[str, float]:
+        """Return how far the mission has come, as each step keeps it."""
+        built = self.builder.newest
+        found = {
+            "coverage_pct": self.builder.coverage_pct(),
+            "remaining_pct": self.builder.remaining_pct(),
+            "distance_m": self.journal.travelled_m,
+        }
+        return found | ({} if built is None else {"mean_sd_m": float(np.nanmean(built.map.sd_m))})
+
     def progress(self) -> Progress:
         """Return how far the mission has come."""
         built = self.builder.newest
@@ -305,6 +329,7 @@ class LiveMission:
             rejected=self.journal.counts.rejected,
             distance_m=self.journal.travelled_m,
             coverage_pct=self.builder.coverage_pct(),
+            remaining_pct=self.builder.remaining_pct(),
             mean_sd_m=float(np.nanmean(built.map.sd_m)) if built is not None else None,
             objective=header.objective,
             terms=header.terms or {},

@@ -33,6 +33,22 @@ class _Everything:
 
     soundings: NDArray[np.float64] | None
     prior: NDArray[np.float64]
+    trusted: BoolArray
+
+
+@dataclass(frozen=True)
+class _Learned:
+    """The model with its hyperparameters, and of the soundings that it was learned on why outliers are left out.
+
+    ``reasons`` has one entry per sounding, empty where it is used.
+    """
+
+    model: GaussianProcessMap
+    reasons: tuple[str, ...] = ()
+
+    @property
+    def rejected(self) -> BoolArray:
+        return np.array([bool(reason) for reason in self.reasons], dtype=bool)
 
 
 @dataclass(frozen=True)
@@ -75,9 +91,10 @@ class MapBuilder:
         self._accurate = np.zeros(len(self._nodes_xy), dtype=bool)
         self._pending: deque[NDArray[np.float64] | _Everything] = deque()
         self._soundings = np.zeros((0, 4))
+        # Those that an operator restored: they are no outliers whatever their neighbours say.
+        self._trusted = np.zeros(0, dtype=bool)
         self._prior: BathymetricMap | None = None
-        # The model with its hyperparameters, and for the soundings it was learned on which are outliers.
-        self._learned = (_new_model(), np.zeros(0, dtype=bool))
+        self._learned = _Learned(_new_model())
         self._building = threading.Lock()
         self._learning = threading.Lock()
         self._newest: BuiltMap | None = None
@@ -90,13 +107,19 @@ class MapBuilder:
         if len(soundings):
             self._pending.append(soundings)
 
-    def replace(self, soundings: NDArray[np.float64], prior: NDArray[np.float64]) -> None:
-        """Take these in place of all soundings so far; ``prior`` are those that were imported. Shapes (n, 4)."""
-        self._pending.append(_Everything(soundings, prior))
+    def replace(
+        self, soundings: NDArray[np.float64], prior: NDArray[np.float64], trusted: BoolArray | None = None
+    ) -> None:
+        """Take these in place of all soundings so far; ``prior`` are those that were imported. Shapes (n, 4).
+
+        ``trusted`` (n,) is True for soundings that are never taken for outliers.
+        """
+        known = np.zeros(len(soundings), dtype=bool) if trusted is None else trusted
+        self._pending.append(_Everything(soundings, prior, known))
 
     def replace_prior(self, prior: NDArray[np.float64]) -> None:
         """Take these, shape (n, 4), in place of all imported soundings so far."""
-        self._pending.append(_Everything(None, prior))
+        self._pending.append(_Everything(None, prior, np.zeros(0, dtype=bool)))
 
     @property
     def newest(self) -> BuiltMap | None:
@@ -135,12 +158,14 @@ class MapBuilder:
                 self._prior = prior_map(_as_soundings(item.prior), self.grid, self.mask) if len(item.prior) else None
                 if item.soundings is not None:
                     self._generation += 1
-                    arrived, self._soundings = [], item.soundings
-                    self._learned = (_new_model(), np.zeros(0, dtype=bool))
+                    arrived, self._soundings, self._trusted = [], item.soundings, item.trusted
+                    self._learned = _Learned(_new_model())
             else:
                 arrived.append(item)
         if arrived:
             self._soundings = np.concatenate([self._soundings, *arrived])
+            new = np.zeros(len(self._soundings) - len(self._trusted), dtype=bool)
+            self._trusted = np.concatenate([self._trusted, new])
         return changed
 
     def _build(self) -> BuiltMap:
@@ -156,14 +181,14 @@ class MapBuilder:
 
     def _measured(self) -> BathymetricMap:
         """Return the map of the mission's own soundings."""
-        model, rejected = self._learned
-        trusted = np.ones(len(self._soundings), dtype=bool)
-        trusted[: len(rejected)] = ~rejected
-        model = copy.copy(model)
-        bathymetry = model.fit(_as_soundings(self._soundings[trusted]), learn=False).predict(self.grid, self.mask)
-        if not rejected.size:
+        learned = self._learned
+        used = np.ones(len(self._soundings), dtype=bool)
+        used[: len(learned.reasons)] = ~learned.rejected
+        model = copy.copy(learned.model)
+        bathymetry = model.fit(_as_soundings(self._soundings[used]), learn=False).predict(self.grid, self.mask)
+        if not learned.reasons:
             # The first fit had to learn; keep what it found.
-            self._learned = (model, rejected)
+            self._learned = _Learned(model)
         return bathymetry
 
     def learn(self, *, always: bool = False) -> None:
@@ -173,16 +198,43 @@ class MapBuilder:
         """
         with self._learning:
             generation = self._generation
-            model, rejected = self._learned
-            known = self._soundings
-            if not len(known) or (len(known) < RELEARN_GROWTH * len(rejected) and not always):
+            model, before = self._learned.model, self._learned.reasons
+            known, trusted = self._soundings, self._trusted
+            if not len(known) or (len(known) < RELEARN_GROWTH * len(before) and not always):
                 return
             soundings = _as_soundings(known)
             verdict = flag_outliers(soundings, hyperparameters=getattr(model, "stationary_hyperparameters_", None))
-            trusted = ~verdict.rejected
-            fitted = copy.copy(model).fit(soundings.take(trusted), learn=True)
+            # Both were taken while soundings may have been added: the shorter one says for how many.
+            restored = np.flatnonzero(trusted[: len(known)])
+            reasons = list(verdict.reasons)
+            for i in restored:
+                reasons[i] = ""
+            used = np.array([not reason for reason in reasons])
+            fitted = copy.copy(model).fit(soundings.take(used), learn=True)
             if generation == self._generation:
-                self._learned = (fitted, verdict.rejected)
+                self._learned = _Learned(fitted, tuple(reasons))
+
+    def doubted(self) -> list[tuple[NDArray[np.float64], str]]:
+        """Return the soundings, rows of shape (4,), that the map leaves out as outliers, each with the reason."""
+        with self._building:
+            learned, soundings = self._learned, self._soundings
+            return [(soundings[i], reason) for i, reason in enumerate(learned.reasons) if reason]
+
+    def as_of(self, soundings: NDArray[np.float64]) -> BathymetricMap:
+        """Return the map that the first soundings (n, 4) alone make, under the model learned of all of them."""
+        with self._building:
+            learned, prior = self._learned, self._prior
+            doubted = {
+                row[:3].tobytes() for row, reason in zip(self._soundings, learned.reasons, strict=False) if reason
+            }
+        used = np.array([row[:3].tobytes() not in doubted for row in soundings], dtype=bool)
+        if not used.any():
+            if prior is None:
+                raise ValueError("there is no sounding to make a map of")
+            return prior
+        model = copy.copy(learned.model)
+        measured = model.fit(_as_soundings(soundings[used]), learn=False).predict(self.grid, self.mask)
+        return measured if prior is None else fuse(measured, prior)
 
     def coverage_pct(self) -> float:
         """Return the share of the area's cells that are known to the asked accuracy."""
@@ -190,6 +242,13 @@ class MapBuilder:
             return 0.0
         sd = self._newest.map.sd_m[self.mask]
         return float(100.0 * np.mean(sd <= self._accuracy_m))
+
+    def remaining_pct(self) -> float:
+        """Return the share of the landmarks that were never known to the asked accuracy, in a belief or now."""
+        known = self._accurate
+        if self._newest is not None:
+            known = known | (self._newest.map.sd_m[self._nodes] <= self._accuracy_m)
+        return float(100.0 * np.mean(~known))
 
     def belief(self) -> Belief:
         """Return what is known at the landmarks (a lattice of the grid's cells)."""

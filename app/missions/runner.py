@@ -257,6 +257,7 @@ class Runner:
             committed_at=now(),
             objective=decision.objective,
             terms=dict(decision.terms),
+            figures=live.figures(),
             soundings=built.soundings if built else 0,
             map_digest=built.digest if built else "",
             memory=decision.memory,

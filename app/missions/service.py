@@ -1,30 +1,28 @@
 """What can be done with missions: the one door through which the HTTP edge and the command line come in."""
 
 import asyncio
-import hashlib
 import inspect
-import math
 import uuid
-from collections.abc import AsyncIterator, Awaitable, Callable, Mapping, Sequence
+from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import asynccontextmanager
 from functools import cache
 from pathlib import Path
 from typing import Literal
 
-import orjson
 import structlog
 
 from app.estimation import SingleBeam
 from app.exploration.options import PlannerOptions
 from app.exploration.planners import ONLY_IN_SIMULATION, PLANNERS, REFUSAL
 from app.exploration.planners import warm_up as planning_warm_up
-from app.mapping.georeference import LocalFrame
 from app.mapping.gp import warm_up as mapping_warm_up
 from app.mapping.products.tracks import Track, TrackPoint
 from app.missions import importing, states
 from app.missions.broadcast import Subscription
+from app.missions.claims import Claims, Lead, ShowArea
 from app.missions.clock import now
+from app.missions.conducting import Conductor, receipt
 from app.missions.correcting import check_level_is_known, corrections_view, set_sound_speed, set_tide
 from app.missions.doctoring import DoctorView, Examine, doctor_view, switched_off
 from app.missions.errors import (
@@ -35,21 +33,19 @@ from app.missions.errors import (
     VehicleNotFoundError,
 )
 from app.missions.fleet import (
-    BeamGeometry,
     FleetLink,
-    LinkState,
-    Position,
-    SoundingReport,
     StopReceipt,
-    VehicleReport,
-    WaypointStatus,
 )
+from app.missions.history import map_at_step, steps_after
 from app.missions.hub import FleetHub
 from app.missions.journal import event_view
 from app.missions.links.rest import RestFleetLink
-from app.missions.links.sim import Launch, SimFleetLink
+from app.missions.links.sim import SimFleetLink
 from app.missions.live import LiveMission
 from app.missions.maps import MapSnapshot
+from app.missions.measuring import measure
+from app.missions.polling import waypoint
+from app.missions.preflight import preflight
 from app.missions.products import (
     MAP,
     SOUNDINGS,
@@ -60,7 +56,7 @@ from app.missions.products import (
     make_product,
     product_kind,
 )
-from app.missions.runner import Runner
+from app.missions.reviewing import rule, soundings_page
 from app.missions.settings import ServiceSettings
 from app.missions.spec import MissionSpec, SoundSpeed, VehicleKind, VehicleSpec
 from app.missions.states import ENDED, MissionState
@@ -71,7 +67,6 @@ from app.missions.views import (
     EventView,
     ImportOptions,
     ImportView,
-    ItemVerdict,
     Level,
     LiveMessage,
     LogImportView,
@@ -79,26 +74,28 @@ from app.missions.views import (
     MissionSummary,
     MissionView,
     PlannerView,
+    PreflightView,
     ReferenceView,
+    Ruling,
     SnapshotMessage,
+    SoundingPage,
+    SoundingState,
+    SoundingView,
+    StepView,
     StopView,
     TideCorrection,
     VehicleView,
-    Verdict,
     WaypointView,
 )
 from app.storage import events as event_queries
 from app.storage import missions as mission_queries
 from app.storage import soundings as sounding_queries
 from app.storage.database import Database
-from app.storage.models import BatchRow, MissionRow, MissionVehicleRow, SoundingRow
-from app.storage.shielding import to_the_end
-from imc_bridge.soundings import Beam, StateSample, footprint
+from app.storage.models import MissionRow, MissionVehicleRow, SoundingRow
 
 Action = Literal["start", "pause", "resume", "abort", "finish"]
 
-MAX_BATCH = 10_000
-MAX_TRACK_POINTS = 2000
+MAX_TRACK_POINTS = 5000
 ENDED_MISSIONS_IN_MEMORY = 8
 WORKERS = 2
 
@@ -130,15 +127,15 @@ class MissionService:
         self._sim = SimFleetLink(settings.simulation, settings.time_scale)
         links: list[FleetLink] = [self._rest, self._sim]
         self._examine: Examine = switched_off
-        self._show_area: Callable[[str, Sequence[tuple[float, float]]], None] = lambda _mission, _ring: None
-        self._lead: Callable[[str, str, str | None], None] = lambda _vehicle, _guidance, _gateway: None
+        show_area: ShowArea = lambda _mission, _ring: None  # noqa: E731
+        lead: Lead = lambda _vehicle, _guidance, _gateway: None  # noqa: E731
         if settings.imc.enabled:
             from app.missions.links.imc import make_imc_link
 
             imc = make_imc_link(settings.imc, settings.time_scale)
             self._examine = imc.diagnosis
-            self._lead = imc.lead
-            self._show_area = imc.show_area
+            lead = imc.lead
+            show_area = imc.show_area
             links.append(imc)
         if settings.neptus.enabled:
             from app.missions.neptus import NeptusSessions
@@ -146,40 +143,47 @@ class MissionService:
             links.append(NeptusSessions(self, database, settings.neptus, log_in or _nobody).link)
         self._hub = FleetHub(links)
         self._executor = ThreadPoolExecutor(WORKERS, thread_name_prefix="planning")
+        self._claims = Claims(self._hub, self._sim, lead, show_area)
+        self._conductor = Conductor(database, self._hub, self._claims, self._executor, settings.time_scale)
+        self._runs = self._conductor.runs
         self._live: dict[str, LiveMission] = {}
+        # As they were when they left memory.
+        self._left: dict[str, MissionSummary] = {}
         self._loading = asyncio.Lock()
+        # Maps of missions that were taken up; one at a time, so that planning has a thread.
+        self._mapping = asyncio.Lock()
+        self._mapped: dict[str, asyncio.Task[None]] = {}
         # One file after the other: reading takes memory and a core.
         self._importing = asyncio.Lock()
-        self._runs: dict[str, asyncio.Task[None]] = {}
-        self._acting: dict[str, asyncio.Lock] = {}
         self._started = False
-        self._warm: asyncio.Future[None] | None = None
 
     # Life of the service
 
     async def startup(self) -> None:
         """Open the links and go on with every mission that was running when the process ended."""
-        self._warm = asyncio.get_running_loop().run_in_executor(self._executor, _warm_up)
+        self._conductor.warm = asyncio.get_running_loop().run_in_executor(self._executor, _warm_up)
         await self._hub.start()
         async with self._database.reading() as session:
             rows = await mission_queries.missions_in(session, [MissionState.RUNNING, MissionState.PAUSED])
         for row in rows:
             live = await self._get(row.id)
             try:
-                self._claim_team(live)
+                self._claims.claim_team(live)
             except ConflictError as error:
                 # The settings changed while the service was down: one mission's trouble is not the others'.
-                await self._set_state(live, MissionState.FAILED, str(error), "service", Level.ALARM)
+                await self._conductor.set_state(live, MissionState.FAILED, str(error), "service", Level.ALARM)
                 continue
             if live.header.state is MissionState.RUNNING:
-                self._run(live)
+                self._conductor.run(live)
         self._started = True
 
     async def shutdown(self) -> None:
         """Stop every vehicle and write everything down; running missions stay running and go on at the next start."""
         self._started = False
+        for task in list(self._mapped.values()):
+            task.cancel()
         for mission_id in list(self._runs):
-            await self._halt(mission_id)
+            await self._conductor.halt(await self._get(mission_id))
         await self._hub.close()
         for live in self._live.values():
             await live.close()
@@ -225,7 +229,11 @@ class MissionService:
         """Return every mission, newest first."""
         async with self._database.reading() as session:
             rows = await mission_queries.all_missions(session)
-        return [(await self._get(row.id)).summary() for row in rows]
+        # One that ended and left memory is as it was then: taking it up again for every list would be slow.
+        return [self._left[row.id] if self._is_away(row.id) else (await self._get(row.id)).summary() for row in rows]
+
+    def _is_away(self, mission_id: str) -> bool:
+        return mission_id in self._left and mission_id not in self._live
 
     async def mission(self, mission_id: str) -> MissionView:
         """Return one mission. Raises MissionNotFoundError."""
@@ -240,32 +248,32 @@ class MissionService:
             The latter when a vehicle is not ready or takes part in another mission.
         """
         live = await self._get(mission_id)
-        async with self._acting.setdefault(mission_id, asyncio.Lock()):
+        async with self._conductor.acting(mission_id):
             target = states.move(live.header.state, action)
             stops: list[StopReceipt] = []
             if action in ("start", "resume"):
-                self._check_team(live)
+                self._claims.check_team(live)
                 check_level_is_known(live)
                 if action == "start":
-                    self._check_links(live)
-                self._claim_team(live)
-                await self._set_state(live, target, note, actor)
-                self._run(live)
+                    self._claims.check_links(live)
+                self._claims.claim_team(live)
+                await self._conductor.set_state(live, target, note, actor)
+                self._conductor.run(live)
             else:
                 # The state first: killed in between, a restart must not go on with an aborted mission.
-                await self._set_state(live, target, note, actor)
-                stops = await self._halt(mission_id)
-                await self._log_stops(live, stops)
+                await self._conductor.set_state(live, target, note, actor)
+                stops = await self._conductor.halt(live)
+                await self._conductor.log_stops(live, stops)
                 if target in ENDED:
-                    self._release_team(live)
+                    self._claims.release_team(live)
                     await live.build_map()
                 live.publish_summary()
-        return ActionView(mission=live.summary(), stops=[StopView(**_receipt(stop)) for stop in stops])
+        return _action_view(live, stops)
 
     async def add_vehicle(self, mission_id: str, vehicle: VehicleSpec, *, actor: str = "operator") -> MissionView:
         """Let a vehicle join, while the mission runs too. Raises ConflictError, InvalidRequestError."""
         live = await self._get(mission_id)
-        async with self._acting.setdefault(mission_id, asyncio.Lock()):
+        async with self._conductor.acting(mission_id):
             self._refuse_ended(live, "takes no more vehicles")
             self._check_vehicle(vehicle, live.spec, "")
             if live.team.get(vehicle.name) is not None:
@@ -273,7 +281,7 @@ class MissionService:
                     f"vehicle {vehicle.name!r} takes part already", "choose another name, or remove the vehicle first"
                 )
             if live.header.state in (MissionState.RUNNING, MissionState.PAUSED):
-                self._claim(live, vehicle)
+                self._claims.claim(live, vehicle)
             try:
                 slot = await self._store_vehicle(mission_id, vehicle)
             except BaseException:
@@ -281,7 +289,7 @@ class MissionService:
                 raise
             live.team.join(vehicle, slot)
             if live.header.state is MissionState.DRAFT:
-                await self._set_state(live, states.move(MissionState.DRAFT, "complete_draft"), "", actor)
+                await self._conductor.set_state(live, states.move(MissionState.DRAFT, "complete_draft"), "", actor)
             await live.journal.log(Level.INFO, "vehicle", f"{vehicle.name} joined", vehicle=vehicle.name, actor=actor)
             live.changed.set()
         return self._view(live)
@@ -300,8 +308,14 @@ class MissionService:
 
     async def remove_vehicle(self, mission_id: str, name: str, *, actor: str = "operator") -> MissionView:
         """Stop a vehicle and take it out of the mission. Raises VehicleNotFoundError."""
+        await self.abort_vehicle(mission_id, name, actor=actor)
+        return self._view(await self._get(mission_id))
+
+    async def abort_vehicle(self, mission_id: str, name: str, *, actor: str = "operator") -> ActionView:
+        """Stop a vehicle and take it out of the mission; returns whether it acknowledged that."""
         live = await self._get(mission_id)
-        async with self._acting.setdefault(mission_id, asyncio.Lock()):
+        stops: list[StopReceipt] = []
+        async with self._conductor.acting(mission_id):
             self._refuse_ended(live, "keeps its vehicles")
             member = live.team.get(name)
             if member is None:
@@ -318,13 +332,23 @@ class MissionService:
             live.changed.set()
             live.publish_summary()
             if claimed:
-                await self._log_stops(live, [await self._hub.stop(member.key)])
+                stops = [await self._hub.stop(member.key)]
+                await self._conductor.log_stops(live, stops)
                 self._hub.release(member.key, mission_id)
             if live.header.state is MissionState.READY and not list(live.team):
                 move = states.move(MissionState.READY, "reopen_draft")
-                await self._set_state(live, move, "no vehicle left", actor)
+                await self._conductor.set_state(live, move, "no vehicle left", actor)
             await live.journal.log(Level.INFO, "vehicle", f"{name} left", vehicle=name, actor=actor)
-        return self._view(live)
+        return _action_view(live, stops)
+
+    async def preflight(self, mission_id: str) -> PreflightView:
+        """Return what stands before a mission's start."""
+        return preflight(await self._get(mission_id), self._hub)
+
+    async def write_note(self, mission_id: str, text: str, *, actor: str) -> EventView:
+        """Keep an operator's words in a mission's log."""
+        live = await self._get(mission_id)
+        return event_view(await live.journal.log(Level.INFO, "note", text, actor=actor))
 
     async def note(self, mission_id: str, level: Level, kind: str, message: str, **data: str | float) -> None:
         """Write a line of a mission's log."""
@@ -335,50 +359,17 @@ class MissionService:
     async def measure(
         self, mission_id: str, items: Sequence[Measurement], *, idempotency_key: str | None = None
     ) -> BatchVerdict:
-        """Take in measurements; what is counted accepted is stored for good when this returns.
-
-        Raises
-        ------
-        ConflictError
-            When the mission is a draft, or the idempotency key came before with other content.
-        """
+        """Take in measurements; see ``measuring.measure``."""
         live = await self._get(mission_id)
-        if live.header.state is MissionState.DRAFT:
-            raise ConflictError("the mission is a draft and takes no measurements yet", "add a vehicle to it first")
-        if len(items) > MAX_BATCH:
-            raise InvalidRequestError("items", f"{len(items)} items are too many", f"send at most {MAX_BATCH} at once")
-        digest = hashlib.sha256(orjson.dumps([item.model_dump() for item in items])).hexdigest()
-        strangers = {i: self._stranger(live, item) for i, item in enumerate(items)}
-        reports = {i: report for i, item in enumerate(items) if not strangers[i] and (report := _sounding(item))}
-        async with live.journal.writing, self._database.writing() as session:
-            if idempotency_key is not None:
-                known = await sounding_queries.answer_to(session, mission_id, idempotency_key)
-                if known is not None:
-                    if known.digest != digest:
-                        raise ConflictError(
-                            f"idempotency key {idempotency_key!r} was used before with other measurements",
-                            "use a new key for every new batch",
-                        )
-                    # The first answer may have got lost together with the process that knew where the vehicle is.
-                    self._hear(live, [item for i, item in enumerate(items) if not strangers[i]], only_unknown=True)
-                    return BatchVerdict.model_validate(known.answer | {"replayed": True})
-            verdicts, committed = await live.journal.take(list(reports.values()), session)
-            answer = _batch_verdict(len(items), dict(zip(reports, verdicts, strict=True)), strangers)
-            if idempotency_key is not None:
-                session.add(
-                    BatchRow(
-                        mission_id=mission_id,
-                        key=idempotency_key,
-                        digest=digest,
-                        answer=answer.model_dump(mode="json"),
-                        created_at=now(),
-                    )
-                )
-        committed()
-        self._hear(live, [item for i, item in enumerate(items) if not strangers[i]])
-        # Where the vehicle is, and whether it arrived, is on disk as well before it is answered.
-        await live.journal.flush()
-        return answer
+        return await measure(live, self._database, self._hub, self._rest, items, idempotency_key=idempotency_key)
+
+    async def waypoint(
+        self, mission_id: str, vehicle: str, *, after_step: int | None = None, timeout_s: float = 0.0
+    ) -> WaypointView | None:
+        """Return a vehicle's waypoint when it is newer than ``after_step``; see ``polling.waypoint``."""
+        return await waypoint(
+            await self._get(mission_id), self._rest, vehicle, after_step=after_step, timeout_s=timeout_s
+        )
 
     async def import_log(
         self,
@@ -402,58 +393,25 @@ class MissionService:
         work = await asyncio.to_thread(LogImport, live, self._database, self._settings, path, vehicle)
         return await work.run(actor=actor, progress=progress)
 
-    def _hear(self, live: LiveMission, items: Sequence[Measurement], *, only_unknown: bool = False) -> None:
-        """Tell the link where vehicles are; ``only_unknown``: of those only whose place it does not know."""
-        places = {name: self._hub.info((VehicleKind.REST, name)).report for name in {item.vehicle for item in items}}
-        for item in items:
-            if not only_unknown or places[item.vehicle] is None:
-                self._rest.heard(_vehicle_report(item))
+    # Soundings that are not in the map
 
-    async def waypoint(
-        self, mission_id: str, vehicle: str, *, after_step: int | None = None, timeout_s: float = 0.0
-    ) -> WaypointView | None:
-        """Return a vehicle's waypoint when it is newer than ``after_step``, waiting for it; None when none came.
+    async def review(
+        self,
+        mission_id: str,
+        states: Sequence[SoundingState],
+        *,
+        vehicle: str | None = None,
+        after: int = 0,
+        limit: int = 200,
+    ) -> SoundingPage:
+        """Return soundings in any of the states, a page of them."""
+        return await soundings_page(await self._get(mission_id), self._database, states, vehicle, after, limit)
 
-        A polling vehicle acknowledges the waypoint by this. Raises ConflictError when it must stop.
-        """
-        live = await self._get(mission_id)
-        member = live.team.get(vehicle)
-        if member is None:
-            self._rest.told_to_stop(vehicle)
-            raise VehicleNotFoundError(
-                f"vehicle {vehicle!r} takes no part in this mission", "stop; nothing more comes from here for it"
-            )
-        polls = member.spec.kind is VehicleKind.REST
-        after = -1 if after_step is None else after_step
-
-        def newer() -> WaypointView | None:
-            shown = live.waypoint_of(vehicle)
-            ready = shown is not None and shown.step > after and shown.status is not WaypointStatus.PLANNED
-            return shown if ready and member.order is not None else None
-
-        def must_stop() -> bool:
-            waits = live.header.state is MissionState.READY or (
-                live.header.state is MissionState.RUNNING and not live.halted
-            )
-            return not waits or live.team.get(vehicle) is None
-
-        def settled() -> bool:
-            return newer() is not None or must_stop()
-
-        if polls:
-            self._rest.has_waypoint(vehicle, after)
-        await _wait_watching(live, settled, timeout_s)
-        if must_stop():
-            if polls:
-                self._rest.told_to_stop(vehicle)
-            state = live.header.state if live.team.get(vehicle) is not None else "without this vehicle"
-            state = "ending" if state is MissionState.RUNNING else state
-            raise ConflictError(f"the mission is {state}: stop and hold", "ask again after it was started or resumed")
-        found = newer()
-        if found is not None and polls:
-            self._rest.has_waypoint(vehicle, found.step)
-            return live.waypoint_of(vehicle)
-        return found
+    async def rule(
+        self, mission_id: str, sounding_id: int, ruling: Ruling, *, note: str = "", actor: str = "operator"
+    ) -> SoundingView:
+        """Restore a sounding or reject it; see ``reviewing.rule``."""
+        return await rule(await self._get(mission_id), self._database, sounding_id, ruling, note, actor)
 
     # Corrections
 
@@ -464,7 +422,7 @@ class MissionService:
     async def set_tide(self, mission_id: str, tide: TideCorrection, *, actor: str = "operator") -> CorrectionsView:
         """Change the tide and correct every sounding anew. Raises InvalidRequestError for a table that is wrong."""
         live = await self._get(mission_id)
-        async with self._acting.setdefault(mission_id, asyncio.Lock()):
+        async with self._conductor.acting(mission_id):
             await set_tide(live, self._database, self._executor, tide, actor)
         return corrections_view(live)
 
@@ -473,7 +431,7 @@ class MissionService:
     ) -> CorrectionsView:
         """Change the sound speed profile, or take it away, and correct every sounding anew."""
         live = await self._get(mission_id)
-        async with self._acting.setdefault(mission_id, asyncio.Lock()):
+        async with self._conductor.acting(mission_id):
             await set_sound_speed(live, self._database, self._executor, sound_speed, actor)
         return corrections_view(live)
 
@@ -516,6 +474,26 @@ class MissionService:
             await importing.delete_reference(live, self._database, actor)
 
     # What came of it
+
+    async def steps(self, mission_id: str, *, after: int = 0, limit: int = 1000) -> list[StepView]:
+        """Return up to ``limit`` steps with a number above ``after``."""
+        return await steps_after(await self._get(mission_id), self._database, after, limit)
+
+    async def map_tiles(
+        self, mission_id: str, run: str, since: str, further: Sequence[str] = (), step: int | None = None
+    ) -> bytes:
+        """Return what changed in the map; see ``TileCache.changes``. ``step``: the map as it was at that step's end.
+
+        ``run`` tells this process from others, whose versions begin at 1, too.
+        """
+        live = await self._get(mission_id)
+        if step is None:
+            snapshot = await self.map(mission_id)
+        else:
+            snapshot = await map_at_step(live, self._database, step)
+        at = "" if step is None else f"@{step}"
+        tag = f"{run}.{snapshot.version}.{snapshot.revision}{at}"
+        return await asyncio.to_thread(live.tiles.changes, snapshot, tag, since, tuple(sorted(set(further))))
 
     async def map(self, mission_id: str) -> MapSnapshot:
         """Return the newest map. Raises MapNotReadyError when there is no sounding yet."""
@@ -641,12 +619,36 @@ class MissionService:
             live = await LiveMission.load(self._database, self._hub, self._executor, row)
             await self._make_room()
             self._live[mission_id] = live
+            self._map_soon(live)
             return live
 
+    def _map_soon(self, live: LiveMission) -> None:
+        """Make the map of what was stored; nobody waits for it, and one is made at a time."""
+        if not live.builder.stale:
+            return
+
+        async def make() -> None:
+            async with self._mapping:
+                await live.map_what_is_stored()
+
+        def done(task: asyncio.Task[None]) -> None:
+            self._mapped.pop(live.id, None)
+            error = None if task.cancelled() else task.exception()
+            if error is not None:
+                log.error("the map is not made yet; it is when it is asked for", mission=live.id, exc_info=error)
+
+        self._mapped[live.id] = task = asyncio.create_task(make(), name=f"map of {live.id}")
+        task.add_done_callback(done)
+
     async def _make_room(self) -> None:
-        idle = [m for m in self._live.values() if m.header.state in ENDED and not m.broadcaster.watched]
+        idle = [
+            m
+            for m in self._live.values()
+            if m.header.state in ENDED and not m.broadcaster.watched and m.id not in self._mapped
+        ]
         for live in idle[: max(0, len(idle) - ENDED_MISSIONS_IN_MEMORY + 1)]:
             del self._live[live.id]
+            self._left[live.id] = live.summary()
             await live.close()
 
     def _view(self, live: LiveMission) -> MissionView:
@@ -671,98 +673,6 @@ class MissionService:
             last_event_id=last_event_id,
         )
 
-    def _run(self, live: LiveMission) -> None:
-        live.header.state = MissionState.RUNNING
-        live.halted = False
-        for member in live.team:
-            member.engaged = False
-            member.refusal = ""
-        runner = Runner(live, self._database, self._hub, self._executor, self._settings.time_scale)
-        self._runs[live.id] = asyncio.create_task(self._supervise(live, runner.run), name=f"mission {live.id}")
-
-    async def _supervise(self, live: LiveMission, run: Callable[[], Awaitable[None]]) -> None:
-        """Run a mission to its end; whatever happens, its vehicles are stopped."""
-        try:
-            if self._warm is not None:
-                # Compiling what planning needs takes seconds on a new machine; vehicles must not wait for it.
-                await asyncio.wait([self._warm])
-            await run()
-        except asyncio.CancelledError:
-            raise
-        except Exception as error:
-            log.exception("the step loop failed", mission=live.id)
-            target, level, reason = MissionState.FAILED, Level.ALARM, f"the step loop failed: {error}"
-        else:
-            target, level, reason = MissionState.FINISHED, Level.INFO, "every step is done"
-        async with self._acting.setdefault(live.id, asyncio.Lock()):
-            try:
-                await to_the_end(self._conclude(live, target, reason, level))
-            finally:
-                self._runs.pop(live.id, None)
-
-    async def _conclude(self, live: LiveMission, target: MissionState, reason: str, level: Level) -> None:
-        """Bring a mission whose step loop ended to its end."""
-        live.halt()
-        stops = await self._stop_team(live)
-        try:
-            # What was measured until the vehicles stopped belongs to the result.
-            await live.journal.flush()
-            await live.build_map()
-        except Exception:
-            # The journal goes on trying by itself, and the map is made anew when it is asked for.
-            log.exception("the last soundings are not in the map yet", mission=live.id)
-        await self._set_state(live, target, reason, "service", level)
-        await self._log_stops(live, stops)
-        self._release_team(live)
-
-    async def _halt(self, mission_id: str) -> list[StopReceipt]:
-        """End the step loop and stop the vehicles, at once and not only when the loop has ended."""
-        live = await self._get(mission_id)
-        live.halt()
-        task = self._runs.pop(mission_id, None)
-        if task is not None:
-            task.cancel()
-        stops = await self._stop_team(live)
-        if task is not None:
-            await asyncio.gather(task, return_exceptions=True)
-            # A vehicle that was just being engaged when the loop was cancelled follows now.
-            again = {stop.vehicle: stop for stop in await self._stop_team(live, only_engaged=True)}
-            stops = [again.get(stop.vehicle, stop) for stop in stops]
-        await live.journal.flush()
-        return stops
-
-    async def _stop_team(self, live: LiveMission, *, only_engaged: bool = False) -> list[StopReceipt]:
-        mine = [
-            member
-            for member in live.team
-            if self._hub.claimed_by(member.key) == live.id
-            and (not only_engaged or self._hub.info(member.key).state is LinkState.ENGAGED)
-        ]
-        for member in mine:
-            member.engaged = False
-        live.changed.set()
-        return list(await asyncio.gather(*(self._hub.stop(member.key) for member in mine)))
-
-    async def _log_stops(self, live: LiveMission, stops: Sequence[StopReceipt]) -> None:
-        for stop in stops:
-            level = Level.INFO if stop.acknowledged else Level.ALARM
-            words = "acknowledged the stop" if stop.acknowledged else "has NOT acknowledged the stop"
-            await live.journal.log(level, "stop", f"{stop.vehicle} {words}: {stop.detail}", **_receipt(stop))
-
-    async def _set_state(
-        self, live: LiveMission, state: MissionState, reason: str, actor: str, level: Level = Level.INFO
-    ) -> None:
-        changed_at = now()
-        async with self._database.writing() as session:
-            await mission_queries.set_state(session, live.id, state, reason, changed_at)
-        live.header.state = state
-        live.header.reason = reason
-        live.header.updated_at = changed_at
-        live.changed.set()
-        live.publish_summary()
-        words = f"{state} by {actor}" + (f": {reason}" if reason else "")
-        await live.journal.log(level, "state", words, state=state, actor=actor)
-
     def _check_planner(self, spec: MissionSpec) -> None:
         name, use = spec.planner.name, f"use one of {', '.join(PLANNERS)}"
         if name in ONLY_IN_SIMULATION:
@@ -785,88 +695,13 @@ class MissionService:
                 "make it shallower or raise the limit",
             )
 
-    def _check_team(self, live: LiveMission) -> None:
-        if not list(live.team):
-            raise ConflictError("the mission has no vehicle", "add one: POST /api/v1/missions/{id}/vehicles")
-        for member in live.team:
-            owner = self._hub.claimed_by(member.key)
-            if owner not in (None, live.id):
-                raise ConflictError(
-                    f"vehicle {member.name!r} takes part in mission {owner}",
-                    "finish or abort that mission, or take the vehicle out of one of them",
-                )
-
-    def _check_links(self, live: LiveMission) -> None:
-        """Refuse to start while a vehicle that is commanded over IMC is not ready. Raises ConflictError."""
-        infos = [self._hub.info(member.key) for member in live.team if member.spec.kind is VehicleKind.IMC]
-        missing = [info for info in infos if info.state not in (LinkState.READY, LinkState.ENGAGED)]
-        if missing:
-            reasons = "; ".join(f"{info.name} is {info.state}: {info.reason or 'no reason known'}" for info in missing)
-            raise ConflictError(
-                f"not every vehicle is ready: {reasons}",
-                "wait for it, take it out of the mission, or see what 'bathyfleet doctor' finds",
-            )
-
-    def _claim_team(self, live: LiveMission) -> None:
-        """Claim every vehicle, or none when one cannot be had. Raises ConflictError."""
-        before = {member.key for member in live.team if self._hub.claimed_by(member.key) == live.id}
-        try:
-            for member in live.team:
-                self._claim(live, member.spec)
-        except ConflictError:
-            for member in live.team:
-                if member.key not in before:
-                    self._hub.release(member.key, live.id)
-            raise
-
-    def _claim(self, live: LiveMission, vehicle: VehicleSpec) -> None:
-        key = (vehicle.kind, vehicle.name)
-        self._hub.claim(key, live.id, live.receive)
-        if vehicle.kind is VehicleKind.IMC:
-            self._lead(vehicle.name, vehicle.guidance, vehicle.gateway)
-            self._show_area(live.spec.name, live.spec.area.ring)
-        if vehicle.kind is VehicleKind.SIM:
-            try:
-                self._launch(live, vehicle)
-            except ConflictError:
-                self._hub.release(key, live.id)
-                raise
-
-    def _launch(self, live: LiveMission, vehicle: VehicleSpec) -> None:
-        size = live.area.max(axis=0)
-        start = (vehicle.start[1], vehicle.start[0]) if vehicle.start is not None else None
-        launch = Launch(
-            vehicle=vehicle.name,
-            sensor=vehicle.sensor,
-            south_west=(live.frame.origin_lat_deg, live.frame.origin_lon_deg),
-            width_m=float(size[0]),
-            height_m=float(size[1]),
-            start=start,
-            noise=live.spec.sounding_noise,
-        )
-        try:
-            self._sim.launch(launch)
-        except ValueError as error:
-            raise ConflictError(f"vehicle {vehicle.name!r} cannot be launched: {error}", "change its start") from error
-
-    def _release_team(self, live: LiveMission) -> None:
-        self._show_area(live.spec.name, ())
-        for member in live.team:
-            self._hub.release(member.key, live.id)
-
     def _refuse_ended(self, live: LiveMission, words: str) -> None:
         if live.header.state in ENDED:
             raise ConflictError(f"the mission is {live.header.state} and {words}", "create a new mission")
 
-    def _stranger(self, live: LiveMission, item: Measurement) -> str:
-        member = live.team.get(item.vehicle)
-        if member is None:
-            return f"vehicle: {item.vehicle!r} takes no part in this mission"
-        if member.spec.kind is not VehicleKind.REST:
-            return (
-                f"vehicle: {item.vehicle!r} is of kind {member.spec.kind}; only vehicles of kind rest post measurements"
-            )
-        return _impossible_place(item, live.frame)
+
+def _action_view(live: LiveMission, stops: Sequence[StopReceipt]) -> ActionView:
+    return ActionView(mission=live.summary(), stops=[StopView(**receipt(stop)) for stop in stops])
 
 
 async def _nobody(_password: str, _host: str) -> str | None:
@@ -897,115 +732,6 @@ def _vehicle_row(mission_id: str, vehicle: VehicleSpec, slot: int) -> MissionVeh
         joined_at=now(),
         left_at=None,
     )
-
-
-def _impossible_place(item: Measurement, frame: LocalFrame) -> str:
-    if not -90 <= item.lat_deg <= 90:
-        return f"lat_deg: {item.lat_deg} is not between -90 and 90"
-    if not -180 <= item.lon_deg <= 180:
-        return f"lon_deg: {item.lon_deg} is not between -180 and 180"
-    try:
-        frame.to_local(item.lat_deg, item.lon_deg)
-    except ValueError as error:
-        return f"lat_deg, lon_deg: {error}"
-    return ""
-
-
-def _sounding(item: Measurement) -> SoundingReport | None:
-    if item.range_m is None:
-        return None
-    place, geometry = _footprint(item, item.range_m)
-    return SoundingReport(
-        vehicle=item.vehicle,
-        time_s=item.time_s,
-        footprint=place,
-        vehicle_depth_m=item.depth_m,
-        range_m=item.range_m,
-        source="rest",
-        beam=item.beam,
-        depth_sd_m=item.range_sd_m,
-        position_sd_m=item.position_sd_m,
-        beam_geometry=geometry,
-    )
-
-
-def _footprint(item: Measurement, range_m: float) -> tuple[Position, BeamGeometry]:
-    """Return where a beam met the bottom, and how it pointed."""
-    if item.beam_off_nadir_deg is None or item.heading_deg is None:
-        below = Position(item.lat_deg, item.lon_deg, item.depth_m + range_m)
-        return below, BeamGeometry(item.lat_deg, item.lon_deg)
-    state = StateSample(
-        item.time_s,
-        math.radians(item.lat_deg),
-        math.radians(item.lon_deg),
-        item.depth_m,
-        math.radians(item.roll_deg),
-        math.radians(item.pitch_deg),
-        math.radians(item.heading_deg),
-    )
-    beam = Beam(item.beam, math.radians(item.beam_azimuth_deg), math.radians(item.beam_off_nadir_deg))
-    geometry = BeamGeometry(
-        item.lat_deg,
-        item.lon_deg,
-        item.roll_deg,
-        item.pitch_deg,
-        item.heading_deg,
-        item.beam_azimuth_deg,
-        item.beam_off_nadir_deg,
-    )
-    return Position(*footprint(state, beam, range_m)), geometry
-
-
-def _vehicle_report(item: Measurement) -> VehicleReport:
-    return VehicleReport(
-        vehicle=item.vehicle,
-        time_s=item.time_s,
-        position=Position(item.lat_deg, item.lon_deg, item.depth_m),
-        heading_rad=None if item.heading_deg is None else math.radians(item.heading_deg),
-        speed_mps=item.speed_mps,
-        altitude_m=item.range_m,
-        battery_pct=item.battery_pct,
-        position_sd_m=item.position_sd_m,
-    )
-
-
-def _batch_verdict(count: int, taken: Mapping[int, ItemVerdict], strangers: Mapping[int, str]) -> BatchVerdict:
-    items = []
-    for index in range(count):
-        if index in taken:
-            items.append(taken[index].model_copy(update={"index": index}))
-        elif strangers[index]:
-            items.append(ItemVerdict(index=index, verdict=Verdict.REJECTED, reason=strangers[index]))
-        else:
-            items.append(ItemVerdict(index=index, verdict=Verdict.ACCEPTED, reason="position report"))
-    tally = {verdict: sum(item.verdict is verdict for item in items) for verdict in Verdict}
-    return BatchVerdict(
-        accepted=tally[Verdict.ACCEPTED],
-        rejected=tally[Verdict.REJECTED],
-        duplicate=tally[Verdict.DUPLICATE],
-        items=items,
-    )
-
-
-def _receipt(stop: StopReceipt) -> dict[str, str | bool]:
-    return {"vehicle": stop.vehicle, "acknowledged": stop.acknowledged, "detail": stop.detail}
-
-
-async def _wait_watching(live: LiveMission, condition: Callable[[], bool], timeout_s: float) -> None:
-    """Wait until the condition holds or the time is over, looking again at every live message."""
-    if condition() or timeout_s <= 0:
-        return
-    with live.broadcaster.subscribe() as subscription:
-
-        async def until_it_holds() -> None:
-            async for _message in subscription:
-                if condition():
-                    return
-
-        try:
-            await asyncio.wait_for(until_it_holds(), timeout_s)
-        except TimeoutError:
-            return
 
 
 async def _after(first: LiveMessage, rest: Subscription) -> AsyncIterator[LiveMessage]:

@@ -70,6 +70,7 @@ class Progress(View):
     rejected: int = Field(description="Soundings kept but not used")
     distance_m: float = Field(description="Distance travelled by all vehicles, along their tracks")
     coverage_pct: float = Field(description="Share of the area's cells known to accuracy_m")
+    remaining_pct: float = Field(default=100.0, description="Share of the landmarks never known to accuracy_m")
     mean_sd_m: float | None = Field(default=None, description="Mean standard deviation of the map")
     objective: float | None = Field(default=None, description="The planner's objective at the last step")
     terms: dict[str, float] = Field(default_factory=dict)
@@ -106,6 +107,55 @@ class Verdict(StrEnum):
     """Stored with the reason, not used for the map."""
     DUPLICATE = "duplicate"
     """Already there; nothing stored."""
+
+
+class Ruling(StrEnum):
+    """What an operator said of a sounding."""
+
+    RESTORED = "restored"
+    """It counts, whatever gate and map think of it."""
+    REJECTED = "rejected"
+    """It does not count."""
+
+
+class SoundingState(StrEnum):
+    """Whether a sounding is in the map, and who decided that."""
+
+    USED = "used"
+    RESTORED = "restored"
+    """Used because an operator restored it."""
+    REJECTED = "rejected"
+    """Kept out by the gate."""
+    DOUBTED = "doubted"
+    """Left out of the map because its neighbours say otherwise."""
+    WITHDRAWN = "withdrawn"
+    """Kept out by an operator."""
+
+
+class SoundingView(View):
+    """A stored sounding; what was measured never changes, only whether it counts."""
+
+    id: int
+    vehicle: str
+    time_s: float = Field(description="The vehicle's clock, Unix seconds")
+    beam: int
+    step: int
+    lat_deg: float
+    lon_deg: float
+    range_m: float
+    raw_depth_m: float = Field(description="Of the bottom below the surface, as measured")
+    depth_m: float | None = Field(description="Corrected, below the datum; null where no correction could be made")
+    sd_m: float | None
+    state: SoundingState
+    reason: str = Field(description="Why it is not used, or who restored it")
+
+
+class SoundingPage(View):
+    """Some soundings, in the order they came."""
+
+    total: int = Field(description="Of all pages")
+    items: list[SoundingView]
+    next_after: int | None = Field(description="Give it as `after` for the next page; null: this is the last")
 
 
 class Measurement(BaseModel):
@@ -347,6 +397,49 @@ class DifferenceView(View):
     p95_m: float = Field(description="95th percentile of the absolute difference")
     max_m: float
     cells: int
+
+
+class CheckStatus(StrEnum):
+    """How a line of the checklist stands."""
+
+    OK = "ok"
+    NOTE = "note"
+    """Worth knowing; nothing is wrong."""
+    WARNING = "warning"
+    """The mission can start, but look at it first."""
+    PROBLEM = "problem"
+
+
+class StepView(View):
+    """A step that was decided: its figures, and where it sent the vehicles."""
+
+    number: int
+    committed_at: datetime
+    objective: float | None
+    terms: dict[str, float]
+    figures: dict[str, float] = Field(
+        description="How far the mission had come: coverage_pct, remaining_pct, mean_sd_m, distance_m; empty in steps "
+        "of before they were kept"
+    )
+    soundings: int = Field(description="Soundings that its map was made of")
+    waypoints: list[WaypointView]
+
+
+class CheckView(View):
+    """One line of the checklist before a start."""
+
+    id: str = Field(examples=["links"])
+    title: str
+    status: CheckStatus
+    message: str
+    remedy: str = Field(default="", description="What to do about it; empty when all is well")
+
+
+class PreflightView(View):
+    """What stands before a start."""
+
+    ready: bool = Field(description="False while any line is a problem: a start would be refused or fail")
+    checks: list[CheckView]
 
 
 class QualityView(View):

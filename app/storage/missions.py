@@ -6,6 +6,7 @@ from typing import Any
 
 from sqlalchemy import func, select, update
 from sqlalchemy.ext.asyncio import AsyncSession
+from sqlalchemy.orm import defer
 
 from app.storage.models import MissionRow, MissionVehicleRow, PositionRow, StepRow, WaypointRow
 
@@ -59,6 +60,18 @@ async def waypoints_of_step(session: AsyncSession, mission_id: str, step: int) -
     """Return the waypoints of one step."""
     query = select(WaypointRow).where(WaypointRow.mission_id == mission_id, WaypointRow.step == step)
     return (await session.scalars(query.order_by(WaypointRow.vehicle))).all()
+
+
+async def steps_after(session: AsyncSession, mission_id: str, after: int, limit: int) -> Sequence[StepRow]:
+    """Return up to ``limit`` steps with a number above ``after``, without the planner's memory, first to last."""
+    query = select(StepRow).where(StepRow.mission_id == mission_id, StepRow.number > after).order_by(StepRow.number)
+    return (await session.scalars(query.limit(limit).options(defer(StepRow.memory)))).all()
+
+
+async def waypoints_between(session: AsyncSession, mission_id: str, first: int, last: int) -> Sequence[WaypointRow]:
+    """Return the waypoints of steps ``first`` to ``last``."""
+    query = select(WaypointRow).where(WaypointRow.mission_id == mission_id, WaypointRow.step.between(first, last))
+    return (await session.scalars(query.order_by(WaypointRow.step, WaypointRow.vehicle))).all()
 
 
 async def newest_waypoints(session: AsyncSession, mission_id: str) -> Sequence[WaypointRow]:

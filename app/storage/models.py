@@ -62,6 +62,7 @@ class Base(DeclarativeBase):
         datetime: UtcDateTime(),
         float: Double(),
         dict[str, Any]: JSON(),
+        dict[str, Any] | None: JSON(none_as_null=True),
     }
 
 
@@ -103,6 +104,8 @@ class StepRow(Base):
     committed_at: Mapped[datetime]
     objective: Mapped[float | None]
     terms: Mapped[dict[str, Any]]
+    figures: Mapped[dict[str, Any] | None]
+    """How far the mission had come; None in steps of before that was kept."""
     soundings: Mapped[int]
     map_digest: Mapped[str] = mapped_column(String(64))
     memory: Mapped[bytes] = mapped_column(LargeBinary)
@@ -166,6 +169,8 @@ class SoundingRow(Base):
     beam_off_nadir_deg: Mapped[float | None]
     verdict: Mapped[str] = mapped_column(String(16))
     reason: Mapped[str] = mapped_column(Text, default="")
+    ruling: Mapped[str | None] = mapped_column(String(16))
+    """What an operator said of it, whatever gate and map think: restored or rejected."""
 
 
 class TideTableRow(Base):

@@ -2,11 +2,11 @@
 
 import zlib
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from sqlalchemy import func, select
+from sqlalchemy import func, select, tuple_
 from sqlalchemy.dialects import postgresql, sqlite
 from sqlalchemy.ext.asyncio import AsyncSession
 
@@ -30,15 +30,45 @@ async def insert_new(session: AsyncSession, rows: Sequence[dict[str, Any]]) -> s
     return {(vehicle, time_s, beam) for vehicle, time_s, beam in result}
 
 
-async def accepted_arrays(session: AsyncSession, mission_id: str) -> NDArray[np.float64]:
-    """Return the accepted soundings in the order they came, shape (n, 4): east, north, depth, deviation (metres)."""
+class Accepted(NamedTuple):
+    """Accepted soundings in the order they came.
+
+    ``table`` has shape (n, 4): east, north, depth, deviation (metres); ``trusted`` (n,) is True where an operator
+    restored the sounding.
+    """
+
+    table: NDArray[np.float64]
+    trusted: NDArray[np.bool_]
+
+
+async def accepted_arrays(session: AsyncSession, mission_id: str, *, until_step: int | None = None) -> Accepted:
+    """Return the accepted soundings, those that came until the end of a step where one is given."""
     query = (
-        select(SoundingRow.east_m, SoundingRow.north_m, SoundingRow.depth_m, SoundingRow.sd_m)
+        select(SoundingRow.east_m, SoundingRow.north_m, SoundingRow.depth_m, SoundingRow.sd_m, SoundingRow.ruling)
         .where(SoundingRow.mission_id == mission_id, SoundingRow.verdict == "accepted")
         .order_by(SoundingRow.id)
     )
+    if until_step is not None:
+        query = query.where(SoundingRow.step <= until_step)
     rows = (await session.execute(query)).all()
-    return np.array([tuple(row) for row in rows], dtype=float).reshape(-1, 4)
+    table = np.array([tuple(row)[:4] for row in rows], dtype=float).reshape(-1, 4)
+    return Accepted(table, np.array([row.ruling is not None for row in rows], dtype=bool))
+
+
+async def ids_at(session: AsyncSession, mission_id: str, table: Sequence[NDArray[np.float64]]) -> list[list[int]]:
+    """Return for every row (east, north, depth, ...) of a table the accepted soundings with these very values."""
+    found: dict[tuple[float, float, float], list[int]] = {}
+    columns = (SoundingRow.east_m, SoundingRow.north_m, SoundingRow.depth_m)
+    keys = [(float(row[0]), float(row[1]), float(row[2])) for row in table]
+    for first in range(0, len(keys), 500):
+        query = select(SoundingRow.id, *columns).where(
+            SoundingRow.mission_id == mission_id,
+            SoundingRow.verdict == "accepted",
+            tuple_(*columns).in_(keys[first : first + 500]),
+        )
+        for row in await session.execute(query):
+            found.setdefault((row.east_m, row.north_m, row.depth_m), []).append(row.id)
+    return [found.get(key, []) for key in keys]
 
 
 async def counts(session: AsyncSession, mission_id: str) -> dict[str, int]:

@@ -67,8 +67,8 @@ async def test_a_large_batch_is_stored_whole(database: Database) -> None:
         assert await sounding_queries.counts(session, "m1") == {"accepted": 1667, "rejected": 3333}
         assert await sounding_queries.counts(session, "m2") == {}
         arrays = await sounding_queries.accepted_arrays(session, "m1")
-        assert (await sounding_queries.accepted_arrays(session, "m2")).shape == (0, 4)
-    np.testing.assert_array_equal(arrays[:, 2], np.arange(0.0, 5000.0, 3.0))
+        assert (await sounding_queries.accepted_arrays(session, "m2")).table.shape == (0, 4)
+    np.testing.assert_array_equal(arrays.table[:, 2], np.arange(0.0, 5000.0, 3.0))
 
 
 async def test_newest_waypoints_are_one_for_each_vehicle(database: Database) -> None:

@@ -2,11 +2,12 @@ import "./style.css";
 import { effect } from "@preact/signals";
 import { render } from "preact";
 import { startSession } from "./state/session";
-import { isDark } from "./state/store";
+import { isDark, theme } from "./state/store";
 import { App } from "./ui/App";
 
 effect(() => {
-  document.documentElement.dataset.theme = isDark.value ? "dark" : "light";
+  document.documentElement.dataset.theme =
+    theme.value === "contrast" ? "contrast" : isDark.value ? "dark" : "light";
 });
 startSession();
 render(<App />, document.getElementById("app") as HTMLElement);

@@ -4,15 +4,20 @@ import type {
   DoctorView,
   EventView,
   FieldProblem,
-  MapView,
   MissionAction,
   MissionSummary,
   MissionView,
   NewMission,
   PlannerView,
+  PreflightView,
   Problem,
   ProductView,
   QualityView,
+  SoundingPage,
+  SoundingState,
+  SoundingView,
+  StepView,
+  TimedTracks,
   VehicleView,
 } from "./types";
 
@@ -103,11 +108,44 @@ export const api = {
   create: (mission: NewMission) => post<MissionView>("/missions", mission),
   act: (id: string, action: MissionAction) => post<ActionView>(`${missionPath(id)}/${action}`),
   log: readLog,
-  map: (id: string) => request<MapView>(`${missionPath(id)}/map`),
+  mission: (id: string) => request<MissionView>(missionPath(id)),
+  preflight: (id: string) => request<PreflightView>(`${missionPath(id)}/preflight`),
+  steps: (id: string, after: number) =>
+    request<StepView[]>(`${missionPath(id)}/steps?after=${after}&limit=1000`),
+  tracks: (id: string) => request<TimedTracks>(`${missionPath(id)}/tracks.geojson`),
+  note: (id: string, text: string) => post<EventView>(`${missionPath(id)}/notes`, { text }),
+  abortVehicle: (id: string, name: string) =>
+    post<ActionView>(`${missionPath(id)}/vehicles/${encodeURIComponent(name)}/abort`),
+  soundings: (id: string, after: number, state?: SoundingState) =>
+    request<SoundingPage>(
+      `${missionPath(id)}/soundings?limit=200&after=${after}${state ? `&state=${state}` : ""}`,
+    ),
+  rule: (id: string, sounding: number, ruling: "restore" | "reject", note: string) =>
+    post<SoundingView>(`${missionPath(id)}/soundings/${sounding}/${ruling}`, { note }),
+  setTide: (id: string, tide: { level_m?: number; table?: string; source: string }) =>
+    request<unknown>(`${missionPath(id)}/tide`, {
+      method: "PUT",
+      body: JSON.stringify(tide),
+      headers: { "Content-Type": "application/json" },
+    }),
+  mapTiles,
   products: (id: string) => request<ProductView[]>(`${missionPath(id)}/products`),
   quality: (id: string) => request<QualityView>(`${missionPath(id)}/quality`),
   file,
 };
+
+/** What changed in the map since the one named; `step`: as it was at the end of that step. */
+async function mapTiles(
+  id: string,
+  since: string,
+  further: readonly string[],
+  step: number | null,
+): Promise<ArrayBuffer> {
+  const query = new URLSearchParams({ since });
+  for (const layer of further) query.append("layer", layer);
+  if (step !== null) query.set("step", String(step));
+  return (await ask(`${BASE}${missionPath(id)}/map/tiles?${query}`, {})).arrayBuffer();
+}
 
 /** The log between two of its lines, however long. */
 async function readLog(id: string, after: number, last: number): Promise<EventView[]> {

@@ -148,6 +148,86 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/missions/{mission_id}/preflight": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * See what stands before the start
+         * @description Return the checklist: links, batteries, places, depths, area, tide, and how long it takes at most.
+         */
+        get: operations["checkMission"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/missions/{mission_id}/steps": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * See what was decided
+         * @description Return the steps with their figures and with what became of their waypoints, first to last.
+         */
+        get: operations["listSteps"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/missions/{mission_id}/notes": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Write into the log
+         * @description Keep an operator's words in the mission's log, for the next watch.
+         */
+        post: operations["writeNote"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/missions/{mission_id}/vehicles/{name}/abort": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Stop one vehicle
+         * @description Stop a vehicle now and go on without it; the answer tells whether it acknowledged.
+         */
+        post: operations["abortVehicle"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/missions/{mission_id}/vehicles": {
         parameters: {
             query?: never;
@@ -414,6 +494,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/missions/{mission_id}/map/tiles": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Follow the map
+         * @description Return what changed in the map since the client last asked; all of it when that map is not known any more.
+         */
+        get: operations["getMapTiles"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/missions/{mission_id}/quality": {
         parameters: {
             query?: never;
@@ -510,6 +610,66 @@ export interface paths {
         get: operations["getTracksFile"];
         put?: never;
         post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/missions/{mission_id}/soundings": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * See which soundings are not in the map, and why
+         * @description Return soundings with their raw values, whether they count and why not, in the order they came.
+         */
+        get: operations["listSoundings"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/missions/{mission_id}/soundings/{sounding_id}/restore": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Let a sounding count
+         * @description Take a sounding into the map whatever gate and neighbours say; the log keeps who did so.
+         */
+        post: operations["restoreSounding"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/missions/{mission_id}/soundings/{sounding_id}/reject": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Keep a sounding out
+         * @description Take a sounding out of the map; its values stay, the log keeps who did so, and it can be restored.
+         */
+        post: operations["rejectSounding"];
         delete?: never;
         options?: never;
         head?: never;
@@ -731,6 +891,34 @@ export interface components {
          */
         Cause: "sound" | "switched_off" | "port_in_use" | "no_interface" | "no_vehicle" | "not_heard" | "no_announce" | "no_service" | "announces_ceased" | "no_traffic" | "unreachable" | "blocked_port" | "stale_port" | "foreign_address" | "wrong_version" | "same_id_twice" | "our_id_taken" | "clock_off" | "clock_rate" | "silent" | "low_rate" | "no_entities" | "no_soundings" | "soundings_refused" | "foreign_control" | "not_ready" | "send_errors" | "bad_packets" | "unknown_messages";
         /**
+         * CheckStatus
+         * @description How a line of the checklist stands.
+         * @enum {string}
+         */
+        CheckStatus: "ok" | "note" | "warning" | "problem";
+        /**
+         * CheckView
+         * @description One line of the checklist before a start.
+         */
+        CheckView: {
+            /**
+             * Id
+             * @example links
+             */
+            id: string;
+            /** Title */
+            title: string;
+            status: components["schemas"]["CheckStatus"];
+            /** Message */
+            message: string;
+            /**
+             * Remedy
+             * @description What to do about it; empty when all is well
+             * @default
+             */
+            remedy: string;
+        };
+        /**
          * ComponentHealth
          * @description Whether the service can do its work.
          */
@@ -938,6 +1126,12 @@ export interface components {
              */
             remedy: string;
         };
+        /**
+         * FurtherLayer
+         * @description A layer that the tiles hold on request.
+         * @enum {string}
+         */
+        FurtherLayer: "slope" | "tvu_fraction" | "difference";
         /**
          * Guidance
          * @description How a vehicle of kind ``imc`` is led.
@@ -1437,6 +1631,20 @@ export interface components {
          */
         NodeState: "heard" | "announced" | "active" | "ready" | "in_plan" | "lost" | "expected_offline";
         /**
+         * NoteRequest
+         * @description What the next watch should know.
+         * @example {
+         *       "text": "Ferry passes at 14:10"
+         *     }
+         */
+        NoteRequest: {
+            /**
+             * Text
+             * @description Kept in the mission's log
+             */
+            text: string;
+        };
+        /**
          * Order
          * @description An order of survey.
          * @enum {string}
@@ -1621,6 +1829,19 @@ export interface components {
             ][][];
         };
         /**
+         * PreflightView
+         * @description What stands before a start.
+         */
+        PreflightView: {
+            /**
+             * Ready
+             * @description False while any line is a problem: a start would be refused or fail
+             */
+            ready: boolean;
+            /** Checks */
+            checks: components["schemas"]["CheckView"][];
+        };
+        /**
          * Problem
          * @description A problem document (RFC 9457).
          */
@@ -1720,6 +1941,12 @@ export interface components {
              * @description Share of the area's cells known to accuracy_m
              */
             coverage_pct: number;
+            /**
+             * Remaining Pct
+             * @description Share of the landmarks never known to accuracy_m
+             * @default 100
+             */
+            remaining_pct: number;
             /**
              * Mean Sd M
              * @description Mean standard deviation of the map
@@ -1870,6 +2097,73 @@ export interface components {
             source: string;
         };
         /**
+         * SoundingPage
+         * @description Some soundings, in the order they came.
+         */
+        SoundingPage: {
+            /**
+             * Total
+             * @description Of all pages
+             */
+            total: number;
+            /** Items */
+            items: components["schemas"]["SoundingView"][];
+            /**
+             * Next After
+             * @description Give it as `after` for the next page; null: this is the last
+             */
+            next_after: number | null;
+        };
+        /**
+         * SoundingState
+         * @description Whether a sounding is in the map, and who decided that.
+         * @enum {string}
+         */
+        SoundingState: "used" | "restored" | "rejected" | "doubted" | "withdrawn";
+        /**
+         * SoundingView
+         * @description A stored sounding; what was measured never changes, only whether it counts.
+         */
+        SoundingView: {
+            /** Id */
+            id: number;
+            /** Vehicle */
+            vehicle: string;
+            /**
+             * Time S
+             * @description The vehicle's clock, Unix seconds
+             */
+            time_s: number;
+            /** Beam */
+            beam: number;
+            /** Step */
+            step: number;
+            /** Lat Deg */
+            lat_deg: number;
+            /** Lon Deg */
+            lon_deg: number;
+            /** Range M */
+            range_m: number;
+            /**
+             * Raw Depth M
+             * @description Of the bottom below the surface, as measured
+             */
+            raw_depth_m: number;
+            /**
+             * Depth M
+             * @description Corrected, below the datum; null where no correction could be made
+             */
+            depth_m: number | null;
+            /** Sd M */
+            sd_m: number | null;
+            state: components["schemas"]["SoundingState"];
+            /**
+             * Reason
+             * @description Why it is not used, or who restored it
+             */
+            reason: string;
+        };
+        /**
          * StateMessage
          * @description The mission's state or progress changed.
          */
@@ -1881,6 +2175,39 @@ export interface components {
              */
             type: "mission";
             mission: components["schemas"]["MissionSummary"];
+        };
+        /**
+         * StepView
+         * @description A step that was decided: its figures, and where it sent the vehicles.
+         */
+        StepView: {
+            /** Number */
+            number: number;
+            /**
+             * Committed At
+             * Format: date-time
+             */
+            committed_at: string;
+            /** Objective */
+            objective: number | null;
+            /** Terms */
+            terms: {
+                [key: string]: number;
+            };
+            /**
+             * Figures
+             * @description How far the mission had come: coverage_pct, remaining_pct, mean_sd_m, distance_m; empty in steps of before they were kept
+             */
+            figures: {
+                [key: string]: number;
+            };
+            /**
+             * Soundings
+             * @description Soundings that its map was made of
+             */
+            soundings: number;
+            /** Waypoints */
+            waypoints: components["schemas"]["WaypointView"][];
         };
         /**
          * StopView
@@ -2883,6 +3210,289 @@ export interface operations {
             };
             /** @description The body's media type is not supported */
             415: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    checkMission: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description The mission's id */
+                mission_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["PreflightView"];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such mission */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    listSteps: {
+        parameters: {
+            query?: {
+                /** @description Only steps with a larger number */
+                after?: number;
+                /** @description Most steps in the answer */
+                limit?: number;
+            };
+            header?: never;
+            path: {
+                /** @description The mission's id */
+                mission_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["StepView"][];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such mission */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    writeNote: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description The mission's id */
+                mission_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["NoteRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            201: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["EventView"];
+                };
+            };
+            /** @description The body cannot be read */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such mission */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body is too large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body's media type is not supported */
+            415: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    abortVehicle: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description The mission's id */
+                mission_id: string;
+                /** @description The vehicle's name */
+                name: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ActionView"];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such mission; there is no such vehicle */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description It contradicts the present state */
+            409: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -4150,6 +4760,72 @@ export interface operations {
             };
         };
     };
+    getMapTiles: {
+        parameters: {
+            query?: {
+                /** @description `tag` of the map that the client has */
+                since?: string;
+                /** @description Layers beside the usual ones */
+                layer?: components["schemas"]["FurtherLayer"][];
+                /** @description The map as it was at the end of this step; default: the newest */
+                step?: number;
+            };
+            header?: never;
+            path: {
+                /** @description The mission's id */
+                mission_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description The tiles that changed, in a binary form that the guide to REST describes */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/octet-stream": string;
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such mission; there is no map yet */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
     getQuality: {
         parameters: {
             query?: never;
@@ -4477,6 +5153,276 @@ export interface operations {
             };
             /** @description There is no such mission; there is no map yet; there is no such format */
             404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    listSoundings: {
+        parameters: {
+            query?: {
+                /** @description Only soundings in these states; default: all that are not simply used */
+                state?: components["schemas"]["SoundingState"][];
+                /** @description Only this vehicle's */
+                vehicle?: string;
+                /** @description Only soundings with a larger id */
+                after?: number;
+                /** @description Most soundings in the answer */
+                limit?: number;
+            };
+            header?: never;
+            path: {
+                /** @description The mission's id */
+                mission_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["SoundingPage"];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such mission */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    restoreSounding: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description The mission's id */
+                mission_id: string;
+                /** @description The sounding's id */
+                sounding_id: number;
+            };
+            cookie?: never;
+        };
+        requestBody?: {
+            content: {
+                "application/json": components["schemas"]["ActionRequest"] | null;
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["SoundingView"];
+                };
+            };
+            /** @description The body cannot be read */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such sounding */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description It contradicts the present state */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body is too large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body's media type is not supported */
+            415: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    rejectSounding: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description The mission's id */
+                mission_id: string;
+                /** @description The sounding's id */
+                sounding_id: number;
+            };
+            cookie?: never;
+        };
+        requestBody?: {
+            content: {
+                "application/json": components["schemas"]["ActionRequest"] | null;
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["SoundingView"];
+                };
+            };
+            /** @description The body cannot be read */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such sounding */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description It contradicts the present state */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body is too large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body's media type is not supported */
+            415: {
                 headers: {
                     [name: string]: unknown;
                 };

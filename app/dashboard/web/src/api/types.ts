@@ -22,7 +22,13 @@ export type WaypointView = Complete<Schemas["WaypointView"]>;
 export type MissionSummary = Complete<Schemas["MissionSummary"]>;
 export type MissionView = Complete<Schemas["MissionView"]>;
 export type EventView = Complete<Schemas["EventView"]>;
-export type MapView = Complete<Schemas["MapView"]>;
+export type StepView = Complete<Schemas["StepView"]>;
+export type PreflightView = Complete<Schemas["PreflightView"]>;
+export type CheckView = Complete<Schemas["CheckView"]>;
+export type CheckStatus = Schemas["CheckStatus"];
+export type SoundingView = Complete<Schemas["SoundingView"]>;
+export type SoundingPage = Complete<Schemas["SoundingPage"]>;
+export type SoundingState = Schemas["SoundingState"];
 export type ProductView = Complete<Schemas["ProductView"]>;
 export type QualityView = Complete<Schemas["QualityView"]>;
 export type PlannerView = Complete<Schemas["PlannerView"]>;
@@ -37,10 +43,22 @@ export type FieldProblem = Complete<Schemas["FieldProblem"]>;
 
 /** What a request says of a vehicle; whatever is left out takes the service's default. */
 export type VehicleSpec = Pick<Schemas["VehicleSpec"], "name" | "kind" | "sensor">;
+export type PlannerOptions = Partial<Schemas["PlannerOptions"]>;
 
 /** What the form sends. */
-export type NewMission = Pick<Schemas["MissionSpec"], "name" | "area" | "steps" | "cell_m"> & {
+export type NewMission = Pick<Schemas["MissionSpec"], "name" | "area" | "keep_out" | "steps" | "cell_m"> & {
   vehicles: VehicleSpec[];
+  speed_mps: number;
+  accuracy_m: number;
   limits: Partial<Schemas["Limits"]>;
-  planner: Pick<Schemas["PlannerSpec"], "name">;
+  planner: { name: string; options: PlannerOptions };
+  tide?: { level_m: number; source: string };
 };
+
+/** Where a vehicle was and when, as the tracks' GeoJSON says. */
+export interface TimedTracks {
+  features: {
+    properties: { vehicle: string; depths_m: number[]; times: string[] };
+    geometry: { coordinates: LngLat[] };
+  }[];
+}

@@ -1,53 +1,47 @@
 /** The map: MapLibre with a style drawn here and nothing fetched, so that it works without internet. */
 
 import "maplibre-gl/dist/maplibre-gl.css";
-import type * as GeoJSON from "geojson";
 import {
+  type AllLayoutProperties,
   type AllPaintProperties,
-  type ExpressionSpecification,
   type GeoJSONSource,
   type ImageSource,
-  type LayerSpecification,
   Map as MapLibreMap,
   Marker,
   NavigationControl,
   ScaleControl,
-  type StyleSpecification,
   setWorkerUrl,
 } from "maplibre-gl";
 import workerUrl from "maplibre-gl/dist/maplibre-gl-worker.mjs?url";
-import type { LngLat, MapView, PolygonGeometry } from "../api/types";
-import { interpolatedBlocks, type Layer, paint, type Range } from "./bathymetry";
+import type { LngLat, PolygonGeometry } from "../api/types";
 import {
   type Bounds,
   boundsOf,
+  circle,
   contains,
   type Graticule,
   graticule,
   graticuleStep,
   grown,
-  metresPerDegree,
   pieces,
-  placeIn,
 } from "./geo";
+import type { PictureResult } from "./picture.worker";
+import { placeIn } from "./seafloor";
+import {
+  collection,
+  type Feature,
+  feature,
+  type Look,
+  layers,
+  line,
+  PAPER,
+  point,
+  type SourceName,
+  stripes,
+  style,
+} from "./style";
 
 setWorkerUrl(workerUrl);
-
-type Feature = GeoJSON.Feature<GeoJSON.Geometry, Record<string, string | number>>;
-
-const collection = (features: Feature[]): GeoJSON.FeatureCollection => ({
-  type: "FeatureCollection",
-  features,
-});
-const feature = (geometry: GeoJSON.Geometry, properties: Record<string, string | number> = {}): Feature => ({
-  type: "Feature",
-  geometry,
-  properties,
-});
-const line = (coordinates: readonly LngLat[]): GeoJSON.LineString => ({
-  type: "LineString",
-  coordinates: coordinates as LngLat[],
-});
 
 /** Line on the map: a vehicle's track or its route to a waypoint. */
 export interface Track {
@@ -69,6 +63,13 @@ export interface Pin {
   layerIndex: number;
 }
 
+export interface Spot {
+  id: number;
+  at: LngLat;
+  state: string;
+  chosen: boolean;
+}
+
 /** Where the grid's lines meet the edges of the visible map, in its pixels. */
 export interface GridFrame extends Graticule {
   xOf: (longitude: number) => number;
@@ -77,6 +78,8 @@ export interface GridFrame extends Graticule {
 
 export interface ChartHooks {
   onCursor: (place: LngLat | null) => void;
+  onClick: (place: LngLat) => void;
+  onSpot: (id: number) => void;
   onCentre: (place: LngLat) => void;
   onFrame: (frame: GridFrame) => void;
 }
@@ -88,120 +91,8 @@ export interface Padding {
   left: number;
 }
 
-const PAPER = {
-  light: { sea: "#e6eef3", grid: "#b3c5d1", area: "#16394f", keepOut: "#9b1c1c", casing: "#ffffff" },
-  dark: { sea: "#0c1922", grid: "#26404f", area: "#d5e6f0", keepOut: "#ff8f8f", casing: "#06121a" },
-} as const;
-
-const SOURCES = ["grid", "area", "keep-out", "interpolated", "tracks", "routes", "arrival", "draft"] as const;
-type SourceName = (typeof SOURCES)[number];
-
-const COLOUR: ExpressionSpecification = ["get", "colour"];
-
-function layers(dark: boolean): LayerSpecification[] {
-  const paper = dark ? PAPER.dark : PAPER.light;
-  const round = { "line-cap": "round", "line-join": "round" } as const;
-  return [
-    { id: "sea", type: "background", paint: { "background-color": paper.sea } },
-    {
-      id: "sea-floor",
-      type: "raster",
-      source: "sea-floor",
-      paint: { "raster-resampling": "nearest", "raster-fade-duration": 0 },
-    },
-    {
-      id: "interpolated",
-      type: "fill",
-      source: "interpolated",
-      paint: { "fill-pattern": "hatch", "fill-antialias": false },
-    },
-    {
-      id: "grid",
-      type: "line",
-      source: "grid",
-      paint: { "line-color": paper.grid, "line-width": 1, "line-opacity": 0.7 },
-    },
-    {
-      id: "keep-out-fill",
-      type: "fill",
-      source: "keep-out",
-      paint: { "fill-pattern": `forbidden-${dark ? "dark" : "light"}` },
-    },
-    {
-      id: "keep-out",
-      type: "line",
-      source: "keep-out",
-      paint: { "line-color": paper.keepOut, "line-width": 2 },
-    },
-    {
-      id: "area",
-      type: "line",
-      source: "area",
-      layout: round,
-      paint: { "line-color": paper.area, "line-width": 2 },
-    },
-    {
-      id: "draft",
-      type: "line",
-      source: "draft",
-      paint: { "line-color": paper.area, "line-width": 2.5, "line-dasharray": [2, 2] },
-    },
-    {
-      id: "track-casing",
-      type: "line",
-      source: "tracks",
-      layout: round,
-      paint: { "line-color": paper.casing, "line-width": 4.5, "line-opacity": 0.65 },
-    },
-    {
-      id: "tracks",
-      type: "line",
-      source: "tracks",
-      layout: round,
-      paint: { "line-color": COLOUR, "line-width": 2 },
-    },
-    {
-      id: "arrival",
-      type: "line",
-      source: "arrival",
-      paint: { "line-color": COLOUR, "line-width": 1.5, "line-opacity": 0.8 },
-    },
-    {
-      id: "routes-acknowledged",
-      type: "line",
-      source: "routes",
-      filter: ["==", ["get", "state"], "acknowledged"],
-      paint: { "line-color": COLOUR, "line-width": 2.5 },
-    },
-    {
-      id: "routes-sent",
-      type: "line",
-      source: "routes",
-      filter: ["==", ["get", "state"], "sent"],
-      paint: { "line-color": COLOUR, "line-width": 2, "line-dasharray": [1.5, 2] },
-    },
-  ];
-}
-
-function style(dark: boolean): StyleSpecification {
-  const empty = { type: "geojson", data: collection([]), maxzoom: 22, tolerance: 0.1 } as const;
-  return {
-    version: 8,
-    sources: {
-      "sea-floor": {
-        type: "image",
-        coordinates: [
-          [0, 0.1],
-          [0.1, 0.1],
-          [0.1, 0],
-          [0, 0],
-        ],
-      },
-      ...Object.fromEntries(SOURCES.map((name) => [name, empty])),
-    },
-    layers: layers(dark),
-  };
-}
+/** Every so many contours one is drawn stronger and labelled. */
+const MAIN_EVERY = 2;
 
 export class Chart {
   readonly #map: MapLibreMap;
@@ -210,6 +101,7 @@ export class Chart {
   #fitting: (() => Padding) | null = null;
   /** The lines that are drawn reach beyond the window, so that most moves need no new ones. */
   #grid: { step: number; bounds: Bounds } | null = null;
+  #tiles = "";
 
   private constructor(
     map: MapLibreMap,
@@ -218,7 +110,12 @@ export class Chart {
     this.#map = map;
     map.on("mousemove", (e) => hooks.onCursor([e.lngLat.lng, e.lngLat.lat]));
     map.on("mouseout", () => hooks.onCursor(null));
-    map.on("click", (e) => hooks.onCursor([e.lngLat.lng, e.lngLat.lat]));
+    map.on("click", (e) => {
+      hooks.onCursor([e.lngLat.lng, e.lngLat.lat]);
+      const [spot] = map.queryRenderedFeatures(e.point, { layers: ["soundings"] });
+      if (spot) hooks.onSpot(Number(spot.properties.id));
+      else hooks.onClick([e.lngLat.lng, e.lngLat.lat]);
+    });
     map.on("move", this.#drawGrid);
     map.on("resize", this.#drawGrid);
     map.on("resize", this.#fitAgain);
@@ -229,10 +126,10 @@ export class Chart {
   }
 
   /** Makes the map inside an element; resolves when it can be drawn on. */
-  static create(container: HTMLElement, centre: LngLat, dark: boolean, hooks: ChartHooks): Promise<Chart> {
+  static create(container: HTMLElement, centre: LngLat, look: Look, hooks: ChartHooks): Promise<Chart> {
     const map = new MapLibreMap({
       container,
-      style: style(dark),
+      style: style(look),
       center: centre,
       zoom: 18,
       minZoom: 2,
@@ -251,18 +148,6 @@ export class Chart {
     map.addControl(new ScaleControl({ maxWidth: 140, unit: "metric" }), "bottom-left");
     return new Promise((resolve) =>
       map.once("style.load", () => {
-        // A light stripe beside a dark one shows on every depth's colour.
-        map.addImage(
-          "hatch",
-          stripes(
-            [
-              ["#0d2230", 0.3, 1.5, 0],
-              ["#ffffff", 0.3, 1.5, 2],
-            ],
-            18,
-          ),
-          { pixelRatio: 2 },
-        );
         for (const [name, { keepOut }] of Object.entries(PAPER)) {
           map.addImage(`forbidden-${name}`, stripes([[keepOut, 0.75, 4, 0]], 24), { pixelRatio: 2 });
         }
@@ -275,12 +160,33 @@ export class Chart {
     this.#map.remove();
   }
 
-  setDark(dark: boolean): void {
-    for (const { id, ...spec } of layers(dark)) {
+  /** For what draws on the map by itself. */
+  get map(): MapLibreMap {
+    return this.#map;
+  }
+
+  setLook(look: Look): void {
+    for (const { id, ...spec } of layers(look)) {
       for (const [property, value] of Object.entries("paint" in spec ? (spec.paint ?? {}) : {})) {
         this.#map.setPaintProperty(id, property as keyof AllPaintProperties, value);
       }
     }
+  }
+
+  /** Charts under everything else, from a server of raster tiles; none without an address. */
+  setTiles(address: string): void {
+    if (address === this.#tiles) return;
+    if (this.#map.getLayer("tiles")) this.#map.removeLayer("tiles");
+    if (this.#map.getSource("tiles")) this.#map.removeSource("tiles");
+    this.#tiles = address;
+    if (!address) return;
+    this.#map.addSource(
+      "tiles",
+      address.startsWith("pmtiles://")
+        ? { type: "raster", url: address, tileSize: 256 }
+        : { type: "raster", tiles: [address], tileSize: 256, maxzoom: 19 },
+    );
+    this.#map.addLayer({ id: "tiles", type: "raster", source: "tiles" }, "sea-floor");
   }
 
   setMission(area: PolygonGeometry | null, keepOut: readonly PolygonGeometry[]): void {
@@ -292,8 +198,11 @@ export class Chart {
     this.#areaBounds = boundsOf(area?.coordinates[0] ?? []);
   }
 
-  setDraft(area: PolygonGeometry | null): void {
-    this.#set("draft", area ? [feature(area)] : []);
+  setDraft(area: PolygonGeometry | null, keepOut: readonly PolygonGeometry[]): void {
+    this.#set("draft", [
+      ...(area ? [feature(area, { kind: "area" })] : []),
+      ...keepOut.map((zone) => feature(zone, { kind: "keep-out" })),
+    ]);
   }
 
   /** Shows the mission's area with room for what lies over the map's edges, and goes on to until the map is moved. */
@@ -302,35 +211,53 @@ export class Chart {
     this.#fitAgain();
   }
 
-  setSeaFloor(map: MapView | null, layer: Layer, range: Range | null): void {
-    const visible = map !== null && range !== null;
-    this.#map.setLayoutProperty("sea-floor", "visibility", visible ? "visible" : "none");
-    if (!visible) return;
-    const [northWest, northEast, southEast, southWest] = map.corners as [LngLat, LngLat, LngLat, LngLat];
-    (this.#map.getSource("sea-floor") as ImageSource).updateImage({
-      image: new ImageData(paint(map, layer, range), map.cols, map.rows),
-      coordinates: [northWest, northEast, southEast, southWest],
-    });
+  /** Shows a place once, as the area of a mission being described. */
+  show(points: readonly LngLat[], padding: () => Padding): void {
+    const bounds = boundsOf(points);
+    if (bounds) this.#map.fitBounds(bounds, { padding: padding(), animate: false, maxZoom: 19 });
   }
 
-  setHatching(map: MapView | null): void {
-    if (!map) {
-      this.#set("interpolated", []);
+  /** A painted layer with its contours, whose levels are divided by `scale`; null: nothing is known. */
+  setSeaFloor(
+    corners: readonly LngLat[],
+    rows: number,
+    cols: number,
+    picture: PictureResult | null,
+    scale: number,
+    interval: number,
+  ): void {
+    this.#layout("sea-floor", "visibility", picture ? "visible" : "none");
+    if (!picture) {
+      this.#set("contours", []);
       return;
     }
-    const coordinates = interpolatedBlocks(map).map(({ west, south, east, north }) => {
-      const corner = (col: number, row: number) => placeIn(map.corners, col / map.cols, row / map.rows);
-      const first = corner(west, south);
-      return [[first, corner(east, south), corner(east, north), corner(west, north), first]];
+    (this.#map.getSource("sea-floor") as ImageSource).updateImage({
+      image: new ImageData(picture.pixels, picture.width, picture.height),
+      coordinates: corners.slice(0, 4) as [LngLat, LngLat, LngLat, LngLat],
     });
-    this.#set("interpolated", [feature({ type: "MultiPolygon", coordinates })]);
+    const digits = Math.max(0, -Math.floor(Math.log10(interval / scale) + 1e-9));
+    this.#set(
+      "contours",
+      picture.contours.map(({ level, points }) => {
+        const places = points.map(([col, row]) => placeIn(corners, col / cols, row / rows));
+        const main = Math.round(level / interval) % MAIN_EVERY === 0;
+        return {
+          type: "Feature",
+          geometry: line(places),
+          properties: { main, label: (level / scale).toFixed(digits) },
+        } as unknown as Feature;
+      }),
+    );
   }
 
+  /** The long part of the vehicles' ways; changes seldom. */
   setTracks(tracks: readonly Track[]): void {
-    this.#set(
-      "tracks",
-      tracks.flatMap((t) => pieces(t.points).map((piece) => feature(line(piece), { colour: t.colour }))),
-    );
+    this.#set("tracks", lines(tracks));
+  }
+
+  /** The newest part of the vehicles' ways. */
+  setTails(tracks: readonly Track[]): void {
+    this.#set("tails", lines(tracks));
   }
 
   setRoutes(routes: readonly Route[]): void {
@@ -347,6 +274,29 @@ export class Chart {
         return to ? [feature(line(circle(to, arrivalRadius_m)), { colour })] : [];
       }),
     );
+  }
+
+  /** How far each vehicle's messages reach. */
+  setRanges(rings: readonly { at: LngLat; radius_m: number; colour: string }[]): void {
+    this.#set(
+      "com-range",
+      rings.map(({ at, radius_m, colour }) => feature(line(circle(at, radius_m, 72)), { colour })),
+    );
+  }
+
+  setSpots(spots: readonly Spot[]): void {
+    this.#set(
+      "soundings",
+      spots.map(({ id, at, state, chosen }) => feature(point(at), { id, state, chosen: chosen ? 1 : 0 })),
+    );
+  }
+
+  setMeasure(points: readonly LngLat[]): void {
+    this.#set("measure", [
+      ...(points.length > 1 ? [feature(line(points))] : []),
+      ...points.map((at) => feature(point(at))),
+    ]);
+    this.#map.getCanvas().style.cursor = points.length > 0 ? "crosshair" : "";
   }
 
   setPins(pins: readonly Pin[]): void {
@@ -373,6 +323,10 @@ export class Chart {
     void (this.#map.getSource(name) as GeoJSONSource).setData(collection(features));
   }
 
+  #layout(id: string, property: keyof AllLayoutProperties, value: string): void {
+    if (this.#map.getLayoutProperty(id, property) !== value) this.#map.setLayoutProperty(id, property, value);
+  }
+
   #fitAgain = (): void => {
     if (this.#fitting && this.#areaBounds) {
       this.#map.fitBounds(this.#areaBounds, { padding: this.#fitting(), animate: false, maxZoom: 21 });
@@ -388,23 +342,10 @@ export class Chart {
       this.#grid = { step, bounds: grown(bounds, 1) };
       const [west, south, east, north] = this.#grid.bounds;
       const { meridians, parallels } = graticule(this.#grid.bounds, step);
+      const across = (a: LngLat, b: LngLat) => feature(line([a, b]));
       this.#set("grid", [
-        ...meridians.map((lng) =>
-          feature(
-            line([
-              [lng, south],
-              [lng, north],
-            ]),
-          ),
-        ),
-        ...parallels.map((lat) =>
-          feature(
-            line([
-              [west, lat],
-              [east, lat],
-            ]),
-          ),
-        ),
+        ...meridians.map((lng) => across([lng, south], [lng, north])),
+        ...parallels.map((lat) => across([west, lat], [east, lat])),
       ]);
     }
     const centre = map.getCenter();
@@ -417,35 +358,5 @@ export class Chart {
   };
 }
 
-function circle([lng, lat]: LngLat, radius_m: number): LngLat[] {
-  const scale = metresPerDegree(lat);
-  return Array.from({ length: 37 }, (_, i): LngLat => {
-    const angle = (i * Math.PI) / 18;
-    return [
-      lng + (Math.cos(angle) * radius_m) / scale.east,
-      lat + (Math.sin(angle) * radius_m) / scale.north,
-    ];
-  });
-}
-
-type Stripe = [colour: string, opacity: number, width: number, shift: number];
-
-/** A square picture with diagonal stripes that join at its edges. */
-function stripes(kinds: readonly Stripe[], size: number): ImageData {
-  const canvas = document.createElement("canvas");
-  canvas.width = canvas.height = size;
-  const context = canvas.getContext("2d");
-  if (!context) throw new Error("This browser cannot draw on a canvas");
-  for (const [colour, opacity, width, shift] of kinds) {
-    context.strokeStyle = colour;
-    context.globalAlpha = opacity;
-    context.lineWidth = width;
-    for (const start of [-size, 0, size]) {
-      context.beginPath();
-      context.moveTo(start + shift - width, size + width);
-      context.lineTo(start + shift + size + width, -width);
-      context.stroke();
-    }
-  }
-  return context.getImageData(0, 0, size, size);
-}
+const lines = (tracks: readonly Track[]) =>
+  tracks.flatMap((t) => pieces(t.points).map((piece) => feature(line(piece), { colour: t.colour })));

@@ -1,6 +1,6 @@
 /** Geometry on the ellipsoid, small areas only. */
 
-import type { LngLat, MapView, PolygonGeometry } from "../api/types";
+import type { LngLat, PolygonGeometry } from "../api/types";
 import { niceStep } from "./palette";
 
 const WGS84_A = 6_378_137;
@@ -42,45 +42,27 @@ export function boundsOf(points: readonly LngLat[]): Bounds | null {
   return [Math.min(...lngs), Math.min(...lats), Math.max(...lngs), Math.max(...lats)];
 }
 
-export interface CellReading {
-  east_m: number;
-  north_m: number;
-  depth_m: number | null;
-  sd_m: number | null;
-  count: number;
-  sounded: boolean;
-}
-
-/** What the map says at a place; null outside its grid. The grid is taken as a parallelogram between its corners. */
-export function readCell(map: MapView, [lng, lat]: LngLat): CellReading | null {
-  const [northWest, , southEast, southWest] = map.corners;
-  if (!northWest || !southEast || !southWest) return null;
-  const eastward = [southEast[0] - southWest[0], southEast[1] - southWest[1]] as const;
-  const northward = [northWest[0] - southWest[0], northWest[1] - southWest[1]] as const;
-  const to = [lng - southWest[0], lat - southWest[1]] as const;
-  const determinant = eastward[0] * northward[1] - eastward[1] * northward[0];
-  const u = (to[0] * northward[1] - to[1] * northward[0]) / determinant;
-  const v = (eastward[0] * to[1] - eastward[1] * to[0]) / determinant;
-  if (!(u >= 0 && u < 1 && v >= 0 && v < 1)) return null;
-  const row = Math.floor(v * map.rows);
-  const col = Math.floor(u * map.cols);
+/** Metres between two places, and the direction from one to the other in degrees from north; for short ways. */
+export function wayBetween(from: LngLat, to: LngLat): { metres: number; bearing_deg: number } {
+  const scale = metresPerDegree((from[1] + to[1]) / 2);
+  const east = (to[0] - from[0]) * scale.east;
+  const north = (to[1] - from[1]) * scale.north;
   return {
-    east_m: map.west_m + u * map.cols * map.cell_m,
-    north_m: map.south_m + v * map.rows * map.cell_m,
-    depth_m: map.depth_m[row]?.[col] ?? null,
-    sd_m: map.sd_m[row]?.[col] ?? null,
-    count: map.count[row]?.[col] ?? 0,
-    sounded: map.sounded[row]?.[col] ?? false,
+    metres: Math.hypot(east, north),
+    bearing_deg: (((Math.atan2(east, north) / RAD) % 360) + 360) % 360,
   };
 }
 
-/** A place inside a parallelogram given by a map's corners; u and v run from 0 (west, south) to 1 (east, north). */
-export function placeIn(corners: readonly LngLat[], u: number, v: number): LngLat {
-  const [northWest, , southEast, southWest] = corners as [LngLat, LngLat, LngLat, LngLat];
-  return [
-    southWest[0] + u * (southEast[0] - southWest[0]) + v * (northWest[0] - southWest[0]),
-    southWest[1] + u * (southEast[1] - southWest[1]) + v * (northWest[1] - southWest[1]),
-  ];
+/** A ring about a place, closed, as a line. */
+export function circle([lng, lat]: LngLat, radius_m: number, corners = 36): LngLat[] {
+  const scale = metresPerDegree(lat);
+  return Array.from({ length: corners + 1 }, (_, i): LngLat => {
+    const angle = (i * 2 * Math.PI) / corners;
+    return [
+      lng + (Math.cos(angle) * radius_m) / scale.east,
+      lat + (Math.sin(angle) * radius_m) / scale.north,
+    ];
+  });
 }
 
 export interface Graticule {

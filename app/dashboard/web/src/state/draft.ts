@@ -1,50 +1,92 @@
 /** A mission being described: the form's fields, checked and turned into what the service takes. Pure. */
 
-import type { LngLat, NewMission, VehicleSpec } from "../api/types";
+import type { LngLat, NewMission, PlannerOptions, VehicleSpec } from "../api/types";
+import { areaFault, polygonOf, ringOf } from "../map/area";
 import { rectangle } from "../map/geo";
+
+/** How the area is given: typed as a rectangle, or as a ring that was drawn or came in a file. */
+export type AreaSource = "typed" | "drawn";
 
 /** As typed. */
 export interface Draft {
   name: string;
+  source: AreaSource;
+  ring: readonly LngLat[];
+  keepOut: readonly (readonly LngLat[])[];
   latitude: string;
   longitude: string;
   east_m: string;
   north_m: string;
   steps: string;
   cell_m: string;
+  accuracy_m: string;
+  speed_mps: string;
   max_step_m: string;
   min_depth_m: string;
   max_depth_m: string;
+  min_altitude_m: string;
+  min_separation_m: string;
+  com_range_m: string;
+  tide_m: string;
+  tide_source: string;
+  tide_table: string;
   planner: string;
+  options: PlannerOptions;
   simulated: string;
   chosen: readonly VehicleSpec[];
 }
 
 export type Faults = Partial<Record<keyof Draft, string>>;
 
+/** Planners in plain words, the sensible one first. */
+export const PLANNER_PRESETS: Readonly<Record<string, { title: string; words: string }>> = {
+  cao: {
+    title: "Adaptive",
+    words: "Begins evenly and goes where the map is least sure. The right choice for nearly every survey.",
+  },
+  lawnmower: {
+    title: "Even lines",
+    words:
+      "Parallel lines over the whole area, shared among the vehicles. Predictable; finds no more where it is rough.",
+  },
+  random: { title: "Random", words: "Wanders about. Only to compare the others with." },
+};
+
 /** A draft whose area lies in the middle of what the map shows. */
 export function emptyDraft(middle: LngLat): Draft {
   const draft: Draft = {
     name: "",
+    source: "typed",
+    ring: [],
+    keepOut: [],
     latitude: "",
     longitude: "",
     east_m: "100",
     north_m: "100",
     steps: "100",
     cell_m: "1",
+    accuracy_m: "0.25",
+    speed_mps: "1",
     max_step_m: "10",
     min_depth_m: "2",
     max_depth_m: "30",
+    min_altitude_m: "1",
+    min_separation_m: "5",
+    com_range_m: "",
+    tide_m: "",
+    tide_source: "",
+    tide_table: "",
     planner: "cao",
+    options: {},
     simulated: "2",
     chosen: [],
   };
   return { ...draft, ...centred(draft, middle) };
 }
 
-/** Where a draft's area begins when a place is to be its middle; nothing while its size is no size. */
+/** Where a typed area begins when a place is to be its middle; nothing while its size is no size. */
 export function centred(draft: Draft, [lng, lat]: LngLat): Partial<Draft> {
-  const area = areaOf({ ...draft, longitude: String(lng), latitude: String(lat) });
+  const area = areaOf({ ...draft, source: "typed", longitude: String(lng), latitude: String(lat) });
   const northEast = area?.coordinates[0]?.[2];
   if (!northEast) return {};
   return {
@@ -53,16 +95,33 @@ export function centred(draft: Draft, [lng, lat]: LngLat): Partial<Draft> {
   };
 }
 
-const NUMBERS: { field: keyof Draft; label: string; low: number; high: number; whole?: boolean }[] = [
-  { field: "latitude", label: "Latitude", low: -85, high: 85 },
-  { field: "longitude", label: "Longitude", low: -180, high: 180 },
-  { field: "east_m", label: "Size to the east", low: 2, high: 20_000 },
-  { field: "north_m", label: "Size to the north", low: 2, high: 20_000 },
+interface NumberField {
+  field: keyof Draft;
+  label: string;
+  low: number;
+  high: number;
+  whole?: boolean;
+  /** May stay empty. */
+  optional?: boolean;
+  typedArea?: boolean;
+}
+
+const NUMBERS: NumberField[] = [
+  { field: "latitude", label: "Latitude", low: -85, high: 85, typedArea: true },
+  { field: "longitude", label: "Longitude", low: -180, high: 180, typedArea: true },
+  { field: "east_m", label: "Size to the east", low: 2, high: 20_000, typedArea: true },
+  { field: "north_m", label: "Size to the north", low: 2, high: 20_000, typedArea: true },
   { field: "steps", label: "Steps", low: 1, high: 100_000, whole: true },
   { field: "cell_m", label: "Cell", low: 0.1, high: 1000 },
+  { field: "accuracy_m", label: "Accuracy", low: 0.001, high: 100 },
+  { field: "speed_mps", label: "Speed", low: 0.1, high: 5 },
   { field: "max_step_m", label: "Largest step", low: 0.1, high: 2000 },
   { field: "min_depth_m", label: "Shallowest travel", low: 0, high: 6000 },
   { field: "max_depth_m", label: "Deepest travel", low: 0.1, high: 6000 },
+  { field: "min_altitude_m", label: "Least altitude", low: 0, high: 1000 },
+  { field: "min_separation_m", label: "Least distance", low: 0, high: 10_000 },
+  { field: "com_range_m", label: "Communication range", low: 1, high: 100_000, optional: true },
+  { field: "tide_m", label: "Water level", low: -20, high: 20, optional: true },
   { field: "simulated", label: "Simulated vehicles", low: 0, high: 20, whole: true },
 ];
 
@@ -70,13 +129,23 @@ const NUMBERS: { field: keyof Draft; label: string; low: number; high: number; w
 export function faultsOf(draft: Draft): Faults {
   const faults: Faults = {};
   if (!draft.name.trim()) faults.name = "Give the mission a name";
-  for (const { field, label, low, high, whole } of NUMBERS) {
+  for (const { field, label, low, high, whole, optional, typedArea } of NUMBERS) {
+    if (typedArea && draft.source !== "typed") continue;
     const text = String(draft[field]).trim();
     const value = Number(text);
+    if (text === "" && optional) continue;
     if (text === "" || !Number.isFinite(value)) faults[field] = `${label} needs a number`;
     else if (whole && !Number.isInteger(value)) faults[field] = `${label} needs a whole number`;
     else if (value < low || value > high) faults[field] = `${label} must be between ${low} and ${high}`;
   }
+  if (draft.source === "drawn") {
+    const fault = areaFault(draft.ring, faults.cell_m ? 0 : Number(draft.cell_m));
+    if (fault) faults.ring = draft.ring.length === 0 ? "Draw the area, or read it from a file" : fault;
+  }
+  draft.keepOut.forEach((zone, i) => {
+    const fault = areaFault(zone, 0);
+    if (fault) faults.keepOut = `Keep-out zone ${i + 1}: ${fault.toLowerCase()}`;
+  });
   if (!faults.max_depth_m && !faults.min_depth_m && Number(draft.max_depth_m) < Number(draft.min_depth_m)) {
     faults.max_depth_m = "Deepest travel must not be above the shallowest";
   }
@@ -86,8 +155,9 @@ export function faultsOf(draft: Draft): Faults {
   return faults;
 }
 
-/** The rectangle that a draft describes; null while its numbers make none. */
+/** The area that a draft describes; null while it describes none. */
 export function areaOf(draft: Draft) {
+  if (draft.source === "drawn") return draft.ring.length >= 3 ? polygonOf(draft.ring) : null;
   const faults = faultsOf(draft);
   if (faults.latitude || faults.longitude || faults.east_m || faults.north_m) return null;
   return rectangle(
@@ -95,6 +165,12 @@ export function areaOf(draft: Draft) {
     Number(draft.east_m),
     Number(draft.north_m),
   );
+}
+
+/** Corners of a draft's area, typed or drawn. */
+export function cornersOf(draft: Draft): LngLat[] {
+  const area = areaOf(draft);
+  return area ? ringOf(area) : [];
 }
 
 /** What to send for a draft without faults. */
@@ -107,30 +183,64 @@ export function toMission(draft: Draft): NewMission {
     const name = `sim-${n}`;
     if (!taken.has(name)) simulated.push({ name, kind: "sim", sensor: "dvl" });
   }
+  const range = draft.com_range_m.trim();
+  const tide = draft.tide_m.trim();
   return {
     name: draft.name.trim(),
     area,
+    keep_out: draft.keepOut.map(polygonOf),
     vehicles: [...draft.chosen, ...simulated],
     steps: Number(draft.steps),
     cell_m: Number(draft.cell_m),
+    accuracy_m: Number(draft.accuracy_m),
+    speed_mps: Number(draft.speed_mps),
     limits: {
       max_step_m: Number(draft.max_step_m),
       min_depth_m: Number(draft.min_depth_m),
       max_depth_m: Number(draft.max_depth_m),
+      min_altitude_m: Number(draft.min_altitude_m),
+      min_separation_m: Number(draft.min_separation_m),
+      ...(range ? { com_range_m: Number(range) } : {}),
     },
-    planner: { name: draft.planner },
+    planner: { name: draft.planner, options: draft.options },
+    ...(tide
+      ? { tide: { level_m: Number(tide), source: draft.tide_source.trim() || "stated by the operator" } }
+      : {}),
   };
+}
+
+/** How long a mission takes at most, how far its vehicles go, and how far apart lines over the whole area would be. */
+export function estimate(
+  draft: Draft,
+  area_m2: number,
+): { seconds: number; metres: number; spacing_m: number } | null {
+  const vehicles = Number(draft.simulated) + draft.chosen.length;
+  const [steps, step, speed] = [draft.steps, draft.max_step_m, draft.speed_mps].map(Number) as [
+    number,
+    number,
+    number,
+  ];
+  const metres = vehicles * steps * step;
+  if (!(metres > 0) || !(speed > 0)) return null;
+  return { seconds: (steps * step) / speed, metres, spacing_m: area_m2 / metres };
 }
 
 const FROM_SERVICE: [prefix: string, field: keyof Draft][] = [
   ["limits.max_step_m", "max_step_m"],
   ["limits.min_depth_m", "min_depth_m"],
   ["limits.max_depth_m", "max_depth_m"],
+  ["limits.min_altitude_m", "min_altitude_m"],
+  ["limits.min_separation_m", "min_separation_m"],
+  ["limits.com_range_m", "com_range_m"],
   ["planner", "planner"],
+  ["tide", "tide_m"],
   ["vehicles", "simulated"],
-  ["area", "east_m"],
+  ["keep_out", "keepOut"],
+  ["area", "ring"],
   ["steps", "steps"],
   ["cell_m", "cell_m"],
+  ["accuracy_m", "accuracy_m"],
+  ["speed_mps", "speed_mps"],
   ["name", "name"],
 ];
 

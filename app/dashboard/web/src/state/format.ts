@@ -10,8 +10,8 @@ export function percent(value: number | null | undefined, digits = 0): string {
   return value == null ? UNKNOWN : `${value.toFixed(digits)} %`;
 }
 
-export function distance(value_m: number): string {
-  return value_m < 1000 ? `${value_m.toFixed(0)} m` : `${(value_m / 1000).toFixed(2)} km`;
+export function distance(value_m: number, digits = 0): string {
+  return value_m < 1000 ? `${value_m.toFixed(digits)} m` : `${(value_m / 1000).toFixed(2)} km`;
 }
 
 export function count(value: number): string {
@@ -39,6 +39,22 @@ export function latitude(degrees: number, decimals = 6): string {
 
 export function longitude(degrees: number, decimals = 6): string {
   return `${Math.abs(degrees).toFixed(decimals)}° ${degrees < 0 ? "W" : "E"}`;
+}
+
+export type CoordinateFormat = "decimal" | "minutes";
+
+/** A place as charts and radios say it: decimal degrees, or degrees and decimal minutes. */
+export function place([lng, lat]: readonly [number, number], format: CoordinateFormat): string {
+  if (format === "decimal") return `${latitude(lat)} ${longitude(lng)}`;
+  return `${minutes(lat, 2)} ${lat < 0 ? "S" : "N"} ${minutes(lng, 3)} ${lng < 0 ? "W" : "E"}`;
+}
+
+/** 41°11.1234′, rounded before it is split so that no 60 appears. */
+function minutes(degrees: number, width: number): string {
+  const tenThousandths = Math.round(Math.abs(degrees) * 600_000);
+  const whole = Math.floor(tenThousandths / 600_000);
+  const rest = (tenThousandths % 600_000) / 10_000;
+  return `${String(whole).padStart(width, "0")}°${rest.toFixed(4).padStart(7, "0")}′`;
 }
 
 export function clock(date: Date, zone: "utc" | "local"): string {

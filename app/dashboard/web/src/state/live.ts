@@ -2,9 +2,27 @@
 
 import type { EventView, LiveMessage, LngLat, MissionView, VehicleView, WaypointView } from "../api/types";
 
+/** A vehicle's way: the long part behind it, which changes seldom, and the newest part, which begins where that ends. */
+export interface TrackView {
+  old: readonly LngLat[];
+  tail: readonly LngLat[];
+}
+
+/** What a vehicle told at one moment, for the charts. */
+export interface Sample {
+  at: number;
+  depth_m: number | null;
+  altitude_m: number | null;
+  battery_pct: number | null;
+  age_s: number | null;
+}
+
 export interface LiveView {
   mission: MissionView | null;
-  tracks: Readonly<Record<string, readonly LngLat[]>>;
+  tracks: Readonly<Record<string, TrackView>>;
+  /** One a second, the newest hour; replaced once a second. */
+  samples: Readonly<Record<string, readonly Sample[]>>;
+  sampledAt: number;
   events: readonly EventView[];
   mapVersion: number;
   lastEventId: number;
@@ -17,6 +35,8 @@ export interface LiveView {
 export const EMPTY_VIEW: LiveView = {
   mission: null,
   tracks: {},
+  samples: {},
+  sampledAt: 0,
   events: [],
   mapVersion: 0,
   lastEventId: 0,
@@ -25,6 +45,9 @@ export const EMPTY_VIEW: LiveView = {
 };
 
 const MOST_TRACK_POINTS = 8000;
+const MOST_TAIL_POINTS = 120;
+const SAMPLE_PERIOD_MS = 1000;
+const MOST_SAMPLES = 3600;
 const MOST_EVENTS = 2000;
 /** A vehicle that moved less than this adds nothing to its track; about 0.3 m, in degrees of latitude. */
 const LEAST_MOVE_DEG = 3e-6;
@@ -34,7 +57,11 @@ export function reduce(view: LiveView, message: LiveMessage, at: number): LiveVi
     case "snapshot":
       return {
         mission: message.mission,
-        tracks: message.tracks,
+        tracks: Object.fromEntries(
+          Object.entries(message.tracks).map(([name, old]) => [name, { old, tail: old.slice(-1) }]),
+        ),
+        samples: view.mission?.id === message.mission.id ? view.samples : {},
+        sampledAt: view.sampledAt,
         events: view.mission?.id === message.mission.id ? view.events : [],
         mapVersion: message.map_version,
         lastEventId: message.last_event_id,
@@ -48,6 +75,9 @@ export function reduce(view: LiveView, message: LiveMessage, at: number): LiveVi
         mission: { ...view.mission, vehicles: message.vehicles },
         tracks: extendTracks(view.tracks, message.vehicles),
         vehiclesAt: at,
+        ...(at - view.sampledAt >= SAMPLE_PERIOD_MS
+          ? { samples: sampled(view.samples, message.vehicles, at), sampledAt: at }
+          : {}),
       };
     case "waypoints":
       if (!view.mission) return view;
@@ -84,16 +114,21 @@ function newest(old: readonly WaypointView[], changed: readonly WaypointView[]):
 }
 
 function extendTracks(tracks: LiveView["tracks"], vehicles: readonly VehicleView[]): LiveView["tracks"] {
-  let changed: Record<string, readonly LngLat[]> | null = null;
+  let changed: Record<string, TrackView> | null = null;
   for (const { name, lon_deg, lat_deg } of vehicles) {
     if (lon_deg === null || lat_deg === null) continue;
-    const track = tracks[name] ?? [];
-    const last = track.at(-1);
+    const track = tracks[name] ?? { old: [], tail: [] };
+    const last = track.tail.at(-1);
     if (last && Math.hypot(last[0] - lon_deg, last[1] - lat_deg) < LEAST_MOVE_DEG) continue;
     changed ??= { ...tracks };
-    changed[name] = [...thinned(track), [lon_deg, lat_deg]];
+    changed[name] = extended(track, [lon_deg, lat_deg]);
   }
   return changed ?? tracks;
+}
+
+function extended({ old, tail }: TrackView, place: LngLat): TrackView {
+  if (tail.length < MOST_TAIL_POINTS) return { old, tail: [...tail, place] };
+  return { old: [...thinned(old), ...tail.slice(old.length > 0 ? 1 : 0), place], tail: [place] };
 }
 
 /** Drops every other point of the older half once a track is full, so that the shape of the recent part stays. */
@@ -101,6 +136,21 @@ function thinned(track: readonly LngLat[]): readonly LngLat[] {
   if (track.length < MOST_TRACK_POINTS) return track;
   const half = track.length >> 1;
   return [...track.slice(0, half).filter((_, i) => i % 2 === 0), ...track.slice(half)];
+}
+
+function sampled(
+  samples: LiveView["samples"],
+  vehicles: readonly VehicleView[],
+  at: number,
+): LiveView["samples"] {
+  const next = { ...samples };
+  for (const { name, depth_m, altitude_m, battery_pct, age_s } of vehicles) {
+    next[name] = [
+      ...(samples[name] ?? []).slice(1 - MOST_SAMPLES),
+      { at, depth_m, altitude_m, battery_pct, age_s },
+    ];
+  }
+  return next;
 }
 
 /** Seconds since a vehicle was last heard, counted on since the service said so; null: never. */

@@ -1,14 +1,28 @@
 /** What goes on while the page is open: asking for lists, following one mission, sending commands. */
 
-import { effect, signal } from "@preact/signals";
+import { effect, signal, untracked } from "@preact/signals";
 import { api, liveUrl, ServiceError, token } from "../api/client";
 import { LiveSocket } from "../api/socket";
 import type { ActionView, MissionAction, NewMission } from "../api/types";
+import { withTiles } from "../map/seafloor";
 import { EMPTY_VIEW, reduce, withEvents } from "./live";
-import { fleet, missions, now, seaFloor, selectedId, serviceFault, socketStatus, view } from "./store";
+import {
+  fleet,
+  furtherLayers,
+  missions,
+  now,
+  replayStep,
+  seaFloor,
+  selectedId,
+  serviceFault,
+  socketStatus,
+  steps,
+  view,
+} from "./store";
 
 const LIST_PERIOD_MS = 5000;
 const LEAST_MAP_PERIOD_MS = 700;
+const REPLAY_MAP_PERIOD_MS = 120;
 
 /** The last command that was refused, until it is dismissed or the next one succeeds. */
 export const refusal = signal<{ what: string; error: ServiceError } | null>(null);
@@ -60,9 +74,15 @@ export async function refresh(): Promise<void> {
   }
 }
 
-function noteFault(error: unknown): void {
+export function noteFault(error: unknown): void {
   if (!(error instanceof ServiceError)) throw error;
   serviceFault.value = error;
+}
+
+/** What the service said, for the operator. */
+export function said(error: unknown): string {
+  if (!(error instanceof ServiceError)) return String(error);
+  return [error.message, error.remedy].filter(Boolean).join(". ");
 }
 
 /** Uses another access token from now on, and asks for everything again. */
@@ -85,16 +105,20 @@ function followMission(id: string): () => void {
     const events = await api.log(id, known, last);
     if (!closed) view.value = withEvents(view.peek(), events);
   };
+  const connections = signal(0);
   const socket = new LiveSocket(liveUrl(id), {
     onStatus: (status) => {
       socketStatus.value = status;
     },
     onMessage: (message) => {
       view.value = reduce(view.peek(), message, Date.now());
-      if (message.type === "snapshot") catchUp(message.last_event_id).catch(noteFault);
+      if (message.type !== "snapshot") return;
+      // A service that was started anew counts its maps from one again.
+      connections.value += 1;
+      catchUp(message.last_event_id).catch(noteFault);
     },
   });
-  const stopMap = followMap(id);
+  const stopMap = followMap(id, () => connections.value);
   return () => {
     closed = true;
     socket.close();
@@ -102,34 +126,66 @@ function followMission(id: string): () => void {
   };
 }
 
-/** Fetches the newest map whenever there is a newer one, one request at a time. */
-function followMap(id: string): () => void {
+/** Fetches what changed in the map whenever something did, one request at a time. */
+function followMap(id: string, connections: () => number): () => void {
   let stopped = false;
   let fetching = false;
+  let shown = "";
+  const wanted = () => {
+    const step = replayStep.value;
+    const further = furtherLayers.value;
+    const has = step !== null || view.value.mapVersion > 0;
+    const version = step === null ? `${connections()}.${view.value.mapVersion}` : `@${step}`;
+    return has ? `${version} ${further.join()}` : "";
+  };
   const stop = effect(() => {
-    const wanted = view.value.mapVersion;
-    if (!fetching && wanted > 0 && wanted !== seaFloor.peek()?.version) {
-      fetching = true;
-      void fetchMap();
-    }
+    const want = wanted();
+    if (want !== shown && want !== "" && !fetching) void fetchMaps();
   });
-  async function fetchMap(): Promise<void> {
-    while (!stopped && view.peek().mapVersion !== seaFloor.peek()?.version) {
+  async function fetchMaps(): Promise<void> {
+    fetching = true;
+    for (let want = untracked(wanted); !stopped && want !== shown && want !== ""; want = untracked(wanted)) {
+      const step = replayStep.peek();
       try {
-        const map = await api.map(id);
-        if (stopped) return;
-        seaFloor.value = map;
-      } catch {
-        // The live socket tells of a service that is gone; the next round asks again.
+        await fetchMap(step);
+        shown = want;
+      } catch (error) {
+        // Nothing was sounded until that step; or the service is gone, which the live socket tells of.
+        if (step !== null && error instanceof ServiceError && error.status === 404) {
+          seaFloor.value = null;
+          shown = want;
+        }
       }
-      await new Promise((resolve) => setTimeout(resolve, LEAST_MAP_PERIOD_MS));
+      const pause = step === null ? LEAST_MAP_PERIOD_MS : REPLAY_MAP_PERIOD_MS;
+      await new Promise((resolve) => setTimeout(resolve, pause));
     }
     fetching = false;
+  }
+  async function fetchMap(step: number | null): Promise<void> {
+    const further = furtherLayers.peek();
+    const known = seaFloor.peek();
+    const answer = await api.mapTiles(id, known?.tag ?? "", further, step);
+    if (stopped) return;
+    const map = withTiles(known, answer) ?? withTiles(null, await api.mapTiles(id, "", further, step));
+    if (!stopped) seaFloor.value = map;
   }
   return () => {
     stopped = true;
     stop();
   };
+}
+
+/** Asks for the steps that are not known yet. */
+export async function fetchSteps(): Promise<void> {
+  const id = selectedId.peek();
+  if (!id) return;
+  for (;;) {
+    const known = steps.peek();
+    const more = await api.steps(id, known.at(-1)?.number ?? 0);
+    if (selectedId.peek() !== id || more.length === 0) return;
+    steps.value = [...known, ...more];
+    if (more.length < 1000) return;
+  }
 }
 
 /** Sends a command for the selected mission. Returns the service's answer, or null when it was refused. */
@@ -138,21 +194,34 @@ export async function act(action: MissionAction): Promise<ActionView | null> {
   if (!id) return null;
   busyWith.value = action;
   try {
-    const answer = await api.act(id, action);
-    refusal.value = null;
-    void refresh();
-    return answer;
-  } catch (error) {
-    if (!(error instanceof ServiceError)) throw error;
-    refusal.value = { what: action, error };
-    return null;
+    return await send(action, api.act(id, action));
   } finally {
     busyWith.value = null;
   }
 }
 
-export async function createMission(mission: NewMission): Promise<void> {
+/** Stops one vehicle of the selected mission and takes it out. */
+export async function abortVehicle(name: string): Promise<ActionView | null> {
+  const id = selectedId.value;
+  return id ? send(`abort of ${name}`, api.abortVehicle(id, name)) : null;
+}
+
+async function send<T>(what: string, answer: Promise<T>): Promise<T | null> {
+  try {
+    const found = await answer;
+    refusal.value = null;
+    void refresh();
+    return found;
+  } catch (error) {
+    if (!(error instanceof ServiceError)) throw error;
+    refusal.value = { what, error };
+    return null;
+  }
+}
+
+export async function createMission(mission: NewMission): Promise<string> {
   const created = await api.create(mission);
   await refresh();
   selectMission(created.id);
+  return created.id;
 }

@@ -1,19 +1,22 @@
 /** The page's state: signals that the components and the map read. */
 
-import { computed, signal } from "@preact/signals";
+import { computed, effect, signal } from "@preact/signals";
 import type { ServiceError } from "../api/client";
 import type { SocketStatus } from "../api/socket";
 import type {
   LngLat,
-  MapView,
   MissionSummary,
   PolygonGeometry,
+  SoundingView,
+  StepView,
   VehicleView,
   WaypointView,
 } from "../api/types";
 import { kept } from "../kept";
-import { fittingRange, type Layer, type Range } from "../map/bathymetry";
-import { vehicleColour } from "../map/palette";
+import { fittingRange, KINDS, type Range, type Shown } from "../map/layers";
+import { type DepthPalette, vehicleColour } from "../map/palette";
+import type { SeaFloor } from "../map/seafloor";
+import type { CoordinateFormat } from "./format";
 import { ageSeconds, EMPTY_VIEW, type LiveView } from "./live";
 
 /** null until the first answer. */
@@ -24,7 +27,7 @@ export const serviceFault = signal<ServiceError | null>(null);
 
 export const selectedId = signal<string | null>(null);
 export const view = signal<LiveView>(EMPTY_VIEW);
-export const seaFloor = signal<MapView | null>(null);
+export const seaFloor = signal<SeaFloor | null>(null);
 export const socketStatus = signal<SocketStatus | null>(null);
 /** Page clock, milliseconds, ticking. */
 export const now = signal(Date.now());
@@ -81,7 +84,7 @@ export function takeAlarms(): void {
   if (newest) takenAlarms.value = { ...takenAlarms.value, [newest.mission_id]: newest.id };
 }
 
-export type Theme = "system" | "light" | "dark";
+export type Theme = "system" | "light" | "dark" | "contrast";
 export const theme = kept<Theme>("theme", "system");
 const systemDark = signal(matchMedia("(prefers-color-scheme: dark)").matches);
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", (e) => {
@@ -89,26 +92,67 @@ matchMedia("(prefers-color-scheme: dark)").addEventListener("change", (e) => {
 });
 export const isDark = computed(() => (theme.value === "system" ? systemDark.value : theme.value === "dark"));
 
-export const layer = signal<Layer>("depth");
+/** What the map shows. */
+export const layer = signal<Shown>("depth");
+export const depthPalette = kept<DepthPalette>("palette", "deep");
 export const showHatching = kept("hatching", true);
+export const showContours = kept("contours", true);
+export const showTracks = kept("tracks", true);
+export const showRanges = kept("com-range", false);
 /** Ranges that the operator fixed, for each layer; a layer without one takes a fitting range. */
-export const fixedRanges = kept<Partial<Record<Layer, Range>>>("ranges", {});
+export const fixedRanges = kept<Partial<Record<Shown, Range>>>("ranges", {});
 export const shownRange = computed<Range | null>(() => {
   const fixed = fixedRanges.value[layer.value];
   if (fixed) return fixed;
   return seaFloor.value ? fittingRange(seaFloor.value, layer.value) : null;
 });
+/** Layers that the service has to be asked for beside the usual ones. */
+export const furtherLayers = computed<readonly string[]>(() =>
+  KINDS[layer.value].further ? [KINDS[layer.value].source] : [],
+);
 
-/** The area of a mission being described, and where the cursor is on the map. */
-export const draftArea = signal<PolygonGeometry | null>(null);
+export const coordinateFormat = kept<CoordinateFormat>("coordinates", "decimal");
 export const cursor = signal<LngLat | null>(null);
 export const mapCentre = signal<LngLat>([-8.7044, 41.1854]);
+export const in3d = signal(false);
+
+/** Corners of the line being measured; null while nothing is measured. */
+export const measured = signal<readonly LngLat[] | null>(null);
+
+/** A mission being described: its area and zones on the map, and what is being drawn. */
+export interface DraftShapes {
+  area: PolygonGeometry | null;
+  keepOut: readonly PolygonGeometry[];
+}
+export const draftShapes = signal<DraftShapes | null>(null);
+export type Drawing = { shape: "polygon" | "rectangle"; onDrawn: (ring: LngLat[]) => void };
+export const drawing = signal<Drawing | null>(null);
+
+/** Steps of the shown mission as far as they were asked for, and the one that is replayed; null: what is now. */
+export const steps = signal<readonly StepView[]>([]);
+export const replayStep = signal<number | null>(null);
+
+/** Soundings that are not simply used, while they are looked through. */
+export const reviewed = signal<readonly SoundingView[] | null>(null);
+export const chosenSounding = signal<number | null>(null);
 
 export const panelOpen = signal(matchMedia("(min-width: 1180px)").matches);
 export const describing = signal(false);
+/** What is being asked before an abort: of the whole team, or of one vehicle. */
 export const abortDialogOpen = signal(false);
-
+export const abortOne = signal<string | null>(null);
+export const preflightOpen = signal(false);
 /** Whether the link doctor is shown. */
 export const linksOpen = signal(false);
-export const logOpen = signal(false);
-export const filesOpen = signal(false);
+
+export type Tab = "log" | "files" | "charts" | "soundings" | "compare";
+/** What is opened above the bottom strip. */
+export const tab = signal<Tab | null>(null);
+
+effect(() => {
+  selectedId.value;
+  replayStep.value = null;
+  reviewed.value = null;
+  chosenSounding.value = null;
+  steps.value = [];
+});

@@ -69,6 +69,8 @@ export function vehicleState(
   waypoint: WaypointView | undefined,
 ): { words: string; tone: Tone } {
   if (!vehicle.active) return { words: "Left the mission", tone: "calm" };
+  // It is launched when the mission starts and put away when that ends: nothing to worry about.
+  if (vehicle.kind === "sim" && vehicle.link === "unknown") return { words: "Not launched", tone: "calm" };
   const tone = LINK_TONES[vehicle.link];
   if (vehicle.link !== "engaged" || !waypoint) return { words: LINK_WORDS[vehicle.link], tone };
   switch (waypoint.status) {

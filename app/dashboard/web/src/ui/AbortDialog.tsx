@@ -1,14 +1,16 @@
 import { useSignal } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
 import type { StopView } from "../api/types";
-import { act, busyWith, refusal } from "../state/session";
-import { abortDialogOpen, mission, vehicles } from "../state/store";
+import { abortVehicle, act, refusal } from "../state/session";
+import { abortDialogOpen, abortOne, mission, vehicles } from "../state/store";
 
-/** Asks once, then stays until it has shown what every vehicle answered. */
+/** Asks once, then stays until it has shown what every vehicle answered. Of the whole team, or of one vehicle. */
 export function AbortDialog() {
   const dialog = useRef<HTMLDialogElement>(null);
   const receipts = useSignal<readonly StopView[] | null>(null);
+  const sending = useSignal(false);
   const open = abortDialogOpen.value;
+  const only = abortOne.value;
 
   useEffect(() => {
     if (open) {
@@ -21,13 +23,20 @@ export function AbortDialog() {
 
   const close = () => {
     abortDialogOpen.value = false;
+    abortOne.value = null;
   };
   const abort = async () => {
-    const answer = await act("abort");
-    if (answer) receipts.value = answer.stops;
+    sending.value = true;
+    try {
+      const answer = await (only ? abortVehicle(only) : act("abort"));
+      if (answer) receipts.value = answer.stops;
+    } finally {
+      sending.value = false;
+    }
   };
-  const sending = busyWith.value === "abort";
-  const refused = refusal.value?.what === "abort" ? refusal.value.error : null;
+  const what = only ? `abort of ${only}` : "abort";
+  const refused = refusal.value?.what === what ? refusal.value.error : null;
+  const name = only ?? mission.value?.name ?? "the mission";
 
   return (
     <dialog
@@ -38,21 +47,23 @@ export function AbortDialog() {
       data-testid="abort-dialog"
     >
       <h2 id="abort-title">
-        {receipts.value ? "Mission aborted" : `Abort ${mission.value?.name ?? "the mission"}?`}
+        {receipts.value ? (only ? `${only} was taken out` : "Mission aborted") : `Abort ${name}?`}
       </h2>
       {receipts.value ? null : (
         <p>
-          Every vehicle is told to stop following its waypoints. An aborted mission cannot be resumed; its map
-          stays.
+          {only
+            ? "This vehicle is told to stop and leaves the mission; the others go on. It can be added again."
+            : "Every vehicle is told to stop following its waypoints. An aborted mission cannot be resumed; its map stays."}
         </p>
       )}
       <ul class="receipts" aria-live="polite">
-        {rows(receipts.value, sending).map((row) => (
+        {rows(receipts.value, sending.value, only).map((row) => (
           <li key={row.vehicle} class={row.tone} data-testid={`receipt-${row.vehicle}`}>
             <span aria-hidden="true">{row.sign}</span> <b>{row.vehicle}</b> {row.words}
           </li>
         ))}
       </ul>
+      {receipts.value?.length === 0 ? <p>No vehicle was under way.</p> : null}
       {receipts.value?.some((r) => !r.acknowledged) ? (
         <p class="reason alarm">
           A vehicle that did not acknowledge may go on until its own time-out. Watch it, and stop it from its
@@ -72,11 +83,11 @@ export function AbortDialog() {
           <button
             type="button"
             class="abort"
-            disabled={sending}
+            disabled={sending.value}
             onClick={() => void abort()}
             data-testid="abort-confirm"
           >
-            {sending ? "Aborting…" : "Abort mission"}
+            {sending.value ? "Aborting…" : only ? `Abort ${only}` : "Abort mission"}
           </button>
         )}
       </div>
@@ -84,7 +95,7 @@ export function AbortDialog() {
   );
 }
 
-function rows(receipts: readonly StopView[] | null, sending: boolean) {
+function rows(receipts: readonly StopView[] | null, sending: boolean, only: string | null) {
   if (receipts) {
     return receipts.map((r) => ({
       vehicle: r.vehicle,
@@ -94,7 +105,7 @@ function rows(receipts: readonly StopView[] | null, sending: boolean) {
     }));
   }
   return vehicles.value
-    .filter((v) => v.view.active)
+    .filter((v) => v.view.active && (only === null || v.view.name === only))
     .map((v) => ({
       vehicle: v.view.name,
       tone: "calm",

@@ -1,4 +1,4 @@
-import { mission, panelOpen } from "../state/store";
+import { in3d, mission, panelOpen } from "../state/store";
 import { AbortDialog } from "./AbortDialog";
 import { BottomStrip } from "./BottomStrip";
 import { ChartPane } from "./ChartPane";
@@ -7,7 +7,9 @@ import { Legend } from "./Legend";
 import { LinksDialog } from "./LinksDialog";
 import { MissionPanel } from "./MissionPanel";
 import { Notices } from "./Notices";
+import { PreflightDialog } from "./PreflightDialog";
 import { Readout } from "./Readout";
+import { SpaceView } from "./SpaceView";
 import { TopBar } from "./TopBar";
 import { VehicleCards } from "./VehicleCards";
 
@@ -18,7 +20,7 @@ export function App() {
       <TopBar />
       <main class="stage">
         <ChartPane />
-        <Readout />
+        {in3d.value ? <SpaceView /> : <Readout />}
         <Legend />
         <div class="over-map">
           <Alarms />
@@ -28,6 +30,7 @@ export function App() {
       {panelOpen.value ? <MissionPanel /> : null}
       <VehicleCards />
       <BottomStrip />
+      <PreflightDialog />
       <AbortDialog />
       <LinksDialog />
     </div>

@@ -1,7 +1,12 @@
+import type { ComponentChildren } from "preact";
 import { count, distance, metres, percent } from "../state/format";
-import { filesOpen, logOpen, mission, view } from "../state/store";
+import { mission, type Tab, tab, view } from "../state/store";
+import { Charts } from "./Charts";
+import { Compare } from "./Compare";
 import { EventLog } from "./EventLog";
 import { Files } from "./Files";
+import { Review } from "./Review";
+import { TimeSlider } from "./TimeSlider";
 
 export function BottomStrip() {
   const present = mission.value;
@@ -10,15 +15,13 @@ export function BottomStrip() {
   const newest = view.value.events.at(-1);
   return (
     <section class="bottom" aria-label="Progress and log">
-      {logOpen.value ? <EventLog /> : null}
-      {filesOpen.value ? <Files /> : null}
+      {tab.value === "log" ? <EventLog /> : null}
+      {tab.value === "files" ? <Files /> : null}
+      {tab.value === "charts" ? <Charts /> : null}
+      {tab.value === "soundings" ? <Review /> : null}
+      {tab.value === "compare" ? <Compare /> : null}
+      <TimeSlider />
       <div class="strip">
-        <div class="steps">
-          <span>
-            Step <b data-testid="step">{p.step}</b> of {p.steps}
-          </span>
-          <progress max={p.steps} value={p.step} aria-label="Steps done" />
-        </div>
         <dl class="figures">
           <Figure
             label={`Known to ${present.spec.accuracy_m} m`}
@@ -26,40 +29,45 @@ export function BottomStrip() {
             id="coverage"
           />
           <Figure label="Mean deviation" value={metres(p.mean_sd_m, 2)} id="mean-sd" />
-          <Figure
-            label="Soundings"
-            value={`${count(p.soundings)}${p.rejected ? ` (${count(p.rejected)} rejected)` : ""}`}
-            id="soundings"
-          />
+          <Figure label="Soundings" value={count(p.soundings)} id="soundings" />
           <Figure label="Travelled" value={distance(p.distance_m)} id="distance" />
         </dl>
+        <nav class="tabs" aria-label="More about this mission">
+          <Toggle name="charts">Charts</Toggle>
+          <Toggle name="soundings">Rejected{p.rejected ? ` (${count(p.rejected)})` : ""}</Toggle>
+          <Toggle name="files">Files</Toggle>
+          <Toggle name="compare">Compare</Toggle>
+        </nav>
         <button
           type="button"
           class="log-toggle"
-          aria-expanded={logOpen.value}
+          aria-expanded={tab.value === "log"}
           data-testid="toggle-log"
-          onClick={() => {
-            logOpen.value = !logOpen.value;
-            filesOpen.value = false;
-          }}
+          onClick={() => toggle("log")}
         >
-          <b>Log {logOpen.value ? "▾" : "▴"}</b>{" "}
+          <b>Log {tab.value === "log" ? "▾" : "▴"}</b>{" "}
           <span class="newest">{newest?.message ?? "nothing yet"}</span>
-        </button>
-        <button
-          type="button"
-          class="command"
-          aria-expanded={filesOpen.value}
-          data-testid="toggle-files"
-          onClick={() => {
-            filesOpen.value = !filesOpen.value;
-            logOpen.value = false;
-          }}
-        >
-          Files {filesOpen.value ? "▾" : "▴"}
         </button>
       </div>
     </section>
+  );
+}
+
+function toggle(name: Tab): void {
+  tab.value = tab.value === name ? null : name;
+}
+
+function Toggle({ name, children }: { name: Tab; children: ComponentChildren }) {
+  return (
+    <button
+      type="button"
+      class="command"
+      aria-expanded={tab.value === name}
+      data-testid={`toggle-${name}`}
+      onClick={() => toggle(name)}
+    >
+      {children} {tab.value === name ? "▾" : "▴"}
+    </button>
   );
 }
 

@@ -1,39 +1,133 @@
-import { useSignal } from "@preact/signals";
+import { useComputed, useSignal } from "@preact/signals";
+import { api } from "../api/client";
 import type { Level } from "../api/types";
 import { clock } from "../state/format";
-import { openAlarms, takeAlarms, view } from "../state/store";
+import { said } from "../state/session";
+import { openAlarms, selectedId, takeAlarms, view } from "../state/store";
 
 const SIGNS: Record<Level, string> = { info: "·", warning: "▲", alarm: "✕" };
 const MOST_SHOWN = 300;
 
-/** The mission's log, newest first. */
+/** The mission's log, newest first, with a field for what the next watch should know. */
 export function EventLog() {
-  const important = useSignal(false);
-  const lines = view.value.events.filter((e) => !important.value || e.level !== "info").slice(-MOST_SHOWN);
+  const least = useSignal<"all" | "important" | "notes">("all");
+  const kind = useSignal("");
+  const words = useSignal("");
+  const kinds = useComputed(() => [...new Set(view.value.events.map((e) => e.kind))].sort());
+  const wanted = words.value.trim().toLowerCase();
+  const lines = view.value.events
+    .filter((e) => least.value !== "important" || e.level !== "info")
+    .filter((e) => least.value !== "notes" || e.kind === "note")
+    .filter((e) => kind.value === "" || e.kind === kind.value)
+    .filter((e) => wanted === "" || `${e.message} ${e.kind}`.toLowerCase().includes(wanted))
+    .slice(-MOST_SHOWN);
   return (
     <div class="log" data-testid="log">
-      <label class="check">
-        <input
-          type="checkbox"
-          checked={important.value}
+      <NoteForm />
+      <div class="filters">
+        <select
+          aria-label="Which lines"
+          value={least.value}
+          data-testid="log-level"
           onChange={(event) => {
-            important.value = event.currentTarget.checked;
+            least.value = event.currentTarget.value as typeof least.value;
+          }}
+        >
+          <option value="all">All lines</option>
+          <option value="important">Warnings and alarms</option>
+          <option value="notes">Notes</option>
+        </select>
+        <select
+          aria-label="Kind of line"
+          value={kind.value}
+          onChange={(event) => {
+            kind.value = event.currentTarget.value;
+          }}
+        >
+          <option value="">Every kind</option>
+          {kinds.value.map((name) => (
+            <option key={name} value={name}>
+              {name}
+            </option>
+          ))}
+        </select>
+        <input
+          type="search"
+          aria-label="Words in the line"
+          placeholder="Words"
+          value={words.value}
+          data-testid="log-words"
+          onInput={(event) => {
+            words.value = event.currentTarget.value;
           }}
         />
-        Only warnings and alarms
-      </label>
-      {lines.length === 0 ? <p class="empty">Nothing to show.</p> : null}
-      <ol>
+      </div>
+      {lines.length === 0 ? <p class="empty">No line is like that.</p> : null}
+      <ol aria-label="Log, newest first">
         {lines.reverse().map((event) => (
-          <li key={event.id} class={event.level}>
-            <time dateTime={event.time}>{clock(new Date(event.time), "utc")}</time>
+          <li key={event.id} class={`${event.level}${event.kind === "note" ? " note" : ""}`}>
+            <time dateTime={event.time} title={`${clock(new Date(event.time), "local")} local`}>
+              {clock(new Date(event.time), "utc")}
+            </time>
             <span aria-hidden="true">{SIGNS[event.level]}</span>
             <span class="kind">{event.kind}</span>
-            <span class="message">{event.message}</span>
+            <span class="message">
+              {event.message}
+              {event.kind === "note" && event.data.actor ? <small> {String(event.data.actor)}</small> : null}
+            </span>
           </li>
         ))}
       </ol>
     </div>
+  );
+}
+
+function NoteForm() {
+  const text = useSignal("");
+  const fault = useSignal("");
+  const sending = useSignal(false);
+  const write = async () => {
+    const id = selectedId.value;
+    if (!id || text.value.trim() === "") return;
+    sending.value = true;
+    try {
+      await api.note(id, text.value.trim());
+      text.value = "";
+      fault.value = "";
+    } catch (error) {
+      fault.value = said(error);
+    } finally {
+      sending.value = false;
+    }
+  };
+  return (
+    <form
+      class="note-form"
+      onSubmit={(event) => {
+        event.preventDefault();
+        void write();
+      }}
+    >
+      <input
+        type="text"
+        aria-label="Note for the log"
+        placeholder="Note for the next watch"
+        maxLength={2000}
+        value={text.value}
+        data-testid="note"
+        onInput={(event) => {
+          text.value = event.currentTarget.value;
+        }}
+      />
+      <button type="submit" class="command" disabled={sending.value || text.value.trim() === ""}>
+        Write down
+      </button>
+      {fault.value ? (
+        <span class="fault" role="alert">
+          {fault.value}
+        </span>
+      ) : null}
+    </form>
   );
 }
 

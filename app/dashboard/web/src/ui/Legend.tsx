@@ -1,90 +1,188 @@
 import { type Signal, useSignal } from "@preact/signals";
 import type { ComponentChildren } from "preact";
-import { gridOf, type Layer, PALETTES, type Range } from "../map/bathymetry";
-import { fixedRanges, layer, seaFloor, showHatching, shownRange } from "../state/store";
-
-const TITLES: Record<Layer, string> = { depth: "Depth", uncertainty: "Standard deviation" };
+import {
+  KINDS,
+  LANDMARK_COLOURS,
+  LANDMARK_WORDS,
+  landmarkShares,
+  paletteOf,
+  type Range,
+  type Shown,
+  shareOutside,
+} from "../map/layers";
+import { DEPTH_PALETTES, type DepthPalette } from "../map/palette";
+import {
+  depthPalette,
+  fixedRanges,
+  layer,
+  mission,
+  seaFloor,
+  showContours,
+  showHatching,
+  shownRange,
+} from "../state/store";
 
 /** Layer switch, colour scale and its range, which stays what the operator set until changed. */
 export function Legend() {
   const map = seaFloor.value;
   const range = shownRange.value;
+  if (!mission.value) return null;
+  return (
+    <section class="legend" aria-label="Map layer and legend">
+      <label class="layer-choice">
+        <span class="visually-hidden">Layer</span>
+        <select
+          value={layer.value}
+          data-testid="layer"
+          title={KINDS[layer.value].meaning}
+          onChange={(event) => {
+            layer.value = event.currentTarget.value as Shown;
+          }}
+        >
+          {Object.entries(KINDS).map(([name, { title }]) => (
+            <option key={name} value={name}>
+              {title}
+            </option>
+          ))}
+        </select>
+      </label>
+      {map && range ? (
+        layer.value === "landmarks" ? (
+          <Landmarks />
+        ) : (
+          <Scale range={range} />
+        )
+      ) : (
+        <p class="empty">{map ? missing(layer.value) : "The sea floor appears with the first soundings"}</p>
+      )}
+      {map ? <Options /> : null}
+    </section>
+  );
+}
+
+function missing(shown: Shown): string {
+  return shown === "difference"
+    ? "There is no reference grid to differ from: send one (PUT …/reference)"
+    : "This layer is on its way";
+}
+
+function Scale({ range }: { range: Range }) {
+  const { title, unit } = KINDS[layer.value];
+  const map = seaFloor.value;
   const fixed = fixedRanges.value[layer.value] !== undefined;
   const setRange = (next: Range | undefined) => {
     const { [layer.value]: _, ...others } = fixedRanges.value;
     fixedRanges.value = next ? { ...others, [layer.value]: next } : others;
   };
   return (
-    <section class="legend" aria-label="Map layer and legend">
-      <fieldset class="segments">
-        <legend class="visually-hidden">Layer</legend>
-        {(["depth", "uncertainty"] as const).map((name) => (
-          <label key={name}>
-            <input
-              type="radio"
-              name="layer"
-              checked={layer.value === name}
-              data-testid={`layer-${name}`}
-              onChange={() => {
-                layer.value = name;
-              }}
-            />
-            <span>{name === "depth" ? "Depth" : "Uncertainty"}</span>
-          </label>
-        ))}
-      </fieldset>
-      {map && range ? (
-        <>
-          <div class="range-row">
-            <RangeInputs range={range} onChange={setRange} key={`${layer.value} ${range.low} ${range.high}`}>
-              <div
-                class="scale"
-                role="img"
-                aria-label={`${TITLES[layer.value]} from ${range.low} to ${range.high} metres`}
-                style={{ background: `linear-gradient(to right, ${PALETTES[layer.value].css})` }}
-              />
-            </RangeInputs>
-            <span>m</span>
-          </div>
-          <span class="range-kind">
-            {fixed ? (
-              <button
-                type="button"
-                class="link-button"
-                data-testid="range-fit"
-                onClick={() => setRange(undefined)}
-              >
-                Fit to data
-              </button>
-            ) : (
-              <button
-                type="button"
-                class="link-button"
-                data-testid="range-fix"
-                title="The colours follow the data now. Keep them, so that a colour goes on meaning the same depth"
-                onClick={() => setRange(range)}
-              >
-                Keep range
-              </button>
-            )}
-            {fixed ? <Outside share={shareOutside(gridOf(map, layer.value), range)} /> : null}
-          </span>
-          <label class="check">
-            <input
-              type="checkbox"
-              checked={showHatching.value}
-              data-testid="hatching"
-              onChange={(event) => {
-                showHatching.value = event.currentTarget.checked;
-              }}
-            />
-            <span class="hatch-sample" aria-hidden="true" /> interpolated
-          </label>
-        </>
-      ) : (
-        <p class="empty">The sea floor appears with the first soundings</p>
-      )}
-    </section>
+    <>
+      <div class="range-row">
+        <RangeInputs range={range} onChange={setRange} key={`${layer.value} ${range.low} ${range.high}`}>
+          <div
+            class="scale"
+            role="img"
+            aria-label={`${title} from ${range.low} to ${range.high} ${unit}`}
+            style={{
+              background: `linear-gradient(to right, ${paletteOf(layer.value, depthPalette.value).css})`,
+            }}
+          />
+        </RangeInputs>
+        <span>{unit}</span>
+      </div>
+      <span class="range-kind">
+        {fixed ? (
+          <button
+            type="button"
+            class="link-button"
+            data-testid="range-fit"
+            onClick={() => setRange(undefined)}
+          >
+            Fit to data
+          </button>
+        ) : (
+          <button
+            type="button"
+            class="link-button"
+            data-testid="range-fix"
+            title="The colours follow the data now. Keep them, so that a colour goes on meaning the same value"
+            onClick={() => setRange(range)}
+          >
+            Keep range
+          </button>
+        )}
+        {fixed && map ? <Outside share={shareOutside(map, layer.value, range)} /> : null}
+      </span>
+    </>
+  );
+}
+
+function Landmarks() {
+  const shares = seaFloor.value ? landmarkShares(seaFloor.value) : null;
+  return (
+    <ul class="landmarks" data-testid="landmarks">
+      {LANDMARK_WORDS.map((words, i) => (
+        <li key={words}>
+          <span class="swatch" style={{ background: `rgb(${LANDMARK_COLOURS[i]?.join(" ")})` }} /> {words}
+          {shares ? ` ${((shares[i] ?? 0) * 100).toFixed(0)} %` : ""}
+        </li>
+      ))}
+    </ul>
+  );
+}
+
+function Options() {
+  return (
+    <>
+      {layer.value === "depth" ? (
+        <label>
+          <span class="visually-hidden">Colours of depths</span>
+          <select
+            value={depthPalette.value}
+            data-testid="palette"
+            title="Colours of depths"
+            onChange={(event) => {
+              depthPalette.value = event.currentTarget.value as DepthPalette;
+            }}
+          >
+            {Object.entries(DEPTH_PALETTES).map(([name, { title }]) => (
+              <option key={name} value={name}>
+                {title}
+              </option>
+            ))}
+          </select>
+        </label>
+      ) : null}
+      <Check signal={showContours} id="contours">
+        contours
+      </Check>
+      <Check signal={showHatching} id="hatching">
+        <span class="hatch-sample" aria-hidden="true" /> interpolated
+      </Check>
+    </>
+  );
+}
+
+function Check({
+  signal,
+  id,
+  children,
+}: {
+  signal: Signal<boolean>;
+  id: string;
+  children: ComponentChildren;
+}) {
+  return (
+    <label class="check">
+      <input
+        type="checkbox"
+        checked={signal.value}
+        data-testid={id}
+        onChange={(event) => {
+          signal.value = event.currentTarget.checked;
+        }}
+      />
+      {children}
+    </label>
   );
 }
 
@@ -125,19 +223,14 @@ function RangeInputs({ range, onChange, children }: RangeProps) {
         commit();
       }}
     >
-      {end(low, "Lower end of the colour range, metres", "range-low")}
+      {end(low, "Lower end of the colour range", "range-low")}
       {children}
-      {end(high, "Upper end of the colour range, metres", "range-high")}
+      {end(high, "Upper end of the colour range", "range-high")}
       <button type="submit" class="visually-hidden" tabIndex={-1}>
         Set the range
       </button>
     </form>
   );
-}
-
-function shareOutside(grid: (number | null)[][], { low, high }: Range): number {
-  const known = grid.flat().filter((value) => value !== null);
-  return known.length === 0 ? 0 : known.filter((value) => value < low || value > high).length / known.length;
 }
 
 function Outside({ share }: { share: number }) {

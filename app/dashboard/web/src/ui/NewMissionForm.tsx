@@ -1,50 +1,48 @@
 import { useSignal, useSignalEffect } from "@preact/signals";
-import { type ComponentChildren, createContext } from "preact";
-import { useContext, useEffect } from "preact/hooks";
+import { useEffect } from "preact/hooks";
 import { api, ServiceError } from "../api/client";
 import type { PlannerView, VehicleSpec, VehicleView } from "../api/types";
+import { polygonOf, sizeOf } from "../map/area";
 import {
   areaOf,
-  centred,
+  cornersOf,
   type Draft,
   emptyDraft,
+  estimate,
   type Faults,
   faultsOf,
   fieldOf,
+  PLANNER_PRESETS,
   toMission,
 } from "../state/draft";
-import { createMission } from "../state/session";
-import { describing, draftArea, fleet, mapCentre } from "../state/store";
-
-interface FormState {
-  draft: Draft;
-  faults: Faults;
-  set: (change: Partial<Draft>) => void;
-}
-
-const Form = createContext<FormState | null>(null);
+import { distance, duration } from "../state/format";
+import { createMission, said } from "../state/session";
+import { describing, draftShapes, drawing, fleet, mapCentre } from "../state/store";
+import { AreaFields } from "./AreaFields";
+import { Fault, Form, Text, useForm } from "./Fields";
 
 export function NewMissionForm() {
   const draft = useSignal(emptyDraft(mapCentre.peek()));
   const faults = useSignal<Faults>({});
   const refused = useSignal<ServiceError | null>(null);
   const sending = useSignal(false);
-  const planners = useSignal<readonly PlannerView[]>([]);
+  const tideFault = useSignal("");
 
   useSignalEffect(() => {
-    draftArea.value = areaOf(draft.value);
+    draftShapes.value = {
+      area: areaOf(draft.value),
+      keepOut: draft.value.keepOut.filter((zone) => zone.length > 2).map(polygonOf),
+    };
   });
   useEffect(() => {
-    api.planners().then(
-      (list) => {
-        planners.value = list;
-      },
-      (error: unknown) => {
-        if (error instanceof ServiceError) refused.value = error;
-      },
-    );
+    const stopDrawing = (event: KeyboardEvent) => {
+      if (event.key === "Escape") drawing.value = null;
+    };
+    window.addEventListener("keydown", stopDrawing);
     return () => {
-      draftArea.value = null;
+      window.removeEventListener("keydown", stopDrawing);
+      draftShapes.value = null;
+      drawing.value = null;
     };
   }, []);
 
@@ -53,7 +51,13 @@ export function NewMissionForm() {
   };
   const set = (change: Partial<Draft>) => {
     draft.value = { ...draft.value, ...change };
-    if (Object.keys(faults.value).length > 0) faults.value = faultsOf(draft.value);
+    const found = faultsOf(draft.value);
+    // What was drawn is judged at once, typed fields only after the first try.
+    if (Object.keys(faults.value).length > 0) faults.value = found;
+    else if (change.ring || change.keepOut) {
+      const { ring, keepOut } = found;
+      faults.value = { ...(ring ? { ring } : {}), ...(keepOut ? { keepOut } : {}) };
+    }
   };
   const submit = async (event: SubmitEvent) => {
     event.preventDefault();
@@ -62,7 +66,13 @@ export function NewMissionForm() {
     if (Object.keys(faults.value).length > 0) return;
     sending.value = true;
     try {
-      await createMission(toMission(draft.value));
+      const id = await createMission(toMission(draft.value));
+      if (draft.value.tide_table) {
+        await api.setTide(id, {
+          table: draft.value.tide_table,
+          source: draft.value.tide_source || "tide table",
+        });
+      }
       close();
     } catch (error) {
       if (!(error instanceof ServiceError)) throw error;
@@ -75,6 +85,10 @@ export function NewMissionForm() {
     } finally {
       sending.value = false;
     }
+  };
+  const readTide = async (file: File | undefined) => {
+    tideFault.value = "";
+    if (file) set({ tide_table: await file.text(), tide_source: file.name });
   };
 
   return (
@@ -92,58 +106,59 @@ export function NewMissionForm() {
           </button>
         </header>
         <Text field="name" label="Name" placeholder="Leixões quay" />
-        <fieldset>
-          <legend>Area, from its south-west corner</legend>
-          <div class="pair">
-            <Text field="latitude" label="Latitude °N" numeric />
-            <Text field="longitude" label="Longitude °E" numeric />
-            <Text field="east_m" label="To the east, m" numeric />
-            <Text field="north_m" label="To the north, m" numeric />
-          </div>
-          <button
-            type="button"
-            class="link-button"
-            onClick={() => set(centred(draft.value, mapCentre.value))}
-          >
-            Place it in the middle of the map
-          </button>
-        </fieldset>
+        <AreaFields />
         <fieldset>
           <legend>Vehicles</legend>
           <FleetChoice />
           <Text field="simulated" label="Simulated vehicles" numeric />
         </fieldset>
-        <Text field="steps" label="Steps" numeric />
-        <label class="field">
-          Planner
-          <select
-            value={draft.value.planner}
-            data-testid="field-planner"
-            onChange={(event) => set({ planner: event.currentTarget.value })}
-          >
-            {(planners.value.length > 0 ? planners.value.map((p) => p.name) : [draft.value.planner]).map(
-              (name) => (
-                <option key={name} value={name}>
-                  {name}
-                </option>
-              ),
-            )}
-          </select>
-          <small>{planners.value.find((p) => p.name === draft.value.planner)?.summary}</small>
-          <Fault field="planner" />
-        </label>
+        <Planner />
+        <Text field="steps" label="Steps" numeric hint="How many waypoints every vehicle gets" />
+        <Expected />
         <details>
           <summary>Limits and grid</summary>
           <div class="pair">
             <Text field="max_step_m" label="Largest step, m" numeric />
-            <Text field="cell_m" label="Cell, m" numeric />
-            <Text field="min_depth_m" label="Shallowest, m" numeric />
-            <Text field="max_depth_m" label="Deepest, m" numeric />
+            <Text field="speed_mps" label="Speed, m/s" numeric />
+            <Text field="min_depth_m" label="Shallowest, m" numeric hint="Shallowest depth of travel" />
+            <Text field="max_depth_m" label="Deepest, m" numeric hint="Deepest depth of travel" />
+            <Text field="min_altitude_m" label="Altitude, m" numeric hint="Least height above the bottom" />
+            <Text
+              field="min_separation_m"
+              label="Apart, m"
+              numeric
+              hint="Between vehicles at similar depth"
+            />
+            <Text field="com_range_m" label="Com. range, m" placeholder="unlimited" numeric />
+            <Text field="cell_m" label="Cell, m" numeric hint="Side of the map's cells" />
+            <Text
+              field="accuracy_m"
+              label="Accuracy, m"
+              numeric
+              hint="Deviation below which a cell is known"
+            />
           </div>
+        </details>
+        <details>
+          <summary>Tide</summary>
+          <div class="pair">
+            <Text field="tide_m" label="Level, m" placeholder="none" numeric />
+            <Text field="tide_source" label="From where" placeholder="gauge" />
+          </div>
+          <label class="command file">
+            {draft.value.tide_table ? `Table: ${draft.value.tide_source}` : "Table (.tid)"}
+            <input
+              type="file"
+              accept=".tid,.txt"
+              data-testid="tide-file"
+              onChange={(event) => void readTide(event.currentTarget.files?.[0])}
+            />
+          </label>
+          <p class="hint">Tides can be set and changed at any time; soundings keep their raw values.</p>
         </details>
         {refused.value ? (
           <p class="reason alarm" role="alert">
-            {refused.value.message}. {refused.value.remedy}
+            {said(refused.value)}
           </p>
         ) : null}
         <button
@@ -159,43 +174,126 @@ export function NewMissionForm() {
   );
 }
 
-function useForm(): FormState {
-  const form = useContext(Form);
-  if (!form) throw new Error("a field outside its form");
-  return form;
-}
-
-type TextField = Exclude<keyof Draft, "chosen">;
-
-function Text(props: {
-  field: TextField;
-  label: ComponentChildren;
-  placeholder?: string;
-  numeric?: boolean;
-}) {
-  const { draft, faults, set } = useForm();
-  const { field, label, numeric = false } = props;
+/** How long it takes at most and how dense it gets, before anything is created. */
+function Expected() {
+  const { draft } = useForm();
+  const corners = cornersOf(draft);
+  const found = corners.length > 2 ? estimate(draft, sizeOf(corners).area_m2) : null;
+  if (!found) return null;
   return (
-    <label class="field">
-      {label}
-      <input
-        type="text"
-        autocomplete="off"
-        value={draft[field]}
-        inputMode={numeric ? "decimal" : "text"}
-        placeholder={props.placeholder ?? ""}
-        aria-invalid={faults[field] ? "true" : "false"}
-        data-testid={`field-${field}`}
-        onInput={(event) => set({ [field]: event.currentTarget.value })}
-      />
-      <Fault field={field} />
-    </label>
+    <p class="hint" data-testid="estimate">
+      At most {duration(found.seconds)} and {distance(found.metres)} of tracks, as much as lines{" "}
+      {found.spacing_m.toFixed(1)} m apart.
+    </p>
   );
 }
 
-function Fault({ field }: { field: keyof Draft }) {
-  const { faults } = useForm();
-  return faults[field] ? <span class="fault">▲ {faults[field]}</span> : null;
+function Planner() {
+  const { draft, set } = useForm();
+  const planners = useSignal<readonly PlannerView[]>([]);
+  const fault = useSignal("");
+  useEffect(() => {
+    api.planners().then(
+      (list) => {
+        planners.value = list;
+      },
+      (error: unknown) => {
+        fault.value = said(error);
+      },
+    );
+  }, []);
+  const others = planners.value.filter((p) => !(p.name in PLANNER_PRESETS));
+  const other = others.find((p) => p.name === draft.planner);
+  return (
+    <fieldset class="planner">
+      <legend>Planner</legend>
+      {Object.entries(PLANNER_PRESETS).map(([name, { title, words }]) => (
+        <label key={name} class="preset">
+          <input
+            type="radio"
+            name="planner"
+            checked={draft.planner === name}
+            data-testid={`planner-${name}`}
+            onChange={() => set({ planner: name })}
+          />
+          <span>
+            <b>{title}</b> <small>{words}</small>
+          </span>
+        </label>
+      ))}
+      <details>
+        <summary>More planners and their settings</summary>
+        <label class="field">
+          Planner
+          <select
+            value={draft.planner}
+            data-testid="field-planner"
+            onChange={(event) => set({ planner: event.currentTarget.value })}
+          >
+            {(planners.value.length > 0 ? planners.value.map((p) => p.name) : [draft.planner]).map((name) => (
+              <option key={name} value={name}>
+                {name}
+              </option>
+            ))}
+          </select>
+          {other ? <small>{other.summary}</small> : null}
+        </label>
+        <Options schema={planners.value.find((p) => p.name === draft.planner)?.options} />
+      </details>
+      {fault.value ? <span class="fault">▲ {fault.value}</span> : null}
+      <Fault field="planner" />
+    </fieldset>
+  );
+}
+
+interface OptionSchema {
+  description?: string;
+  default?: unknown;
+  type?: string;
+  enum?: string[];
+  anyOf?: { type?: string }[];
+}
+
+/** The planner's settings as the service declares them; an empty field takes the default. */
+function Options({ schema }: { schema: Record<string, unknown> | undefined }) {
+  const { draft, set } = useForm();
+  const properties = (schema?.properties ?? {}) as Record<string, OptionSchema>;
+  const change = (name: string, value: unknown) => {
+    const { [name as keyof typeof draft.options]: _, ...rest } = draft.options;
+    set({ options: value === undefined ? rest : { ...rest, [name]: value } });
+  };
+  return (
+    <div class="options">
+      {Object.entries(properties).map(([name, option]) => (
+        <div key={name} class="field">
+          <label for={`option-${name}`}>{name.replaceAll("_", " ")}</label>
+          {option.enum ? (
+            <select
+              id={`option-${name}`}
+              value={String(draft.options[name as keyof typeof draft.options] ?? option.default)}
+              onChange={(event) => change(name, event.currentTarget.value)}
+            >
+              {option.enum.map((value) => (
+                <option key={value}>{value}</option>
+              ))}
+            </select>
+          ) : (
+            <input
+              id={`option-${name}`}
+              type="text"
+              inputMode="decimal"
+              placeholder={option.default === null ? "automatic" : String(option.default)}
+              onInput={(event) => {
+                const text = event.currentTarget.value.trim();
+                change(name, text === "" || !Number.isFinite(Number(text)) ? undefined : Number(text));
+              }}
+            />
+          )}
+          <small>{option.description}</small>
+        </div>
+      ))}
+    </div>
+  );
 }
 
 /** Real vehicles that the service hears and that are free. */

@@ -1,10 +1,15 @@
 import { useSignal } from "@preact/signals";
-import { refusal, signIn } from "../state/session";
+import { emptyDraft, toMission } from "../state/draft";
+import { createMission, refusal, said, signIn } from "../state/session";
 import {
   describing,
+  fleet,
+  linksOpen,
+  mapCentre,
   mission,
   missions,
   panelOpen,
+  preflightOpen,
   selectedId,
   serviceFault,
   socketStatus,
@@ -23,7 +28,7 @@ export function Notices() {
           {mission.value ? "; what is shown is old." : "."}
         </p>
       ) : null}
-      {refused && refused.what !== "abort" ? (
+      {refused && !refused.what.startsWith("abort") && !preflightOpen.value ? (
         <div class="notice alarm" role="alert" data-testid="refusal">
           <p>
             <b>✕ {refused.what} was refused:</b> {refused.error.message}. {refused.error.remedy}
@@ -46,28 +51,7 @@ export function Notices() {
 
 function Guide() {
   if (serviceFault.value || missions.value === null || describing.value) return null;
-  if (!selectedId.value) {
-    return (
-      <div class="notice" data-testid="no-mission">
-        <p>
-          <b>No mission is shown.</b>{" "}
-          {missions.value.length > 0
-            ? "Choose one from the list, or describe a new one."
-            : "Describe the first one."}
-        </p>
-        <button
-          type="button"
-          class="command primary"
-          onClick={() => {
-            panelOpen.value = true;
-            describing.value = missions.value?.length === 0;
-          }}
-        >
-          {missions.value.length > 0 ? "Show missions" : "New mission"}
-        </button>
-      </div>
-    );
-  }
+  if (!selectedId.value) return <NoMission none={missions.value.length === 0} />;
   const known = missions.value.some((m) => m.id === selectedId.value);
   if (!mission.value && !known && socketStatus.value?.kind !== "open") {
     return (
@@ -77,6 +61,59 @@ function Guide() {
     );
   }
   return null;
+}
+
+/** Nothing is shown: what there is to choose from, and how to try it without a vehicle. */
+function NoMission({ none }: { none: boolean }) {
+  const fault = useSignal("");
+  const heard = fleet.value.filter((v) => v.kind !== "sim").length;
+  const tryIt = async () => {
+    try {
+      const draft = {
+        ...emptyDraft(mapCentre.value),
+        name: "Trial with two simulated vehicles",
+        steps: "60",
+      };
+      await createMission(toMission(draft));
+      preflightOpen.value = true;
+    } catch (error) {
+      fault.value = said(error);
+    }
+  };
+  return (
+    <div class="notice" data-testid="no-mission">
+      <p>
+        <b>No mission is shown.</b>{" "}
+        {none ? "Describe the first one." : "Choose one from the list, or describe a new one."}{" "}
+        {heard > 0
+          ? `${heard} vehicle${heard > 1 ? "s are" : " is"} heard.`
+          : "No vehicle is heard yet: switch one on within reach, see Links for what is missing, or try it with simulated ones."}
+      </p>
+      <button
+        type="button"
+        class="command primary"
+        onClick={() => {
+          panelOpen.value = true;
+          describing.value = none;
+        }}
+      >
+        {none ? "New mission" : "Show missions"}
+      </button>
+      <button type="button" class="command" data-testid="try" onClick={() => void tryIt()}>
+        Try with two simulated vehicles
+      </button>
+      <button
+        type="button"
+        class="command"
+        onClick={() => {
+          linksOpen.value = true;
+        }}
+      >
+        Links
+      </button>
+      {fault.value ? <p class="fault">{fault.value}</p> : null}
+    </div>
+  );
 }
 
 function SignIn() {

@@ -1,17 +1,15 @@
-import { readCell } from "../map/geo";
-import { latitude, longitude, metres } from "../state/format";
-import { cursor, seaFloor } from "../state/store";
+import { readCell } from "../map/seafloor";
+import { metres, place } from "../state/format";
+import { coordinateFormat, cursor, seaFloor } from "../state/store";
 
 /** What lies under the cursor. */
 export function Readout() {
-  const place = cursor.value;
-  if (!place) return null;
-  const cell = seaFloor.value ? readCell(seaFloor.value, place) : null;
+  const at = cursor.value;
+  if (!at) return null;
+  const cell = seaFloor.value ? readCell(seaFloor.value, at) : null;
   return (
     <output class="readout" data-testid="readout">
-      <span>
-        {latitude(place[1])} {longitude(place[0])}
-      </span>
+      <span>{place(at, coordinateFormat.value)}</span>
       {cell ? (
         <span>
           E {cell.east_m.toFixed(1)} m, N {cell.north_m.toFixed(1)} m
@@ -19,12 +17,16 @@ export function Readout() {
       ) : null}
       {cell && cell.depth_m !== null ? (
         <span>
-          <b>{metres(cell.depth_m, 2)}</b> ± {metres(cell.sd_m, 2)} ·{" "}
-          {cell.sounded ? `${cell.count} sounding${cell.count === 1 ? "" : "s"}` : "interpolated"}
+          <b>{metres(cell.depth_m, 2)}</b> ± {metres(cell.sd_m, 2)} · {origin(cell)}
         </span>
       ) : cell ? (
         <span>not mapped yet</span>
       ) : null}
     </output>
   );
+}
+
+function origin(cell: { sounded: boolean; imported: boolean; count: number }): string {
+  if (cell.sounded) return `${cell.count} sounding${cell.count === 1 ? "" : "s"}`;
+  return cell.imported ? "imported" : "interpolated";
 }

@@ -3,10 +3,12 @@ import { age, clock, duration } from "../state/format";
 import { act, busyWith } from "../state/session";
 import {
   abortDialogOpen,
+  abortOne,
   linksOpen,
   mission,
   now,
   panelOpen,
+  preflightOpen,
   socketStatus,
   theme,
   vehicles,
@@ -94,10 +96,11 @@ export function TopBar() {
               : `This mission is over: ${MISSION_WORDS[present.state].toLowerCase()}`
         }
         onClick={() => {
+          abortOne.value = null;
           abortDialogOpen.value = true;
         }}
       >
-        Abort
+        Abort all
       </button>
     </header>
   );
@@ -161,15 +164,18 @@ function Command({ action, label }: { action: MissionAction; label: string }) {
       class={action === "finish" ? "command" : "command primary"}
       data-testid={action}
       disabled={busyWith.value !== null}
-      onClick={() => void act(action)}
+      onClick={() => {
+        if (action === "start") preflightOpen.value = true;
+        else void act(action);
+      }}
     >
       {busyWith.value === action ? `${label}…` : label}
     </button>
   );
 }
 
-const NEXT_THEME = { system: "light", light: "dark", dark: "system" } as const;
-const THEME_SIGNS = { system: "◐", light: "☀", dark: "☾" } as const;
+const NEXT_THEME = { system: "light", light: "dark", dark: "contrast", contrast: "system" } as const;
+const THEME_SIGNS = { system: "◐", light: "☀", dark: "☾", contrast: "◼" } as const;
 
 function ThemeSwitch() {
   const words = `Colours: ${theme.value}. Change to ${NEXT_THEME[theme.value]}`;

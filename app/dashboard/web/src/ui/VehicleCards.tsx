@@ -1,6 +1,6 @@
 import { age, metres, percent } from "../state/format";
-import { mission, socketStatus, type Vehicle, vehicles } from "../state/store";
-import { vehicleState, WAYPOINT_WORDS } from "../state/words";
+import { abortDialogOpen, abortOne, mission, socketStatus, type Vehicle, vehicles } from "../state/store";
+import { hasEnded, vehicleState, WAYPOINT_WORDS } from "../state/words";
 import { WaypointShape } from "./marks";
 
 export function VehicleCards() {
@@ -25,10 +25,11 @@ const LOW_BATTERY_PCT = 25;
 function Card({ vehicle }: { vehicle: Vehicle }) {
   const v = vehicle.view;
   const state = vehicleState(v, vehicle.waypoint);
+  const away = v.kind === "sim" && v.link === "unknown";
   const low = v.battery_pct !== null && v.battery_pct < LOW_BATTERY_PCT;
   return (
     <article
-      class={`card ${state.tone}${vehicle.stale ? " stale" : ""}`}
+      class={`card ${state.tone}${vehicle.stale && !away ? " stale" : ""}`}
       style={{ "--vehicle": vehicle.colour }}
       data-testid={`card-${v.name}`}
       data-link={v.link}
@@ -57,7 +58,7 @@ function Card({ vehicle }: { vehicle: Vehicle }) {
             {percent(v.battery_pct)}
           </dd>
         </div>
-        <div class={vehicle.stale ? "late" : ""}>
+        <div class={vehicle.stale && !away ? "late" : ""}>
           <dt>Heard</dt>
           <dd>{age(vehicle.age_s)}</dd>
         </div>
@@ -81,6 +82,19 @@ function Card({ vehicle }: { vehicle: Vehicle }) {
           Waypoint {vehicle.waypoint.step} at {metres(vehicle.waypoint.depth_m)} depth,{" "}
           {WAYPOINT_WORDS[vehicle.waypoint.status]}
         </p>
+      ) : null}
+      {v.active && mission.value && !hasEnded(mission.value.state) ? (
+        <button
+          type="button"
+          class="abort-one"
+          data-testid={`abort-${v.name}`}
+          onClick={() => {
+            abortOne.value = v.name;
+            abortDialogOpen.value = true;
+          }}
+        >
+          Abort {v.name}
+        </button>
       ) : null}
       {v.reason ? <p class={`reason ${state.tone}`}>{v.reason}</p> : null}
       {vehicle.waypoint?.reason ? <p class={`reason ${state.tone}`}>{vehicle.waypoint.reason}</p> : null}

@@ -1,35 +1,66 @@
 /** Vehicles and waypoints as shapes on the map. */
 
-import type { WaypointStatus, WaypointView } from "../api/types";
+import type { LngLat, WaypointStatus, WaypointView } from "../api/types";
+import { wayBetween } from "../map/geo";
 import { age } from "../state/format";
 import type { Vehicle } from "../state/store";
 import { WAYPOINT_WORDS } from "../state/words";
 
-export function VehicleMark({ vehicle }: { vehicle: Vehicle }) {
-  const { name, heading_deg } = vehicle.view;
-  const silent = vehicle.view.link === "lost" || vehicle.view.link === "unknown";
-  const title = `${name}${vehicle.stale ? `, last heard ${age(vehicle.age_s)} ago` : ""}`;
+/** A vehicle as it was: its heading is that of its last way. */
+interface Past {
+  name: string;
+  colour: string;
+  from: LngLat | null;
+  at: LngLat;
+}
+
+export function VehicleMark({ vehicle, past }: { vehicle?: Vehicle; past?: Past }) {
+  if (past) {
+    const heading = past.from ? wayBetween(past.from, past.at).bearing_deg : null;
+    return <Mark name={past.name} colour={past.colour} heading_deg={heading} age="" title={past.name} />;
+  }
+  if (!vehicle) return null;
+  const { name, heading_deg, link } = vehicle.view;
+  const old = vehicle.stale || link === "lost" || link === "unknown";
   return (
-    <div
-      class={`vehicle-mark${vehicle.stale ? " stale" : ""}`}
-      data-testid={`vehicle-mark-${name}`}
-      title={title}
-    >
+    <Mark
+      name={name}
+      colour={vehicle.colour}
+      heading_deg={heading_deg}
+      stale={vehicle.stale}
+      age={old ? age(vehicle.age_s) : ""}
+      title={`${name}${vehicle.stale ? `, last heard ${age(vehicle.age_s)} ago` : ""}`}
+    />
+  );
+}
+
+interface MarkProps {
+  name: string;
+  colour: string;
+  heading_deg: number | null;
+  stale?: boolean;
+  age: string;
+  title: string;
+}
+
+function Mark({ name, colour, heading_deg, stale = false, age: old, title }: MarkProps) {
+  return (
+    <div class={`vehicle-mark${stale ? " stale" : ""}`} data-testid={`vehicle-mark-${name}`} title={title}>
       <svg viewBox="-16 -16 32 32" width="34" height="34" aria-hidden="true">
         {heading_deg === null ? (
-          <circle r="8" fill={vehicle.colour} class="outline" />
+          <circle r="8" fill={colour} class="outline" />
         ) : (
           <path
             d="M0,-13 L8.5,10 L0,5.5 L-8.5,10 Z"
             transform={`rotate(${heading_deg})`}
-            fill={vehicle.colour}
+            fill={colour}
             class="outline"
           />
         )}
       </svg>
       <span class="mark-label">
         {name}
-        {silent || vehicle.stale ? <b> {age(vehicle.age_s)} old</b> : null}
+        {old ? <b> {old} old</b> : null}
       </span>
     </div>
   );

@@ -1,0 +1,80 @@
+"""Soundings that are not in the map, and what operators say of them."""
+
+from typing import Annotated
+
+from fastapi import APIRouter, Path, Query
+
+from app.api.auth import Operator, Reader
+from app.api.problems import problems
+from app.api.schemas import API, ActionRequest, MissionId
+from app.api.state import Service
+from app.missions.spec import Name
+from app.missions.views import Ruling, SoundingPage, SoundingState, SoundingView
+
+router = APIRouter(
+    prefix=f"{API}/missions/{{mission_id}}/soundings",
+    tags=["maps"],
+    responses=problems("unauthenticated", "forbidden", "mission-not-found", "invalid-request"),
+)
+
+TO_REVIEW = (SoundingState.REJECTED, SoundingState.DOUBTED, SoundingState.WITHDRAWN, SoundingState.RESTORED)
+
+SoundingId = Annotated[int, Path(ge=1, lt=2**62, description="The sounding's id")]
+
+
+@router.get("", operation_id="listSoundings", summary="See which soundings are not in the map, and why")
+async def list_soundings(
+    mission_id: MissionId,
+    service: Service,
+    reader: Reader,
+    state: Annotated[
+        list[SoundingState] | None,
+        Query(
+            max_length=len(SoundingState),
+            description="Only soundings in these states; default: all that are not simply used",
+        ),
+    ] = None,
+    vehicle: Annotated[Name | None, Query(description="Only this vehicle's")] = None,
+    after: Annotated[int, Query(ge=0, lt=2**62, description="Only soundings with a larger id")] = 0,
+    limit: Annotated[int, Query(ge=1, le=1000, description="Most soundings in the answer")] = 200,
+) -> SoundingPage:
+    """Return soundings with their raw values, whether they count and why not, in the order they came."""
+    return await service.review(mission_id, state or TO_REVIEW, vehicle=vehicle, after=after, limit=limit)
+
+
+_RULING = problems(
+    "malformed-body", "sounding-not-found", "conflict", "body-too-large", "unsupported-media-type", "invalid-request"
+)
+
+
+@router.post(
+    "/{sounding_id}/restore", operation_id="restoreSounding", summary="Let a sounding count", responses=_RULING
+)
+async def restore_sounding(
+    mission_id: MissionId,
+    sounding_id: SoundingId,
+    service: Service,
+    operator: Operator,
+    body: ActionRequest | None = None,
+) -> SoundingView:
+    """Take a sounding into the map whatever gate and neighbours say; the log keeps who did so."""
+    return await _rule(service, mission_id, sounding_id, Ruling.RESTORED, operator.name, body)
+
+
+@router.post("/{sounding_id}/reject", operation_id="rejectSounding", summary="Keep a sounding out", responses=_RULING)
+async def reject_sounding(
+    mission_id: MissionId,
+    sounding_id: SoundingId,
+    service: Service,
+    operator: Operator,
+    body: ActionRequest | None = None,
+) -> SoundingView:
+    """Take a sounding out of the map; its values stay, the log keeps who did so, and it can be restored."""
+    return await _rule(service, mission_id, sounding_id, Ruling.REJECTED, operator.name, body)
+
+
+async def _rule(
+    service: Service, mission_id: str, sounding_id: int, ruling: Ruling, actor: str, body: ActionRequest | None
+) -> SoundingView:
+    note = body.note if body is not None else ""
+    return await service.rule(mission_id, sounding_id, ruling, note=note, actor=actor)

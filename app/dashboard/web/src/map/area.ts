@@ -1,0 +1,163 @@
+/** Areas as files bring them and operators draw them: read, checked, and measured. Pure but for the XML reader. */
+
+import { kml } from "@tmcw/togeojson";
+import type { LngLat, PolygonGeometry } from "../api/types";
+import { metresPerDegree } from "./geo";
+
+const MOST_CORNERS = 1000;
+const MOST_CELLS = 4_000_000;
+
+/** A polygon of a ring without its closing corner, digits beyond a tenth of a millimetre cut off. */
+export function polygonOf(ring: readonly LngLat[]): PolygonGeometry {
+  const round = (degrees: number) => Math.round(degrees * 1e9) / 1e9;
+  const corners = ring.map(([lng, lat]): LngLat => [round(lng), round(lat)]);
+  return { type: "Polygon", coordinates: [[...corners, corners[0] as LngLat]] };
+}
+
+export function ringOf(polygon: PolygonGeometry): LngLat[] {
+  return (polygon.coordinates[0] ?? []).slice(0, -1) as LngLat[];
+}
+
+/** What is wrong with an area; empty when it can be taken. */
+export function areaFault(ring: readonly LngLat[], cell_m: number): string {
+  if (ring.length < 3) return "An area needs at least three corners";
+  if (ring.length > MOST_CORNERS)
+    return `The area has ${ring.length} corners, at most ${MOST_CORNERS} are taken`;
+  if (ring.some(([lng, lat]) => !(Math.abs(lng) <= 180 && Math.abs(lat) <= 85))) {
+    return "A corner lies outside of ±180° and ±85°: are longitude and latitude in this order?";
+  }
+  const crossing = crossingOf(ring);
+  if (crossing) return `The outline crosses itself between corners ${crossing[0] + 1} and ${crossing[1] + 1}`;
+  const { east_m, north_m } = sizeOf(ring);
+  if (!(cell_m > 0)) return "";
+  if (Math.min(east_m, north_m) < 2 * cell_m) {
+    return `The area is ${east_m.toFixed(1)} x ${north_m.toFixed(1)} m, less than two cells of ${cell_m} m`;
+  }
+  const cells = Math.ceil(east_m / cell_m) * Math.ceil(north_m / cell_m);
+  if (cells > MOST_CELLS) {
+    return `The area has ${(cells / 1e6).toFixed(1)} million cells of ${cell_m} m, at most 4 are taken: larger cells?`;
+  }
+  return "";
+}
+
+/** Extent of the bounding box and enclosed area. */
+export function sizeOf(ring: readonly LngLat[]): { east_m: number; north_m: number; area_m2: number } {
+  const lats = ring.map((p) => p[1]);
+  const lngs = ring.map((p) => p[0]);
+  const scale = metresPerDegree((Math.min(...lats) + Math.max(...lats)) / 2);
+  let twice = 0;
+  ring.forEach(([lng, lat], i) => {
+    const [nextLng, nextLat] = ring[(i + 1) % ring.length] as LngLat;
+    twice += lng * nextLat - nextLng * lat;
+  });
+  return {
+    east_m: (Math.max(...lngs) - Math.min(...lngs)) * scale.east,
+    north_m: (Math.max(...lats) - Math.min(...lats)) * scale.north,
+    area_m2: (Math.abs(twice) / 2) * scale.east * scale.north,
+  };
+}
+
+/** The first two sides that cross or touch though they are no neighbours; null when the outline is simple. */
+function crossingOf(ring: readonly LngLat[]): [number, number] | null {
+  const n = ring.length;
+  const side = (i: number) => [ring[i] as LngLat, ring[(i + 1) % n] as LngLat] as const;
+  for (let i = 0; i < n; i++) {
+    for (let j = i + 2; j < n; j++) {
+      if (i === 0 && j === n - 1) continue;
+      const [a, b] = side(i);
+      const [c, d] = side(j);
+      if (turn(a, b, c) * turn(a, b, d) <= 0 && turn(c, d, a) * turn(c, d, b) <= 0) return [i, j];
+    }
+  }
+  return null;
+}
+
+const turn = (a: LngLat, b: LngLat, c: LngLat) =>
+  Math.sign((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]));
+
+export interface FoundAreas {
+  area: LngLat[];
+  keepOut: LngLat[][];
+  /** What was done with the file, in words. */
+  note: string;
+}
+
+/** The polygons of a GeoJSON or KML file: the largest is the area, those in it or called keep-out are zones. */
+export function areasIn(name: string, text: string): FoundAreas {
+  const json = /\.kml$/i.test(name) || text.trimStart().startsWith("<") ? fromKml(text) : parsed(text);
+  const polygons = polygonsOf(json);
+  const [first] = polygons;
+  if (!first) throw new Error(`${name} holds no polygon: an area is a polygon`);
+  const largest = polygons.reduce((a, b) => (sizeOf(b.ring).area_m2 > sizeOf(a.ring).area_m2 ? b : a), first);
+  const area =
+    polygons.find((p) => !p.keepOut && p === largest) ?? polygons.find((p) => !p.keepOut) ?? largest;
+  const keepOut = polygons.filter((p) => p !== area).map((p) => p.ring);
+  const zones = keepOut.length
+    ? `, ${keepOut.length} more as keep-out zone${keepOut.length > 1 ? "s" : ""}`
+    : "";
+  return { area: area.ring, keepOut, note: `${name}: area of ${area.ring.length} corners${zones}` };
+}
+
+function parsed(text: string): unknown {
+  try {
+    return JSON.parse(text);
+  } catch {
+    throw new Error("The file is neither GeoJSON nor KML");
+  }
+}
+
+function fromKml(text: string): unknown {
+  const document = new DOMParser().parseFromString(text, "text/xml");
+  if (document.querySelector("parsererror"))
+    throw new Error("The KML file cannot be read: its XML is broken");
+  return kml(document);
+}
+
+interface Found {
+  ring: LngLat[];
+  keepOut: boolean;
+}
+
+function polygonsOf(value: unknown, keepOut = false): Found[] {
+  if (typeof value !== "object" || value === null) return [];
+  const { type, features, geometries, geometry, coordinates, properties } = value as Record<string, unknown>;
+  switch (type) {
+    case "FeatureCollection":
+      return (features as unknown[]).flatMap((one) => polygonsOf(one));
+    case "GeometryCollection":
+      return (geometries as unknown[]).flatMap((one) => polygonsOf(one, keepOut));
+    case "Feature": {
+      const words = Object.values((properties as Record<string, unknown>) ?? {}).join(" ");
+      return polygonsOf(geometry, /keep[\s_-]?out|exclu|forbidden|no[\s_-]?go/i.test(words));
+    }
+    case "Polygon":
+      return (coordinates as unknown[][]).map((ring, i) => ({
+        ring: cleaned(ring),
+        keepOut: keepOut || i > 0,
+      }));
+    case "MultiPolygon":
+      return (coordinates as unknown[][][]).flatMap((one) =>
+        polygonsOf({ type: "Polygon", coordinates: one }, keepOut),
+      );
+    case "LineString": {
+      // A closed line is what many chart plotters write for an area.
+      const ring = coordinates as number[][];
+      const [a, b] = [ring[0], ring.at(-1)];
+      const closed = ring.length > 3 && a && b && a[0] === b[0] && a[1] === b[1];
+      return closed ? [{ ring: cleaned(ring), keepOut }] : [];
+    }
+    default:
+      return [];
+  }
+}
+
+function cleaned(ring: readonly unknown[]): LngLat[] {
+  const corners = ring.map((position) => {
+    const [lng, lat] = position as number[];
+    if (typeof lng !== "number" || typeof lat !== "number")
+      throw new Error("A corner of the file has no numbers");
+    return [lng, lat] as LngLat;
+  });
+  const [a, b] = [corners[0], corners.at(-1)];
+  return a && b && corners.length > 1 && a[0] === b[0] && a[1] === b[1] ? corners.slice(0, -1) : corners;
+}

@@ -1,0 +1,129 @@
+import { useSignal } from "@preact/signals";
+import type { LngLat } from "../api/types";
+import { areasIn, sizeOf } from "../map/area";
+import { centred, cornersOf } from "../state/draft";
+import { distance } from "../state/format";
+import { type Drawing, drawing, mapCentre } from "../state/store";
+import { Fault, Text, useForm } from "./Fields";
+
+/** Where to map: drawn on the map, typed as a rectangle, or read from a file; and where not to go. */
+export function AreaFields() {
+  const { draft, faults, set } = useForm();
+  const note = useSignal("");
+  const corners = cornersOf(draft);
+  const size = corners.length > 2 ? sizeOf(corners) : null;
+  const begin = (shape: Drawing["shape"], onDrawn: (ring: LngLat[]) => void) => {
+    drawing.value = { shape, onDrawn };
+  };
+  const take = (ring: LngLat[]) => {
+    note.value = "";
+    set({ source: "drawn", ring });
+  };
+  const read = async (file: File | undefined) => {
+    if (!file) return;
+    try {
+      const found = areasIn(file.name, await file.text());
+      set({ source: "drawn", ring: found.area, keepOut: [...draft.keepOut, ...found.keepOut] });
+      note.value = found.note;
+    } catch (error) {
+      note.value = error instanceof Error ? error.message : String(error);
+    }
+  };
+  return (
+    <fieldset>
+      <legend>Area</legend>
+      <div class="draw-buttons">
+        <button
+          type="button"
+          class="command"
+          data-testid="draw-polygon"
+          aria-pressed={drawing.value?.shape === "polygon"}
+          onClick={() => begin("polygon", take)}
+        >
+          Draw corners
+        </button>
+        <button
+          type="button"
+          class="command"
+          data-testid="draw-rectangle"
+          aria-pressed={drawing.value?.shape === "rectangle"}
+          onClick={() => begin("rectangle", take)}
+        >
+          Draw rectangle
+        </button>
+        <label class="command file">
+          From a file
+          <input
+            type="file"
+            accept=".geojson,.json,.kml"
+            data-testid="area-file"
+            onChange={(event) => {
+              void read(event.currentTarget.files?.[0]);
+              event.currentTarget.value = "";
+            }}
+          />
+        </label>
+      </div>
+      {drawing.value ? (
+        <p class="hint" role="status" data-testid="drawing">
+          {drawing.value.shape === "polygon"
+            ? "Click corner after corner on the map; click the first one again to close. Escape ends drawing."
+            : "Click one corner on the map, then the opposite one. Escape ends drawing."}
+        </p>
+      ) : null}
+      {note.value ? (
+        <p class="hint" role="status" data-testid="area-note">
+          {note.value}
+        </p>
+      ) : null}
+      {draft.source === "typed" ? (
+        <>
+          <div class="pair">
+            <Text field="latitude" label="South-west corner °N" numeric />
+            <Text field="longitude" label="South-west corner °E" numeric />
+            <Text field="east_m" label="To the east, m" numeric />
+            <Text field="north_m" label="To the north, m" numeric />
+          </div>
+          <button type="button" class="link-button" onClick={() => set(centred(draft, mapCentre.value))}>
+            Place it in the middle of the map
+          </button>
+        </>
+      ) : (
+        <button type="button" class="link-button" onClick={() => set({ source: "typed" })}>
+          Type a rectangle instead
+        </button>
+      )}
+      {size && !faults.ring ? (
+        <p class="hint" data-testid="area-size">
+          {distance(size.east_m)} x {distance(size.north_m)}, {(size.area_m2 / 1e4).toFixed(2)} ha
+          {draft.source === "drawn" ? `, ${corners.length} corners` : ""}
+        </p>
+      ) : null}
+      <Fault field="ring" />
+      <div class="zones">
+        <button
+          type="button"
+          class="link-button"
+          data-testid="draw-keep-out"
+          onClick={() => begin("polygon", (ring) => set({ keepOut: [...draft.keepOut, ring] }))}
+        >
+          + Keep-out zone
+        </button>
+        {draft.keepOut.map((zone, i) => (
+          <span key={zone.join()} class="zone">
+            Zone {i + 1}
+            <button
+              type="button"
+              class="tool small"
+              aria-label={`Remove keep-out zone ${i + 1}`}
+              onClick={() => set({ keepOut: draft.keepOut.filter((_, k) => k !== i) })}
+            >
+              ✕
+            </button>
+          </span>
+        ))}
+      </div>
+      <Fault field="keepOut" />
+    </fieldset>
+  );
+}

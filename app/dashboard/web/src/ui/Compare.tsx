@@ -1,0 +1,156 @@
+import { useSignal, useSignalEffect } from "@preact/signals";
+import { api } from "../api/client";
+import type { MissionView, StepView } from "../api/types";
+import { differenceOf, type SeaFloor, withTiles } from "../map/seafloor";
+import { count, distance, duration, metres, percent } from "../state/format";
+import { figuresOf } from "../state/history";
+import { fetchSteps, noteFault, said } from "../state/session";
+import { mission, missions, seaFloor, steps } from "../state/store";
+import { MISSION_WORDS } from "../state/words";
+import { Plot } from "./Plot";
+
+interface Other {
+  mission: MissionView;
+  steps: readonly StepView[];
+  map: SeaFloor | null;
+}
+
+/** This mission beside another one: figures, their course over the steps, and how the maps differ. */
+export function Compare() {
+  const chosen = useSignal("");
+  const other = useSignal<Other | null>(null);
+  const fault = useSignal("");
+  useSignalEffect(() => {
+    const id = chosen.value;
+    other.value = null;
+    if (!id) return;
+    fetchSteps().catch(noteFault);
+    fetchOther(id).then(
+      (found) => {
+        if (chosen.peek() === id) other.value = found;
+      },
+      (error) => {
+        fault.value = said(error);
+      },
+    );
+  });
+  const present = mission.value;
+  if (!present) return null;
+  const found = other.value;
+  return (
+    <div class="log compare" data-testid="compare">
+      <label class="field">
+        Compare with
+        <select
+          value={chosen.value}
+          data-testid="compare-with"
+          onChange={(event) => {
+            fault.value = "";
+            chosen.value = event.currentTarget.value;
+          }}
+        >
+          <option value="">Choose a mission</option>
+          {(missions.value ?? [])
+            .filter((m) => m.id !== present.id)
+            .map((m) => (
+              <option key={m.id} value={m.id}>
+                {m.name}, {MISSION_WORDS[m.state].toLowerCase()},{" "}
+                {m.created_at.slice(0, 16).replace("T", " ")}
+              </option>
+            ))}
+        </select>
+      </label>
+      {fault.value ? (
+        <p class="alarm" role="alert">
+          ✕ {fault.value}
+        </p>
+      ) : null}
+      {found ? <Both one={present} other={found} /> : null}
+    </div>
+  );
+}
+
+async function fetchOther(id: string): Promise<Other> {
+  const mission = await api.mission(id);
+  const steps: StepView[] = [];
+  for (;;) {
+    const more = await api.steps(id, steps.at(-1)?.number ?? 0);
+    steps.push(...more);
+    if (more.length < 1000) break;
+  }
+  const map = await api.mapTiles(id, "", [], null).then(
+    (answer) => withTiles(null, answer),
+    () => null,
+  );
+  return { mission, steps, map };
+}
+
+function Both({ one, other }: { one: MissionView; other: Other }) {
+  const two = other.mission;
+  const difference = seaFloor.value && other.map ? differenceOf(seaFloor.value, other.map) : null;
+  const rows: [string, (m: MissionView) => string][] = [
+    ["State", (m) => MISSION_WORDS[m.state]],
+    ["Planner", (m) => m.spec.planner.name],
+    ["Vehicles", (m) => String(m.vehicles.length)],
+    ["Steps", (m) => `${m.progress.step} of ${m.progress.steps}`],
+    ["Known to the asked accuracy", (m) => percent(m.progress.coverage_pct, 1)],
+    ["Remaining landmarks", (m) => percent(m.progress.remaining_pct, 1)],
+    ["Mean deviation", (m) => metres(m.progress.mean_sd_m, 3)],
+    ["Soundings", (m) => count(m.progress.soundings)],
+    ["Rejected", (m) => count(m.progress.rejected)],
+    ["Travelled", (m) => distance(m.progress.distance_m)],
+    ["Time", (m) => duration(m.progress.elapsed_s)],
+  ];
+  const a = figuresOf(steps.value);
+  const b = figuresOf(other.steps);
+  const xs = a.numbers.length >= b.numbers.length ? a.numbers : b.numbers;
+  return (
+    <>
+      <table data-testid="compare-table">
+        <thead>
+          <tr>
+            <th scope="col">Figure</th>
+            <th scope="col">{one.name}</th>
+            <th scope="col">{two.name}</th>
+          </tr>
+        </thead>
+        <tbody>
+          {rows.map(([label, of]) => (
+            <tr key={label}>
+              <th scope="row">{label}</th>
+              <td>{of(one)}</td>
+              <td>{of(two)}</td>
+            </tr>
+          ))}
+        </tbody>
+      </table>
+      <p data-testid="compare-maps">
+        {difference
+          ? `Where both know the bottom (${count(difference.cells)} cells) the maps differ by ${metres(difference.rmse_m, 3)} RMSE, ` +
+            `${metres(difference.bias_m, 3)} on average, at most ${metres(difference.largest_m, 2)}.`
+          : "The maps do not overlap, or one of them is not there yet."}
+      </p>
+      <div class="charts">
+        <Plot
+          title="Remaining landmarks"
+          xs={xs}
+          unit="%"
+          range={[0, 100]}
+          lines={[
+            { label: one.name, colour: "#2f7fc1", values: a.remaining },
+            { label: two.name, colour: "#c1592f", dash: [6, 4], values: b.remaining },
+          ]}
+        />
+        <Plot
+          title="Mean deviation of the map"
+          xs={xs}
+          unit="m"
+          lines={[
+            { label: one.name, colour: "#2f7fc1", values: a.deviation },
+            { label: two.name, colour: "#c1592f", dash: [6, 4], values: b.deviation },
+          ]}
+        />
+      </div>
+    </>
+  );
+}

@@ -1,0 +1,143 @@
+import type { ComponentChildren } from "preact";
+import { wayBetween } from "../map/geo";
+import { distance } from "../state/format";
+import { coordinateFormat, in3d, measured, mission, seaFloor, showRanges, showTracks } from "../state/store";
+
+/** Buttons on the map's edge: show the area, measure, what is drawn, look at it in space. */
+export function MapTools({ onFit }: { onFit: () => void }) {
+  const measuring = measured.value !== null;
+  return (
+    <>
+      <div class="map-tools" role="toolbar" aria-label="Map tools">
+        <Tool label="Show the whole area" onClick={onFit}>
+          <path d="M2,7 V2 H7 M13,2 H18 V7 M18,13 V18 H13 M7,18 H2 V13" />
+        </Tool>
+        <Tool
+          label={measuring ? "Stop measuring" : "Measure distances: click corner after corner"}
+          pressed={measuring}
+          id="measure"
+          onClick={() => {
+            measured.value = measuring ? null : [];
+          }}
+        >
+          <path d="M2,14 L14,2 L18,6 L6,18 Z M6,10 l2,2 M9,7 l2,2 M12,4 l2,2" />
+        </Tool>
+        <Tool
+          label={`Tracks: ${showTracks.value ? "shown" : "hidden"}`}
+          pressed={showTracks.value}
+          onClick={() => {
+            showTracks.value = !showTracks.value;
+          }}
+        >
+          <path d="M3,17 C3,9 10,13 10,8 S17,9 17,3" />
+        </Tool>
+        {mission.value?.spec.limits.com_range_m ? (
+          <Tool
+            label={`Communication range: ${showRanges.value ? "shown" : "hidden"}`}
+            pressed={showRanges.value}
+            onClick={() => {
+              showRanges.value = !showRanges.value;
+            }}
+          >
+            <path d="M10,10 h0.01 M6,14 a6,6 0 1 1 8,0 M3,17 a10,10 0 1 1 14,0" />
+          </Tool>
+        ) : null}
+        <Tool
+          label={`Positions in ${coordinateFormat.value === "decimal" ? "decimal degrees" : "degrees and minutes"}`}
+          pressed={coordinateFormat.value === "minutes"}
+          id="coordinates"
+          onClick={() => {
+            coordinateFormat.value = coordinateFormat.value === "decimal" ? "minutes" : "decimal";
+          }}
+        >
+          <circle cx="6" cy="5" r="2.5" />
+          <path d="M14,4 v5 M4,12 h12 M4,17 h12" />
+        </Tool>
+        <Tool
+          label="Look at the sea floor in space"
+          id="open-3d"
+          disabled={!seaFloor.value}
+          onClick={() => {
+            in3d.value = true;
+          }}
+        >
+          <path d="M2,13 L8,5 L12,10 L14,8 L18,13 M2,13 L10,18 L18,13" />
+        </Tool>
+      </div>
+      {measuring ? <Measured /> : null}
+    </>
+  );
+}
+
+function Measured() {
+  const points = measured.value ?? [];
+  const legs = points.slice(1).map((to, i) => wayBetween(points[i] as typeof to, to));
+  const last = legs.at(-1);
+  return (
+    <output class="measured" data-testid="measured">
+      {last ? (
+        <>
+          <span>
+            Last <b>{distance(last.metres, 1)}</b> at {last.bearing_deg.toFixed(0).padStart(3, "0")}°
+          </span>
+          <span>
+            Altogether{" "}
+            <b data-testid="measured-all">
+              {distance(
+                legs.reduce((sum, leg) => sum + leg.metres, 0),
+                1,
+              )}
+            </b>
+          </span>
+          <button
+            type="button"
+            class="link-button"
+            onClick={() => {
+              measured.value = [];
+            }}
+          >
+            Anew
+          </button>
+        </>
+      ) : (
+        <span>Click on the map, corner after corner.</span>
+      )}
+    </output>
+  );
+}
+
+interface ToolProps {
+  label: string;
+  pressed?: boolean;
+  disabled?: boolean;
+  id?: string;
+  onClick: () => void;
+  children: ComponentChildren;
+}
+
+function Tool({ label, pressed, disabled = false, id, onClick, children }: ToolProps) {
+  return (
+    <button
+      type="button"
+      class="tool"
+      title={label}
+      aria-label={label}
+      {...(pressed === undefined ? {} : { "aria-pressed": pressed })}
+      disabled={disabled}
+      data-testid={id}
+      onClick={onClick}
+    >
+      <svg viewBox="0 0 20 20" width="18" height="18" aria-hidden="true">
+        <g
+          fill="none"
+          stroke="currentColor"
+          stroke-width="1.8"
+          stroke-linecap="round"
+          stroke-linejoin="round"
+        >
+          {children}
+        </g>
+      </svg>
+    </button>
+  );
+}

@@ -1,0 +1,107 @@
+import { useSignal } from "@preact/signals";
+import { useEffect, useRef } from "preact/hooks";
+import { api } from "../api/client";
+import type { CheckStatus, PreflightView } from "../api/types";
+import { act, busyWith, refusal, said } from "../state/session";
+import { mission, preflightOpen, selectedId } from "../state/store";
+
+const SIGNS: Record<CheckStatus, string> = { ok: "✓", note: "•", warning: "▲", problem: "✕" };
+const TONES: Record<CheckStatus, string> = { ok: "good", note: "calm", warning: "warning", problem: "alarm" };
+const AGAIN_MS = 3000;
+
+/** The checklist before a start; starts the mission when nothing stands in its way. */
+export function PreflightDialog() {
+  const dialog = useRef<HTMLDialogElement>(null);
+  const found = useSignal<PreflightView | null>(null);
+  const fault = useSignal("");
+  const open = preflightOpen.value;
+
+  useEffect(() => {
+    if (!open) {
+      dialog.current?.close();
+      return;
+    }
+    dialog.current?.showModal();
+    let stopped = false;
+    const look = async () => {
+      const id = selectedId.peek();
+      if (!id) return;
+      try {
+        const answer = await api.preflight(id);
+        if (!stopped) {
+          found.value = answer;
+          fault.value = "";
+        }
+      } catch (error) {
+        fault.value = said(error);
+      }
+    };
+    void look();
+    const timer = setInterval(look, AGAIN_MS);
+    return () => {
+      stopped = true;
+      clearInterval(timer);
+      found.value = null;
+    };
+  }, [open]);
+
+  const close = () => {
+    preflightOpen.value = false;
+  };
+  const start = async () => {
+    if (await act("start")) close();
+  };
+  const view = found.value;
+  const problems = view?.checks.filter((c) => c.status === "problem").length ?? 0;
+  const refused = refusal.value?.what === "start" ? refusal.value.error : null;
+  return (
+    <dialog
+      ref={dialog}
+      class="dialog preflight"
+      aria-labelledby="preflight-title"
+      onClose={close}
+      data-testid="preflight"
+      data-ready={view?.ready ?? "unknown"}
+    >
+      <h2 id="preflight-title">Start {mission.value?.name ?? "the mission"}?</h2>
+      {fault.value || refused ? (
+        <p class="reason alarm" role="alert">
+          {refused ? `${refused.message}. ${refused.remedy}` : fault.value}
+        </p>
+      ) : null}
+      {view ? null : <p>Looking at the vehicles…</p>}
+      <ul class="checklist">
+        {view?.checks.map((check) => (
+          <li key={check.id} data-testid={`check-${check.id}`} data-status={check.status}>
+            <span class={`tone ${TONES[check.status]}`}>
+              <span aria-hidden="true">{SIGNS[check.status]}</span>
+              <span class="visually-hidden">{check.status}:</span>
+            </span>
+            <span>
+              <b>{check.title}</b> {check.message}
+              {check.remedy ? <span class={`remedy ${TONES[check.status]}`}> → {check.remedy}</span> : null}
+            </span>
+          </li>
+        ))}
+      </ul>
+      <div class="dialog-actions">
+        <button type="button" class="command" onClick={close} data-testid="preflight-close">
+          Not yet
+        </button>
+        <button
+          type="button"
+          class="command primary"
+          disabled={!view?.ready || busyWith.value !== null}
+          data-testid="confirm-start"
+          onClick={() => void start()}
+        >
+          {busyWith.value === "start"
+            ? "Starting…"
+            : problems > 0
+              ? `${problems} problem${problems > 1 ? "s" : ""} to solve first`
+              : "Start mission"}
+        </button>
+      </div>
+    </dialog>
+  );
+}

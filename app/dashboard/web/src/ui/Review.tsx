@@ -1,0 +1,166 @@
+import { useComputed, useSignal, useSignalEffect } from "@preact/signals";
+import { useEffect } from "preact/hooks";
+import { api } from "../api/client";
+import type { SoundingState, SoundingView } from "../api/types";
+import { metres } from "../state/format";
+import { said } from "../state/session";
+import { chosenSounding, reviewed, selectedId, view } from "../state/store";
+
+const WORDS: Record<SoundingState, string> = {
+  used: "used",
+  restored: "restored",
+  rejected: "kept out by the gate",
+  doubted: "left out by the map",
+  withdrawn: "kept out by an operator",
+};
+
+/** Soundings that are not in the map, with the reason; an operator may let them count, and take that back. */
+export function Review() {
+  const filter = useSignal<"" | SoundingState>("");
+  const total = useSignal(0);
+  const next = useSignal<number | null>(null);
+  const fault = useSignal("");
+  const busy = useSignal(0);
+  const note = useSignal("");
+
+  const load = async (after: number) => {
+    const id = selectedId.peek();
+    if (!id) return;
+    try {
+      const page = await api.soundings(id, after, filter.peek() || undefined);
+      if (selectedId.peek() !== id) return;
+      reviewed.value = after === 0 ? page.items : [...(reviewed.peek() ?? []), ...page.items];
+      total.value = page.total;
+      next.value = page.next_after;
+    } catch (error) {
+      fault.value = said(error);
+    }
+  };
+  // What the map leaves out changes with the map.
+  const version = useComputed(() => view.value.mapVersion);
+  useSignalEffect(() => {
+    filter.value;
+    version.value;
+    void load(0);
+  });
+  useEffect(
+    () => () => {
+      reviewed.value = null;
+      chosenSounding.value = null;
+    },
+    [],
+  );
+  const rule = async (sounding: SoundingView, ruling: "restore" | "reject") => {
+    const id = selectedId.value;
+    if (!id) return;
+    busy.value = sounding.id;
+    fault.value = "";
+    try {
+      const changed = await api.rule(id, sounding.id, ruling, note.value.trim());
+      reviewed.value = (reviewed.value ?? []).map((s) => (s.id === changed.id ? changed : s));
+      note.value = "";
+    } catch (error) {
+      fault.value = said(error);
+    } finally {
+      busy.value = 0;
+    }
+  };
+  const items = reviewed.value ?? [];
+  return (
+    <div class="log review" data-testid="review">
+      <div class="filters">
+        <select
+          aria-label="Which soundings"
+          value={filter.value}
+          data-testid="review-filter"
+          onChange={(event) => {
+            filter.value = event.currentTarget.value as typeof filter.value;
+          }}
+        >
+          <option value="">Everything that is not simply used</option>
+          {(["rejected", "doubted", "withdrawn", "restored", "used"] as const).map((state) => (
+            <option key={state} value={state}>
+              {WORDS[state]}
+            </option>
+          ))}
+        </select>
+        <input
+          type="text"
+          aria-label="Why: kept in the log"
+          placeholder="Why (kept in the log)"
+          maxLength={500}
+          value={note.value}
+          data-testid="review-note"
+          onInput={(event) => {
+            note.value = event.currentTarget.value;
+          }}
+        />
+        <span>
+          {total.value} sounding{total.value === 1 ? "" : "s"}
+        </span>
+      </div>
+      {fault.value ? (
+        <p class="alarm" role="alert" data-testid="review-fault">
+          ✕ {fault.value}
+        </p>
+      ) : null}
+      {items.length === 0 ? <p class="empty">Every sounding so far is in the map.</p> : null}
+      <ol aria-label="Soundings">
+        {items.map((s) => (
+          <Row key={s.id} sounding={s} busy={busy.value === s.id} onRule={rule} />
+        ))}
+      </ol>
+      {next.value !== null ? (
+        <button type="button" class="command" onClick={() => load(next.value ?? 0)}>
+          More
+        </button>
+      ) : null}
+    </div>
+  );
+}
+
+interface RowProps {
+  sounding: SoundingView;
+  busy: boolean;
+  onRule: (sounding: SoundingView, ruling: "restore" | "reject") => void;
+}
+
+function Row({ sounding: s, busy, onRule }: RowProps) {
+  const counts = s.state === "restored" || s.state === "used";
+  const chosen = chosenSounding.value === s.id;
+  return (
+    <li
+      class={chosen ? "chosen" : ""}
+      data-testid={`sounding-${s.id}`}
+      data-state={s.state}
+      ref={(element) => {
+        if (chosen) element?.scrollIntoView({ block: "nearest" });
+      }}
+    >
+      <button
+        type="button"
+        class="link-button"
+        title="Show it on the map"
+        onClick={() => {
+          chosenSounding.value = s.id;
+        }}
+      >
+        {s.vehicle} #{s.id}
+      </button>
+      <b>{metres(s.depth_m ?? s.raw_depth_m, 2)}</b>
+      <span class="message">
+        {WORDS[s.state]}
+        {s.reason ? <small>: {s.reason}</small> : null}
+      </span>
+      <button
+        type="button"
+        class="command"
+        disabled={busy}
+        data-testid={`rule-${s.id}`}
+        onClick={() => onRule(s, counts ? "reject" : "restore")}
+      >
+        {busy ? "…" : counts ? "Reject" : "Restore"}
+      </button>
+    </li>
+  );
+}

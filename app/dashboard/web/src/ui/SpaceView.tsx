@@ -1,0 +1,124 @@
+import { effect, useSignal } from "@preact/signals";
+import { useEffect, useRef } from "preact/hooks";
+import { fittingRange } from "../map/layers";
+import { DEPTH_PALETTES } from "../map/palette";
+import type { SceneVehicle } from "../map/scene";
+import { replayed } from "../state/replay";
+import { depthPalette, fixedRanges, in3d, isDark, seaFloor, theme, vehicles, view } from "../state/store";
+
+/** The sea floor in space over the whole map. */
+export function SpaceView() {
+  const canvas = useRef<HTMLCanvasElement>(null);
+  const exaggeration = useSignal(4);
+  const fault = useSignal("");
+  const reset = useRef(() => {});
+
+  useEffect(() => {
+    const element = canvas.current;
+    if (!element) return;
+    let stop = () => {};
+    let closed = false;
+    import("../map/scene").then(
+      ({ SeaFloorScene }) => {
+        if (closed) return;
+        const scene = new SeaFloorScene(element);
+        reset.current = () => scene.lookFromSouth();
+        const watcher = new ResizeObserver(() => scene.resize(element.clientWidth, element.clientHeight));
+        watcher.observe(element);
+        const stops = [
+          effect(() => {
+            const contrast = theme.value === "contrast";
+            scene.setBackground(contrast ? "#ffffff" : isDark.value ? "#0c1922" : "#dfe9f0");
+          }),
+          effect(() => scene.setExaggeration(exaggeration.value)),
+          effect(() => {
+            const map = seaFloor.value;
+            const range = map && (fixedRanges.value.depth ?? fittingRange(map, "depth"));
+            if (map && range) {
+              scene.setSeaFloor(map, DEPTH_PALETTES[depthPalette.value].palette, range.low, range.high);
+            }
+          }),
+          effect(() => scene.setVehicles(seaFloor.value ? fleetInSpace() : [])),
+        ];
+        stop = () => {
+          for (const one of stops) one();
+          watcher.disconnect();
+          scene.close();
+        };
+      },
+      (error: unknown) => {
+        fault.value = String(error);
+      },
+    );
+    return () => {
+      closed = true;
+      stop();
+    };
+  }, []);
+
+  return (
+    <section class="space" aria-label="Sea floor in space" data-testid="space">
+      <canvas ref={canvas} tabIndex={0} aria-label="Sea floor; drag to turn it, arrow keys move it" />
+      <div class="space-tools">
+        <label class="field">
+          Heights x {exaggeration.value}
+          <input
+            type="range"
+            min={1}
+            max={20}
+            value={exaggeration.value}
+            data-testid="exaggeration"
+            onInput={(event) => {
+              exaggeration.value = Number(event.currentTarget.value);
+            }}
+          />
+        </label>
+        <button type="button" class="command" onClick={() => reset.current()}>
+          From the south
+        </button>
+        <button
+          type="button"
+          class="command primary"
+          data-testid="close-3d"
+          onClick={() => {
+            in3d.value = false;
+          }}
+        >
+          Back to the map
+        </button>
+      </div>
+      {fault.value ? (
+        <p class="notice alarm" role="alert">
+          It cannot be shown in space: {fault.value}
+        </p>
+      ) : null}
+    </section>
+  );
+}
+
+function fleetInSpace(): SceneVehicle[] {
+  const past = replayed.value;
+  if (past) {
+    return past.map((p) => ({
+      name: p.vehicle,
+      colour: p.colour,
+      place: p.place,
+      depth_m: p.depth_m,
+      heading_deg: null,
+      way: p.track,
+      depths_m: p.depths_m,
+    }));
+  }
+  return vehicles.value.map(({ view: v, colour }) => {
+    const track = view.value.tracks[v.name];
+    return {
+      name: v.name,
+      colour,
+      place: v.lon_deg === null || v.lat_deg === null ? null : [v.lon_deg, v.lat_deg],
+      depth_m: v.depth_m,
+      heading_deg: v.heading_deg,
+      way: track ? [...track.old, ...track.tail] : [],
+      depths_m: [],
+    };
+  });
+}

@@ -1,0 +1,80 @@
+import { clock } from "../state/format";
+import { pace, playing, replay, showPresent } from "../state/replay";
+import { mission, replayStep, steps } from "../state/store";
+import { hasEnded } from "../state/words";
+
+/** How far the mission has come, and back to any step of it. */
+export function TimeSlider() {
+  const present = mission.value;
+  if (!present) return null;
+  const { step: last, steps: planned } = present.progress;
+  const shown = replayStep.value;
+  const past = steps.value.find((s) => s.number === shown);
+  const over = hasEnded(present.state);
+  return (
+    <div class={`timeline${shown === null ? "" : " past"}`}>
+      <span class="steps">
+        Step <b data-testid="step">{shown ?? last}</b> of {shown === null ? planned : last}
+      </span>
+      <button
+        type="button"
+        class="tool"
+        data-testid="play"
+        aria-label={playing.value ? "Stop the replay" : "Replay the mission"}
+        title={playing.value ? "Stop the replay" : "Replay the mission"}
+        disabled={last === 0}
+        onClick={async () => {
+          if (playing.value) {
+            playing.value = false;
+            return;
+          }
+          if (shown === null || shown >= last) await replay(1);
+          playing.value = true;
+        }}
+      >
+        {playing.value ? "❚❚" : "▶"}
+      </button>
+      <input
+        type="range"
+        min={last > 0 ? 1 : 0}
+        max={Math.max(1, last)}
+        value={shown ?? last}
+        disabled={last === 0}
+        aria-label="Step that is shown"
+        aria-valuetext={shown === null ? "the present" : `step ${shown} of ${last}`}
+        data-testid="slider"
+        onInput={(event) => {
+          playing.value = false;
+          void replay(Number(event.currentTarget.value));
+        }}
+      />
+      {shown === null ? (
+        <span class="when">{over ? "as it ended" : "live"}</span>
+      ) : (
+        <>
+          <span class="when" data-testid="replayed-at" role="status">
+            Replay{past ? `, ${clock(new Date(past.committed_at), "utc")} UTC` : ""}
+          </span>
+          <label class="pace">
+            <span class="visually-hidden">Pace of the replay</span>
+            <select
+              value={pace.value}
+              onChange={(event) => {
+                pace.value = Number(event.currentTarget.value);
+              }}
+            >
+              {[1, 4, 10, 25].map((n) => (
+                <option key={n} value={n}>
+                  {n} steps/s
+                </option>
+              ))}
+            </select>
+          </label>
+          <button type="button" class="command primary" data-testid="to-present" onClick={showPresent}>
+            {over ? "To the end" : "Live"}
+          </button>
+        </>
+      )}
+    </div>
+  );
+}

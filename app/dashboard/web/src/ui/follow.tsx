@@ -1,0 +1,250 @@
+/** Keeps the map in step with the page's state. */
+
+import { effect } from "@preact/signals";
+import { render } from "preact";
+import type { LngLat, WaypointView } from "../api/types";
+import type { Chart, Padding, Pin, Route, Track } from "../map/chart";
+import { contourInterval } from "../map/contours";
+import { KINDS, paletteOf } from "../map/layers";
+import { Painter } from "../map/painter";
+import { lookupTable } from "../map/palette";
+import type { SeaFloor } from "../map/seafloor";
+import type { Look } from "../map/style";
+import { replayed } from "../state/replay";
+import {
+  chosenSounding,
+  colourOf,
+  depthPalette,
+  draftShapes,
+  drawing,
+  isDark,
+  layer,
+  measured,
+  mission,
+  replayStep,
+  reviewed,
+  seaFloor,
+  showContours,
+  showHatching,
+  shownRange,
+  showRanges,
+  showTracks,
+  theme,
+  vehicles,
+  view,
+} from "../state/store";
+import { tilesAddress } from "../state/tiles";
+import { VehicleMark, WaypointMark } from "./marks";
+
+const look = (): Look => (theme.value === "contrast" ? "contrast" : isDark.value ? "dark" : "light");
+
+/** Returns what ends it. */
+export function follow(chart: Chart): () => void {
+  let shownMission = "";
+  const stops = [
+    effect(() => chart.setLook(look())),
+    effect(() => chart.setTiles(tilesAddress.value)),
+    effect(() => {
+      const present = mission.value;
+      if ((present?.id ?? "") === shownMission) return;
+      shownMission = present?.id ?? "";
+      chart.setMission(present?.spec.area ?? null, present?.spec.keep_out ?? []);
+      // What lies over the map is laid out first.
+      requestAnimationFrame(() => chart.fit(overlaid));
+    }),
+    effect(() => chart.setDraft(draftShapes.value?.area ?? null, draftShapes.value?.keepOut ?? [])),
+    followDrawing(chart),
+    followSeaFloor(chart),
+    followTracks(chart),
+    effect(() => {
+      chart.setRoutes(replayStep.value === null ? routes() : []);
+      chart.setPins(replayStep.value === null ? pins() : pastPins());
+    }),
+    effect(() => {
+      const range = mission.value?.spec.limits.com_range_m;
+      chart.setRanges(
+        showRanges.value && range ? places().map(({ at, colour }) => ({ at, colour, radius_m: range })) : [],
+      );
+    }),
+    effect(() =>
+      chart.setSpots(
+        (reviewed.value ?? []).map((s) => ({
+          id: s.id,
+          at: [s.lon_deg, s.lat_deg],
+          state: s.state,
+          chosen: s.id === chosenSounding.value,
+        })),
+      ),
+    ),
+    effect(() => chart.setMeasure(measured.value ?? [])),
+  ];
+  return () => {
+    for (const stop of stops) stop();
+  };
+}
+
+function followDrawing(chart: Chart): () => void {
+  return effect(() => {
+    const wanted = drawing.value;
+    if (!wanted) return;
+    let ended = false;
+    let end = () => {};
+    void import("../map/draw").then(async ({ draw }) => {
+      if (ended) return;
+      end = await draw(
+        chart,
+        wanted.shape,
+        () => {},
+        (ring) => {
+          wanted.onDrawn(ring);
+          if (drawing.peek() === wanted) drawing.value = null;
+        },
+      );
+      if (ended) end();
+    });
+    return () => {
+      ended = true;
+      end();
+    };
+  });
+}
+
+function followSeaFloor(chart: Chart): () => void {
+  let map: SeaFloor | null = null;
+  let scale = 1;
+  let interval = 1;
+  const painter = new Painter((picture) => {
+    if (map) chart.setSeaFloor(map.corners, map.rows, map.cols, picture, scale, interval);
+  });
+  const stop = effect(() => {
+    map = seaFloor.value;
+    const range = shownRange.value;
+    const { source } = KINDS[layer.value];
+    const values = map?.layers[source];
+    const { flags, depth } = map?.layers ?? {};
+    const hatched = showHatching.value;
+    const table =
+      layer.value === "landmarks" ? null : lookupTable(paletteOf(layer.value, depthPalette.value));
+    const wanted = showContours.value;
+    if (!map || !range || !values || !flags || !depth) {
+      painter.forget();
+      chart.setSeaFloor([], 0, 0, null, 1, 1);
+      return;
+    }
+    scale = map.scales.depth ?? 1;
+    interval = Math.round(contourInterval(map.min_depth_m ?? 0, map.max_depth_m ?? 1) * scale) || 1;
+    const layerScale = map.scales[source] ?? 1;
+    painter.paint({
+      painting: {
+        rows: map.rows,
+        cols: map.cols,
+        values,
+        flags,
+        low: range.low * layerScale,
+        high: range.high * layerScale,
+        table,
+        hatched,
+      },
+      contours: wanted ? { depths: depth, interval } : null,
+    });
+  });
+  return () => {
+    stop();
+    painter.close();
+  };
+}
+
+function followTracks(chart: Chart): () => void {
+  let shown: readonly (readonly LngLat[])[] = [];
+  return effect(() => {
+    const past = replayed.value;
+    const present = Object.entries(view.value.tracks);
+    const colour = (name: string) => colourOf.value.get(name) ?? "#888888";
+    const old: Track[] = !showTracks.value
+      ? []
+      : past
+        ? past.map((p) => ({ points: p.track, colour: p.colour }))
+        : present.map(([name, track]) => ({ points: track.old, colour: colour(name) }));
+    // The long part seldom changes; to hand it over at every message would keep the map's worker busy with nothing.
+    if (old.length !== shown.length || old.some((track, i) => track.points !== shown[i])) {
+      shown = old.map((track) => track.points);
+      chart.setTracks(old);
+    }
+    const tails = past || !showTracks.value ? [] : present;
+    chart.setTails(tails.map(([name, track]) => ({ points: track.tail, colour: colour(name) })));
+  });
+}
+
+function places(): { at: LngLat; colour: string }[] {
+  const past = replayed.value;
+  if (past) return past.map(({ place, colour }) => ({ at: place, colour }));
+  return vehicles.value.flatMap(({ view: { lon_deg, lat_deg }, colour }) =>
+    lon_deg === null || lat_deg === null ? [] : [{ at: [lon_deg, lat_deg] as LngLat, colour }],
+  );
+}
+
+function routes(): Route[] {
+  return vehicles.value.flatMap(({ view: { lon_deg, lat_deg }, waypoint, colour }) => {
+    if (!waypoint || lon_deg === null || lat_deg === null) return [];
+    if (waypoint.status !== "sent" && waypoint.status !== "acknowledged") return [];
+    return [
+      {
+        points: [
+          [lon_deg, lat_deg],
+          [waypoint.lon_deg, waypoint.lat_deg],
+        ] as const,
+        colour,
+        acknowledged: waypoint.status === "acknowledged",
+        arrivalRadius_m: waypoint.arrival_radius_m,
+      },
+    ];
+  });
+}
+
+function waypointPin(waypoint: WaypointView, colour: string): Pin {
+  return {
+    key: `waypoint ${waypoint.vehicle}`,
+    at: [waypoint.lon_deg, waypoint.lat_deg],
+    layerIndex: 1,
+    draw: (element) => render(<WaypointMark waypoint={waypoint} colour={colour} />, element),
+  };
+}
+
+function pins(): Pin[] {
+  return vehicles.value.flatMap((vehicle) => {
+    const { view: v, waypoint, colour } = vehicle;
+    const made: Pin[] = waypoint ? [waypointPin(waypoint, colour)] : [];
+    if (v.lon_deg !== null && v.lat_deg !== null) {
+      made.push({
+        key: `vehicle ${v.name}`,
+        at: [v.lon_deg, v.lat_deg],
+        layerIndex: 2,
+        draw: (element) => render(<VehicleMark vehicle={vehicle} />, element),
+      });
+    }
+    return made;
+  });
+}
+
+function pastPins(): Pin[] {
+  return (replayed.value ?? []).flatMap(({ vehicle, place, colour, waypoint, track }) => {
+    const before = track.at(-2);
+    const mark = <VehicleMark past={{ name: vehicle, colour, from: before ?? null, at: place }} />;
+    return [
+      ...(waypoint ? [waypointPin(waypoint, colour)] : []),
+      {
+        key: `vehicle ${vehicle}`,
+        at: place,
+        layerIndex: 2,
+        draw: (element: HTMLElement) => render(mark, element),
+      },
+    ];
+  });
+}
+
+/** How far panels reach over the map, as the style sheet says for this width of window. */
+export function overlaid(): Padding {
+  const styles = getComputedStyle(document.querySelector(".app") ?? document.body);
+  const pixels = (side: string) => (Number.parseFloat(styles.getPropertyValue(`--over-${side}`)) || 0) + 30;
+  return { top: pixels("top"), right: pixels("right"), bottom: pixels("bottom"), left: pixels("left") };
+}

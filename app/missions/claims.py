@@ -1,0 +1,98 @@
+"""Which mission has which vehicle: every vehicle belongs to one at most."""
+
+from collections.abc import Callable, Sequence
+
+from app.missions.errors import ConflictError
+from app.missions.fleet import LinkState
+from app.missions.hub import FleetHub
+from app.missions.links.sim import Launch, SimFleetLink
+from app.missions.live import LiveMission
+from app.missions.spec import VehicleKind, VehicleSpec
+
+Lead = Callable[[str, str, str | None], None]
+"""How a vehicle is led from now on: its name, the guidance, the gateway."""
+
+ShowArea = Callable[[str, Sequence[tuple[float, float]]], None]
+"""What other consoles are shown of a mission: its name and its area's ring; an empty ring takes it away."""
+
+
+class Claims:
+    """Takes vehicles for missions and gives them up."""
+
+    def __init__(self, hub: FleetHub, sim: SimFleetLink, lead: Lead, show_area: ShowArea) -> None:
+        self._hub = hub
+        self._sim = sim
+        self._lead = lead
+        self._show_area = show_area
+
+    def check_team(self, live: LiveMission) -> None:
+        """Refuse a mission without vehicles, or with one that another mission has. Raises ConflictError."""
+        if not list(live.team):
+            raise ConflictError("the mission has no vehicle", "add one: POST /api/v1/missions/{id}/vehicles")
+        for member in live.team:
+            owner = self._hub.claimed_by(member.key)
+            if owner not in (None, live.id):
+                raise ConflictError(
+                    f"vehicle {member.name!r} takes part in mission {owner}",
+                    "finish or abort that mission, or take the vehicle out of one of them",
+                )
+
+    def check_links(self, live: LiveMission) -> None:
+        """Refuse to start while a vehicle that is commanded over IMC is not ready. Raises ConflictError."""
+        infos = [self._hub.info(member.key) for member in live.team if member.spec.kind is VehicleKind.IMC]
+        missing = [info for info in infos if info.state not in (LinkState.READY, LinkState.ENGAGED)]
+        if missing:
+            reasons = "; ".join(f"{info.name} is {info.state}: {info.reason or 'no reason known'}" for info in missing)
+            raise ConflictError(
+                f"not every vehicle is ready: {reasons}",
+                "wait for it, take it out of the mission, or see what 'bathyfleet doctor' finds",
+            )
+
+    def claim_team(self, live: LiveMission) -> None:
+        """Claim every vehicle, or none when one cannot be had. Raises ConflictError."""
+        before = {member.key for member in live.team if self._hub.claimed_by(member.key) == live.id}
+        try:
+            for member in live.team:
+                self.claim(live, member.spec)
+        except ConflictError:
+            for member in live.team:
+                if member.key not in before:
+                    self._hub.release(member.key, live.id)
+            raise
+
+    def claim(self, live: LiveMission, vehicle: VehicleSpec) -> None:
+        """Take one vehicle; a simulated one is launched. Raises ConflictError."""
+        key = (vehicle.kind, vehicle.name)
+        self._hub.claim(key, live.id, live.receive)
+        if vehicle.kind is VehicleKind.IMC:
+            self._lead(vehicle.name, vehicle.guidance, vehicle.gateway)
+            self._show_area(live.spec.name, live.spec.area.ring)
+        if vehicle.kind is VehicleKind.SIM:
+            try:
+                self._launch(live, vehicle)
+            except ConflictError:
+                self._hub.release(key, live.id)
+                raise
+
+    def _launch(self, live: LiveMission, vehicle: VehicleSpec) -> None:
+        size = live.area.max(axis=0)
+        start = (vehicle.start[1], vehicle.start[0]) if vehicle.start is not None else None
+        launch = Launch(
+            vehicle=vehicle.name,
+            sensor=vehicle.sensor,
+            south_west=(live.frame.origin_lat_deg, live.frame.origin_lon_deg),
+            width_m=float(size[0]),
+            height_m=float(size[1]),
+            start=start,
+            noise=live.spec.sounding_noise,
+        )
+        try:
+            self._sim.launch(launch)
+        except ValueError as error:
+            raise ConflictError(f"vehicle {vehicle.name!r} cannot be launched: {error}", "change its start") from error
+
+    def release_team(self, live: LiveMission) -> None:
+        """Give every vehicle of a mission up."""
+        self._show_area(live.spec.name, ())
+        for member in live.team:
+            self._hub.release(member.key, live.id)

@@ -1,0 +1,149 @@
+"""Missions as they run: their step loops are begun, watched over and ended, their vehicles stopped."""
+
+import asyncio
+from collections.abc import Awaitable, Callable, Sequence
+from concurrent.futures import Executor
+
+import structlog
+
+from app.missions.claims import Claims
+from app.missions.clock import now
+from app.missions.fleet import LinkState, StopReceipt
+from app.missions.hub import FleetHub
+from app.missions.live import LiveMission
+from app.missions.runner import Runner
+from app.missions.states import MissionState
+from app.missions.views import Level
+from app.storage import missions as mission_queries
+from app.storage.database import Database
+from app.storage.shielding import to_the_end
+
+log = structlog.get_logger(__name__)
+
+
+class Conductor:
+    """Runs missions and ends them.
+
+    Attributes
+    ----------
+    runs
+        The step loops that go on, by their missions' ids.
+    warm
+        Done when what planning needs has been compiled.
+    """
+
+    def __init__(
+        self, database: Database, hub: FleetHub, claims: Claims, executor: Executor, time_scale: float
+    ) -> None:
+        self._database = database
+        self._hub = hub
+        self._claims = claims
+        self._executor = executor
+        self._time_scale = time_scale
+        self.runs: dict[str, asyncio.Task[None]] = {}
+        self._acting: dict[str, asyncio.Lock] = {}
+        self.warm: asyncio.Future[None] | None = None
+
+    def acting(self, mission_id: str) -> asyncio.Lock:
+        """Return the lock under which a mission's state changes."""
+        return self._acting.setdefault(mission_id, asyncio.Lock())
+
+    def run(self, live: LiveMission) -> None:
+        """Begin the step loop."""
+        live.header.state = MissionState.RUNNING
+        live.halted = False
+        for member in live.team:
+            member.engaged = False
+            member.refusal = ""
+        runner = Runner(live, self._database, self._hub, self._executor, self._time_scale)
+        self.runs[live.id] = asyncio.create_task(self._supervise(live, runner.run), name=f"mission {live.id}")
+
+    async def _supervise(self, live: LiveMission, run: Callable[[], Awaitable[None]]) -> None:
+        """Run a mission to its end; whatever happens, its vehicles are stopped."""
+        try:
+            if self.warm is not None:
+                # Compiling what planning needs takes seconds on a new machine; vehicles must not wait for it.
+                await asyncio.wait([self.warm])
+            await run()
+        except asyncio.CancelledError:
+            raise
+        except Exception as error:
+            log.exception("the step loop failed", mission=live.id)
+            target, level, reason = MissionState.FAILED, Level.ALARM, f"the step loop failed: {error}"
+        else:
+            target, level, reason = MissionState.FINISHED, Level.INFO, "every step is done"
+        async with self.acting(live.id):
+            try:
+                await to_the_end(self._conclude(live, target, reason, level))
+            finally:
+                self.runs.pop(live.id, None)
+
+    async def _conclude(self, live: LiveMission, target: MissionState, reason: str, level: Level) -> None:
+        """Bring a mission whose step loop ended to its end."""
+        live.halt()
+        stops = await self.stop_team(live)
+        try:
+            # What was measured until the vehicles stopped belongs to the result.
+            await live.journal.flush()
+            await live.build_map()
+        except Exception:
+            # The journal goes on trying by itself, and the map is made anew when it is asked for.
+            log.exception("the last soundings are not in the map yet", mission=live.id)
+        await self.set_state(live, target, reason, "service", level)
+        await self.log_stops(live, stops)
+        self._claims.release_team(live)
+
+    async def halt(self, live: LiveMission) -> list[StopReceipt]:
+        """End the step loop and stop the vehicles, at once and not only when the loop has ended."""
+        live.halt()
+        task = self.runs.pop(live.id, None)
+        if task is not None:
+            task.cancel()
+        stops = await self.stop_team(live)
+        if task is not None:
+            await asyncio.gather(task, return_exceptions=True)
+            # A vehicle that was just being engaged when the loop was cancelled follows now.
+            again = {stop.vehicle: stop for stop in await self.stop_team(live, only_engaged=True)}
+            stops = [again.get(stop.vehicle, stop) for stop in stops]
+        await live.journal.flush()
+        return stops
+
+    async def stop_team(self, live: LiveMission, *, only_engaged: bool = False) -> list[StopReceipt]:
+        """Stop the mission's vehicles, or those of them that follow; returns what each answered."""
+        mine = [
+            member
+            for member in live.team
+            if self._hub.claimed_by(member.key) == live.id
+            and (not only_engaged or self._hub.info(member.key).state is LinkState.ENGAGED)
+        ]
+        for member in mine:
+            member.engaged = False
+        live.changed.set()
+        return list(await asyncio.gather(*(self._hub.stop(member.key) for member in mine)))
+
+    async def log_stops(self, live: LiveMission, stops: Sequence[StopReceipt]) -> None:
+        """Write down what vehicles answered to a stop; a missing answer is an alarm."""
+        for stop in stops:
+            level = Level.INFO if stop.acknowledged else Level.ALARM
+            words = "acknowledged the stop" if stop.acknowledged else "has NOT acknowledged the stop"
+            await live.journal.log(level, "stop", f"{stop.vehicle} {words}: {stop.detail}", **receipt(stop))
+
+    async def set_state(
+        self, live: LiveMission, state: MissionState, reason: str, actor: str, level: Level = Level.INFO
+    ) -> None:
+        """Commit a mission's new state, then tell everyone."""
+        changed_at = now()
+        async with self._database.writing() as session:
+            await mission_queries.set_state(session, live.id, state, reason, changed_at)
+        live.header.state = state
+        live.header.reason = reason
+        live.header.updated_at = changed_at
+        live.changed.set()
+        live.publish_summary()
+        words = f"{state} by {actor}" + (f": {reason}" if reason else "")
+        await live.journal.log(level, "state", words, state=state, actor=actor)
+
+
+def receipt(stop: StopReceipt) -> dict[str, str | bool]:
+    """Return a vehicle's answer to a stop as it is written down and shown."""
+    return {"vehicle": stop.vehicle, "acknowledged": stop.acknowledged, "detail": stop.detail}

@@ -1,0 +1,53 @@
+"""What a mission did, step by step, for replay and charts."""
+
+from app.missions.errors import MapNotReadyError
+from app.missions.live import LiveMission
+from app.missions.map_builder import BuiltMap
+from app.missions.maps import MapSnapshot
+from app.missions.views import StepView, WaypointView
+from app.storage import missions as mission_queries
+from app.storage import soundings as sounding_queries
+from app.storage.database import Database
+
+
+async def steps_after(live: LiveMission, database: Database, after: int, limit: int) -> list[StepView]:
+    """Return up to ``limit`` steps with a number above ``after``, each with its waypoints as they ended."""
+    async with database.reading() as session:
+        steps = await mission_queries.steps_after(session, live.id, after, limit)
+        if not steps:
+            return []
+        rows = await mission_queries.waypoints_between(session, live.id, steps[0].number, steps[-1].number)
+    waypoints: dict[int, list[WaypointView]] = {}
+    for row in rows:
+        waypoints.setdefault(row.step, []).append(live.waypoint_view(row))
+    return [
+        StepView(
+            number=step.number,
+            committed_at=step.committed_at,
+            objective=step.objective,
+            terms=step.terms,
+            figures=step.figures or {},
+            soundings=step.soundings,
+            waypoints=waypoints.get(step.number, []),
+        )
+        for step in steps
+    ]
+
+
+async def map_at_step(live: LiveMission, database: Database, step: int) -> MapSnapshot:
+    """Return the map that the soundings until the end of a step make. Raises MapNotReadyError without any."""
+    if live.builder.newest is None or live.builder.stale:
+        await live.build_map()
+    async with database.reading() as session:
+        accepted = await sounding_queries.accepted_arrays(session, live.id, until_step=step)
+    newest = live.builder.newest
+    if newest is None:
+        raise MapNotReadyError("no sounding was accepted, so there is no map", "choose a later step")
+    try:
+        bathymetry = await live.in_thread(live.builder.as_of, accepted.table)
+    except ValueError:
+        raise MapNotReadyError(
+            f"no sounding was accepted until the end of step {step}", "choose a later step"
+        ) from None
+    built = BuiltMap(newest.version, len(accepted.table), bathymetry, newest.digest)
+    return MapSnapshot(live.facts, built, step, live.reference_m, live.revision)

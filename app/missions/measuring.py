@@ -1,0 +1,183 @@
+"""Measurements that vehicles post: judged one by one, stored together, each batch once."""
+
+import hashlib
+import math
+from collections.abc import Mapping, Sequence
+
+import orjson
+
+from app.mapping.georeference import LocalFrame
+from app.missions.clock import now
+from app.missions.errors import ConflictError, InvalidRequestError
+from app.missions.fleet import BeamGeometry, Position, SoundingReport, VehicleReport
+from app.missions.hub import FleetHub
+from app.missions.links.rest import RestFleetLink
+from app.missions.live import LiveMission
+from app.missions.spec import VehicleKind
+from app.missions.states import MissionState
+from app.missions.views import BatchVerdict, ItemVerdict, Measurement, Verdict
+from app.storage import soundings as sounding_queries
+from app.storage.database import Database
+from app.storage.models import BatchRow
+from imc_bridge.soundings import Beam, StateSample, footprint
+
+MAX_BATCH = 10_000
+
+
+async def measure(
+    live: LiveMission,
+    database: Database,
+    hub: FleetHub,
+    rest: RestFleetLink,
+    items: Sequence[Measurement],
+    *,
+    idempotency_key: str | None = None,
+) -> BatchVerdict:
+    """Take in measurements; what is counted accepted is stored for good when this returns.
+
+    Raises
+    ------
+    ConflictError
+        When the mission is a draft, or the idempotency key came before with other content.
+    """
+    if live.header.state is MissionState.DRAFT:
+        raise ConflictError("the mission is a draft and takes no measurements yet", "add a vehicle to it first")
+    if len(items) > MAX_BATCH:
+        raise InvalidRequestError("items", f"{len(items)} items are too many", f"send at most {MAX_BATCH} at once")
+    digest = hashlib.sha256(orjson.dumps([item.model_dump() for item in items])).hexdigest()
+    strangers = {i: _stranger(live, item) for i, item in enumerate(items)}
+    reports = {i: report for i, item in enumerate(items) if not strangers[i] and (report := _sounding(item))}
+    async with live.journal.writing, database.writing() as session:
+        if idempotency_key is not None:
+            known = await sounding_queries.answer_to(session, live.id, idempotency_key)
+            if known is not None:
+                if known.digest != digest:
+                    raise ConflictError(
+                        f"idempotency key {idempotency_key!r} was used before with other measurements",
+                        "use a new key for every new batch",
+                    )
+                # The first answer may have got lost together with the process that knew where the vehicle is.
+                _hear(hub, rest, [item for i, item in enumerate(items) if not strangers[i]], only_unknown=True)
+                return BatchVerdict.model_validate(known.answer | {"replayed": True})
+        verdicts, committed = await live.journal.take(list(reports.values()), session)
+        answer = _batch_verdict(len(items), dict(zip(reports, verdicts, strict=True)), strangers)
+        if idempotency_key is not None:
+            session.add(
+                BatchRow(
+                    mission_id=live.id,
+                    key=idempotency_key,
+                    digest=digest,
+                    answer=answer.model_dump(mode="json"),
+                    created_at=now(),
+                )
+            )
+    committed()
+    _hear(hub, rest, [item for i, item in enumerate(items) if not strangers[i]])
+    # Where the vehicle is, and whether it arrived, is on disk as well before it is answered.
+    await live.journal.flush()
+    return answer
+
+
+def _hear(hub: FleetHub, rest: RestFleetLink, items: Sequence[Measurement], *, only_unknown: bool = False) -> None:
+    """Tell the link where vehicles are; ``only_unknown``: of those only whose place it does not know."""
+    places = {name: hub.info((VehicleKind.REST, name)).report for name in {item.vehicle for item in items}}
+    for item in items:
+        if not only_unknown or places[item.vehicle] is None:
+            rest.heard(_vehicle_report(item))
+
+
+def _stranger(live: LiveMission, item: Measurement) -> str:
+    member = live.team.get(item.vehicle)
+    if member is None:
+        return f"vehicle: {item.vehicle!r} takes no part in this mission"
+    if member.spec.kind is not VehicleKind.REST:
+        return f"vehicle: {item.vehicle!r} is of kind {member.spec.kind}; only vehicles of kind rest post measurements"
+    return _impossible_place(item, live.frame)
+
+
+def _impossible_place(item: Measurement, frame: LocalFrame) -> str:
+    if not -90 <= item.lat_deg <= 90:
+        return f"lat_deg: {item.lat_deg} is not between -90 and 90"
+    if not -180 <= item.lon_deg <= 180:
+        return f"lon_deg: {item.lon_deg} is not between -180 and 180"
+    try:
+        frame.to_local(item.lat_deg, item.lon_deg)
+    except ValueError as error:
+        return f"lat_deg, lon_deg: {error}"
+    return ""
+
+
+def _sounding(item: Measurement) -> SoundingReport | None:
+    if item.range_m is None:
+        return None
+    place, geometry = _footprint(item, item.range_m)
+    return SoundingReport(
+        vehicle=item.vehicle,
+        time_s=item.time_s,
+        footprint=place,
+        vehicle_depth_m=item.depth_m,
+        range_m=item.range_m,
+        source="rest",
+        beam=item.beam,
+        depth_sd_m=item.range_sd_m,
+        position_sd_m=item.position_sd_m,
+        beam_geometry=geometry,
+    )
+
+
+def _footprint(item: Measurement, range_m: float) -> tuple[Position, BeamGeometry]:
+    """Return where a beam met the bottom, and how it pointed."""
+    if item.beam_off_nadir_deg is None or item.heading_deg is None:
+        below = Position(item.lat_deg, item.lon_deg, item.depth_m + range_m)
+        return below, BeamGeometry(item.lat_deg, item.lon_deg)
+    state = StateSample(
+        item.time_s,
+        math.radians(item.lat_deg),
+        math.radians(item.lon_deg),
+        item.depth_m,
+        math.radians(item.roll_deg),
+        math.radians(item.pitch_deg),
+        math.radians(item.heading_deg),
+    )
+    beam = Beam(item.beam, math.radians(item.beam_azimuth_deg), math.radians(item.beam_off_nadir_deg))
+    geometry = BeamGeometry(
+        item.lat_deg,
+        item.lon_deg,
+        item.roll_deg,
+        item.pitch_deg,
+        item.heading_deg,
+        item.beam_azimuth_deg,
+        item.beam_off_nadir_deg,
+    )
+    return Position(*footprint(state, beam, range_m)), geometry
+
+
+def _vehicle_report(item: Measurement) -> VehicleReport:
+    return VehicleReport(
+        vehicle=item.vehicle,
+        time_s=item.time_s,
+        position=Position(item.lat_deg, item.lon_deg, item.depth_m),
+        heading_rad=None if item.heading_deg is None else math.radians(item.heading_deg),
+        speed_mps=item.speed_mps,
+        altitude_m=item.range_m,
+        battery_pct=item.battery_pct,
+        position_sd_m=item.position_sd_m,
+    )
+
+
+def _batch_verdict(count: int, taken: Mapping[int, ItemVerdict], strangers: Mapping[int, str]) -> BatchVerdict:
+    items = []
+    for index in range(count):
+        if index in taken:
+            items.append(taken[index].model_copy(update={"index": index}))
+        elif strangers[index]:
+            items.append(ItemVerdict(index=index, verdict=Verdict.REJECTED, reason=strangers[index]))
+        else:
+            items.append(ItemVerdict(index=index, verdict=Verdict.ACCEPTED, reason="position report"))
+    tally = {verdict: sum(item.verdict is verdict for item in items) for verdict in Verdict}
+    return BatchVerdict(
+        accepted=tally[Verdict.ACCEPTED],
+        rejected=tally[Verdict.REJECTED],
+        duplicate=tally[Verdict.DUPLICATE],
+        items=items,
+    )

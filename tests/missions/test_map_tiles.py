@@ -1,0 +1,93 @@
+"""The map as it travels: a reader written from the guide puts the tiles together again."""
+
+import json
+import struct
+import zlib
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from app.missions.map_builder import BuiltMap, MapBuilder
+from app.missions.map_tiles import ACCURATE, SOUNDED, TILE, VISIBLE, TileCache
+from app.missions.maps import MapSnapshot, MissionFacts
+from tests.missions.builders import make_spec
+
+SPEC = make_spec(side_m=70.0, cell_m=1.0)
+
+
+def snapshot(version: int, *soundings: tuple[float, float, float]) -> MapSnapshot:
+    builder = MapBuilder(SPEC.local_area(), SPEC.cell_m, SPEC.accuracy_m)
+    builder.add(np.array([(east, north, depth, 0.05) for east, north, depth in soundings]))
+    built = builder.build()
+    assert built is not None
+    from app.missions.corrections import Corrections
+
+    facts = MissionFacts("m", SPEC, SPEC.frame(), Corrections(SPEC.frame(), SPEC.tide).vertical_datum)
+    return MapSnapshot(facts, replace(built, version=version), step=1)
+
+
+def read(answer: bytes) -> tuple[dict[str, Any], dict[int, dict[str, np.ndarray]]]:
+    content = zlib.decompress(answer)
+    assert content[:4] == b"BFM1"
+    (length,) = struct.unpack_from("<I", content, 4)
+    header = json.loads(content[8 : 8 + length])
+    at = 8 + length + -length % 4
+    across = -(-header["cols"] // header["tile"])
+    tiles: dict[int, dict[str, np.ndarray]] = {}
+    for number in header["tiles"]:
+        rows = min(header["tile"], header["rows"] - number // across * header["tile"])
+        cols = min(header["tile"], header["cols"] - number % across * header["tile"])
+        for name in header["layers"]:
+            cells = np.frombuffer(content, "<i4", rows * cols, at).reshape(rows, cols)
+            tiles.setdefault(number, {})[name] = cells
+            at += 4 * rows * cols
+    assert at == len(content)
+    return header, tiles
+
+
+def put_together(header: dict[str, Any], tiles: dict[int, dict[str, np.ndarray]], into: np.ndarray) -> np.ndarray:
+    across = -(-header["cols"] // TILE)
+    for number, layers in tiles.items():
+        row, col = number // across * TILE, number % across * TILE
+        cells = layers["depth"]
+        into[row : row + cells.shape[0], col : col + cells.shape[1]] = cells
+    return into
+
+
+def test_a_map_comes_whole_and_then_only_where_it_changed() -> None:
+    places = [(5.0 + 6 * i, 5.0 + 6 * j, 8.0 + 0.02 * i * j) for i in range(11) for j in range(11)]
+    cache = TileCache()
+    first = snapshot(1, *places)
+    header, tiles = read(cache.changes(first, "a.1", ""))
+    depths = first.built.map.depth_m
+    assert header["base"] is None
+    assert (header["rows"], header["cols"]) == depths.shape
+    whole = put_together(header, tiles, np.zeros(depths.shape, dtype=np.int32))
+    np.testing.assert_allclose(whole / 100, depths, atol=0.0051)
+    flags = np.concatenate([layers["flags"].ravel() for layers in tiles.values()])
+    assert (flags & SOUNDED).astype(bool).sum() == first.built.map.sounded.sum()
+    assert (flags & ACCURATE).astype(bool).sum() == (first.built.map.sd_m <= SPEC.accuracy_m).sum()
+    assert ((flags & VISIBLE).astype(bool) >= (flags & SOUNDED).astype(bool)).all()
+
+    moved = first.built.map.depth_m.copy()
+    moved[3, 40] += 1.0
+    built = first.built
+    second = replace(first, built=BuiltMap(2, built.soundings, replace(built.map, depth_m=moved), built.digest))
+    header, tiles = read(cache.changes(second, "a.2", "a.1"))
+    assert (header["base"], header["tiles"]) == ("a.1", [1])
+    np.testing.assert_allclose(put_together(header, tiles, whole) / 100, moved, atol=0.0051)
+    assert read(cache.changes(second, "a.2", "a.2"))[0]["tiles"] == []
+    assert read(cache.changes(second, "a.2", "never"))[0]["base"] is None
+
+
+def test_everyone_who_asks_the_same_gets_the_same_bytes_made_once() -> None:
+    cache = TileCache()
+    first = snapshot(1, (5, 5, 8), (30, 30, 9), (50, 20, 9))
+    assert cache.changes(first, "a.1", "") is cache.changes(first, "a.1", "")
+
+
+def test_a_difference_without_a_reference_grid_is_unknown_everywhere() -> None:
+    header, tiles = read(TileCache().changes(snapshot(1, (5, 5, 8), (30, 30, 9)), "a.1", "", ("difference", "slope")))
+    assert header["layers"][-2:] == ["difference", "slope"]
+    assert {int(v) for layers in tiles.values() for v in np.unique(layers["difference"])} == {-(2**31)}
