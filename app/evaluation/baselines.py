@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.estimation import SingleBeam
-from app.evaluation.survey_world import SOUNDING_RATE_HZ, SPEED_MPS, Log, fly_routes, mission_map, rmse_m
+from app.evaluation.survey_world import SOUNDING_RATE_HZ, SPEED_MPS, Log, default_map, fly_routes, rmse_m
 from app.exploration.constraints import Constraints
 from app.exploration.planners.lawnmower import lawnmower_routes
 from app.mapping.types import Grid
@@ -62,7 +62,7 @@ def lawnmower_baseline(
     log = Log(SingleBeam(relative_noise), terrain, np.random.default_rng([seed, 2]))
     routes = lawnmower_routes(constraints, starts_m[:, :2], distance_m)
     flown = fly_routes(log, starts_m, routes, distance_m, spacing_m)
-    rmse, l2 = rmse_m(mission_map(log.soundings, grid), terrain)
+    rmse, l2 = rmse_m(default_map(log.soundings, grid), terrain)
     return Baseline(rmse, l2, len(log.soundings), float(flown.sum()))
 
 

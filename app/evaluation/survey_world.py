@@ -187,11 +187,6 @@ def stationary_map(soundings: Soundings, grid: Grid) -> BathymetricMap:
     return GaussianProcessMap("matern32", nonstationary=False).fit(soundings).predict(grid)
 
 
-def mission_map(soundings: Soundings, grid: Grid) -> BathymetricMap:
-    """Return the map that a mission makes, which keeps to one kernel (see ``app.missions.map_builder``)."""
-    return GaussianProcessMap("matern32").fit(soundings).predict(grid)
-
-
 def rmse_m(estimate: BathymetricMap, terrain: Terrain) -> tuple[float, float]:
     """Return the root mean square and the L2 norm of the error over all cells whose true depth is known."""
     centres = estimate.grid.centres_m

@@ -34,6 +34,7 @@ PROBABILITIES = (0.68, 0.95)
 SCALE_RANGE = (0.2, 5.0)
 GAP_CELLS = 64  # along each side of the lattice on which gaps between soundings are measured
 GOLDEN = 0.6180339887498949
+LEAST_BEYOND = 6  # soundings that the ground beyond a survey is predicted from, to learn how well that works
 
 
 @dataclass(frozen=True)
@@ -45,24 +46,29 @@ class Calibration:
     field
         Two quantities: the logarithm of the factor on the variance, high where the sea floor is steep, about 0 on
         average; and the error in metres that does not average out.
-    log_scale
-        Logarithm of the factor on the deviation everywhere.
+    support
+        How far soundings surround places, see :mod:`app.mapping.support`.
+    log_scale, log_scale_beyond
+        Logarithm of the factor on the deviation where soundings surround a place, and where they do not.
     """
 
     field: Field
+    support: Field
     log_scale: float
+    log_scale_beyond: float
 
-    def variance_factor(self, points: FloatArray) -> FloatArray:
-        """Factor on the variance at ``points`` (m, 2): (m,)."""
-        return np.asarray(np.exp(self.field.at(points)[0] + 2.0 * self.log_scale))
+    def steepness_factor(self, points: FloatArray) -> FloatArray:
+        """Factor on the variance at ``points`` (m, 2) that steepness makes: (m,)."""
+        return np.asarray(np.exp(self.field.at(points)[0]))
 
     def deviation(self, grid: Grid, variance: FloatArray) -> FloatArray:
         """Deviation in metres on ``grid``, where the process has ``variance``, both (rows, cols)."""
         log_steepness, common = self.field.over(grid)
-        return np.asarray(np.sqrt(variance * np.exp(log_steepness + 2.0 * self.log_scale) + common**2))
+        log_scale = self.log_scale_beyond + (self.log_scale - self.log_scale_beyond) * self.support.over(grid)[0]
+        return np.asarray(np.sqrt(variance * np.exp(log_steepness + 2.0 * log_scale) + common**2))
 
 
-def uncalibrated(grid: Grid, relief_m: FloatArray, tree: cKDTree, sd_m: FloatArray) -> Calibration:
+def uncalibrated(grid: Grid, relief_m: FloatArray, tree: cKDTree, sd_m: FloatArray, surrounded: Field) -> Calibration:
     """Return the calibration before any check: steep places and common errors.
 
     Parameters
@@ -73,6 +79,8 @@ def uncalibrated(grid: Grid, relief_m: FloatArray, tree: cKDTree, sd_m: FloatArr
         Positions of the soundings.
     sd_m : (n,)
         Their stated deviations, which tell the common error.
+    surrounded
+        How far soundings surround places.
     """
     d_north, d_east = np.gradient(relief_m, grid.cell_m)
     square = gaussian_filter(d_north**2 + d_east**2, 1.0, mode="nearest")
@@ -80,7 +88,7 @@ def uncalibrated(grid: Grid, relief_m: FloatArray, tree: cKDTree, sd_m: FloatArr
     _, closest = nearest(tree, grid.centres_m, 1)
     relative = (square + STEEPNESS_FLOOR * typical) / (typical * (1.0 + STEEPNESS_FLOOR))
     common = COMMON_ERROR * sd_m[closest[:, 0]].reshape(grid.rows, grid.cols)
-    return Calibration(Field(grid, np.array([STEEPNESS_EXPONENT * np.log(relative), common])), 0.0)
+    return Calibration(Field(grid, np.array([STEEPNESS_EXPONENT * np.log(relative), common])), surrounded, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -112,10 +120,28 @@ def gaps(tree: cKDTree) -> FloatArray:
 
 def hold_out(process: Conditioned, rows: IntArray, neighbours: tuple[int, int]) -> HeldOut:
     """Predict the fine soundings ``rows`` across holes as wide as the survey's gaps."""
+    radius = np.maximum(np.quantile(gaps(process.levels.fine_tree), _evenly(len(rows))), 1e-6)
+    return _held_out(process, rows, process.levels.neighbours_beyond(process.levels.points[rows], radius, *neighbours))
+
+
+def hold_out_beyond(process: Conditioned, rows: IntArray, neighbours: tuple[int, int], farthest_m: float) -> HeldOut:
+    """Predict the fine soundings ``rows`` as if the survey ended up to ``farthest_m`` before them."""
+    even = _evenly(len(rows))
+    course = 2.0 * np.pi * ((0.5 + np.sqrt(2.0) * np.arange(len(rows))) % 1.0)
+    near = process.levels.neighbours_beyond(
+        process.levels.points[rows], farthest_m * even, *neighbours, np.column_stack([np.cos(course), np.sin(course)])
+    )
+    enough = (near >= 0).sum(axis=1) >= LEAST_BEYOND
+    return _held_out(process, rows[enough], near[enough])
+
+
+def _evenly(n: int) -> FloatArray:
+    """Return (n,) numbers in [0, 1), steps of the golden ratio: even, and unrelated to the order of the soundings."""
+    return np.asarray((0.5 + GOLDEN * np.arange(n)) % 1.0)
+
+
+def _held_out(process: Conditioned, rows: IntArray, neighbours: IntArray) -> HeldOut:
     points = process.levels.points
-    # steps of the golden ratio: even over the gaps, and unrelated to the order of the soundings
-    chosen = (0.5 + GOLDEN * np.arange(len(rows))) % 1.0
-    radius = np.maximum(np.quantile(gaps(process.levels.fine_tree), chosen), 1e-6)
     error, noise_part, model_part = krige_holes(
         KERNEL_CODES[process.kernel],
         points,
@@ -124,7 +150,7 @@ def hold_out(process: Conditioned, rows: IntArray, neighbours: tuple[int, int]) 
         process.scales.scaled_metric(process.length_m),
         process.amplitude_m * process.scales.amplitude,
         rows,
-        process.levels.neighbours_beyond(points[rows], radius, *neighbours),
+        neighbours,
     )
     known = np.isfinite(error)
     own = process.noise_variance[rows]
@@ -158,7 +184,7 @@ def checked_log_scale(calibration: Calibration, held_out: HeldOut) -> float:
     """
     if len(held_out.error_m) == 0:
         return CELL_EXCESS
-    variance = held_out.map_variance * calibration.variance_factor(held_out.points_m)
+    variance = held_out.map_variance * calibration.steepness_factor(held_out.points_m)
     weight = (variance / (variance + held_out.own_variance)) ** 2
     total = float(weight.sum())
     found = [

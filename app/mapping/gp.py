@@ -6,7 +6,16 @@ from typing import Literal, Self
 
 import numpy as np
 
-from app.mapping.calibration import Calibration, checked_log_scale, error_ratio, gaps, hold_out, mixed, uncalibrated
+from app.mapping.calibration import (
+    Calibration,
+    checked_log_scale,
+    error_ratio,
+    gaps,
+    hold_out,
+    hold_out_beyond,
+    mixed,
+    uncalibrated,
+)
 from app.mapping.counting import count_per_cell
 from app.mapping.fields import Field, coarse_grid
 from app.mapping.gaussian import GaussianInterpolator
@@ -17,6 +26,7 @@ from app.mapping.likelihood import Hyperparameters, RestrictedLikelihood, spread
 from app.mapping.outliers import OutlierReport, flag_outliers
 from app.mapping.roughness import HOLE_NEIGHBOURS, hole_errors, local_ratio, neighbours_beyond
 from app.mapping.scales import LocalScales, local_scales, stretch_from_relief, uniform_scales
+from app.mapping.support import support
 from app.mapping.types import BathymetricMap, BoolArray, FloatArray, Grid, IntArray, Soundings
 
 COARSE_FACTOR = 3.0  # side of the squares of merged soundings over that of single ones
@@ -31,6 +41,7 @@ MOST_RATIO_CELLS = 128
 
 LEAST_HOLES, MOST_HOLES, SOUNDINGS_PER_HOLE = 800, 4000, 10
 CHECK_POINTS = 800
+BEYOND_UNITS = 25.0  # how far beyond the soundings predictions are checked
 
 SMALL_GRID_CELLS = 60_000
 NEIGHBOURS_OF_SMALL_GRIDS = (32, 64)
@@ -38,7 +49,8 @@ NEIGHBOURS_OF_LARGE_GRIDS = (32, 24)
 SOUNDINGS_PER_TILE_OF_SMALL_GRIDS, SOUNDINGS_PER_TILE_OF_LARGE_GRIDS = 6, 10
 TILE_RANGE = (4, 16)
 
-KERNEL_LADDER: tuple[KernelName, ...] = ("matern32", "matern52", "gaussian")
+ROUGHEST: KernelName = "matern32"
+KERNEL_LADDER: tuple[KernelName, ...] = (ROUGHEST, "matern52", "gaussian")
 KERNEL_GAIN = 0.05  # of log likelihood per sounding, to prefer a smoother kernel
 CHOICE_OF_KERNEL_POINTS = 200
 REFINEMENT_GAIN = 5.0  # of log likelihood, to consider the nonstationary process
@@ -54,7 +66,8 @@ GAP_FACTOR = 1.5  # radius of the holes over the median distance of places to th
 class GaussianProcessMap:
     """Depth and its uncertainty by Gaussian-process regression on soundings.
 
-    The sea floor is a plane plus a process with correlation ``kernel`` (Matern 3/2 by default). Length,
+    The sea floor is a plane plus a process with correlation ``kernel`` (by default as smooth as the soundings
+    suggest; where they do not surround a place, Matern 3/2). Length,
     amplitude and the factor on the stated noise variances are learned by restricted maximum likelihood on at
     most ``learning_points`` soundings. Then the process becomes nonstationary (Paciorek and Schervish 2006)
     in two ways. Every sounding is predicted across a hole of ``hole_m``; how far these predictions miss,
@@ -68,7 +81,8 @@ class GaussianProcessMap:
     Parameters
     ----------
     kernel
-        ``matern32`` (default), ``matern52``, ``exponential`` or ``gaussian``.
+        ``auto`` (default: Matern 3/2 or a smoother one, by likelihood), ``matern32``, ``matern52``,
+        ``exponential`` or ``gaussian``.
     nonstationary
         False for one length and amplitude everywhere.
     neighbours
@@ -143,11 +157,12 @@ class GaussianProcessMap:
         if len(soundings) == 0:
             raise ValueError("soundings is empty; a map needs at least one sounding")
         start = getattr(self, "stationary_hyperparameters_", None)
+        rough = getattr(self, "_rough_hyperparameters", None)
         self.outliers_: OutlierReport | None = None
         if self.reject_outliers:
-            kernel = "matern32" if self.kernel == "auto" else self.kernel
-            self.outliers_ = flag_outliers(soundings, kernel=kernel, hyperparameters=start)
-            start = self.outliers_.hyperparameters
+            kernel = ROUGHEST if self.kernel == "auto" else self.kernel
+            self.outliers_ = flag_outliers(soundings, kernel=kernel, hyperparameters=rough or start)
+            start = start or self.outliers_.hyperparameters
             soundings = soundings.take(~self.outliers_.rejected)
         self.soundings_ = soundings
         extent = max(float(np.ptp(soundings.east_m)), float(np.ptp(soundings.north_m)), 1e-3)
@@ -168,6 +183,9 @@ class GaussianProcessMap:
             self.refinement_ = 0.0
         self._plain = self._condition(self.stationary_hyperparameters_, likelihood, uniform)
         self._refined: Conditioned | None = None
+        self._rough = self._rough_process(subset, learn=learn)
+        cell = max(RELIEF_UNITS * self._unit_m, extent / MOST_RELIEF_CELLS)
+        self._support = support(self._levels, cell, BEYOND_UNITS * self._unit_m)
         ratio = self._local_ratio()
         self._log_ratio = Field(ratio.grid, np.log(ratio.values))
         relief = self._coarse_relief(extent)
@@ -183,11 +201,13 @@ class GaussianProcessMap:
                 self._refined = self._condition(self._refined_hyperparameters, likelihood, scales)
         self._calibration: Calibration | None = None
         if self.calibrate:
-            self._calibration = uncalibrated(*relief, self._levels.fine_tree, fine.sd_m)
+            self._calibration = uncalibrated(*relief, self._levels.fine_tree, fine.sd_m, self._support)
         if learn:
             self._check()
         if self._calibration is not None:
-            self._calibration = replace(self._calibration, log_scale=self.log_scale_)
+            self._calibration = replace(
+                self._calibration, log_scale=self.log_scale_, log_scale_beyond=self.log_scale_beyond_
+            )
         best = self._refined if self._refined is not None and self.refinement_ >= 0.5 else self._plain
         self.hyperparameters_ = (
             self._refined_hyperparameters if best is self._refined else self.stationary_hyperparameters_
@@ -209,18 +229,38 @@ class GaussianProcessMap:
             best, least = kernel, value
         return best
 
-    def _likelihood(self, subset: IntArray, scales: LocalScales) -> RestrictedLikelihood:
+    def _rough_process(self, subset: IntArray, *, learn: bool) -> Conditioned | None:
+        """What is believed where soundings do not surround a place; None where the kernel is not smoother than that."""
+        if learn:
+            self._rough_hyperparameters: Hyperparameters | None = None
+        if self.kernel != "auto" or self.kernel_ == ROUGHEST:
+            return None
+        uniform = uniform_scales(len(self._levels.soundings))
+        likelihood = self._likelihood(subset, uniform, ROUGHEST)
+        if learn or self._rough_hyperparameters is None:
+            self._rough_hyperparameters, _ = likelihood.maximise(None)
+        return self._condition(self._rough_hyperparameters, likelihood, uniform, ROUGHEST)
+
+    def _likelihood(
+        self, subset: IntArray, scales: LocalScales, kernel: KernelName | None = None
+    ) -> RestrictedLikelihood:
         return RestrictedLikelihood(
-            self.kernel_,
+            kernel or self.kernel_,
             self._points[subset],
             self._depth[subset],
             self._variance[subset],
             scales.take(subset),
         )
 
-    def _condition(self, hyper: Hyperparameters, likelihood: RestrictedLikelihood, scales: LocalScales) -> Conditioned:
+    def _condition(
+        self,
+        hyper: Hyperparameters,
+        likelihood: RestrictedLikelihood,
+        scales: LocalScales,
+        kernel: KernelName | None = None,
+    ) -> Conditioned:
         return Conditioned(
-            self.kernel_,
+            kernel or self.kernel_,
             self._levels,
             hyper.noise_scale * self._levels.soundings.sd_m**2,
             hyper.length_m,
@@ -308,6 +348,10 @@ class GaussianProcessMap:
             held_out = mixed(refined, held_out, self.refinement_)
         if self._calibration is not None:
             self.log_scale_ = checked_log_scale(self._calibration, held_out)
+            beyond = hold_out_beyond(
+                self._rough or self._plain, rows, NEIGHBOURS_OF_LARGE_GRIDS, BEYOND_UNITS * self._unit_m
+            )
+            self.log_scale_beyond_ = max(self.log_scale_, checked_log_scale(self._calibration, beyond))
 
     def _scales_over(self, grid: Grid) -> LocalScales:
         return _scales(self._scale_fields.over(grid).reshape(3, -1))
@@ -344,17 +388,28 @@ class GaussianProcessMap:
         )
 
     def _predict(self, grid: Grid, wanted: BoolArray, neighbours: tuple[int, int]) -> tuple[FloatArray, FloatArray]:
-        """Depth and variance, (rows, cols): of one process, or averaged over both as far as each is trusted."""
-        side, weight = self._tile_cells(grid), self.refinement_
+        """Depth and variance, (rows, cols), averaged over the processes as far as each is trusted."""
+        side = self._tile_cells(grid)
+        depth, variance = self._predict_between(grid, wanted, neighbours, side)
+        if self._rough is None:
+            return depth, variance
+        surrounded = self._support.over(grid)[0]
+        beyond = wanted & (surrounded < 1.0)
+        rough = self._rough.predict(grid, None, beyond, neighbours, side)
+        both = _averaged((depth, variance), rough, surrounded)
+        return np.where(beyond, both[0], depth), np.where(beyond, both[1], variance)
+
+    def _predict_between(
+        self, grid: Grid, wanted: BoolArray, neighbours: tuple[int, int], side: int
+    ) -> tuple[FloatArray, FloatArray]:
+        """Depth and variance by the chosen kernel."""
+        weight = self.refinement_
         if self._refined is None or weight == 0.0:
             return self._plain.predict(grid, None, wanted, neighbours, side)
-        depth, variance = self._refined.predict(grid, self._scales_over, wanted, neighbours, side)
-        if weight < 1.0:
-            plain, plain_variance = self._plain.predict(grid, None, wanted, neighbours, side)
-            apart = depth - plain
-            depth = plain + weight * apart
-            variance = weight * variance + (1.0 - weight) * (plain_variance + weight * apart**2)
-        return depth, variance
+        refined = self._refined.predict(grid, self._scales_over, wanted, neighbours, side)
+        if weight == 1.0:
+            return refined
+        return _averaged(refined, self._plain.predict(grid, None, wanted, neighbours, side), weight)
 
     def _tile_cells(self, grid: Grid) -> int:
         """Side of the tiles: few soundings in each, so that all its cells have much the same nearest ones."""
@@ -368,6 +423,15 @@ def _scale_fields(ratio: Field, points: FloatArray, log_stretch: Field) -> Field
     log_ratio = np.log(ratio.values)
     log_ratio -= float(Field(ratio.grid, log_ratio).at(points).mean())
     return Field(ratio.grid, np.concatenate([log_ratio, log_stretch.over(ratio.grid)]))
+
+
+def _averaged(
+    one: tuple[FloatArray, FloatArray], other: tuple[FloatArray, FloatArray], weight: FloatArray | float
+) -> tuple[FloatArray, FloatArray]:
+    """Mean and variance of a mixture of two predictions, of which ``one`` has the ``weight``."""
+    apart = one[0] - other[0]
+    variance = weight * one[1] + (1.0 - weight) * (other[1] + weight * apart**2)
+    return other[0] + weight * apart, variance
 
 
 def _small(grid: Grid) -> bool:

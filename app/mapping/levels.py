@@ -56,12 +56,20 @@ class TwoLevels:
         _, groups = nearest(self.coarse_tree, at, n_fine + n_coarse)
         return _expand(groups, self.members, self.start, self.n_fine, n_fine, n_coarse)
 
-    def neighbours_beyond(self, at: FloatArray, radius_m: FloatArray, n_fine: int, n_coarse: int) -> IntArray:
-        """Choose neighbours as ``neighbours`` does, as if nothing had been sounded within ``radius_m`` (m,)."""
+    def neighbours_beyond(
+        self, at: FloatArray, radius_m: FloatArray, n_fine: int, n_coarse: int, towards: FloatArray | None = None
+    ) -> IntArray:
+        """Choose neighbours as ``neighbours`` does, as if nothing had been sounded within ``radius_m`` (m,).
+
+        With unit vectors ``towards`` (m, 2): as if soundings began only ``radius_m`` away in that direction.
+        """
         inside = int(np.ceil(np.pi * (float(radius_m.max()) / self.coarse_m + 1.5) ** 2))
-        _, groups = nearest(self.coarse_tree, at, n_fine + n_coarse + inside)
+        wanted = n_fine + n_coarse + inside if towards is None else 3 * (n_fine + n_coarse) + 2 * inside
+        _, groups = nearest(self.coarse_tree, at, wanted)
+        if towards is None:
+            towards = np.zeros_like(at)
         return _expand_beyond(
-            groups, self.members, self.start, self.n_fine, n_fine, n_coarse, self.points, at, radius_m
+            groups, self.members, self.start, self.n_fine, n_fine, n_coarse, self.points, at, radius_m, towards
         )
 
 
@@ -119,12 +127,14 @@ def _expand_beyond(
     points: FloatArray,
     at: FloatArray,
     radius: FloatArray,
+    towards: FloatArray,
 ) -> IntArray:
     result = np.full((groups.shape[0], n_fine + n_coarse), -1, np.int64)
     left = np.empty(0, np.int64)
     for t in range(groups.shape[0]):
         used = 0
         merged = 0
+        hole = towards[t, 0] == 0.0 and towards[t, 1] == 0.0
         for c in range(groups.shape[1]):
             g = groups[t, c]
             size = start[g + 1] - start[g]
@@ -134,7 +144,8 @@ def _expand_beyond(
             for i in range(start[g], start[g + 1]):
                 dx = points[members[i], 0] - at[t, 0]
                 dy = points[members[i], 1] - at[t, 1]
-                if dx * dx + dy * dy >= radius[t] * radius[t]:
+                away = np.sqrt(dx * dx + dy * dy) if hole else dx * towards[t, 0] + dy * towards[t, 1]
+                if away >= radius[t]:
                     left[n] = members[i]
                     n += 1
             if (merged == 0 and used + n <= n_fine) or n < size or size == 1 or n_coarse == 0:

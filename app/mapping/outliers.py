@@ -24,6 +24,7 @@ LEARNING_POINTS = 200
 EXCUSE_POINTS = 600
 EXCUSE_NEIGHBOURS = 12
 EXCUSE_PRIOR_WEIGHT = 2.0
+LEAST_EXCUSE = 1e-4
 NORMAL_99 = 2.576
 CHUNK = 30_000
 """Planes are fitted to so many soundings at a time: bounds the memory, and threads share the chunks."""
@@ -179,7 +180,8 @@ def _excuse(
 
     def local(near: IntArray) -> FloatArray:
         total = EXCUSE_PRIOR_WEIGHT * square.mean() + square[near].sum(axis=1)
-        return np.asarray(np.sqrt(total / (EXCUSE_PRIOR_WEIGHT + near.shape[1])))
+        # Depths that were rounded may agree exactly: that is no misprediction to compare others with.
+        return np.asarray(np.sqrt(np.maximum(total / (EXCUSE_PRIOR_WEIGHT + near.shape[1]), LEAST_EXCUSE)))
 
     others = nearest(sampled, places, EXCUSE_NEIGHBOURS + 1)[1][:, 1:]
     tail = float(np.percentile(np.sqrt(square) / local(others), 99.0)) / NORMAL_99

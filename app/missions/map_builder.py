@@ -282,9 +282,7 @@ class MapBuilder:
 
 
 def _new_model() -> GaussianProcessMap:
-    # Smoother kernels predict better between soundings, but are far too sure of the ground beyond them, where vehicles
-    # are sent next and the safety check goes by the deviation. Outliers are judged by ``learn``.
-    return GaussianProcessMap("matern32", reject_outliers=False)
+    return GaussianProcessMap(reject_outliers=False)  # outliers are judged by ``learn``
 
 
 def _as_soundings(rows: NDArray[np.float64]) -> Soundings:

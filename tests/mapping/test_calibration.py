@@ -10,7 +10,7 @@ from app.mapping.gp import GaussianProcessMap
 from app.mapping.types import Grid, Soundings
 
 COARSE = Grid(0.0, 0.0, 10.0, 4, 4)
-NEUTRAL = Calibration(Field(COARSE, np.zeros((2, 4, 4))), 0.0)
+NEUTRAL = Calibration(Field(COARSE, np.zeros((2, 4, 4))), Field(COARSE, np.ones((1, 4, 4))), 0.0, 0.0)
 
 
 def held_out(true_factor: float, own_sd: float, n: int = 2000) -> HeldOut:
@@ -32,6 +32,12 @@ def test_soundings_too_noisy_to_tell_change_nothing() -> None:
     assert checked_log_scale(NEUTRAL, held_out(3.0, 100.0, n=300)) == pytest.approx(
         checked_log_scale(NEUTRAL, nothing), abs=0.01
     )
+
+
+def test_each_place_has_the_factor_of_where_it_is() -> None:
+    support = np.tile([1.0, 1.0, 0.0, 0.0], (1, 4, 1))
+    calibration = Calibration(NEUTRAL.field, Field(COARSE, support), np.log(2.0), np.log(3.0))
+    np.testing.assert_allclose(calibration.deviation(COARSE, np.ones((4, 4))), np.tile([2.0, 2.0, 3.0, 3.0], (4, 1)))
 
 
 def test_mixing_lies_between_and_counts_disagreement() -> None:

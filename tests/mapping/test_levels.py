@@ -61,3 +61,22 @@ def test_what_lies_within_the_radius_is_not_used() -> None:
             fine.extend(levels.members[levels.start[g] : levels.start[g + 1]])
         assert len(fine) == len(set(fine)) >= 16
         assert np.linalg.norm(levels.points[fine] - place, axis=1).min() >= r
+
+
+def test_beyond_an_edge_nothing_before_it_is_used() -> None:
+    rng = np.random.default_rng(2)
+    s = Soundings(rng.uniform(0, 30, 400), rng.uniform(0, 30, 400), rng.uniform(5, 9, 400), np.full(400, 0.1))
+    levels = two_levels(s, 0.5, 3.0)
+    at, before, course = rng.uniform(10, 20, (12, 2)), rng.uniform(0.0, 6.0, 12), rng.uniform(0, 2 * np.pi, 12)
+    towards = np.column_stack([np.cos(course), np.sin(course)])
+    for row, place, r, u in zip(levels.neighbours_beyond(at, before, 16, 8, towards), at, before, towards, strict=True):
+        used = row[row >= 0]
+        fine = [i for i in used if i < levels.n_fine]
+        for g in used[used >= levels.n_fine] - levels.n_fine:
+            fine.extend(levels.members[levels.start[g] : levels.start[g + 1]])
+        assert len(fine) == len(set(fine)) >= 8
+        along = (levels.points[fine] - place) @ u
+        assert along.min() >= r
+        every = (levels.points[: levels.n_fine] - place) @ u >= r
+        nearest = np.linalg.norm(levels.points[: levels.n_fine][every] - place, axis=1).min()
+        assert np.linalg.norm(levels.points[fine] - place, axis=1).min() <= nearest + 3.0 * np.sqrt(2)

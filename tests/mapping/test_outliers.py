@@ -78,6 +78,14 @@ def test_a_handful_of_soundings_can_be_judged(n: int) -> None:
     assert flag_outliers(s).rejected.shape == (n,)
 
 
+def test_a_gross_error_on_a_floor_that_is_flat_to_the_last_digit_is_found() -> None:
+    s = survey(0)
+    depth = np.full(len(s), 8.4)
+    depth[500] = 3.1
+    report = flag_outliers(Soundings(s.east_m, s.north_m, depth, np.full(len(s), 0.05)))
+    assert np.flatnonzero(report.rejected).tolist() == [500]
+
+
 def large_survey(seed: int) -> Soundings:
     """Many soundings, four to a square metre, beside a cliff; and one lonely track."""
     rng = np.random.default_rng(seed)
