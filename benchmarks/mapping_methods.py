@@ -45,6 +45,18 @@ def _thinned(s: Soundings, most: int) -> Soundings:
     return thin
 
 
+def _without_plane(s: Soundings) -> tuple[FloatArray, FloatArray]:
+    """Return depths minus their least-squares plane, and its coefficients (3,)."""
+    basis = np.column_stack([np.ones(len(s)), s.east_m, s.north_m])
+    plane, *_ = np.linalg.lstsq(basis, s.depth_m, rcond=None)
+    return s.depth_m - basis @ plane, plane
+
+
+def _plane_on(grid: Grid, plane: FloatArray) -> FloatArray:
+    trend = np.column_stack([np.ones(grid.rows * grid.cols), grid.centres_m]) @ plane
+    return np.asarray(trend).reshape(grid.rows, grid.cols)
+
+
 def scikit_learn(s: Soundings, grid: Grid) -> tuple[FloatArray, FloatArray | None]:
     """Matern 3/2 with the stated noise, linear trend taken out, maximum likelihood."""
     from sklearn.exceptions import ConvergenceWarning
@@ -53,9 +65,7 @@ def scikit_learn(s: Soundings, grid: Grid) -> tuple[FloatArray, FloatArray | Non
 
     thin = s if len(s) <= SKLEARN_LEARNS_FROM else _thinned(s, SKLEARN_PREDICTS_FROM)
     points = np.column_stack([thin.east_m, thin.north_m])
-    basis = np.column_stack([np.ones(len(thin)), points])
-    plane, *_ = np.linalg.lstsq(basis, thin.depth_m, rcond=None)
-    residual = thin.depth_m - basis @ plane
+    residual, plane = _without_plane(thin)
     subset = np.random.default_rng(0).permutation(len(thin))[:SKLEARN_LEARNS_FROM]
     kernel = ConstantKernel(float(residual.var()) + 1e-6, (1e-8, 1e4)) * Matern(8.0, (0.2, 300.0), nu=1.5)
     with warnings.catch_warnings():
@@ -63,8 +73,7 @@ def scikit_learn(s: Soundings, grid: Grid) -> tuple[FloatArray, FloatArray | Non
         learned = GaussianProcessRegressor(kernel, alpha=thin.sd_m[subset] ** 2).fit(points[subset], residual[subset])
     model = GaussianProcessRegressor(learned.kernel_, alpha=thin.sd_m**2, optimizer=None).fit(points, residual)
     mean, sd = model.predict(grid.centres_m, return_std=True)
-    trend = np.column_stack([np.ones(len(mean)), grid.centres_m]) @ plane
-    return (mean + trend).reshape(grid.rows, grid.cols), sd.reshape(grid.rows, grid.cols)
+    return mean.reshape(grid.rows, grid.cols) + _plane_on(grid, plane), sd.reshape(grid.rows, grid.cols)
 
 
 def thin_plate(s: Soundings, grid: Grid) -> tuple[FloatArray, FloatArray | None]:
@@ -88,15 +97,14 @@ def verde_spline(s: Soundings, grid: Grid) -> tuple[FloatArray, FloatArray | Non
 
 
 def pykrige_ordinary(s: Soundings, grid: Grid) -> tuple[FloatArray, FloatArray | None]:
-    """Universal kriging with a linear drift and a spherical variogram fitted by the library."""
-    from pykrige.uk import UniversalKriging
+    """Ordinary kriging about a plane, with a spherical variogram fitted by the library."""
+    from pykrige.ok import OrdinaryKriging
 
     thin = s if len(s) <= SKLEARN_LEARNS_FROM else _thinned(s, SKLEARN_PREDICTS_FROM)
-    kriging = UniversalKriging(
-        thin.east_m, thin.north_m, thin.depth_m, variogram_model="spherical", drift_terms=["regional_linear"]
-    )
+    residual, plane = _without_plane(thin)
+    kriging = OrdinaryKriging(thin.east_m, thin.north_m, residual, variogram_model="spherical")
     mean, variance = kriging.execute("grid", grid.east_m, grid.north_m)
-    return np.asarray(mean), np.sqrt(np.maximum(np.asarray(variance), 0.0))
+    return np.asarray(mean) + _plane_on(grid, plane), np.sqrt(np.maximum(np.asarray(variance), 0.0))
 
 
 METHODS: dict[str, Method] = {
