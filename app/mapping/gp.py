@@ -10,7 +10,6 @@ from app.mapping.calibration import (
     Calibration,
     checked_log_scale,
     error_ratio,
-    gaps,
     hold_out,
     hold_out_beyond,
     mixed,
@@ -20,11 +19,12 @@ from app.mapping.counting import count_per_cell
 from app.mapping.fields import Field, coarse_grid
 from app.mapping.gaussian import GaussianInterpolator
 from app.mapping.kernels import KERNEL_CODES, KernelName
-from app.mapping.kriging import Conditioned, krige_holes
+from app.mapping.kriging import Conditioned
+from app.mapping.learning import ROUGHEST, choose_kernel, conditioned, lengthen, likelihood_of
 from app.mapping.levels import two_levels
-from app.mapping.likelihood import Hyperparameters, RestrictedLikelihood, spread_subset
+from app.mapping.likelihood import Hyperparameters, spread_subset
 from app.mapping.outliers import OutlierReport, flag_outliers
-from app.mapping.roughness import HOLE_NEIGHBOURS, hole_errors, local_ratio, neighbours_beyond
+from app.mapping.roughness import hole_errors, local_ratio
 from app.mapping.scales import LocalScales, local_scales, stretch_from_relief, uniform_scales
 from app.mapping.support import support
 from app.mapping.types import BathymetricMap, BoolArray, FloatArray, Grid, IntArray, Soundings
@@ -49,18 +49,8 @@ NEIGHBOURS_OF_LARGE_GRIDS = (32, 24)
 SOUNDINGS_PER_TILE_OF_SMALL_GRIDS, SOUNDINGS_PER_TILE_OF_LARGE_GRIDS = 6, 10
 TILE_RANGE = (4, 16)
 
-ROUGHEST: KernelName = "matern32"
-KERNEL_LADDER: tuple[KernelName, ...] = (ROUGHEST, "matern52", "gaussian")
-KERNEL_GAIN = 0.05  # of log likelihood per sounding, to prefer a smoother kernel
-CHOICE_OF_KERNEL_POINTS = 200
 REFINEMENT_GAIN = 5.0  # of log likelihood, to consider the nonstationary process
 FULL_TRUST_GAIN = 0.04  # by which part it must predict better to be trusted alone
-
-LENGTH_FACTORS = (1.0, 1.5, 2.2, 3.3)
-LENGTHEN_FROM = 30  # soundings; fewer cannot choose
-CHOICE_POINTS = 400
-CHOICE_MARGIN = 0.02  # a longer length must predict better by this much
-GAP_FACTOR = 1.5  # radius of the holes over the median distance of places to their nearest sounding
 
 
 class GaussianProcessMap:
@@ -168,20 +158,16 @@ class GaussianProcessMap:
         extent = max(float(np.ptp(soundings.east_m)), float(np.ptp(soundings.north_m)), 1e-3)
         self._unit_m = self.merge_m or extent / max(LEAST_RESOLUTION, math.sqrt(len(soundings)))
         self._levels = two_levels(soundings, self._unit_m, COARSE_FACTOR * self._unit_m)
-        fine = self._levels.soundings.take(np.arange(self._levels.n_fine))
-        self._points = np.column_stack([fine.east_m, fine.north_m])
-        self._depth = fine.depth_m
-        self._variance = fine.sd_m**2
         learn = learn or not hasattr(self, "hyperparameters_")
         subset = spread_subset(self._levels.fine_tree, self.learning_points)
         uniform = uniform_scales(len(self._levels.soundings))
         if learn:
-            self.kernel_ = self._choose_kernel() if self.kernel == "auto" else self.kernel
-        likelihood = self._likelihood(subset, uniform)
+            self.kernel_ = choose_kernel(self._levels) if self.kernel == "auto" else self.kernel
+        likelihood = likelihood_of(self._levels, self.kernel_, subset, uniform)
         if learn:
             self.stationary_hyperparameters_, least = likelihood.maximise(start)
             self.refinement_ = 0.0
-        self._plain = self._condition(self.stationary_hyperparameters_, likelihood, uniform)
+        self._plain = conditioned(self._levels, self.kernel_, self.stationary_hyperparameters_, likelihood, uniform)
         self._refined: Conditioned | None = None
         self._rough = self._rough_process(subset, learn=learn)
         cell = max(RELIEF_UNITS * self._unit_m, extent / MOST_RELIEF_CELLS)
@@ -189,19 +175,25 @@ class GaussianProcessMap:
         ratio = self._local_ratio()
         self._log_ratio = Field(ratio.grid, np.log(ratio.values))
         relief = self._coarse_relief(extent)
-        self._scale_fields = _scale_fields(ratio, self._points, stretch_from_relief(*relief))
+        self._scale_fields = _scale_fields(
+            ratio, self._levels.points[: self._levels.n_fine], stretch_from_relief(*relief)
+        )
         if self.nonstationary and (learn or self.refinement_ > 0.0):
             scales = _scales(self._scale_fields.at(self._levels.points))
-            likelihood = self._likelihood(subset, scales)
+            likelihood = likelihood_of(self._levels, self.kernel_, subset, scales)
             if learn:
                 hyper, value = likelihood.maximise(getattr(self, "_refined_hyperparameters", start))
-                self._refined_hyperparameters = self._lengthen(hyper, likelihood, scales)
+                self._refined_hyperparameters = lengthen(
+                    self._levels, self.kernel_, hyper, likelihood, scales, REACH_UNITS * self._unit_m
+                )
                 self.refinement_ = float(value < least - REFINEMENT_GAIN)
             if self.refinement_ > 0.0:
-                self._refined = self._condition(self._refined_hyperparameters, likelihood, scales)
+                self._refined = conditioned(
+                    self._levels, self.kernel_, self._refined_hyperparameters, likelihood, scales
+                )
         self._calibration: Calibration | None = None
         if self.calibrate:
-            self._calibration = uncalibrated(*relief, self._levels.fine_tree, fine.sd_m, self._support)
+            self._calibration = uncalibrated(*relief, self._levels.fine_tree, self._levels.fine.sd_m, self._support)
         if learn:
             self._check()
         if self._calibration is not None:
@@ -215,20 +207,6 @@ class GaussianProcessMap:
         self.trend_ = best.trend
         return self
 
-    def _choose_kernel(self) -> KernelName:
-        """Climb from the roughest kernel to smoother ones while the likelihood gains enough by it."""
-        subset = spread_subset(self._levels.fine_tree, CHOICE_OF_KERNEL_POINTS)
-        best = KERNEL_LADDER[0]
-        least = math.inf
-        hyper: Hyperparameters | None = None
-        for kernel in KERNEL_LADDER:
-            self.kernel_ = kernel
-            hyper, value = self._likelihood(subset, uniform_scales(len(self._levels.soundings))).maximise(hyper)
-            if not value < least - KERNEL_GAIN * len(subset):
-                break
-            best, least = kernel, value
-        return best
-
     def _rough_process(self, subset: IntArray, *, learn: bool) -> Conditioned | None:
         """What is believed where soundings do not surround a place; None where the kernel is not smoother than that."""
         if learn:
@@ -236,101 +214,36 @@ class GaussianProcessMap:
         if self.kernel != "auto" or self.kernel_ == ROUGHEST:
             return None
         uniform = uniform_scales(len(self._levels.soundings))
-        likelihood = self._likelihood(subset, uniform, ROUGHEST)
+        likelihood = likelihood_of(self._levels, ROUGHEST, subset, uniform)
         if learn or self._rough_hyperparameters is None:
             self._rough_hyperparameters, _ = likelihood.maximise(None)
-        return self._condition(self._rough_hyperparameters, likelihood, uniform, ROUGHEST)
-
-    def _likelihood(
-        self, subset: IntArray, scales: LocalScales, kernel: KernelName | None = None
-    ) -> RestrictedLikelihood:
-        return RestrictedLikelihood(
-            kernel or self.kernel_,
-            self._points[subset],
-            self._depth[subset],
-            self._variance[subset],
-            scales.take(subset),
-        )
-
-    def _condition(
-        self,
-        hyper: Hyperparameters,
-        likelihood: RestrictedLikelihood,
-        scales: LocalScales,
-        kernel: KernelName | None = None,
-    ) -> Conditioned:
-        return Conditioned(
-            kernel or self.kernel_,
-            self._levels,
-            hyper.noise_scale * self._levels.soundings.sd_m**2,
-            hyper.length_m,
-            hyper.amplitude_m,
-            likelihood.trend(hyper),
-            scales,
-        )
+        return conditioned(self._levels, ROUGHEST, self._rough_hyperparameters, likelihood, uniform)
 
     def _coarse_relief(self, extent: float) -> tuple[Grid, FloatArray]:
         """A coarse stationary map, depth minus trend: shows the grain and the edges of the sea floor."""
         cell = max(RELIEF_UNITS * self._unit_m, extent / MOST_RELIEF_CELLS)
-        grid = coarse_grid(self._points.min(axis=0), self._points.max(axis=0), cell)
+        grid = coarse_grid(self._levels.fine_tree.mins, self._levels.fine_tree.maxes, cell)
         everywhere = np.ones((grid.rows, grid.cols), np.bool_)
         first, _ = self._plain.predict(grid, None, everywhere, NEIGHBOURS_OF_LARGE_GRIDS, 2)
         return grid, first - self._plain.trend(grid.centres_m).reshape(grid.rows, grid.cols)
 
-    def _lengthen(
-        self, hyper: Hyperparameters, likelihood: RestrictedLikelihood, scales: LocalScales
-    ) -> Hyperparameters:
-        """Choose the length by how well soundings are predicted across the gaps that the survey leaves.
-
-        Where a sea floor is patchy, the likelihood shortens the length to explain steep places, and the map falls
-        back to the trend between the lines. Amplitude grows with length: the variance of short differences stays.
-        """
-        n = len(self._points)
-        gap = gaps(self._levels.fine_tree)
-        gap = gap[gap < REACH_UNITS * self._unit_m]
-        if n < LENGTHEN_FROM or len(gap) == 0:
-            return hyper
-        rows = np.unique(np.linspace(0, n - 1, min(n, CHOICE_POINTS)).astype(np.int64))
-        near = neighbours_beyond(self._levels.fine_tree, rows, GAP_FACTOR * float(np.median(gap)), HOLE_NEIGHBOURS)
-        own = scales.take(np.arange(n))
-        best, least = hyper, np.inf
-        for factor in LENGTH_FACTORS:
-            candidate = Hyperparameters(hyper.length_m * factor, hyper.amplitude_m * factor, hyper.noise_scale)
-            error, _, _ = krige_holes(
-                KERNEL_CODES[self.kernel_],
-                self._points,
-                self._depth - likelihood.trend(candidate)(self._points),
-                candidate.noise_scale * self._variance,
-                own.scaled_metric(candidate.length_m),
-                candidate.amplitude_m * own.amplitude,
-                rows,
-                near,
-            )
-            known = np.isfinite(error)
-            if not known.any():
-                return hyper
-            loss = float(np.mean(error[known] ** 2)) * (1.0 if factor == 1.0 else 1.0 + CHOICE_MARGIN)
-            if loss < least:
-                best, least = candidate, loss
-        return best
-
     def _local_ratio(self) -> Field:
         """How variable the sea floor is, place by place, from predicting soundings across holes."""
         hyper = self.stationary_hyperparameters_
-        n = len(self._points)
+        fine, n = self._levels.fine, self._levels.n_fine
         count = self.hole_points or min(max(LEAST_HOLES, n // SOUNDINGS_PER_HOLE), MOST_HOLES)
         errors = hole_errors(
             KERNEL_CODES[self.kernel_],
             self._levels.fine_tree,
-            self._depth - self._plain.trend(self._points),
-            hyper.noise_scale * self._variance,
+            fine.depth_m - self._plain.trend(self._levels.points[:n]),
+            hyper.noise_scale * fine.sd_m**2,
             uniform_scales(n).scaled_metric(hyper.length_m),
             np.full(n, hyper.amplitude_m),
             np.unique(np.linspace(0, n - 1, min(n, count)).astype(np.int64)),
             self.hole_m or HOLE_UNITS * self._unit_m,
         )
         reach = REACH_UNITS * self._unit_m
-        low, high = self._points.min(axis=0), self._points.max(axis=0)
+        low, high = self._levels.fine_tree.mins, self._levels.fine_tree.maxes
         margin = 4.0 * reach  # beyond it the ratio has returned to what holds without soundings
         cell = max(RELIEF_UNITS * self._unit_m, float((high - low).max()) / MOST_RATIO_CELLS)
         grid = coarse_grid(low - margin, high + margin, cell)
@@ -338,7 +251,7 @@ class GaussianProcessMap:
 
     def _check(self) -> None:
         """Hold soundings out: how far to trust the nonstationary process, and the factor on deviations."""
-        n = len(self._points)
+        n = self._levels.n_fine
         rows = np.unique(np.linspace(0, n - 1, min(n, CHECK_POINTS)).astype(np.int64))
         held_out = hold_out(self._plain, rows, NEIGHBOURS_OF_LARGE_GRIDS)
         if self._refined is not None:

@@ -38,11 +38,16 @@ class TwoLevels:
     coarse_m: float
 
     @cached_property
+    def fine(self) -> Soundings:
+        """The fine soundings."""
+        return self.soundings.take(np.arange(self.n_fine))
+
+    @cached_property
     def fine_tree(self) -> cKDTree:
         """The fine soundings' positions, for looking up neighbours."""
         return cKDTree(self.points[: self.n_fine])
 
-    @property
+    @cached_property
     def points(self) -> FloatArray:
         """Positions of all, (n, 2)."""
         return np.column_stack([self.soundings.east_m, self.soundings.north_m])

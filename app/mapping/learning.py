@@ -1,0 +1,105 @@
+"""What the process learns from the soundings: its kernel, and its length by what the map is for."""
+
+import math
+
+import numpy as np
+
+from app.mapping.calibration import gaps
+from app.mapping.kernels import KERNEL_CODES, KernelName
+from app.mapping.kriging import Conditioned, krige_holes
+from app.mapping.levels import TwoLevels
+from app.mapping.likelihood import Hyperparameters, RestrictedLikelihood, spread_subset
+from app.mapping.roughness import HOLE_NEIGHBOURS, neighbours_beyond
+from app.mapping.scales import LocalScales, uniform_scales
+from app.mapping.types import IntArray
+
+ROUGHEST: KernelName = "matern32"
+KERNEL_LADDER: tuple[KernelName, ...] = (ROUGHEST, "matern52", "gaussian")
+KERNEL_GAIN = 0.05  # of log likelihood per sounding, to prefer a smoother kernel
+CHOICE_OF_KERNEL_POINTS = 200
+
+LENGTH_FACTORS = (1.0, 1.5, 2.2, 3.3)
+LENGTHEN_FROM = 30  # soundings; fewer cannot choose
+CHOICE_POINTS = 400
+CHOICE_MARGIN = 0.02  # a longer length must predict better by this much
+GAP_FACTOR = 1.5  # radius of the holes over the median distance of places to their nearest sounding
+
+
+def likelihood_of(levels: TwoLevels, kernel: KernelName, subset: IntArray, scales: LocalScales) -> RestrictedLikelihood:
+    """Return the likelihood of the fine soundings ``subset``; ``scales`` are those of all soundings."""
+    fine = levels.fine
+    return RestrictedLikelihood(
+        kernel, levels.points[subset], fine.depth_m[subset], fine.sd_m[subset] ** 2, scales.take(subset)
+    )
+
+
+def conditioned(
+    levels: TwoLevels,
+    kernel: KernelName,
+    hyper: Hyperparameters,
+    likelihood: RestrictedLikelihood,
+    scales: LocalScales,
+) -> Conditioned:
+    """Return the process that knows all soundings, its trend found by ``likelihood``."""
+    noise = hyper.noise_scale * levels.soundings.sd_m**2
+    return Conditioned(kernel, levels, noise, hyper.length_m, hyper.amplitude_m, likelihood.trend(hyper), scales)
+
+
+def choose_kernel(levels: TwoLevels) -> KernelName:
+    """Climb from the roughest kernel to smoother ones while the likelihood gains enough by it."""
+    subset = spread_subset(levels.fine_tree, CHOICE_OF_KERNEL_POINTS)
+    uniform = uniform_scales(len(levels.soundings))
+    best = ROUGHEST
+    least = math.inf
+    hyper: Hyperparameters | None = None
+    for kernel in KERNEL_LADDER:
+        hyper, value = likelihood_of(levels, kernel, subset, uniform).maximise(hyper)
+        if not value < least - KERNEL_GAIN * len(subset):
+            break
+        best, least = kernel, value
+    return best
+
+
+def lengthen(
+    levels: TwoLevels,
+    kernel: KernelName,
+    hyper: Hyperparameters,
+    likelihood: RestrictedLikelihood,
+    scales: LocalScales,
+    widest_m: float,
+) -> Hyperparameters:
+    """Choose the length by how well soundings are predicted across the gaps that the survey leaves.
+
+    Where a sea floor is patchy, the likelihood shortens the length to explain steep places, and the map falls
+    back to the trend between the lines. Amplitude grows with length: the variance of short differences stays. Gaps of
+    ``widest_m`` and more are places that the survey left out.
+    """
+    n, fine = levels.n_fine, levels.fine
+    points = levels.points[:n]
+    gap = gaps(levels.fine_tree)
+    gap = gap[gap < widest_m]
+    if n < LENGTHEN_FROM or len(gap) == 0:
+        return hyper
+    rows = np.unique(np.linspace(0, n - 1, min(n, CHOICE_POINTS)).astype(np.int64))
+    near = neighbours_beyond(levels.fine_tree, rows, GAP_FACTOR * float(np.median(gap)), HOLE_NEIGHBOURS)
+    own = scales.take(np.arange(n))
+    best, least = hyper, np.inf
+    for factor in LENGTH_FACTORS:
+        candidate = Hyperparameters(hyper.length_m * factor, hyper.amplitude_m * factor, hyper.noise_scale)
+        error, _, _ = krige_holes(
+            KERNEL_CODES[kernel],
+            points,
+            fine.depth_m - likelihood.trend(candidate)(points),
+            candidate.noise_scale * fine.sd_m**2,
+            own.scaled_metric(candidate.length_m),
+            candidate.amplitude_m * own.amplitude,
+            rows,
+            near,
+        )
+        known = np.isfinite(error)
+        if not known.any():
+            return hyper
+        loss = float(np.mean(error[known] ** 2)) * (1.0 if factor == 1.0 else 1.0 + CHOICE_MARGIN)
+        if loss < least:
+            best, least = candidate, loss
+    return best
