@@ -33,9 +33,9 @@ from simulator import seafloors
 from simulator.dune import DuneFleet, DuneOptions, default_specs
 from simulator.dune.plan import PlanState
 from simulator.terrain import Terrain
-from tests.imc_bridge.conftest import free_ports
 from tests.missions.builders import LAT, LON
 from tests.missions.fleet import until
+from tests.ports import free_ports
 
 SPEED = 20.0
 MISSION = "m1"
