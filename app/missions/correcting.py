@@ -137,17 +137,15 @@ def recorrected(rows: Sequence[SoundingRow], corrections: Corrections, gate: Gat
 
 
 def _report(row: SoundingRow) -> SoundingReport:
-    geometry = None
-    if row.vehicle_lat_deg is not None and row.vehicle_lon_deg is not None:
-        geometry = BeamGeometry(
-            row.vehicle_lat_deg,
-            row.vehicle_lon_deg,
-            row.roll_deg,
-            row.pitch_deg,
-            row.heading_deg,
-            row.beam_azimuth_deg,
-            row.beam_off_nadir_deg,
-        )
+    geometry = BeamGeometry.where_known(
+        row.vehicle_lat_deg,
+        row.vehicle_lon_deg,
+        row.roll_deg,
+        row.pitch_deg,
+        row.heading_deg,
+        row.beam_azimuth_deg,
+        row.beam_off_nadir_deg,
+    )
     return SoundingReport(
         vehicle=row.vehicle,
         time_s=row.time_s,
