@@ -145,13 +145,15 @@ class Target:
         self.events = self.impossible = 0
         self.bridge = Bridge(BridgeSettings(loopback_only=True), clock=lambda: self.now)
         self.bridge.listen(self._note)
-        self._engaging: dict[str, asyncio.Task[None]] = {}
+        self._engaging: dict[int, asyncio.Task[None]] = {}
 
     def _note(self, event: object) -> None:
         self.events += 1
         if isinstance(event, StateReport | Sounding):
             numbers = [value for value in dataclasses.astuple(event) if isinstance(value, float)]
-            self.impossible += not (all(map(math.isfinite, numbers)) and abs(event.lat_deg) <= 90.0)
+            if not (all(map(math.isfinite, numbers)) and abs(event.lat_deg) <= 90.0):
+                self.impossible += 1
+                print(event, file=sys.stderr)
 
     def take(self, packet: bytes, address: Address, *, announce: bool) -> None:
         """One packet a millisecond after the last."""
@@ -164,11 +166,11 @@ class Target:
         """Let time pass, and order every vehicle about."""
         self.bridge.pass_time()
         for node in self.bridge.nodes():
-            task = self._engaging.get(node.name)
+            task = self._engaging.get(node.imc_id)
             if task is None or (task.done() and not node.engaged):
                 if task is not None and not task.cancelled():
                     task.exception()
-                self._engaging[node.name] = asyncio.create_task(self.bridge.engage(node.name))
+                self._engaging[node.imc_id] = asyncio.create_task(self.bridge.engage(node.name))
             with contextlib.suppress(RefusedError):
                 self.bridge.goto(node.name, Waypoint("fuzz", step, 41.185, -8.706, 3.0))
         await asyncio.sleep(0)
