@@ -2,8 +2,9 @@
 
 Packets of recorded sessions (or, without any, of every message the bridge takes in) are flipped, cut, spliced and
 filled with extreme numbers; most get a right checksum afterwards, so that they reach the parsers and gates. Printed
-is one JSON object: what became of them, errors of the handlers (must be 0) and growth of the process's memory between
-the first tenth and the end. A crash ends the command with a traceback.
+is one JSON object: what became of them, errors of the handlers (must be 0) and the process's memory after each tenth,
+with its growth over the second half, in which every bounded store is full (must stay below 4 MB). ``--write`` puts
+it into a page. A crash ends the command with a traceback.
 """
 
 import argparse
@@ -23,6 +24,8 @@ from typing import Any
 
 import imcpy
 import numpy as np
+from imc_report import write_section
+from numba import njit
 
 from imc_bridge import Bridge, BridgeSettings, RefusedError, Sounding, StateReport, Waypoint
 from imc_bridge.codec import message_ids
@@ -35,26 +38,26 @@ Packet = tuple[bytes, Address]
 ANNOUNCE = imcpy.Announce().msg_id.to_bytes(2, "little")
 
 
-def crc_table() -> list[int]:
-    """CRC-16/ARC, byte by byte."""
-    table = []
-    for value in range(256):
+MARKS = 10
+"""Moments at which memory is measured."""
+MOST_GROWTH_MB = 4.0
+
+
+@njit(cache=True)  # type: ignore[untyped-decorator]
+def crc(data: np.ndarray) -> int:
+    """CRC-16/ARC."""
+    value = 0
+    for byte in data:
+        value ^= byte
         for _ in range(8):
             value = value >> 1 ^ (0xA001 if value & 1 else 0)
-        table.append(value)
-    return table
-
-
-TABLE = crc_table()
+    return value
 
 
 def with_checksum(packet: bytearray) -> bytes:
     """The packet with its own length in the header and the checksum that belongs to it."""
     struct.pack_into("<H", packet, 4, max(len(packet) - 22, 0) & 0xFFFF)
-    crc = 0
-    for byte in packet[:-2]:
-        crc = crc >> 8 ^ TABLE[(crc ^ byte) & 0xFF]
-    struct.pack_into("<H", packet, len(packet) - 2, crc)
+    struct.pack_into("<H", packet, len(packet) - 2, crc(np.frombuffer(packet, np.uint8, len(packet) - 2)))
     return bytes(packet)
 
 
@@ -142,13 +145,15 @@ class Target:
         self.events = self.impossible = 0
         self.bridge = Bridge(BridgeSettings(loopback_only=True), clock=lambda: self.now)
         self.bridge.listen(self._note)
-        self._engaging: dict[str, asyncio.Task[None]] = {}
+        self._engaging: dict[int, asyncio.Task[None]] = {}
 
     def _note(self, event: object) -> None:
         self.events += 1
         if isinstance(event, StateReport | Sounding):
             numbers = [value for value in dataclasses.astuple(event) if isinstance(value, float)]
-            self.impossible += not (all(map(math.isfinite, numbers)) and abs(event.lat_deg) <= 90.0)
+            if not (all(map(math.isfinite, numbers)) and abs(event.lat_deg) <= 90.0):
+                self.impossible += 1
+                print(event, file=sys.stderr)
 
     def take(self, packet: bytes, address: Address, *, announce: bool) -> None:
         """One packet a millisecond after the last."""
@@ -161,11 +166,11 @@ class Target:
         """Let time pass, and order every vehicle about."""
         self.bridge.pass_time()
         for node in self.bridge.nodes():
-            task = self._engaging.get(node.name)
+            task = self._engaging.get(node.imc_id)
             if task is None or (task.done() and not node.engaged):
                 if task is not None and not task.cancelled():
                     task.exception()
-                self._engaging[node.name] = asyncio.create_task(self.bridge.engage(node.name))
+                self._engaging[node.imc_id] = asyncio.create_task(self.bridge.engage(node.name))
             with contextlib.suppress(RefusedError):
                 self.bridge.goto(node.name, Waypoint("fuzz", step, 41.185, -8.706, 3.0))
         await asyncio.sleep(0)
@@ -183,7 +188,7 @@ async def fuzz(packets: int, seed: int, captures: Path | None = None) -> dict[st
     bridge = target.bridge
     pool = seeds(captures)
     stream = mutated(pool, np.random.default_rng(seed))
-    begun, early_mb = time.process_time(), 0.0
+    begun, marks_mb = time.process_time(), []
     for packet, address in pool:
         target.take(packet, address, announce=True)
     for number in range(packets):
@@ -191,8 +196,8 @@ async def fuzz(packets: int, seed: int, captures: Path | None = None) -> dict[st
         target.take(packet, address, announce=packet[2:4] == ANNOUNCE or number % 7 == 0)
         if number % 200 == 0:
             await target.live(number // 5000)
-        if number == packets // 10:
-            early_mb = memory_mb()
+        if (number + 1) % max(packets // MARKS, 1) == 0:
+            marks_mb.append(round(memory_mb(), 1))
     await target.end()
     return {
         "packets": packets,
@@ -205,7 +210,8 @@ async def fuzz(packets: int, seed: int, captures: Path | None = None) -> dict[st
         "impossible_events": target.impossible,
         "handler_errors": dict(bridge.handler_errors),
         "nodes": len(bridge.nodes()),
-        "growth_mb": round(memory_mb() - early_mb, 2),
+        "memory_mb": marks_mb,
+        "growth_mb": round(marks_mb[-1] - marks_mb[MARKS // 2 - 1], 2),
         "cpu_s": round(time.process_time() - begun, 1),
     }
 
@@ -216,10 +222,15 @@ def main() -> None:
     parser.add_argument("--packets", type=int, default=1_000_000)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--captures", type=Path)
+    parser.add_argument("--write", type=Path, help="page of results in which this run gets a section")
     options = parser.parse_args()
     result = asyncio.run(fuzz(options.packets, options.seed, options.captures))
     print(json.dumps(result))
-    sys.exit(1 if result["handler_errors"] or result["impossible_events"] else 0)
+    if options.write is not None:
+        title = f"{options.packets:,} mutated packets".replace(",", " ")
+        write_section(options.write, title, result, {options.captures: "CAPTURES"})
+    grown = result["growth_mb"] > MOST_GROWTH_MB
+    sys.exit(1 if result["handler_errors"] or result["impossible_events"] or grown else 0)
 
 
 if __name__ == "__main__":

@@ -24,6 +24,11 @@ SENT = frozenset({1, 51, 52})
 """Sent, delivered, perhaps delivered."""
 QUEUED = 0
 ACOUSTIC_INTERFACE = 0x01
+FRAME_BYTES = 5
+"""What a frame has more than the message's packet."""
+ABORT_BYTES = 3
+INSTANT_BYTES = 64
+"""The longest instant message of the modems that DUNE drives; longer ones take a burst, which is acknowledged."""
 STATES = {
     52: "perhaps delivered",
     101: "refused by the gateway",
@@ -48,6 +53,7 @@ class _Transmission:
     what: str
     since: float
     urgent: bool
+    size: int
 
 
 def transmission(message: Message, vehicle: str, request_id: int, deadline_s: float) -> Message:
@@ -57,9 +63,20 @@ def transmission(message: Message, vehicle: str, request_id: int, deadline_s: fl
     request.comm_mean = imcpy.TransmissionRequest.CommunicationMeanEnum.ACOUSTIC
     request.destination = vehicle
     request.deadline = deadline_s
-    request.data_mode = imcpy.TransmissionRequest.DataModeEnum.INLINEMSG
-    request.msg_data = message
+    if isinstance(message, imcpy.Abort):
+        # Three bytes, which the vehicle acknowledges.
+        request.data_mode = imcpy.TransmissionRequest.DataModeEnum.ABORT
+    else:
+        request.data_mode = imcpy.TransmissionRequest.DataModeEnum.INLINEMSG
+        request.msg_data = message
     return request
+
+
+def frame_bytes(message: Message) -> int:
+    """How many bytes DUNE's modem sends for a message; up to ``INSTANT_BYTES`` at once, more as a burst."""
+    if isinstance(message, imcpy.Abort):
+        return ABORT_BYTES
+    return len(imcpy.Packet.serialize(message)) + FRAME_BYTES
 
 
 def report_request(gateway: str) -> Message:
@@ -117,7 +134,7 @@ class SoundPath:
         if busy is not None and now - busy.since < DEADLINE_S and (busy.urgent or not urgent):
             return False
         request_id = self._next_id()
-        self._under_way = _Transmission(request_id, type(message).__name__, now, urgent)
+        self._under_way = _Transmission(request_id, type(message).__name__, now, urgent, frame_bytes(message))
         self._send(transmission(message, self.vehicle, request_id, self._wall_clock() + DEADLINE_S / self._time_scale))
         return True
 
@@ -135,7 +152,9 @@ class SoundPath:
             return busy.what
         words = STATES.get(state, f"status {state}")
         self.outcomes[words] += 1
-        self.last_problem = f"{busy.what} by sound: {words}" + (f" ({message.info})" if message.info else "")
+        self.last_problem = f"{busy.what} by sound ({busy.size} bytes): {words}" + (
+            f" ({message.info})" if message.info else ""
+        )
         return ""
 
     def take_report(self, message: Message) -> SoundReport | None:

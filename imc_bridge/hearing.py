@@ -179,7 +179,7 @@ class Hearing:
         elif header.src == self._settings.imc_id:
             via.echoes += 1
         else:
-            via.relayed[header.src] += 1
+            via.relayed += 1
             if header.dst in (via.imc_id, BROADCAST_ID) and self.decoder.wants(header):
                 self._relayed(via, packet, now)
 
@@ -250,7 +250,7 @@ class Hearing:
                     if other.sound is not None:
                         other.left_by_sound(other.sound.status(message), now)
             case "FuelLevel":
-                node.battery_pct = float(message.value)
+                node.take_fuel(message)
             case "EntityList" if message.op == imcpy.EntityList.OperationEnum.REPORT:
                 node.take_entities(message)
             case "EntityParameters" if rates is not None:

@@ -11,8 +11,6 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import imcpy
-
 from imc_bridge.acoustics import SoundPath, SoundReport
 from imc_bridge.codec import Message
 from imc_bridge.control import Control, Phase
@@ -28,6 +26,7 @@ from imc_bridge.plans import (
     goto_maneuver,
     leg_plan,
     leg_time_s,
+    plan_control,
 )
 
 END_WITHIN_M = 25.0
@@ -263,19 +262,13 @@ class LegFollower(Control):
 
     def _send_leg(self, order: Order, leg: Leg, now: float) -> None:
         self._request_due = now + START_RETRY_S
-        request = imcpy.PlanControl()
-        request.type = imcpy.PlanControl.TypeEnum.REQUEST
-        request.op = imcpy.PlanControl.OperationEnum.START
-        request.request_id = self._request_id
-        request.plan_id = self._settings.plan_id
-        request.flags = 0
         # A single maneuver is the shortest plan there is.
-        request.arg = (
+        plan = (
             goto_maneuver(order.waypoint, leg.depth_m)
             if self._by_sound(now)
             else leg_plan(self._settings, order.waypoint, leg.depth_m)
         )
-        self._send(request)
+        self._send(plan_control(OPERATION_START, self._request_id, self._settings, plan))
         if order.status is None:
             self._advance(order, WaypointStatus.SENT, order.limited)
 

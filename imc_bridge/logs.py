@@ -246,7 +246,7 @@ def _take(node: Node, header: Header, message: Message) -> Iterator[LogEvent]:
         case "NavigationUncertainty":
             node.take_uncertainty(message)
         case "FuelLevel":
-            node.battery_pct = float(message.value)
+            node.take_fuel(message)
         case _:
             names = dict(node.entities or {})
             _note_entities(names, message)

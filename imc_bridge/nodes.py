@@ -8,7 +8,7 @@ timestamps order its messages.
 from __future__ import annotations
 
 import math
-from collections import Counter, deque
+from collections import deque
 from dataclasses import dataclass
 from enum import IntEnum
 
@@ -121,7 +121,8 @@ class Node:
         self.heard_at: float | None = None
         self.telemetry_at: float | None = None
         self.echoes = 0
-        self.relayed: Counter[int] = Counter()
+        self.relayed = 0
+        """How many packets of others it passed on."""
         self.foreign_address = 0
         self.last_foreign: Address | None = None
         """Where packets under its id came from last that is not an address of its own."""
@@ -271,6 +272,12 @@ class Node:
             return None
         at_s, sd = self._uncertainty
         return sd if self.clock.time_s - at_s <= UNCERTAINTY_VALID_S else None
+
+    def take_fuel(self, message: Message) -> None:
+        """FuelLevel: per cent."""
+        value = float(message.value)
+        if 0.0 <= value <= 100.0:
+            self.battery_pct = value
 
     def take_vehicle_state(self, message: Message, now: float) -> None:
         """VehicleState: the operation mode and the errors that explain it."""

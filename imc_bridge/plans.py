@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import math
+from collections.abc import Sequence
 
 import imcpy
 
@@ -48,8 +50,8 @@ def follow_plan(settings: BridgeSettings) -> Message:
     return plan
 
 
-def plan_control(operation: int, request_id: int, settings: BridgeSettings) -> Message:
-    """A request to plan control: START with our plan, or STOP."""
+def plan_control(operation: int, request_id: int, settings: BridgeSettings, plan: Message | None = None) -> Message:
+    """A request to plan control: STOP, or START with a plan, a single maneuver, or by default our FollowReference."""
     request = imcpy.PlanControl()
     request.type = imcpy.PlanControl.TypeEnum.REQUEST
     request.op = imcpy.PlanControl.OperationEnum(operation)
@@ -57,26 +59,34 @@ def plan_control(operation: int, request_id: int, settings: BridgeSettings) -> M
     request.plan_id = settings.plan_id
     request.flags = 0
     if operation == OPERATION_START:
-        request.arg = follow_plan(settings)
+        request.arg = plan if plan is not None else follow_plan(settings)
     return request
+
+
+def goto_plan(plan_id: str, steps: Sequence[tuple[str, Message]]) -> Message:
+    """A plan of maneuvers, each with its name, one after the other."""
+    plan = imcpy.PlanSpecification()
+    plan.plan_id = plan_id
+    plan.start_man_id = steps[0][0]
+    for name, maneuver in steps:
+        step = imcpy.PlanManeuver()
+        step.maneuver_id = name
+        step.data = maneuver
+        plan.maneuvers.append(step)
+    for (before, _), (after, _) in itertools.pairwise(steps):
+        transition = imcpy.PlanTransition()
+        transition.source_man = before
+        transition.dest_man = after
+        transition.conditions = DONE
+        plan.transitions.append(transition)
+    return plan
 
 
 def leg_plan(settings: BridgeSettings, waypoint: Waypoint, depth_m: float) -> Message:
     """A plan that leads to a waypoint at a depth and then up to the surface, with no further contact."""
-    plan = imcpy.PlanSpecification()
-    plan.plan_id = settings.plan_id
-    plan.start_man_id = THERE
-    for name, depth in ((THERE, depth_m), (UP, 0.0)):
-        step = imcpy.PlanManeuver()
-        step.maneuver_id = name
-        step.data = goto_maneuver(waypoint, depth)
-        plan.maneuvers.append(step)
-    transition = imcpy.PlanTransition()
-    transition.source_man = THERE
-    transition.dest_man = UP
-    transition.conditions = DONE
-    plan.transitions.append(transition)
-    return plan
+    return goto_plan(
+        settings.plan_id, [(name, goto_maneuver(waypoint, depth)) for name, depth in ((THERE, depth_m), (UP, 0.0))]
+    )
 
 
 def goto_maneuver(waypoint: Waypoint, depth_m: float) -> Message:

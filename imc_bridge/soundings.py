@@ -31,6 +31,8 @@ MAX_EDGE_S = 0.6
 MAX_IGNORED = 256
 MAX_WAIT_S = 3.0
 """How far the vehicle's clock may run on before a Distance without a following state is given up."""
+LONGEST_LEVER_M = 20.0
+"""No sonar sits farther from its vehicle's reference point than this; what says so is damaged."""
 MAX_PENDING = 256
 HISTORY_LENGTH = 400
 REMEMBERED_TIMES = 128
@@ -274,7 +276,7 @@ class SoundingGate:
             return self._refuse(time_s, source, range_m, "zero or negative range")
         if range_m > self._max_range_m:
             return self._refuse(time_s, source, range_m, f"beyond {self._max_range_m:g} m")
-        if not all(map(math.isfinite, lever_arm_m)):
+        if not all(abs(offset_m) <= LONGEST_LEVER_M for offset_m in lever_arm_m):
             lever_arm_m = (0.0, 0.0, 0.0)
         self._pending.append(Ping(time_s, source, beam, range_m, lever_arm_m))
         if len(self._pending) > MAX_PENDING:

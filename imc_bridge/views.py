@@ -41,7 +41,7 @@ def view_of(
         soundings=node.gate.accepted,
         refused=dict(node.gate.refused),
         echoes=node.echoes,
-        relayed=sum(node.relayed.values()),
+        relayed=node.relayed,
         foreign_address=node.foreign_address,
         foreign_from=f"{node.last_foreign[0]}:{node.last_foreign[1]}" if node.last_foreign else None,
         conflict=node.conflict,

@@ -139,17 +139,15 @@ def recorrected(rows: Sequence[SoundingRow], corrections: Corrections, gate: Gat
 
 def report_of(row: SoundingRow) -> SoundingReport:
     """Return a stored sounding as it came from the vehicle."""
-    geometry = None
-    if row.vehicle_lat_deg is not None and row.vehicle_lon_deg is not None:
-        geometry = BeamGeometry(
-            row.vehicle_lat_deg,
-            row.vehicle_lon_deg,
-            row.roll_deg,
-            row.pitch_deg,
-            row.heading_deg,
-            row.beam_azimuth_deg,
-            row.beam_off_nadir_deg,
-        )
+    geometry = BeamGeometry.where_known(
+        row.vehicle_lat_deg,
+        row.vehicle_lon_deg,
+        row.roll_deg,
+        row.pitch_deg,
+        row.heading_deg,
+        row.beam_azimuth_deg,
+        row.beam_off_nadir_deg,
+    )
     return SoundingReport(
         vehicle=row.vehicle,
         time_s=row.time_s,

@@ -80,6 +80,13 @@ class BeamGeometry:
     azimuth_deg: float | None = None
     off_nadir_deg: float | None = None
 
+    @classmethod
+    def where_known(
+        cls, lat_deg: float | None, lon_deg: float | None, *angles_deg: float | None
+    ) -> "BeamGeometry | None":
+        """Return the geometry, or None where not even the vehicle's place is known; angles in the fields' order."""
+        return None if lat_deg is None or lon_deg is None else cls(lat_deg, lon_deg, *angles_deg)
+
 
 @dataclass(frozen=True, slots=True)
 class SoundingReport:

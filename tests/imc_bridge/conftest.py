@@ -19,22 +19,12 @@ from simulator import seafloors
 from simulator.dune import DuneFleet, DuneOptions, default_specs
 from simulator.network import NetworkFaults
 from simulator.terrain import Terrain
+from tests.ports import free_ports
 
 SPEED = 20.0
-PATIENCE_WALL_S = 30.0
+PATIENCE_WALL_S = 120.0
+"""A condition is waited for this long; only on a machine that is very busy it comes near that."""
 Event = TypeVar("Event")
-
-
-def free_ports(count: int) -> list[int]:
-    """UDP ports that nothing on this machine uses now."""
-    sockets = [socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(count)]
-    try:
-        for sock in sockets:
-            sock.bind(("127.0.0.1", 0))
-        return [sock.getsockname()[1] for sock in sockets]
-    finally:
-        for sock in sockets:
-            sock.close()
 
 
 async def until(condition: Callable[[], bool], what: str) -> None:

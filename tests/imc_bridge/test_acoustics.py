@@ -6,12 +6,22 @@ import math
 import imcpy
 import pytest
 
-from imc_bridge import Guidance, NodeState, RefusedError, WaypointStatus
-from imc_bridge.acoustics import DEADLINE_S, REPORT_PERIOD_S, SoundPath, report_request, transmission
+from imc_bridge import BridgeSettings, Guidance, NodeState, RefusedError, Waypoint, WaypointStatus
+from imc_bridge.acoustics import (
+    DEADLINE_S,
+    INSTANT_BYTES,
+    REPORT_PERIOD_S,
+    SoundPath,
+    frame_bytes,
+    report_request,
+    transmission,
+)
+from imc_bridge.plans import OPERATION_START, OPERATION_STOP, goto_maneuver, leg_plan, plan_control
 from simulator.dune.node import FakeDune
 from tests.imc_bridge.conftest import Peer, Sea, open_sea, read_capture, until
 
 GATEWAY, GATEWAY_ID = "manta-1", 0x8012
+WAYPOINT = Waypoint("m", 1, 41.185, -8.705, 3.0)
 RADIO_M = 30.0
 """So short that a vehicle on its way has sound only."""
 SENT = imcpy.TransmissionStatus.StatusEnum.SENT
@@ -32,11 +42,35 @@ def test_requests_are_those_of_the_recorded_console_field_by_field(recorded):
     theirs = {m.req_id: m for m in recorded if isinstance(m, imcpy.TransmissionRequest) and m.src == 0x3F01}
     with_message = [m for m in theirs.values() if m.msg_data is not None]
     assert len(with_message) >= 3
+    [abort] = [m for m in theirs.values() if m.data_mode == imcpy.TransmissionRequest.DataModeEnum.ABORT]
+    ours = transmission(imcpy.Abort(), abort.destination, abort.req_id, abort.deadline)
+    assert ours.serialize_fields() == abort.serialize_fields()
     for message in with_message:
         ours = transmission(message.msg_data, message.destination, message.req_id, message.deadline)
         assert ours.serialize_fields() == message.serialize_fields()
     [report] = [m.msg_data for m in with_message if isinstance(m.msg_data, imcpy.ReportControl)]
     assert report_request(GATEWAY).serialize_fields() == report.serialize_fields()
+
+
+def test_frames_are_as_long_as_the_recorded_modem_made_them(recorded):
+    sent = [m.msg_data for m in recorded if isinstance(m, imcpy.TransmissionRequest) and m.msg_data is not None]
+    frames = {len(m.data) for m in recorded if isinstance(m, imcpy.UamTxFrame) and m.src == GATEWAY_ID}
+    assert {frame_bytes(m) for m in sent if m.msg_name in ("PlanControl", "Reference", "ReportControl")} <= frames
+    assert frame_bytes(imcpy.Abort()) in frames
+
+
+def test_what_has_to_get_through_at_once_is_an_instant_message():
+    settings = BridgeSettings()
+    leg = goto_maneuver(WAYPOINT, 3.0)
+    sizes = {
+        "abort": frame_bytes(imcpy.Abort()),
+        "stop": frame_bytes(plan_control(OPERATION_STOP, 1, settings)),
+        "report": frame_bytes(report_request(GATEWAY)),
+        "leg": frame_bytes(plan_control(OPERATION_START, 1, settings, leg)),
+        "leg and up": frame_bytes(plan_control(OPERATION_START, 1, settings, leg_plan(settings, WAYPOINT, 3.0))),
+    }
+    assert sizes == {"abort": 3, "stop": 49, "report": 40, "leg": 103, "leg and up": 248}
+    assert max(sizes[kind] for kind in ("abort", "stop", "report")) <= INSTANT_BYTES
 
 
 def test_the_recorded_gateways_answers_are_understood(recorded):
@@ -65,7 +99,7 @@ def test_one_message_is_under_way_at_a_time_and_commands_go_before_reports():
     status = imcpy.TransmissionStatus()
     status.req_id, status.status, status.info = 3, imcpy.TransmissionStatus.StatusEnum.TEMPORARY_FAILURE, "modem busy"
     assert path.status(status) == ""
-    assert path.last_problem == "PlanControl by sound: failed for now (modem busy)"
+    assert path.last_problem == "PlanControl by sound (39 bytes): failed for now (modem busy)"
     path.ask(REPORT_PERIOD_S + 30.0)
     assert isinstance(sent[-1].msg_data, imcpy.ReportControl)
 
@@ -124,7 +158,8 @@ async def test_legs_go_on_by_sound_where_radio_does_not_reach():
             await until(lambda: any(node.name == GATEWAY for node in sea.bridge.nodes()), "the gateway is heard")
             await sea.bridge.engage(name, Guidance.ACOUSTIC, GATEWAY)
             start = modem.node.vehicle.position
-            away = (85.0, 85.0) if start.east_m < 50.0 else (15.0, 15.0)
+            # So far that it is out of radio's reach wherever a report may count as arrival.
+            away = (start.east_m, 85.0)
             sea.bridge.goto(name, sea.waypoint(0, *away, 2.0))
             await sea.reached(name, 0)
             assert modem.node.vehicle.position.horizontal_distance_m(start.east_m, start.north_m) > RADIO_M

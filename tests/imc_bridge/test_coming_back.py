@@ -72,7 +72,7 @@ async def test_a_vehicle_that_goes_on_with_our_plan_is_asked_until_it_hears():
 async def test_a_mission_goes_on_by_itself_when_its_vehicle_hears_again(
     make_settings: Callable[..., ServiceSettings],
 ) -> None:
-    speed = 20.0
+    speed = 10.0
     async with open_sea(connected=False, speed=speed) as sea:
         imc = ImcSettings(port=sea.settings.port, announce_ports=sea.settings.announce_ports, loopback_only=True)
         settings = make_settings(imc=imc, time_scale=speed)

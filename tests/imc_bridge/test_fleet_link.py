@@ -15,7 +15,8 @@ from app.missions.fleet import (
 )
 from app.missions.links.imc import ImcFleetLink, make_imc_link
 from app.missions.settings import ImcSettings
-from tests.imc_bridge.conftest import free_ports, open_sea, until
+from tests.imc_bridge.conftest import open_sea, until
+from tests.ports import free_ports
 
 
 async def test_one_waypoint_from_engaging_to_stopping():

@@ -3,6 +3,7 @@
 import pytest
 
 from imc_bridge import LinkChange, NodeState, Sounding, SoundingRefused, WaypointChange, WaypointStatus
+from imc_bridge.doctor import Cause, judge
 from tests.imc_bridge.conftest import open_sea, until
 
 RANGE_M = 5000.0
@@ -24,6 +25,10 @@ async def test_waypoints_are_reached_though_every_dive_breaks_the_link():
         # What it measured before it was out of reach and after it was back counts, at the edges of the gap too.
         lost = [s for s in sea.of(SoundingRefused) if "no state" in s.reason]
         assert len(lost) <= 0.05 * len(sea.of(Sounding))
+        # Who leads a vehicle by references where radio ends is told what would be right.
+        assert sea.bridge.nodes()[0].radio_gaps > 0
+        [finding] = [f for f in judge(sea.bridge, 1.0).nodes[0].findings if f.cause is Cause.RADIO_GAPS]
+        assert "guidance 'legs'" in finding.remedy
         assert (await sea.bridge.stop(name)).acknowledged
 
 

@@ -10,7 +10,8 @@ import pytest
 from imc_bridge import Bridge, LinkChange, NodeState, RefusedError, Sounding, WaypointChange, WaypointStatus
 from imc_bridge.codec import encode
 from imc_bridge.plans import OPERATION_START, plan_control
-from tests.imc_bridge.conftest import Peer, free_ports, open_sea, until
+from tests.imc_bridge.conftest import Peer, open_sea, until
+from tests.ports import free_ports
 
 S, A, R = WaypointStatus.SENT, WaypointStatus.ACKNOWLEDGED, WaypointStatus.REACHED
 

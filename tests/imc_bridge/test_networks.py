@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 from imc_bridge import Bridge, BridgeSettings, NodeState, WaypointStatus
 from imc_bridge.streams import PacketSplitter
 from imc_bridge.transport import Interface, list_interfaces
-from tests.imc_bridge.conftest import Peer, free_ports, open_sea, until
+from tests.imc_bridge.conftest import Peer, open_sea, until
+from tests.ports import free_ports
 
 GROUP = "224.0.75.69"
 LOOPBACK = Interface("127.0.0.1", "127.255.255.255")

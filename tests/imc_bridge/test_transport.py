@@ -8,7 +8,8 @@ import imcpy
 import pytest
 
 from imc_bridge import Bridge, BridgeSettings, NodeState, PortInUseError
-from tests.imc_bridge.conftest import Peer, free_ports, open_sea, until
+from tests.imc_bridge.conftest import Peer, open_sea, until
+from tests.ports import free_ports
 
 
 async def test_taken_port_is_told_with_a_remedy():

@@ -33,9 +33,9 @@ from simulator import seafloors
 from simulator.dune import DuneFleet, DuneOptions, default_specs
 from simulator.dune.plan import PlanState
 from simulator.terrain import Terrain
-from tests.imc_bridge.conftest import free_ports
 from tests.missions.builders import LAT, LON
 from tests.missions.fleet import until
+from tests.ports import free_ports
 
 SPEED = 20.0
 MISSION = "m1"
@@ -289,7 +289,8 @@ async def test_a_new_order_replaces_the_old(bench: Bench) -> None:
     await bench.reached(2)
     assert R not in bench.statuses(1)
     assert bench.statuses(2) == [S, A, R]
-    assert distance_m(bench, order) <= ARRIVAL_M + 2.0
+    # DUNE circles where it arrived, by up to 10 m from it.
+    assert distance_m(bench, order) <= ARRIVAL_M + 10.0
 
 
 async def test_a_stop_is_acknowledged_and_can_be_repeated(bench: Bench) -> None:

@@ -24,6 +24,7 @@ from app.missions.states import MissionState
 from app.missions.views import MissionView
 from app.storage.database import Database
 from tests.missions.fleet import until
+from tests.ports import free_ports
 
 ROWS, COLS, MAX_DEPTH_M = 60, 50, 50.0
 SESSION = "Neptus_User_4711"
@@ -32,17 +33,6 @@ FIRST_DEPTH_M, SEPARATION_M = 1.5, 1.5
 
 def bottom_m(row: float, col: float) -> float:
     return 12.0 + 0.05 * row + math.sin(col / 8.0)
-
-
-def free_ports(count: int) -> list[int]:
-    sockets = [socket.socket() for _ in range(count)]
-    try:
-        for sock in sockets:
-            sock.bind(("127.0.0.1", 0))
-        return [sock.getsockname()[1] for sock in sockets]
-    finally:
-        for sock in sockets:
-            sock.close()
 
 
 @dataclass

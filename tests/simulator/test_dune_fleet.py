@@ -2,7 +2,6 @@
 
 import asyncio
 import math
-import socket
 
 import imcpy
 import numpy as np
@@ -13,20 +12,10 @@ from simulator import seafloors
 from simulator.clock import SimulationClock
 from simulator.dune import DuneFleet, DuneOptions, default_specs
 from simulator.network import NetworkFaults, UdpEndpoint
+from tests.ports import free_ports
 
 FLOOR = seafloors.generate("harbour", 0)
 SPEED = 10.0
-
-
-def free_ports(count):
-    """UDP ports of the loopback that nobody has now."""
-    sockets = [socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(count)]
-    for s in sockets:
-        s.bind(("127.0.0.1", 0))
-    ports = [s.getsockname()[1] for s in sockets]
-    for s in sockets:
-        s.close()
-    return ports
 
 
 def fleet_of(count, **kwargs):

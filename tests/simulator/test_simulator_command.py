@@ -7,12 +7,12 @@ import sys
 from pathlib import Path
 
 import pytest
-from test_dune_fleet import free_ports
 from typer.testing import CliRunner
 
 from simulator import seafloors
 from simulator.__main__ import app
 from simulator.terrain_files import save_npz
+from tests.ports import free_ports
 
 ROOT = Path(__file__).resolve().parents[2]
 

@@ -193,8 +193,6 @@ def _translate(event: BridgeEvent) -> FleetEvent | None:
 
 
 def _beam_geometry(sounding: Sounding) -> BeamGeometry | None:
-    if sounding.vehicle_lat_deg is None or sounding.vehicle_lon_deg is None:
-        return None
     angles = (
         sounding.roll_rad,
         sounding.pitch_rad,
@@ -203,7 +201,7 @@ def _beam_geometry(sounding: Sounding) -> BeamGeometry | None:
         sounding.beam_off_nadir_rad,
     )
     degrees = (None if angle is None else math.degrees(angle) for angle in angles)
-    return BeamGeometry(sounding.vehicle_lat_deg, sounding.vehicle_lon_deg, *degrees)
+    return BeamGeometry.where_known(sounding.vehicle_lat_deg, sounding.vehicle_lon_deg, *degrees)
 
 
 def _link_state(state: NodeState, engaged: bool, ours: bool) -> LinkState:

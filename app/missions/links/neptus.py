@@ -7,14 +7,13 @@ answered any more flies its last leg and circles at its end, until someone press
 
 import asyncio
 import time
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from app.missions.fleet import (
     EventSink,
-    LinkReport,
     LinkState,
     Position,
     SoundingReport,
@@ -23,9 +22,9 @@ from app.missions.fleet import (
     VehicleRefusedError,
     VehicleReport,
     WaypointOrder,
-    WaypointReport,
     WaypointStatus,
 )
+from app.missions.links.visitors import VisitedLink, Visitor
 from app.missions.settings import NeptusSettings
 from imc_bridge.neptus import (
     Area,
@@ -68,16 +67,11 @@ def gateway_settings(settings: NeptusSettings) -> GatewaySettings:
 
 
 @dataclass
-class _Craft:
-    name: str
-    depth_m: float
+class _Craft(Visitor):
+    depth_m: float = 0.0
     """At which the panel sends it, whatever it is told."""
-    state: LinkState = LinkState.HEARD
     place: Place | None = None
-    report: VehicleReport | None = None
-    order: WaypointOrder | None = None
     published: bool = False
-    status: WaypointStatus | None = None
 
 
 @dataclass
@@ -96,29 +90,27 @@ class _Fleet:
     timer: asyncio.TimerHandle | None = field(default=None, repr=False)
 
 
-class NeptusFleetLink:
+class NeptusFleetLink(VisitedLink):
     """The fleet interface for the gateway's sessions; see :class:`app.missions.fleet.FleetLink` for its contract."""
 
     kind = "neptus"
 
     def __init__(self, settings: NeptusSettings, keeper: SessionKeeper) -> None:
+        super().__init__(settings.lost_after_s)
         self._settings = settings
         self.gateway = NeptusGateway(gateway_settings(settings), keeper)
         self._fleets: dict[str, _Fleet] = {}
-        self._sink: EventSink = lambda _event: None
-        self._watch: asyncio.Task[None] | None = None
 
     async def start(self, sink: EventSink) -> None:
         """Bind both ports and answer. Raises ``imc_bridge.PortInUseError`` when one cannot be had."""
+        # A panel may upload as soon as the gateway answers.
         self._sink = sink
         await self.gateway.start()
-        self._watch = asyncio.create_task(self._watch_silence())
+        self._begin(sink)
 
     async def close(self) -> None:
         """Answer nothing more, then release the ports."""
-        if self._watch is not None:
-            self._watch.cancel()
-            await asyncio.gather(self._watch, return_exceptions=True)
+        await self._end()
         await self.gateway.close()
         for fleet in self._fleets.values():
             if fleet.timer is not None:
@@ -198,7 +190,7 @@ class NeptusFleetLink:
         depths = [
             self._settings.first_depth_m + index * self._settings.depth_separation_m for index in range(len(vehicles))
         ]
-        crafts = [_Craft(name, depth) for name, depth in zip(vehicles, depths, strict=True)]
+        crafts = [_Craft(name, LinkState.HEARD, depth_m=depth) for name, depth in zip(vehicles, depths, strict=True)]
         fleet = self._fleets[session] = _Fleet(session, crafts, host, time.time(), time_step)
         if time_step:
             fleet.pending = time_step
@@ -348,21 +340,6 @@ class NeptusFleetLink:
             return f"its panel was silent for more than {self._settings.lost_after_s:g} s, or began another session"
         return "connected; no step yet: press START in the panel" if state is LinkState.HEARD else ""
 
-    def _set_state(self, craft: _Craft, state: LinkState) -> None:
-        if craft.state is not state:
-            craft.state = state
-            self._sink(LinkReport(craft.name, state, self._reason(state)))
-
-    def _report(self, craft: _Craft, status: WaypointStatus) -> None:
-        craft.status = status
-        if craft.order is not None:
-            self._sink(WaypointReport(craft.name, craft.order.mission_id, craft.order.step, status))
-
-    async def _watch_silence(self) -> None:
-        while True:
-            await asyncio.sleep(self._settings.lost_after_s / 10)
-            limit_s = time.time() - self._settings.lost_after_s
-            for fleet in self._fleets.values():
-                if fleet.heard_s < limit_s:
-                    for craft in fleet.crafts:
-                        self._set_state(craft, LinkState.LOST)
+    def _silent(self) -> Iterable[Visitor]:
+        limit_s = time.time() - self._lost_after_s
+        return [craft for fleet in self._fleets.values() if fleet.heard_s < limit_s for craft in fleet.crafts]

@@ -6,12 +6,11 @@ posts. Nothing is sent to it of our own accord, so it counts as lost when it has
 
 import asyncio
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
 from app.missions.fleet import (
     EventSink,
-    LinkReport,
     LinkState,
     Position,
     StopReceipt,
@@ -19,26 +18,21 @@ from app.missions.fleet import (
     VehicleRefusedError,
     VehicleReport,
     WaypointOrder,
-    WaypointReport,
     WaypointStatus,
 )
+from app.missions.links.visitors import VisitedLink, Visitor
 
 EARTH_RADIUS_M = 6_371_000.0
 
 
 @dataclass
-class _Poller:
-    name: str
-    heard_s: float
-    state: LinkState = LinkState.READY
-    report: VehicleReport | None = None
-    order: WaypointOrder | None = None
-    status: WaypointStatus | None = None
+class _Poller(Visitor):
+    heard_s: float = 0.0
     stopping: bool = False
     told: asyncio.Event = field(default_factory=asyncio.Event)
 
 
-class RestFleetLink:
+class RestFleetLink(VisitedLink):
     """The fleet interface for vehicles that poll.
 
     The mission service calls ``heard``, ``has_waypoint`` and ``told_to_stop`` as requests come in.
@@ -47,23 +41,18 @@ class RestFleetLink:
     kind = "rest"
 
     def __init__(self, *, lost_after_s: float = 30.0) -> None:
-        self._lost_after_s = lost_after_s
+        super().__init__(lost_after_s)
         self._pollers: dict[str, _Poller] = {}
-        self._sink: EventSink = lambda _event: None
-        self._watch: asyncio.Task[None] | None = None
 
     async def start(self, sink: EventSink) -> None:
         """Begin; events go to ``sink``."""
-        self._sink = sink
-        self._watch = asyncio.create_task(self._watch_silence())
+        self._begin(sink)
 
     async def close(self) -> None:
         """Stop every engaged vehicle, then end."""
         engaged = [p.name for p in self._pollers.values() if p.state is LinkState.ENGAGED]
         await asyncio.gather(*(self.stop(name, timeout_s=1.0) for name in engaged))
-        if self._watch is not None:
-            self._watch.cancel()
-            await asyncio.gather(self._watch, return_exceptions=True)
+        await self._end()
 
     def vehicles(self) -> Sequence[VehicleInfo]:
         """Every vehicle that was heard of since the service started."""
@@ -73,7 +62,7 @@ class RestFleetLink:
                 name=p.name,
                 kind=self.kind,
                 state=p.state,
-                reason=self._silence_reason() if p.state is LinkState.LOST else "",
+                reason=self._reason(p.state),
                 age_s=now_s - p.heard_s,
                 report=p.report,
             )
@@ -88,7 +77,7 @@ class RestFleetLink:
                 vehicle, "never heard of", "let it post its position: POST /api/v1/missions/{id}/measurements"
             )
         if poller.state is LinkState.LOST:
-            raise VehicleRefusedError(vehicle, self._silence_reason(), "check its connection; it must poll again")
+            raise VehicleRefusedError(vehicle, self._reason(poller.state), "check its connection; it must poll again")
         poller.stopping = False
         self._set_state(poller, LinkState.ENGAGED)
 
@@ -154,32 +143,18 @@ class RestFleetLink:
         now_s = asyncio.get_running_loop().time()
         poller = self._pollers.get(vehicle)
         if poller is None:
-            poller = self._pollers[vehicle] = _Poller(vehicle, now_s, LinkState.UNKNOWN)
+            poller = self._pollers[vehicle] = _Poller(vehicle, LinkState.UNKNOWN)
         poller.heard_s = now_s
         if poller.state in (LinkState.UNKNOWN, LinkState.LOST):
             self._set_state(poller, LinkState.READY)
         return poller
 
-    def _set_state(self, poller: _Poller, state: LinkState) -> None:
-        if poller.state is not state:
-            poller.state = state
-            self._sink(LinkReport(poller.name, state, self._silence_reason() if state is LinkState.LOST else ""))
+    def _reason(self, state: LinkState) -> str:
+        return f"silent for more than {self._lost_after_s:g} s" if state is LinkState.LOST else ""
 
-    def _report(self, poller: _Poller, status: WaypointStatus) -> None:
-        poller.status = status
-        if poller.order is not None:
-            self._sink(WaypointReport(poller.name, poller.order.mission_id, poller.order.step, status))
-
-    def _silence_reason(self) -> str:
-        return f"silent for more than {self._lost_after_s:g} s"
-
-    async def _watch_silence(self) -> None:
-        while True:
-            await asyncio.sleep(self._lost_after_s / 10)
-            limit_s = asyncio.get_running_loop().time() - self._lost_after_s
-            for poller in self._pollers.values():
-                if poller.heard_s < limit_s:
-                    self._set_state(poller, LinkState.LOST)
+    def _silent(self) -> Iterable[Visitor]:
+        limit_s = asyncio.get_running_loop().time() - self._lost_after_s
+        return [poller for poller in self._pollers.values() if poller.heard_s < limit_s]
 
 
 def horizontal_distance_m(a: Position, b: Position) -> float:
