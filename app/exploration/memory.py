@@ -2,6 +2,7 @@
 
 from typing import Any
 
+import numpy as np
 import orjson
 
 VERSION = 1
@@ -9,7 +10,15 @@ VERSION = 1
 
 def pack(kind: str, memory: dict[str, Any]) -> bytes:
     """Return the memory (numbers, strings, lists, dicts and arrays) of a planner of this kind."""
-    return orjson.dumps({"kind": kind, "version": VERSION, "memory": memory}, option=orjson.OPT_SERIALIZE_NUMPY)
+    document = {"kind": kind, "version": VERSION, "memory": memory}
+    return orjson.dumps(document, default=_scattered, option=orjson.OPT_SERIALIZE_NUMPY)
+
+
+def _scattered(value: object) -> Any:
+    """Return an array as a list that orjson does not take itself: part of a larger one, its rows apart in memory."""
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    raise TypeError(f"a planner's memory holds {type(value).__name__}; it may hold numbers, strings, lists, arrays")
 
 
 def unpack(kind: str, data: bytes) -> dict[str, Any]:
