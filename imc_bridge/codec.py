@@ -12,7 +12,7 @@ from collections import Counter
 from collections.abc import Iterable
 from enum import StrEnum
 from functools import cache
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import imcpy
 
@@ -32,6 +32,12 @@ _LITTLE = struct.Struct("<HHHdHBHB")
 _BIG = struct.Struct(">HHHdHBHB")
 _SYNC_LITTLE = struct.pack("<H", SYNC)
 _SYNC_BIG = struct.pack(">H", SYNC)
+
+PLAN_CONTROL, PLAN_DB = 559, 556
+_BEFORE_NAME = 4
+"""Bytes of either plan message before the plan's name: type, operation, number of the request."""
+NO_MESSAGE = 0xFFFF
+"""Stands in a packet where a message could be carried inside."""
 
 
 class PacketFault(StrEnum):
@@ -100,6 +106,48 @@ def message_name(msg_id: int) -> str | None:
 def message_ids(names: Iterable[str]) -> frozenset[int]:
     """Ids of messages by abbreviated name."""
     return frozenset(int(imcpy.Factory.id_from_abbrev(name)) for name in names)
+
+
+def _checksum_table() -> list[int]:
+    table = list(range(256))
+    for _ in range(8):
+        table = [(value >> 1) ^ (0xA001 if value & 1 else 0) for value in table]
+    return table
+
+
+_CHECKSUM = _checksum_table()
+
+
+def checksum(data: bytes) -> int:
+    """CRC-16-IBM of a packet without its footer."""
+    crc = 0
+    for byte in data:
+        crc = (crc >> 8) ^ _CHECKSUM[(crc ^ byte) & 0xFF]
+    return crc
+
+
+def without_argument(packet: bytes) -> bytes:
+    """Return a plan message's packet without the message that it carries inside (and the text after that).
+
+    Nobody here needs what a vehicle's plan messages carry, and imcpy 1.1.2 loses memory for good with every one that it
+    cannot read: whoever sent many would bring the service down. All other packets are returned as they are.
+    """
+    little = packet[:2] == _SYNC_LITTLE
+    order: Literal["little", "big"] = "little" if little else "big"
+    msg_id = int.from_bytes(packet[2:4], order)
+    if msg_id not in (PLAN_CONTROL, PLAN_DB):
+        return packet
+    end = HEADER_SIZE + _BEFORE_NAME
+    end += 2 + int.from_bytes(packet[end : end + 2], order)
+    end += 2 if msg_id == PLAN_CONTROL else 0  # flags
+    carried = int.from_bytes(packet[end : end + 2], order)
+    if end + 2 > len(packet) - FOOTER_SIZE or carried == NO_MESSAGE:
+        return packet
+    if checksum(packet[:-FOOTER_SIZE]) != int.from_bytes(packet[-FOOTER_SIZE:], order):
+        return packet  # which imcpy notices before it reads further
+    bare = packet[:end] + NO_MESSAGE.to_bytes(2, order) + bytes(2)
+    bare = bare[:4] + (len(bare) - HEADER_SIZE).to_bytes(2, order) + bare[6:]
+    return bare + checksum(bare).to_bytes(2, order)
 
 
 class Decoder:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import imcpy
 
-from imc_bridge.codec import BROADCAST_ID, Decoder, Header, Message
+from imc_bridge.codec import BROADCAST_ID, Decoder, Header, Message, without_argument
 from imc_bridge.control import Control
 from imc_bridge.crew import Crew
 from imc_bridge.discovery import Announcement, read_announce
@@ -166,7 +166,7 @@ class Hearing:
             sender.heard(now, address)
         if not self.decoder.wants(header):
             return
-        message = self.decoder.message(packet)
+        message = self.decoder.message(without_argument(packet))
         if message is not None and 0.0 < message.timestamp < MAX_PLAUSIBLE_VEHICLE_TIME_S:
             self._take_message(sender, message, now)
 
@@ -195,7 +195,7 @@ class Hearing:
 
     def _relayed(self, via: Node, packet: bytes, now: float) -> None:
         control = self._crew.get(via)
-        message = self.decoder.message(packet)
+        message = self.decoder.message(without_argument(packet))
         if isinstance(message, imcpy.EstimatedState):
             self._heard_by_sound(via, message, now)
         if control is None or message is None:

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from imc_bridge.codec import Decoder, Header, PacketFault, encode, message_name, peek
+from imc_bridge.codec import Decoder, Header, PacketFault, checksum, encode, message_name, peek, without_argument
 from imc_bridge.hearing import WANTED
 from tests.imc_bridge.conftest import read_capture
 
@@ -116,3 +116,44 @@ def test_no_packet_whatever_raises(noise: bytes, place: int, value: int):
         if header is not None and decoder.wants(header):
             decoder.message(packet)
     assert decoder.faults.total() + decoder.decoded.total() + decoder.unwanted.total() == 3
+
+
+def test_the_checksum_is_that_of_the_packets(captures: Path):
+    for record in list(read_capture(captures / "udp_session.jsonl.gz"))[:300]:
+        assert checksum(record.packet[:-2]) == int.from_bytes(record.packet[-2:], "little")
+
+
+def plan_control(argument=None):
+    message = imcpy.PlanControl()
+    message.type, message.op, message.request_id, message.flags = 1, 2, 777, 3
+    message.plan_id, message.info = "survey-7", "said the vehicle"
+    if argument is not None:
+        message.arg = argument
+    return message
+
+
+def test_what_a_plan_message_carries_is_left_out_and_the_rest_stays():
+    statistics = imcpy.PlanStatistics()
+    statistics.plan_id = "survey-7"
+    bare = imcpy.Packet.deserialize(without_argument(packet_of(plan_control(statistics))))
+    assert (bare.type, bare.op, bare.request_id, bare.flags) == (1, 2, 777, 3)
+    assert (bare.plan_id, bare.arg, bare.src, bare.timestamp) == ("survey-7", None, 0x1E, 1.5)
+
+
+@pytest.mark.parametrize("message", [plan_control(), imcpy.PlanDB(), imcpy.Heartbeat(), imcpy.VehicleState()])
+def test_packets_that_carry_nothing_stay_as_they_are(message):
+    assert without_argument(packet_of(message)) == packet_of(message)
+
+
+@given(st.binary(max_size=40), st.integers(0, 30), st.booleans())
+def test_whatever_is_carried_imcpy_never_reads_it(rubbish: bytes, cut: int, right: bool):
+    """What imcpy cannot read inside costs it memory for good; a wrong checksum it notices before."""
+    packet = bytearray(packet_of(plan_control()))
+    at = 20 + 4 + 2 + len("survey-7") + 2
+    packet[at:-2] = b"\x10\x27" + rubbish
+    packet = packet[: max(22, len(packet) - cut)]
+    packet[4:6] = (len(packet) - 22).to_bytes(2, "little")
+    packet[-2:] = checksum(bytes(packet[:-2])).to_bytes(2, "little") if right else b"??"
+    decoder = Decoder(WANTED)
+    message = decoder.message(without_argument(bytes(packet)))
+    assert message is None or (message.arg is None and message.plan_id == "survey-7")
