@@ -1,3 +1,4 @@
+import gzip
 from pathlib import Path
 
 import httpx
@@ -67,3 +68,16 @@ async def test_nothing_else_is_served(static: Path, path: str) -> None:
 
 async def test_health_checks_may_ask_for_the_head_only(static: Path) -> None:
     assert (await client(static).head("/")).status_code == 200
+
+
+async def test_assets_go_out_compressed_where_the_browser_takes_that(static: Path) -> None:
+    packed = gzip.compress(b"export {} // packed")
+    (static / "assets" / "index-Ab12.js.gz").write_bytes(packed)
+    service = client(static)
+    small = await service.get("/assets/index-Ab12.js", headers={"Accept-Encoding": "br, gzip"})
+    assert small.text == "export {} // packed"
+    assert small.headers["content-encoding"] == "gzip"
+    assert small.headers["content-type"].startswith("text/javascript")
+    plain = await service.get("/assets/index-Ab12.js", headers={"Accept-Encoding": "identity"})
+    assert (plain.text, plain.headers.get("content-encoding")) == ("export {}", None)
+    assert small.headers["vary"] == plain.headers["vary"] == "Accept-Encoding"
