@@ -182,8 +182,7 @@ def test_an_area_is_drawn_with_a_keep_out_zone_and_judged_at_once(page: Page, se
     expect(by_id(page, "map")).to_have_attribute("data-ready", "true")
     by_id(page, "new-mission").click()
     by_id(page, "draw-polygon").click()
-    expect(by_id(page, "drawing")).to_be_visible()
-    page.wait_for_load_state("networkidle")
+    expect(by_id(page, "drawing")).to_have_attribute("data-ready", "true")
     corners = [(520, 300), (900, 320), (880, 640), (540, 600)]
     for x, y in [*corners, corners[0]]:
         page.mouse.move(x, y)
@@ -191,6 +190,7 @@ def test_an_area_is_drawn_with_a_keep_out_zone_and_judged_at_once(page: Page, se
     expect(by_id(page, "drawing")).to_be_hidden()
     expect(by_id(page, "area-size")).to_contain_text("4 corners")
     by_id(page, "draw-keep-out").click()
+    expect(by_id(page, "drawing")).to_have_attribute("data-ready", "true")
     zone = [(640, 400), (700, 400), (690, 460)]
     for x, y in [*zone, zone[0]]:
         page.mouse.move(x, y)

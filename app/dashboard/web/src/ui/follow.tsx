@@ -17,6 +17,7 @@ import {
   depthPalette,
   draftShapes,
   drawing,
+  drawingReady,
   isDark,
   layer,
   measured,
@@ -94,6 +95,7 @@ export function follow(chart: Chart): () => void {
 function followDrawing(chart: Chart): () => void {
   return effect(() => {
     const wanted = drawing.value;
+    drawingReady.value = false;
     if (!wanted) return;
     let ended = false;
     let end = () => {};
@@ -109,6 +111,7 @@ function followDrawing(chart: Chart): () => void {
         },
       );
       if (ended) end();
+      else drawingReady.value = true;
     });
     return () => {
       ended = true;
