@@ -9,7 +9,7 @@ from app.dashboard.serve import STATIC
 from .service import Service
 
 CHROMIUM = Path("/usr/bin/chromium")
-# WebGL by SwiftShader, the page itself put together by the processor: three times quicker than that by SwiftShader, too.
+# WebGL by SwiftShader, the page itself put together by the processor: three times quicker than all by SwiftShader.
 FLAGS = ["--no-sandbox", "--disable-gpu", "--enable-unsafe-swiftshader", "--disable-background-networking"]
 PATIENCE_MS = 90_000
 """Only how long a missing thing is waited for: the first map waits for numba to compile."""
