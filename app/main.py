@@ -112,7 +112,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     ):
         app.include_router(router)
     app.include_router(health_router(""), include_in_schema=False)
-    mount_dashboard(app)
+    mount_dashboard(app, charts=settings.charts)
     problems.install(app)
     openapi.install(app)
     if settings.allowed_origins:

@@ -76,6 +76,12 @@ class Settings(BaseSettings):
     log_format: Literal["console", "json"] = Field(
         default="console", description="Lines for people, or one JSON object per line for log collectors"
     )
+    charts: str = Field(
+        default="",
+        pattern=r"^$|\.pmtiles$|^https?://[^\s;,'\"]+\{z\}[^\s;,'\"]*$",
+        description="What the dashboard draws under the map: a .pmtiles file with raster tiles, or the address of a "
+        "tile server with {z}, {x} and {y}; empty: nothing, which works without internet",
+    )
     output_dir: Path = Field(default=Path("output"), description="Folder for exported files")
     max_body_bytes: int = Field(default=8 * 2**20, ge=1024, le=2**30, description="Largest request body that is taken")
     max_import_bytes: int = Field(

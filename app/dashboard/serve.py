@@ -2,6 +2,7 @@
 
 import mimetypes
 from pathlib import Path
+from urllib.parse import urlsplit
 
 from fastapi import FastAPI
 from fastapi.responses import FileResponse, HTMLResponse
@@ -71,7 +72,7 @@ class HashedFiles(StaticFiles):
         return response
 
 
-def mount_dashboard(app: FastAPI, static: Path = STATIC) -> None:
+def mount_dashboard(app: FastAPI, static: Path = STATIC, charts: str = "") -> None:
     """Serve the dashboard at ``/`` and its assets below ``/assets``.
 
     Parameters
@@ -80,7 +81,27 @@ def mount_dashboard(app: FastAPI, static: Path = STATIC) -> None:
         The application; its own routes are left alone.
     static
         Folder that the front end was built into. It may be missing: then the page says how to build it.
+    charts
+        What is drawn under the map: a ``.pmtiles`` file, a tile server's address, or nothing.
     """
+    server = urlsplit(charts) if "://" in charts else None
+    policy = CONTENT_SECURITY_POLICY
+    if server is not None:
+        # The page asks nobody else but this one.
+        policy = policy.replace("connect-src 'self'", f"connect-src 'self' {server.scheme}://{server.netloc}")
+    headers = PAGE_HEADERS | {"Content-Security-Policy": policy}
+
+    @app.get("/charts.json", include_in_schema=False)
+    def charts_address() -> dict[str, str]:
+        return {"tiles": charts if server is not None else "pmtiles:///charts.pmtiles" if charts else ""}
+
+    if charts and server is None:
+
+        @app.get("/charts.pmtiles", include_in_schema=False)
+        def charts_file() -> FileResponse:
+            # Answers requests for parts of the file, which is how it is read.
+            return FileResponse(charts, media_type="application/vnd.pmtiles")
+
     app.mount("/assets", HashedFiles(directory=static / "assets", check_dir=False), name="dashboard-assets")
 
     @app.api_route("/", methods=["GET", "HEAD"], include_in_schema=False)
@@ -88,4 +109,4 @@ def mount_dashboard(app: FastAPI, static: Path = STATIC) -> None:
         index = static / "index.html"
         if not index.is_file():
             return HTMLResponse(NOT_BUILT, status_code=503, headers=PAGE_HEADERS)
-        return FileResponse(index, headers=PAGE_HEADERS)
+        return FileResponse(index, headers=headers)

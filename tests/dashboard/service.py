@@ -79,6 +79,12 @@ class Service:
             self._process.wait()
             self._process = None
 
+    @property
+    def pid(self) -> int:
+        """Of the running process."""
+        assert self._process is not None
+        return self._process.pid
+
     def get(self, path: str) -> Any:
         answer = httpx.get(f"{self.url}/api/v1{path}", timeout=60)
         return answer.raise_for_status().json()

@@ -1,3 +1,4 @@
+import gzip
 from pathlib import Path
 
 import httpx
@@ -16,9 +17,9 @@ def static(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def client(static: Path) -> httpx.AsyncClient:
+def client(static: Path, charts: str = "") -> httpx.AsyncClient:
     app = FastAPI()
-    mount_dashboard(app, static)
+    mount_dashboard(app, static, charts)
     return httpx.AsyncClient(transport=httpx.ASGITransport(app), base_url="http://dashboard")
 
 
@@ -67,3 +68,30 @@ async def test_nothing_else_is_served(static: Path, path: str) -> None:
 
 async def test_health_checks_may_ask_for_the_head_only(static: Path) -> None:
     assert (await client(static).head("/")).status_code == 200
+
+
+async def test_assets_go_out_compressed_where_the_browser_takes_that(static: Path) -> None:
+    packed = gzip.compress(b"export {} // packed")
+    (static / "assets" / "index-Ab12.js.gz").write_bytes(packed)
+    service = client(static)
+    small = await service.get("/assets/index-Ab12.js", headers={"Accept-Encoding": "br, gzip"})
+    assert small.text == "export {} // packed"
+    assert small.headers["content-encoding"] == "gzip"
+    assert small.headers["content-type"].startswith("text/javascript")
+    plain = await service.get("/assets/index-Ab12.js", headers={"Accept-Encoding": "identity"})
+    assert (plain.text, plain.headers.get("content-encoding")) == ("export {}", None)
+    assert small.headers["vary"] == plain.headers["vary"] == "Accept-Encoding"
+
+
+async def test_charts_come_from_a_file_in_parts_from_one_server_or_not_at_all(static: Path, tmp_path: Path) -> None:
+    assert (await client(static).get("/charts.json")).json() == {"tiles": ""}
+    assert (await client(static).get("/charts.pmtiles")).status_code == 404
+    file = tmp_path / "harbour.pmtiles"
+    file.write_bytes(bytes(range(200)))
+    own = client(static, str(file))
+    assert (await own.get("/charts.json")).json() == {"tiles": "pmtiles:///charts.pmtiles"}
+    part = await own.get("/charts.pmtiles", headers={"Range": "bytes=10-19"})
+    assert (part.status_code, part.content) == (206, bytes(range(10, 20)))
+    server = client(static, "https://tiles.example:8443/{z}/{x}/{y}.png")
+    policy = (await server.get("/")).headers["content-security-policy"]
+    assert "connect-src 'self' https://tiles.example:8443;" in policy

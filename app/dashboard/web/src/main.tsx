@@ -3,6 +3,7 @@ import { effect } from "@preact/signals";
 import { render } from "preact";
 import { startSession } from "./state/session";
 import { isDark, theme } from "./state/store";
+import { findCharts } from "./state/tiles";
 import { App } from "./ui/App";
 
 effect(() => {
@@ -10,4 +11,5 @@ effect(() => {
     theme.value === "contrast" ? "contrast" : isDark.value ? "dark" : "light";
 });
 startSession();
+void findCharts();
 render(<App />, document.getElementById("app") as HTMLElement);

@@ -1,5 +1,5 @@
 import { describe, expect, it } from "vitest";
-import type { LngLat, MapView } from "../api/types";
+import type { LngLat } from "../api/types";
 import {
   boundsOf,
   contains,
@@ -8,48 +8,8 @@ import {
   grown,
   metresPerDegree,
   pieces,
-  placeIn,
-  readCell,
   rectangle,
 } from "./geo";
-
-const map: MapView = {
-  mission_id: "m",
-  version: 1,
-  step: 1,
-  west_m: 10,
-  south_m: 20,
-  cell_m: 2,
-  rows: 2,
-  cols: 3,
-  corners: [
-    [1, 3],
-    [4, 3],
-    [4, 1],
-    [1, 1],
-  ],
-  vertical_datum: "",
-  min_depth_m: 5,
-  max_depth_m: 9,
-  model: "gp",
-  depth_m: [
-    [5, 6, null],
-    [7, 8, 9],
-  ],
-  sd_m: [
-    [0.1, 0.2, null],
-    [0.3, 0.4, 0.5],
-  ],
-  count: [
-    [1, 0, 0],
-    [0, 4, 0],
-  ],
-  layers: {},
-  sounded: [
-    [true, false, false],
-    [false, true, false],
-  ],
-};
 
 describe("metres per degree", () => {
   it.each([
@@ -77,45 +37,6 @@ describe("a rectangle from a corner and a size", () => {
     const [west, south, east, north] = boundsOf(ring) as [number, number, number, number];
     expect((east - west) * scale.east).toBeCloseTo(100, 2);
     expect((north - south) * scale.north).toBeCloseTo(50, 2);
-  });
-});
-
-describe("reading the map at a place", () => {
-  it("finds the cell, row 0 in the south and column 0 in the west", () => {
-    expect(readCell(map, [1.5, 1.5])).toMatchObject({ depth_m: 5, sd_m: 0.1, count: 1, sounded: true });
-    expect(readCell(map, [3.9, 2.9])).toMatchObject({ depth_m: 9, sounded: false });
-  });
-
-  it("gives local coordinates", () => {
-    const cell = readCell(map, [2.5, 2]);
-    expect(cell?.east_m).toBeCloseTo(13);
-    expect(cell?.north_m).toBeCloseTo(22);
-  });
-
-  it("knows nothing of an unknown cell but its place", () => {
-    expect(readCell(map, [3.5, 1.5])?.depth_m).toBeNull();
-  });
-
-  it.each([[[0.9, 2]], [[4.1, 2]], [[2, 0.9]], [[2, 3.1]]] as [LngLat][])(
-    "is silent outside the grid, at %j",
-    (place) => {
-      expect(readCell(map, place)).toBeNull();
-    },
-  );
-
-  it("undoes placing a point by its share of the grid, also when the grid is turned", () => {
-    const turned: MapView = {
-      ...map,
-      corners: [
-        [0, 2],
-        [2, 3],
-        [3, 1],
-        [1, 0],
-      ],
-    };
-    const cell = readCell(turned, placeIn(turned.corners, 0.5, 0.25));
-    expect(cell?.east_m).toBeCloseTo(13);
-    expect(cell?.north_m).toBeCloseTo(21);
   });
 });
 

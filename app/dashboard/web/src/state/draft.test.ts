@@ -1,6 +1,6 @@
 import { describe, expect, it } from "vitest";
 import { boundsOf } from "../map/geo";
-import { areaOf, centred, emptyDraft, faultsOf, fieldOf, toMission } from "./draft";
+import { areaOf, centred, emptyDraft, estimate, faultsOf, fieldOf, toMission } from "./draft";
 
 const draft = { ...emptyDraft([-8.705, 41.185]), name: "Quay" };
 
@@ -52,9 +52,10 @@ it("an area needs its four numbers only", () => {
 it.each([
   ["limits.max_step_m", "max_step_m"],
   ["vehicles.0.name", "simulated"],
-  ["area.coordinates.0", "east_m"],
+  ["area.coordinates.0", "ring"],
   ["steps", "steps"],
-  ["tide.level_m", null],
+  ["tide.level_m", "tide_m"],
+  ["sounding_noise", null],
 ])("the service's field %s is shown at %s", (service, own) => {
   expect(fieldOf(service)).toBe(own);
 });
@@ -73,4 +74,35 @@ describe("placing an area in the middle", () => {
   it("leaves a draft without a size alone", () => {
     expect(centred({ ...draft, east_m: "wide" }, [0, 0])).toEqual({});
   });
+});
+
+describe("a drawn area", () => {
+  const ring = [
+    [-8.705, 41.185],
+    [-8.704, 41.185],
+    [-8.704, 41.186],
+  ] as [number, number][];
+  const drawn = { ...draft, source: "drawn", ring } as const;
+
+  it("is sent as drawn, with its keep-out zones, and needs no typed numbers", () => {
+    const mission = toMission({ ...drawn, latitude: "", keepOut: [ring], com_range_m: "60" });
+    expect(mission.area.coordinates[0]).toHaveLength(4);
+    expect(mission.keep_out).toHaveLength(1);
+    expect(mission.limits.com_range_m).toBe(60);
+  });
+
+  it("has its faults named", () => {
+    expect(faultsOf({ ...drawn, ring: [] }).ring).toContain("Draw the area");
+    expect(faultsOf({ ...drawn, cell_m: "200" }).ring).toContain("less than two cells");
+    expect(faultsOf({ ...drawn, keepOut: [ring.slice(0, 2)] }).keepOut).toContain("zone 1");
+  });
+});
+
+it("says before the start how long it takes at most and how dense it gets", () => {
+  expect(estimate({ ...draft, simulated: "2", steps: "100", max_step_m: "10" }, 10_000)).toEqual({
+    seconds: 1000,
+    metres: 2000,
+    spacing_m: 5,
+  });
+  expect(estimate({ ...draft, simulated: "0" }, 10_000)).toBeNull();
 });

@@ -127,6 +127,8 @@ export interface DraftShapes {
 export const draftShapes = signal<DraftShapes | null>(null);
 export type Drawing = { shape: "polygon" | "rectangle"; onDrawn: (ring: LngLat[]) => void };
 export const drawing = signal<Drawing | null>(null);
+/** Whether the map takes the clicks of what is being drawn; its tools are fetched when first used. */
+export const drawingReady = signal(false);
 
 /** Steps of the shown mission as far as they were asked for, and the one that is replayed; null: what is now. */
 export const steps = signal<readonly StepView[]>([]);

@@ -3,7 +3,7 @@ import type { LngLat } from "../api/types";
 import { areasIn, sizeOf } from "../map/area";
 import { centred, cornersOf } from "../state/draft";
 import { distance } from "../state/format";
-import { type Drawing, drawing, mapCentre } from "../state/store";
+import { type Drawing, drawing, drawingReady, mapCentre } from "../state/store";
 import { Fault, Text, useForm } from "./Fields";
 
 /** Where to map: drawn on the map, typed as a rectangle, or read from a file; and where not to go. */
@@ -65,7 +65,7 @@ export function AreaFields() {
         </label>
       </div>
       {drawing.value ? (
-        <p class="hint" role="status" data-testid="drawing">
+        <p class="hint" role="status" data-testid="drawing" data-ready={drawingReady.value}>
           {drawing.value.shape === "polygon"
             ? "Click corner after corner on the map; click the first one again to close. Escape ends drawing."
             : "Click one corner on the map, then the opposite one. Escape ends drawing."}

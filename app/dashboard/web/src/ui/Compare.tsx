@@ -78,10 +78,9 @@ async function fetchOther(id: string): Promise<Other> {
     steps.push(...more);
     if (more.length < 1000) break;
   }
-  const map = await api.mapTiles(id, "", [], null).then(
-    (answer) => withTiles(null, answer),
-    () => null,
-  );
+  const { soundings, coverage_pct, mean_sd_m } = mission.progress;
+  const mapped = soundings > 0 || coverage_pct > 0 || mean_sd_m !== null;
+  const map = mapped ? withTiles(null, await api.mapTiles(id, "", [], null)) : null;
   return { mission, steps, map };
 }
 

@@ -17,6 +17,7 @@ import {
   depthPalette,
   draftShapes,
   drawing,
+  drawingReady,
   isDark,
   layer,
   measured,
@@ -36,6 +37,11 @@ import {
 import { tilesAddress } from "../state/tiles";
 import { VehicleMark, WaypointMark } from "./marks";
 
+/** For measurements: when something was shown for the first time. */
+function markOnce(name: string): void {
+  if (performance.getEntriesByName(name).length === 0) performance.mark(name);
+}
+
 const look = (): Look => (theme.value === "contrast" ? "contrast" : isDark.value ? "dark" : "light");
 
 /** Returns what ends it. */
@@ -50,7 +56,10 @@ export function follow(chart: Chart): () => void {
       shownMission = present?.id ?? "";
       chart.setMission(present?.spec.area ?? null, present?.spec.keep_out ?? []);
       // What lies over the map is laid out first.
-      requestAnimationFrame(() => chart.fit(overlaid));
+      requestAnimationFrame(() => {
+        chart.fit(overlaid);
+        if (present) markOnce("mission-shown");
+      });
     }),
     effect(() => chart.setDraft(draftShapes.value?.area ?? null, draftShapes.value?.keepOut ?? [])),
     followDrawing(chart),
@@ -86,6 +95,7 @@ export function follow(chart: Chart): () => void {
 function followDrawing(chart: Chart): () => void {
   return effect(() => {
     const wanted = drawing.value;
+    drawingReady.value = false;
     if (!wanted) return;
     let ended = false;
     let end = () => {};
@@ -101,6 +111,7 @@ function followDrawing(chart: Chart): () => void {
         },
       );
       if (ended) end();
+      else drawingReady.value = true;
     });
     return () => {
       ended = true;
@@ -114,7 +125,9 @@ function followSeaFloor(chart: Chart): () => void {
   let scale = 1;
   let interval = 1;
   const painter = new Painter((picture) => {
-    if (map) chart.setSeaFloor(map.corners, map.rows, map.cols, picture, scale, interval);
+    if (!map) return;
+    chart.setSeaFloor(map.corners, map.rows, map.cols, picture, scale, interval);
+    markOnce("sea-floor");
   });
   const stop = effect(() => {
     map = seaFloor.value;
