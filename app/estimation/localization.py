@@ -101,7 +101,7 @@ def radius_95(sd_m: FloatArray) -> FloatArray:
 class CooperativeLocalizer:
     """The filter; see the module's text."""
 
-    fading: Fading = Fading()  # noqa: RUF009 - frozen
+    fading: Fading = Fading()
 
     def begin(self, positions: FloatArray) -> TeamPosition:
         """Return a team that has just had a fix at ``positions`` (n_vehicles, 3)."""

@@ -80,7 +80,7 @@ def test_a_target_is_found_from_nothing():
     assert right >= 38
 
 
-def test_it_belongs_to_A_only_while_it_is_heard():
+def test_it_counts_as_accurate_only_while_it_is_heard():
     estimator = TargetEstimator()
     *_, (_, track, _) = pursuit(0, 60, estimator)
     assert estimator.accurate(track)

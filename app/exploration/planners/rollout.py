@@ -18,10 +18,10 @@ from app.exploration.constraints import Constraints
 from app.exploration.felt_bottom import FeltBottom
 from app.exploration.options import PlannerOptions
 from app.exploration.planners.base import PlannerBase, settle
-from app.exploration.problem import Proposal, Situation
+from app.exploration.problem import Belief, Proposal, Situation
 from app.exploration.rollout.backbones import Backbone, backbones, with_team
 from app.exploration.rollout.flight import Course, Plan, Rules, Work, begin, fly_plan, fly_step, make_work, new_course
-from app.exploration.rollout.floor import Floor, estimate_floor, fill_depths
+from app.exploration.rollout.floor import Floor, estimate_floor, fill_depths, margin_m
 from app.exploration.rollout.free_space import Free, clear_ways, free_space, settle_waypoint
 from app.exploration.rollout.search import DRAWS, improve
 from app.exploration.routes import FreeSpace
@@ -49,6 +49,9 @@ UP_COUNTS = 0.3
 LINK_OF_RANGE = 29 / 30
 MAY_BE_LEFT = 0.008
 """Part of all landmarks that a plan may leave over, until the team has come so far."""
+
+SAMPLE, SAMPLE_GRID = 500, 20
+"""Landmarks that plans are judged by where whole positions are estimated, and cells per side that they are taken from."""
 
 BUCKETS = 3
 """Buckets of landmarks per visibility."""
@@ -121,7 +124,9 @@ class RolloutPlanner(PlannerBase):
         if self._names != team.vehicles:
             if self._kept is not None:
                 self._kept = with_team(self._kept, self._names, team.vehicles)
-            self._names, self._planned = team.vehicles, 0
+            # On an errand a vehicle is away for a while only: that is no reason to plan everything anew.
+            away = team.targets is not None or team.localization is not None
+            self._names, self._planned = team.vehicles, int(away and self._planned > 0)
         if self._free is None or not _same(self._free[0], team.constraints):
             self._free = (team.constraints, free_space(team.constraints))
         self._felt.feel(team)
@@ -168,6 +173,20 @@ class RolloutPlanner(PlannerBase):
         return self.options.rollouts if mission.far_from_done else self.options.rollouts // LAST_SHARE
 
 
+def _sample(belief: Belief) -> NDArray[np.int64]:
+    """Return the landmarks that plans are judged by: all, or evenly many where each takes many looks.
+
+    Where whole positions are estimated flights are several times as long; a sample of the landmarks tells as much.
+    """
+    n = len(belief.xy_m)
+    if belief.telling[0] == 1.0 or n <= SAMPLE:
+        return np.arange(n)
+    east, north = np.floor((belief.xy_m - belief.xy_m.min(axis=0)) / (np.ptp(belief.xy_m) / SAMPLE_GRID + 1e-12)).T
+    # Along rows of cells to and fro, those still open first, so that every part of the area keeps its share of them.
+    order = np.lexsort((np.where(north % 2 == 0, east, -east), north, belief.accurate))
+    return np.asarray(order[:: -(-n // SAMPLE)], dtype=np.int64)
+
+
 def _same(a: Constraints, b: Constraints) -> bool:
     """Whether two sets of limits leave the same free space."""
     return a is b or (
@@ -199,9 +218,11 @@ class _Mission:
         self._com_range = constraints.com_range_m
         self._link = constraints.com_range_m * LINK_OF_RANGE
         self._horizon = float(max(1, team.steps_total - team.step + 1))
-        unknown = min(constraints.max_depth_m, float(team.positions[:, 2].max()) + HEIGHT * visibility)
+        clearance = constraints.min_altitude_m
+        self._height = max(HEIGHT * visibility, clearance + margin_m(visibility, clearance), constraints.lowest_m)
+        unknown = min(constraints.max_depth_m, float(team.positions[:, 2].max()) + self._height)
         self._floor: Floor = estimate_floor(
-            belief, bottom, felt_m, constraints.area, visibility, constraints.min_altitude_m, unknown
+            belief, bottom, felt_m, constraints.area, visibility, clearance, unknown, constraints.lowest_m
         )
         self._free = free
         self._rules = Rules(
@@ -212,8 +233,12 @@ class _Mission:
             visibility,
             sensor.relative_noise,
             self._free.everywhere,
+            *belief.telling,
         )
-        self._work: Work = self._left(belief.xy_m, belief.depth_m, belief.sd_m, belief.accurate, options)
+        shown = _sample(belief)
+        self._work: Work = self._left(
+            belief.xy_m[shown], belief.depth_m[shown], belief.sd_m[shown], belief.accurate[shown], options
+        )
 
     def _left(
         self, xy: FloatArray, depth: FloatArray, sd: FloatArray, accurate: NDArray[np.bool_], options: PlannerOptions
@@ -277,7 +302,7 @@ class _Mission:
         sweeps = backbones(
             self._work.xyz[:2].T, self._start[:, :2], self._area, self._sight, self._com_range, self._link
         )
-        heights = np.full(ROOM, HEIGHT * self._sight)
+        heights = np.full(ROOM, self._height)
         scratch = new_course(ROOM, len(self._start), len(self._work.need))
         flown = [(self.plan(sweep, heights, scratch), sweep) for sweep in sweeps]
         order = sorted(((best.score, k) for k, (best, _) in enumerate(flown) if best is not None))
@@ -290,7 +315,7 @@ class _Mission:
         For when no sweep finds a way between the zones.
         """
         at = np.repeat(self._way_to_work(constraints)[:, None], len(self._start), axis=1)
-        return self.plan(Backbone(at, np.arange(len(self._start))), np.full(ROOM, HEIGHT * self._sight))
+        return self.plan(Backbone(at, np.arange(len(self._start))), np.full(ROOM, self._height))
 
     def towards_work(self, constraints: Constraints) -> FloatArray:
         """Return a step (n_vehicles, 3) of the whole team in the direction of that way."""

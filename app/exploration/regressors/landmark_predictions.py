@@ -87,6 +87,7 @@ def predict(
     visibility: float,
     noise: float,
     step: float,
+    telling: tuple[float, float] = (1.0, 0.0),
 ) -> FloatArray:
     """Return, for each configuration, expected progress, newly accurate landmarks, and minus the distance left, (c, 3).
 
@@ -108,6 +109,8 @@ def predict(
         Of the range sensor.
     step : float
         Unit of distance.
+    telling : (2,)
+        What parts of a range's information count; see ``Belief.telling``.
     """
     members, slot = np.unique(index, return_inverse=True)
     unit = 1.0 / (noise * noise * needed[members])
@@ -121,6 +124,7 @@ def predict(
         len(members),
         starts,
         np.float32(visibility * visibility),
+        *np.array(telling, dtype=np.float32),
     )
     moves = (candidates - positions).astype(np.float32)
     parts = np.array_split(moves, WORKERS) if len(moves) * len(index) >= WORTH_SHARING else [moves]
@@ -148,6 +152,8 @@ def _look(
     z: Float32Array,
     weight: Float32Array,
     v2: np.float32,
+    vertical: np.float32,
+    across: np.float32,
     near: int,
     gained: Float32Array,
 ) -> np.float32:
@@ -159,7 +165,8 @@ def _look(
         dx, dy, dz = px - x[e], py - y[e], z[e] - pz
         dz2 = dz * dz
         r2 = dx * dx + dy * dy + dz2
-        value = weight[e] * dz2 / (r2 * r2 + np.float32(1e-12))
+        told = vertical * dz2 + across * (dx * dx + dy * dy)
+        value = weight[e] * told / (r2 * r2 + np.float32(1e-12))
         gained[e] = value if r2 < v2 else np.float32(0.0)
     least = FAR
     for e in range(near):
@@ -180,6 +187,8 @@ def _predict(
     members: int,
     starts: NDArray[np.int64],
     v2: np.float32,
+    vertical: np.float32,
+    across: np.float32,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return progress (c,), completed landmarks (c,) and squared distances to the closest landmark (c, n_vehicles)."""
     c, n, _ = moves.shape
@@ -194,7 +203,7 @@ def _predict(
             first, near, last = starts[2 * i], starts[2 * i + 1], starts[2 * i + 2]
             closest[k, i] = _look(
                 px, py, pz, x[first:last], y[first:last], z[first:last], weight[first:last], v2,
-                near - first, gained[first:last],
+                vertical, across, near - first, gained[first:last],
             )  # fmt: skip
             for e in range(first, last):
                 progress[slot[e]] += gained[e]

@@ -98,6 +98,7 @@ class LandmarkRegressors:
             self._sensor.visibility_m,
             self._sensor.relative_noise,
             self._team.constraints.max_step_m,
+            self._team.belief.telling,
         )
 
     def chosen(self, positions: FloatArray) -> None:

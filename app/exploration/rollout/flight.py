@@ -69,7 +69,10 @@ class Work(NamedTuple):
 
 
 class Rules(NamedTuple):
-    """What flying obeys, and what the sensor does; lengths in metres."""
+    """What flying obeys, and what the sensor does; lengths in metres.
+
+    ``vertical`` and ``across`` are the parts of a range's information that count; see ``Belief.telling``.
+    """
 
     step_m: float
     com_range_m: float
@@ -78,6 +81,8 @@ class Rules(NamedTuple):
     visibility_m: float
     relative_noise: float
     cut_corners: bool
+    vertical: float = 1.0
+    across: float = 0.0
 
 
 class Plan(NamedTuple):
@@ -158,9 +163,11 @@ def look(x: float, y: float, z: float, work: Work, rules: Rules, need: FloatArra
             dx = xs[m] - x
             dy = ys[m] - y
             dz = zs[m] - z
-            r2 = max(dx * dx + dy * dy + dz * dz, NEAREST * v2)
+            h2 = dx * dx + dy * dy
+            r2 = max(h2 + dz * dz, NEAREST * v2)
             before = lacks[m]
-            after = before - (gain * dz * dz / (r2 * r2) if r2 < v2 else 0.0)
+            told = rules.vertical * gain * dz * dz + rules.across * gain * h2
+            after = before - (told / (r2 * r2) if r2 < v2 else 0.0)
             lacks[m] = after
             done += 1 if (before > 0.0) & (after <= 0.0) else 0
     return done
