@@ -81,6 +81,7 @@ def run_track(
 ) -> TrackRun:
     """Run the closed loop with one of ``TRACKERS``."""
     began = time.perf_counter()
+    options = options.model_copy(update={"accuracy_sd_m": scenario.accuracy})
     world = TrackWorld(scenario)
     noise, choice = (np.random.default_rng([scenario.seed, k]) for k in (1, 2))
     chooser: Chooser = (

@@ -61,10 +61,6 @@ ROUGHLY = 0.1
 NEARBY = 0.4
 """How far an altimeter's reading is taken to hold, in distances of sight."""
 
-TELLING_ON_FLOOR = (0.0, 0.5)
-"""Vehicles keep well above landmarks on a floor: what takes long is to know them across, along two axes."""
-
-TELLING_IN_WATER = (1 / 3, 1 / 3)
 AREA_OF_CUBE = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 
 
@@ -300,21 +296,17 @@ class TrackWorld:
         point = np.where(seen[:, None], k.position_m, 0.0)
         if not seen.all():
             point[~seen] = self.presumed.places(int((~seen).sum()))
-        enough = 1.0 / self.scenario.accuracy**2
-        told = np.minimum(enough, 1.0 / np.maximum(k.sd_m, 1e-9) ** 2)
-        across = told[:, :2].mean(axis=1)
-        information = np.where(across < 0.999 * enough, across, told[:, 2]) if flat else told.mean(axis=1)
-        sd = np.where(seen & (information > 0.0), 1.0 / np.sqrt(np.maximum(information, 1e-12)), np.inf)
+        sd = np.sqrt(np.linalg.eigvalsh(np.where(seen[:, None, None], k.covariance_m2, 0.0))[:, 2])
         depth = self._depths(point, seen) if flat else point[:, 2]
         return Belief(
             np.ascontiguousarray(np.clip(point[:, :2], -self.half, self.half)),
             depth,
-            sd,
+            np.where(seen, sd, np.inf),
             k.accurate,
             np.ones(n),
             0.2,
-            TELLING_ON_FLOOR if flat else TELLING_IN_WATER,
-            on_floor=flat,
+            k.covariance_m2,
+            flat,
         )
 
     def _depths(self, point: FloatArray, seen: BoolArray) -> FloatArray:

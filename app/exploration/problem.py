@@ -35,9 +35,9 @@ class Belief:
         How much each landmark matters: local roughness of the sea floor relative to the area's mean, mean about 1.
     correlation_length_m : float
         Distance over which a sounding informs its surroundings.
-    telling : (2,)
-        How much of a range's information about a landmark counts, of that along the vertical and of that across it.
-        Where only depths are estimated, all of the first; where whole positions are, ``sd_m`` is that of an axis.
+    covariance_m2 : (n_landmarks, 3, 3) or None
+        Where whole positions are estimated, their covariances; ``xy_m`` are then estimates too, presumed places for
+        landmarks never seen, and ``sd_m`` the deviation along the worst direction. None: only depths are estimated.
     on_floor : bool
         Whether landmarks lie on the sea floor, so that vehicles have to keep above them.
     """
@@ -48,7 +48,7 @@ class Belief:
     accurate: BoolArray
     weight: FloatArray
     correlation_length_m: float
-    telling: tuple[float, float] = (1.0, 0.0)
+    covariance_m2: FloatArray | None = None
     on_floor: bool = True
 
 

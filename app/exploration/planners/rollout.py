@@ -16,6 +16,7 @@ from app.estimation import RangeSensor, Sensor
 from app.exploration.bottom import Bottom
 from app.exploration.constraints import Constraints
 from app.exploration.felt_bottom import FeltBottom
+from app.exploration.lacking import Lacking, lacking
 from app.exploration.options import PlannerOptions
 from app.exploration.planners.base import PlannerBase, settle
 from app.exploration.problem import Belief, Proposal, Situation
@@ -50,8 +51,8 @@ LINK_OF_RANGE = 29 / 30
 MAY_BE_LEFT = 0.008
 """Part of all landmarks that a plan may leave over, until the team has come so far."""
 
-SAMPLE, SAMPLE_GRID = 500, 20
-"""Landmarks that plans are judged by where whole positions are estimated, and cells per side that they are taken from."""
+SAMPLE, SAMPLE_GRID = 800, 20
+"""Tasks that plans are judged by where whole positions are estimated, and cells per side that they are taken from."""
 
 BUCKETS = 3
 """Buckets of landmarks per visibility."""
@@ -173,17 +174,17 @@ class RolloutPlanner(PlannerBase):
         return self.options.rollouts if mission.far_from_done else self.options.rollouts // LAST_SHARE
 
 
-def _sample(belief: Belief) -> NDArray[np.int64]:
-    """Return the landmarks that plans are judged by: all, or evenly many where each takes many looks.
+def _sample(left: Lacking, belief: Belief) -> NDArray[np.int64]:
+    """Return the tasks that plans are judged by: all, or evenly many where a landmark has several.
 
-    Where whole positions are estimated flights are several times as long; a sample of the landmarks tells as much.
+    Where whole positions are estimated each takes many looks, and flights are long; a sample tells as much.
     """
-    n = len(belief.xy_m)
-    if belief.telling[0] == 1.0 or n <= SAMPLE:
+    n = len(left.row)
+    if belief.covariance_m2 is None or n <= SAMPLE:
         return np.arange(n)
-    east, north = np.floor((belief.xy_m - belief.xy_m.min(axis=0)) / (np.ptp(belief.xy_m) / SAMPLE_GRID + 1e-12)).T
-    # Along rows of cells to and fro, those still open first, so that every part of the area keeps its share of them.
-    order = np.lexsort((np.where(north % 2 == 0, east, -east), north, belief.accurate))
+    xy = belief.xy_m[left.row]
+    east, north = np.floor((xy - xy.min(axis=0)) / (np.ptp(xy) / SAMPLE_GRID + 1e-12)).T
+    order = np.lexsort((np.where(north % 2 == 0, east, -east), north))
     return np.asarray(order[:: -(-n // SAMPLE)], dtype=np.int64)
 
 
@@ -233,30 +234,27 @@ class _Mission:
             visibility,
             sensor.relative_noise,
             self._free.everywhere,
-            *belief.telling,
+            belief.covariance_m2 is not None,
         )
-        shown = _sample(belief)
-        self._work: Work = self._left(
-            belief.xy_m[shown], belief.depth_m[shown], belief.sd_m[shown], belief.accurate[shown], options
-        )
+        self._work: Work = self._left(belief, options)
 
-    def _left(
-        self, xy: FloatArray, depth: FloatArray, sd: FloatArray, accurate: NDArray[np.bool_], options: PlannerOptions
-    ) -> Work:
-        open_ = ~accurate
-        xyz = np.column_stack([xy[open_], depth[open_]])
-        unseen = np.isnan(xyz[:, 2])
+    def _left(self, belief: Belief, options: PlannerOptions) -> Work:
+        left = lacking(belief, options.accuracy_sd_m, HEDGE)
+        shown = _sample(left, belief)
+        xyz = np.column_stack([belief.xy_m, belief.depth_m])[left.row[shown]]
         fill_depths(xyz, self._floor)
-        enough = 1.0 / options.accuracy_sd_m**2
-        have = np.where(np.isfinite(sd[open_]), 1.0 / np.maximum(sd[open_], 1e-9) ** 2, 0.0)
-        need = np.maximum(1e-6 * enough, np.where(unseen, HEDGE * enough, enough - have))
-        allowed = np.floor(MAY_BE_LEFT * len(xy))
-        if open_.sum() <= allowed:
+        tasks = len(belief.xy_m) * len(left.row) / max(1, int((~belief.accurate).sum()))
+        part = len(shown) / max(1, len(left.row))
+        allowed = np.floor(MAY_BE_LEFT * tasks * part)
+        if len(shown) <= allowed:
             allowed = 0.0
-        density = len(xy) / float(Polygon(self._area).area)
+        density = tasks * part / float(Polygon(self._area).area)
         links = min(self._link, 2 * self._sight) * (len(self._start) - 1)
         most = SWATH_EXCESS * density * self._rules.step_m * (2 * self._sight + links)
-        return make_work(xyz, need, self._area, self._sight / BUCKETS, allowed, len(xy), max(1.0, most))
+        return make_work(
+            xyz, left.need[shown], self._area, self._sight / BUCKETS, allowed, round(tasks * part), max(1.0, most),
+            left.direction[shown],
+        )  # fmt: skip
 
     @property
     def far_from_done(self) -> bool:

@@ -39,6 +39,8 @@ class Work(NamedTuple):
     ----------
     xyz : (3, m)
         Where they are presumed to be, depth positive down; one row per axis, for loops over neighbours.
+    direction : (3, m)
+        Along which each is to be known; matters only where :class:`Rules` say so.
     need : (m,)
         Information (1/m^2) each still lacks.
     first : (n_rows * n_cols + 1,)
@@ -56,6 +58,7 @@ class Work(NamedTuple):
     """
 
     xyz: FloatArray
+    direction: FloatArray
     need: FloatArray
     first: IntArray
     west_m: float
@@ -71,7 +74,7 @@ class Work(NamedTuple):
 class Rules(NamedTuple):
     """What flying obeys, and what the sensor does; lengths in metres.
 
-    ``vertical`` and ``across`` are the parts of a range's information that count; see ``Belief.telling``.
+    ``directed``: tasks have directions of their own; otherwise all of them are depths.
     """
 
     step_m: float
@@ -81,8 +84,7 @@ class Rules(NamedTuple):
     visibility_m: float
     relative_noise: float
     cut_corners: bool
-    vertical: float = 1.0
-    across: float = 0.0
+    directed: bool = False
 
 
 class Plan(NamedTuple):
@@ -111,8 +113,10 @@ def make_work(
     allowed: float,
     total: int,
     most_per_step: float,
+    direction: FloatArray | None = None,
 ) -> Work:
     """Sort landmarks (m, 3) into buckets over the bounding box of ``area`` (n, 2)."""
+    along = np.zeros_like(xyz) if direction is None else direction
     low, high = area.min(axis=0), area.max(axis=0)
     cols, rows = (max(1, int(k)) for k in np.ceil((high - low) / bucket_m))
     col = np.clip(np.floor((xyz[:, 0] - low[0]) / bucket_m), 0, cols - 1).astype(np.int64)
@@ -123,6 +127,7 @@ def make_work(
     first[1:] = np.cumsum(np.bincount(bucket, minlength=rows * cols))
     return Work(
         np.ascontiguousarray(xyz[order].T, dtype=np.float64),
+        np.ascontiguousarray(along[order].T, dtype=np.float64),
         np.ascontiguousarray(need[order], dtype=np.float64),
         first,
         float(low[0]),
@@ -158,18 +163,48 @@ def look(x: float, y: float, z: float, work: Work, rules: Rules, need: FloatArra
         low_m, high_m = work.first[row * work.cols + left], work.first[row * work.cols + right + 1]
         xs, ys, zs = work.xyz[0, low_m:high_m], work.xyz[1, low_m:high_m], work.xyz[2, low_m:high_m]
         lacks = need[low_m:high_m]
+        if rules.directed:
+            done += _look_along(x, y, z, xs, ys, zs, work.direction[:, low_m:high_m], v2, gain, lacks)
+            continue
         # No branches: such a loop is compiled to take several landmarks at a time.
         for m in range(len(lacks)):
             dx = xs[m] - x
             dy = ys[m] - y
             dz = zs[m] - z
-            h2 = dx * dx + dy * dy
-            r2 = max(h2 + dz * dz, NEAREST * v2)
+            r2 = max(dx * dx + dy * dy + dz * dz, NEAREST * v2)
             before = lacks[m]
-            told = rules.vertical * gain * dz * dz + rules.across * gain * h2
-            after = before - (told / (r2 * r2) if r2 < v2 else 0.0)
+            after = before - (gain * dz * dz / (r2 * r2) if r2 < v2 else 0.0)
             lacks[m] = after
             done += 1 if (before > 0.0) & (after <= 0.0) else 0
+    return done
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _look_along(
+    x: float,
+    y: float,
+    z: float,
+    xs: FloatArray,
+    ys: FloatArray,
+    zs: FloatArray,
+    direction: FloatArray,
+    v2: float,
+    gain: float,
+    lacks: FloatArray,
+) -> int:
+    """Take from ``lacks`` what ranges tell along the tasks' directions (3, m); return how many that completes."""
+    us, vs, ws = direction[0], direction[1], direction[2]
+    done = 0
+    for m in range(len(lacks)):
+        dx = xs[m] - x
+        dy = ys[m] - y
+        dz = zs[m] - z
+        r2 = max(dx * dx + dy * dy + dz * dz, NEAREST * v2)
+        along = us[m] * dx + vs[m] * dy + ws[m] * dz
+        before = lacks[m]
+        after = before - (gain * along * along / (r2 * r2) if r2 < v2 else 0.0)
+        lacks[m] = after
+        done += 1 if (before > 0.0) & (after <= 0.0) else 0
     return done
 
 

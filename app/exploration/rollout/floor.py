@@ -93,7 +93,7 @@ def estimate_floor(
     east, north = np.meshgrid(low[0] + cell * np.arange(cols), low[1] + cell * np.arange(rows))
     known = np.isfinite(belief.depth_m)
     # Where whole positions are estimated their deviation is not that of the depth.
-    trust = belief.sd_m if belief.telling[0] == 1.0 else np.zeros(len(belief.sd_m))
+    trust = belief.sd_m if belief.covariance_m2 is None else np.zeros(len(belief.sd_m))
     if known.any():
         depth = _from_neighbours(
             np.vstack([belief.xy_m[known], felt_m[:, :2]]),
