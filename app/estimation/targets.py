@@ -120,11 +120,11 @@ class TargetEstimator:
     """
 
     sensor: RangeSensor = RangeSensor(EVERYWHERE, 0.1)  # noqa: RUF009 - frozen
-    acceleration_sd: float = 0.001
-    accuracy_sd_m: float = 0.05
+    acceleration_sd: float = 0.0003
+    accuracy_sd_m: float = 0.1
     low_m: tuple[float, float, float] = (-1.0, -1.0, -1.0)
     high_m: tuple[float, float, float] = (1.0, 1.0, 1.0)
-    speed_sd: float = 0.02
+    speed_sd: float = 0.006
 
     def accurate(self, track: TargetTrack) -> bool:
         """Return whether a target belongs to ``A`` now."""

@@ -46,7 +46,7 @@ SURFACED = 1e-9
 START_ABOVE = 0.05
 """Height above the least clearance at which vehicles start over a terrain."""
 
-TARGET_SPEED = (0.01, 0.02)
+TARGET_SPEED = (0.004, 0.01)
 NEEDED_AT = 0.8
 """A rising was needed when the position had become this bad, of what is allowed, before the fix came."""
 NEVER = 10**9
@@ -102,7 +102,7 @@ class TrackScenario:
     seed: int = 0
     clearance: float = 0.3
     visibility: float = 0.4
-    accuracy: float = 0.05
+    accuracy: float = 0.1
     target_accuracy: float = 0.1
     com_range: float = np.inf
     fading: Fading | None = None

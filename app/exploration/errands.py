@@ -28,6 +28,7 @@ ENOUGH = 0.6
 CLOSE = 0.5
 """Closer than this part of (accuracy over noise) a vehicle need not be: from there on geometry counts."""
 
+VEHICLES_PER_CHASER = 3
 PARTS = (1.0, 0.5)
 RISE = -1
 
@@ -77,20 +78,24 @@ class Errands:
             self._on[name] = RISE
 
     def _chase(self, vehicles: tuple[str, ...], positions: FloatArray, targets: Targets | None) -> None:
+        chasing = {name: what for name, what in self._on.items() if what != RISE}
         count = 0 if targets is None else len(targets.state)
-        sd = np.full(0, np.nan) if targets is None else targets.sd_m
-        threshold = 1.0 if targets is None else targets.accuracy_sd_m
-        for name, what in list(self._on.items()):
-            if what != RISE and not (what < count and sd[what] > ENOUGH * threshold):
-                del self._on[name]
-        if targets is None:
+        if targets is None or not all(what < count for what in chasing.values()):
+            self._on = {name: what for name, what in self._on.items() if what == RISE}
             return
-        for target in np.argsort(-sd):
-            state = targets.state[target, :3]
+        part = np.where(np.isfinite(targets.state).all(axis=1), targets.sd_m / targets.accuracy_sd_m, 0.0)
+        for name, what in chasing.items():
+            if part[what] < ENOUGH:
+                del self._on[name]
+        for target in np.argsort(-part):
+            taken = [what for what in self._on.values() if what != RISE]
+            if part[target] <= LEAVES_AT or int(target) in taken or len(taken) >= most_away(len(vehicles)):
+                continue
+            # Who is coming back from another target is on the way already.
             free = [i for i, name in enumerate(vehicles) if name not in self._on]
-            wanted = sd[target] > LEAVES_AT * threshold and np.isfinite(state).all()
-            if wanted and free and int(target) not in self._on.values():
-                distance = np.linalg.norm(positions[free] - state, axis=1)
+            free = [i for i in free if vehicles[i] in chasing] or free
+            if free:
+                distance = np.linalg.norm(positions[free] - targets.state[target, :3], axis=1)
                 self._on[vehicles[free[int(np.argmin(distance))]]] = int(target)
 
     def remember(self) -> dict[str, int]:
@@ -100,6 +105,14 @@ class Errands:
     def recall(self, state: dict[str, Any]) -> None:
         """Take up what :meth:`remember` returned."""
         self._on = {str(name): int(what) for name, what in state.items()}
+
+
+def most_away(vehicles: int) -> int:
+    """Return how many of a team may be away for targets: the others must be able to go on with the plan.
+
+    One vehicle that goes from target to target serves all of them, because every vehicle ranges to each.
+    """
+    return max(1, vehicles // VEHICLES_PER_CHASER)
 
 
 def due_to_rise(localization: Localization) -> NDArray[np.bool_]:
@@ -135,15 +148,12 @@ def errand_move(
     distance = np.linalg.norm(candidates[:, row] - goal, axis=1)
     if errand.target == RISE or targets is None:
         return np.asarray(candidates[np.argmin(distance), row])
-    sd = foretold_sd(
-        targets.state[errand.target],
-        targets.covariance[errand.target],
-        candidates,
-        targets.relative_noise,
-        targets.hearing_m,
-    )
     close = CLOSE * targets.accuracy_sd_m / targets.relative_noise
-    value = sd / targets.accuracy_sd_m + np.maximum(distance - close, 0.0) / constraints.max_step_m
+    value = np.maximum(distance - close, 0.0) / constraints.max_step_m
+    for state, covariance in zip(targets.state, targets.covariance, strict=True):
+        if np.isfinite(state).all():
+            sd = foretold_sd(state, covariance, candidates, targets.relative_noise, targets.hearing_m)
+            value += sd / targets.accuracy_sd_m
     return np.asarray(candidates[np.argmin(value), row])
 
 

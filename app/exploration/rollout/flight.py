@@ -28,6 +28,9 @@ PER_LEFT = 0.8
 
 CLIMB_PASSES = 4
 
+SINKING = 0.8
+"""Part of a step by which vehicles sink at most where that may not wait."""
+
 NEAREST = 1e-12
 """Square of the least distance of a landmark, in visibilities: a sensor right on it learns no more."""
 
@@ -271,8 +274,9 @@ def fly_step(at: FloatArray, plan: Plan, k: int, count: int, floor: Floor, rules
             wish = sample(floor.smooth_m, floor.west_m, floor.south_m, floor.cell_m, x, y) - height
             limit = sample(floor.deepest_m, floor.west_m, floor.south_m, floor.cell_m, x, y)
             spare = np.sqrt(max(0.0, step * step - (x - at[i, 0]) ** 2 - (y - at[i, 1]) ** 2))
-            # Sinking may wait.
-            out[i, 2] = min(max(rules.min_depth_m, min(rules.max_depth_m, wish, limit)), at[i, 2] + spare)
+            # Sinking may wait; not where most of what is in sight would be missed from a little higher up.
+            lowest = at[i, 2] + (SINKING * step if rules.directed else spare)
+            out[i, 2] = min(max(rules.min_depth_m, min(rules.max_depth_m, wish, limit)), lowest)
             out[i, 0] = x
             out[i, 1] = y
         _keep_links(out, plan.chain, rules.com_range_m)
