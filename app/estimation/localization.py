@@ -19,8 +19,6 @@ FloatArray = NDArray[np.float64]
 AXES = 4
 """States of one vehicle: east, north, drift along east and north."""
 
-WITHIN = 0.95
-
 HOPS = 8
 """Parts into which a way ahead is cut, because the drift wanders on the way."""
 
@@ -92,9 +90,9 @@ class TeamPosition:
         return np.sqrt(np.maximum(np.linalg.eigvalsh(blocks)[:, -1], 0.0))
 
 
-def radius_95(sd_m: FloatArray) -> FloatArray:
-    """Return within which horizontal distance a vehicle is with a probability of at least 95 %."""
-    return np.asarray(np.sqrt(chi2.ppf(WITHIN, 2)) * np.asarray(sd_m))
+def radius(sd_m: FloatArray, probability: float) -> FloatArray:
+    """Return within which horizontal distance a vehicle is with at least this probability."""
+    return np.asarray(np.sqrt(chi2.ppf(probability, 2)) * np.asarray(sd_m))
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,9 @@ FloatArray = NDArray[np.float64]
 
 CELLS_PER_SIGHT = 5.0
 FEWEST_CELLS = 4
+MISSED, MISSED_BESIDE = 0.1, 0.02
+"""How likely a cell that was looked at was hidden all the same, and how likely where something was found in it."""
+
 WITHIN = 0.9
 """A cell counts as looked at when its middle was this close, of the distance of sight."""
 
@@ -40,28 +43,37 @@ class Presumed:
         axes = [low[k] + sides[k] * (np.arange(counts[k]) + 0.5) for k in range(3)]
         self.middles = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
         self.looks = np.zeros(len(self.middles), dtype=np.int64)
-        self._sides = sides
+        self._low, self._sides, self._counts = low, sides, counts
         self._flat = flat
         self._sensor = RangeSensor(WITHIN * sight_m)
 
     def look(self, positions: FloatArray, floor_m: FloatArray) -> None:
         """Note what the vehicles at ``positions`` (n_vehicles, 3) have looked at.
 
-        ``floor_m`` (n_vehicles,) are the depths of the floor under them, where there is one.
+        ``floor_m`` (n_vehicles, n_cells) are the depths of the floor in the cells as presumed then, where there is one.
         """
         for position, floor in zip(positions, floor_m, strict=True):
-            middles = self.middles
-            if self._flat:
-                middles = np.column_stack([middles[:, :2], np.full(len(middles), floor)])
+            middles = np.column_stack([self.middles[:, :2], floor]) if self._flat else self.middles
             self.looks += self._sensor.visible(position[None], middles)[0]
 
-    def places(self, count: int) -> FloatArray:
-        """Return ``count`` places (count, 3), as evenly as can be over the cells that were looked at least often."""
-        rarest = np.flatnonzero(self.looks == self.looks.min())
-        chosen = rarest[np.arange(count) * len(rarest) // max(count, 1)] if count < len(rarest) else rarest
-        turns = -(-count // len(chosen))
+    def places(self, count: int, seen_m: FloatArray) -> FloatArray:
+        """Return ``count`` places (count, 3), evenly over the cells by how likely they hold unseen landmarks.
+
+        ``seen_m`` (k, 3) are the estimates of those that were seen: a cell that was looked at and in which none was
+        found may have been hidden, the more so the more there should be.
+        """
+        found = np.zeros(len(self.middles), dtype=np.bool_)
+        if len(seen_m):
+            index = np.floor((seen_m - self._low) / self._sides).astype(int)
+            index[:, 2] = 0 if self._flat else index[:, 2]
+            inside = ((index >= 0) & (index < self._counts)).all(axis=1)
+            found[np.ravel_multi_index(tuple(index[inside].T), tuple(self._counts))] = True
+        expected = (count + len(seen_m)) / len(self.middles)
+        hidden = MISSED / (MISSED + (1.0 - MISSED) * np.exp(-expected))
+        weight = np.where(self.looks == 0, 1.0, np.where(found, MISSED_BESIDE, hidden))
+        share = np.cumsum(weight) / weight.sum()
+        cell = np.searchsorted(share, (np.arange(count) + 0.5) / max(count, 1))
         # Several in a cell lie along its diagonals, evenly and without any randomness.
-        k = np.arange(turns)[:, None]
-        offset = (np.hstack([0.5 + k * 0.7548776662, 0.5 + k * 0.5698402910, 0.5 + k * 0.3803]) % 1.0) - 0.5
-        places = self.middles[chosen][None] + offset[:, None, :] * self._sides
-        return np.asarray(places.reshape(-1, 3)[:count])
+        turn = np.arange(count) - np.searchsorted(cell, cell)
+        offset = (0.5 + turn[:, None] * np.array([0.7548776662, 0.5698402910, 0.3803])) % 1.0 - 0.5
+        return np.asarray(self.middles[cell] + offset * self._sides)

@@ -113,7 +113,7 @@ def run_track(
         cost += world.cost()
         lost.append(float(world.localization_errors().max()))
         if step > SETTLED_AFTER and world.tracks:
-            tracked.append(np.mean([world.target_estimator.accurate(track) for track in world.tracks]))
+            tracked.append(float(np.mean([world.target_estimator.accurate(track) for track in world.tracks])))
             target_error.append(float(world.target_errors().mean()))
         progress(step)
     below = np.flatnonzero(np.array(history) <= 1.0)

@@ -1,7 +1,7 @@
 """The dynamic case without a network: landmarks in three dimensions, targets that move, localization that fades.
 
-MED13's scenario lies over a terrain cast into the cube [-1, 1]^3, NGCUV12's spreads its landmarks over the lower half of
-the cube. Lengths have no unit there; the fields keep their metre names. Depth is positive down, the surface at -1.
+MED13's scenario lies over a terrain cast into the cube [-1, 1]^3, NGCUV12's spreads its landmarks over the lower half
+of it. Lengths have no unit there; the fields keep their metre names. Depth is positive down, the surface at -1.
 """
 
 from dataclasses import dataclass
@@ -15,13 +15,13 @@ from app.estimation import (
     CooperativeLocalizer,
     Fading,
     Landmark3DEstimator,
-    LandmarkSets,
     Landmarks3D,
+    LandmarkSets,
     RangeSensor,
     TargetEstimator,
     TargetTrack,
 )
-from app.estimation.localization import radius_95
+from app.estimation.localization import radius
 from app.evaluation.cube_world import (
     CEILING,
     DEEPEST,
@@ -129,8 +129,11 @@ class TrackScenario:
 
     @property
     def threshold_sd(self) -> float:
-        """Standard deviation of a position that keeps its error below ``lost_beyond`` with 95 % probability."""
-        return self.lost_beyond / float(radius_95(np.array(1.0)))
+        """Standard deviation that keeps a position's error below ``lost_beyond`` with 99 % probability.
+
+        With 95 % for each vehicle, that all of them are below it at once would be less likely than that.
+        """
+        return self.lost_beyond / float(radius(np.array(1.0), 0.99))
 
 
 class TrackWorld:
@@ -194,7 +197,7 @@ class TrackWorld:
     @property
     def estimated(self) -> FloatArray:
         """Where the vehicles believe to be, (n_vehicles, 3)."""
-        return self.positions if self.scenario.fading is None else self.team.positions_m
+        return np.asarray(self.positions if self.scenario.fading is None else self.team.positions_m)
 
     def move(self, waypoints: FloatArray) -> FloatArray:
         """Send the vehicles to where they should be in their own reckoning; return how far each went."""
@@ -210,7 +213,7 @@ class TrackWorld:
         pull = np.sqrt(1.0 - kept**2) * fading.drift * self._walk.standard_normal(self._drift.shape)
         self._drift = kept * self._drift + pull
         self.team = self._localizer.move(self.team, legs)
-        return distance
+        return np.asarray(distance)
 
     def _clear(self, positions: FloatArray) -> FloatArray:
         """Lift vehicles to the clearance above the true floor, as their altimeters do."""
@@ -252,9 +255,9 @@ class TrackWorld:
             ranges = self.scenario.sensor.measure(self.positions[j], self.truth[index], rng)
             self.known = self.estimator.update(self.known, j, places[j], index, ranges, float(sd[j]))
         floor = self._floor_under(places)
-        self.presumed.look(places, floor)
         if self._cube is not None:
             self._felt = np.vstack([self._felt, np.column_stack([places[:, :2], floor])[np.isfinite(floor)]])
+        self.presumed.look(places, self._floor_in_cells(floor))
         blur = np.zeros((len(places), 3)) if fading is None else self.team.variance_m2
         for k, target in enumerate(self.targets):
             hearing = self.target_estimator.sensor
@@ -268,13 +271,14 @@ class TrackWorld:
         if fading is None:
             return
         lost = self.team.sd_m / self.scenario.threshold_sd
-        for j in np.flatnonzero(up & ~self._up):
+        for j in (int(k) for k in np.flatnonzero(up & ~self._up)):
             self.resurfacings += 1
             self.needless += int((lost.max() if self.scenario.shared_fix else lost[j]) < NEEDED_AT)
         self._up = up
-        for j in range(len(up)) if self.scenario.shared_fix and up.any() else np.flatnonzero(up):
-            noise = fading.fix_sd_m * rng.standard_normal(2)
-            self.team = self._localizer.fix(self.team, int(j), self.positions[j, :2] + noise)
+        fixed = range(len(up)) if self.scenario.shared_fix and up.any() else np.flatnonzero(up).tolist()
+        for vehicle in fixed:
+            place = self.positions[vehicle, :2] + fading.fix_sd_m * rng.standard_normal(2)
+            self.team = self._localizer.fix(self.team, vehicle, place)
         if self.scenario.cooperative:
             for i in range(len(up)):
                 for j in range(i):
@@ -286,7 +290,23 @@ class TrackWorld:
         """Return the depths that the vehicles' altimeters find, (n_vehicles,)."""
         if self._cube is None:
             return np.full(len(places), np.nan)
-        return self._cube.depth_at(self.positions[:, :2])
+        return np.asarray(self._cube.depth_at(self.positions[:, :2]), dtype=np.float64)
+
+    def _floor_in_cells(self, under: FloatArray) -> FloatArray:
+        """Return what each vehicle presumes of the floor in the cells of unseen landmarks, (n_vehicles, n_cells).
+
+        That is the depth of the nearest well known landmark; far from all of them, what its altimeter finds.
+        """
+        cells = self.presumed.middles
+        presumed = np.repeat(under[:, None], len(cells), axis=1)
+        fixed = self.known.fixed
+        if self._cube is not None and fixed.any():
+            known = self.known.position_m[fixed]
+            reach = NEARBY * self.scenario.visibility
+            away, nearest = cKDTree(known[:, :2]).query(cells[:, :2], distance_upper_bound=reach)
+            near = np.isfinite(np.asarray(away))
+            presumed[:, near] = known[np.asarray(nearest)[near], 2]
+        return presumed
 
     @property
     def belief(self) -> Belief:
@@ -295,7 +315,7 @@ class TrackWorld:
         n, seen = len(k.looks), k.looks > 0
         point = np.where(seen[:, None], k.position_m, 0.0)
         if not seen.all():
-            point[~seen] = self.presumed.places(int((~seen).sum()))
+            point[~seen] = self.presumed.places(int((~seen).sum()), k.position_m[seen])
         sd = np.sqrt(np.linalg.eigvalsh(np.where(seen[:, None, None], k.covariance_m2, 0.0))[:, 2])
         depth = self._depths(point, seen) if flat else point[:, 2]
         return Belief(
@@ -319,8 +339,8 @@ class TrackWorld:
             away, nearest = cKDTree(self._felt[:, :2]).query(
                 point[rest, :2], distance_upper_bound=NEARBY * self.scenario.visibility
             )
-            near = np.isfinite(away)
-            depth[rest[near]] = self._felt[nearest[near], 2]
+            near = np.isfinite(np.asarray(away))
+            depth[rest[near]] = self._felt[np.asarray(nearest)[near], 2]
         return depth
 
     def situation(self, step: int) -> Situation:
@@ -385,7 +405,7 @@ class TrackWorld:
         """Return how far each target is from its estimate, (k,)."""
         middle = (self._low + self._high) / 2.0
         places = [track.state[:3] if track.known else middle for track in self.tracks]
-        return np.linalg.norm(np.array(places).reshape(-1, 3) - self.targets[:, :3], axis=1)
+        return np.asarray(np.linalg.norm(np.array(places).reshape(-1, 3) - self.targets[:, :3], axis=1))
 
     def localization_errors(self) -> FloatArray:
         """Return how far each vehicle is from where it believes to be, (n_vehicles,), horizontally."""

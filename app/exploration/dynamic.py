@@ -46,7 +46,7 @@ class Targets:
     @property
     def sd_m(self) -> FloatArray:
         """Greatest standard deviation of each position, (k,)."""
-        return np.sqrt(np.diagonal(self.covariance, axis1=1, axis2=2)[:, :3].max(axis=1))
+        return np.asarray(np.sqrt(np.diagonal(self.covariance, axis1=1, axis2=2)[:, :3].max(axis=1)))
 
 
 @dataclass(frozen=True)
@@ -78,9 +78,7 @@ class Localization:
         return replace(self, sd_m=self.sd_m[rows], foretold_sd_m=self.foretold_sd_m[rows])
 
 
-def dynamic_cost(
-    positions: FloatArray, targets: Targets | None, localization: Localization | None, K: float
-) -> float:
+def dynamic_cost(positions: FloatArray, targets: Targets | None, localization: Localization | None, K: float) -> float:
     """Return what targets and localization add to MED13's cost for a team configuration (n_vehicles, 3)."""
     cost = 0.0
     if targets is not None:

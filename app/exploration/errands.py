@@ -144,7 +144,7 @@ def errand_move(
     candidates[:, row] = origin[row] + _moves(goal - origin[row], constraints.max_step_m * (1.0 - 1e-9))
     candidates = candidates[constraints.feasible(origin, candidates, bottom)]
     if len(candidates) == 0:
-        return origin[row]
+        return np.asarray(origin[row])
     distance = np.linalg.norm(candidates[:, row] - goal, axis=1)
     if errand.target == RISE or targets is None:
         return np.asarray(candidates[np.argmin(distance), row])

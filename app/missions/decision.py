@@ -25,7 +25,7 @@ RESERVE = 0.06
 so a plan that needs every step would end with its last line half flown. What is not used is released bit by bit."""
 
 RISE_AT = 0.9
-"""Part of the allowed deviation at which a vehicle comes up, so that it is at the surface before the rest is used up."""
+"""Part of the allowed deviation at which a vehicle comes up: the rest is for the way to the surface."""
 
 RISE_OF_STEP = 0.9
 """Part of a step that a vehicle rises at most, so that a deep one comes up in several steps."""
@@ -77,7 +77,7 @@ class Decision:
     memory: bytes
     notes: list[str] = field(default_factory=list)
     fixes: dict[str, str] = field(default_factory=dict)
-    """Vehicles that begin or end coming up for a fix, with what there is to say about it."""
+    """Vehicles that begin or end coming up for a fix, with what there is to say."""
     bottom: Bottom = field(default_factory=Bottom.unknown)
 
 
@@ -200,7 +200,9 @@ def surfacing(team: list[Place], policy: SurfacePolicy | None) -> tuple[list[boo
                 f"{policy.max_position_sd_m:g} m are allowed"
             )
         elif place.surfacing and not up[-1]:
-            told[place.vehicle] = f"{place.vehicle} goes down again: it knows its position to {place.position_sd_m:.2g} m"
+            told[place.vehicle] = (
+                f"{place.vehicle} goes down again: it knows its position to {place.position_sd_m:.2g} m"
+            )
     return up, told
 
 

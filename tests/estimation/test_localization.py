@@ -5,7 +5,7 @@ import pytest
 from scipy.stats import chi2
 
 from app.estimation import CooperativeLocalizer, Fading
-from app.estimation.localization import radius_95
+from app.estimation.localization import radius
 
 START = np.array([[0.0, 0.0, 0.5], [0.3, 0.0, 0.5], [0.0, 0.3, 0.4]])
 
@@ -105,4 +105,4 @@ def test_a_joint_update_is_that_of_a_slow_reference():
 
 def test_the_radius_holds_95_per_cent():
     drawn = np.linalg.norm(np.random.default_rng(0).standard_normal((100_000, 2)), axis=1)
-    assert np.mean(drawn < radius_95(1.0)) == pytest.approx(0.95, abs=0.005)
+    assert np.mean(drawn < radius(1.0, 0.95)) == pytest.approx(0.95, abs=0.005)

@@ -54,7 +54,9 @@ def test_a_deep_vehicle_comes_up_in_several_steps() -> None:
 
 
 def test_without_a_policy_or_a_deviation_nobody_comes_up() -> None:
-    assert decided([replace(place("a", 10, 10), position_sd_m=9.0)], [[15.0, 12.0, 9.0]], surface_policy=None).fixes == {}
+    assert (
+        decided([replace(place("a", 10, 10), position_sd_m=9.0)], [[15.0, 12.0, 9.0]], surface_policy=None).fixes == {}
+    )
     assert decided([place("a", 10, 10)], [[15.0, 12.0, 9.0]]).legs[0].target_m[2] == 2.0
 
 

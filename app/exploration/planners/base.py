@@ -94,7 +94,9 @@ class PlannerBase(ABC):
     def snapshot(self) -> bytes:
         """Return the planner's memory."""
         errands = self._errands.remember()
-        return pack(self.name, {"cruise": self._cruise, **({"errands": errands} if errands else {}), **self._remember()})
+        return pack(
+            self.name, {"cruise": self._cruise, **({"errands": errands} if errands else {}), **self._remember()}
+        )
 
     def restore(self, memory: bytes) -> None:
         """Take up a memory made by ``snapshot``. Raises ValueError when it is not one."""

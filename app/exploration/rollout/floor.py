@@ -114,7 +114,9 @@ def estimate_floor(
     for x, y, z in felt_m:
         away = np.hypot(east - x, north - y)
         limit = np.minimum(limit, z - clearance_m - margin_m(visibility_m, clearance_m) + ENVELOPE_SLOPE * away)
-    return Floor(float(low[0]), float(low[1]), float(cell), depth, smooth, np.minimum(_envelope(limit, cell), depth - held_m))
+    return Floor(
+        float(low[0]), float(low[1]), float(cell), depth, smooth, np.minimum(_envelope(limit, cell), depth - held_m)
+    )
 
 
 def _from_neighbours(
