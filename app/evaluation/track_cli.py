@@ -65,7 +65,7 @@ def track(
     own_fix: Annotated[
         bool, typer.Option("--own-fix", help="ngcuv12: a fix relocalizes one vehicle, others by ranges to it.")
     ] = False,
-    rollouts: Annotated[int, typer.Option(min=0, help="Changes to the team's plan that a rollout step tries.")] = 60,
+    rollouts: Annotated[int, typer.Option(min=0, help="Changes to the team's plan that a rollout step tries.")] = 100,
     jobs: Jobs = 1,
     as_json: Json = False,
     write: Annotated[

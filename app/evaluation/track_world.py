@@ -32,6 +32,7 @@ from app.evaluation.cube_world import (
     CubeTerrain,
     names_of,
 )
+from app.evaluation.plain_ekf import PlainEkf
 from app.evaluation.presumed import Presumed
 from app.exploration.constraints import Constraints
 from app.exploration.dynamic import Localization, Targets, dynamic_cost
@@ -79,7 +80,7 @@ class TrackScenario:
     clearance : float
         MED13's d: least height above the terrain.
     visibility : float
-        How far landmarks are seen; inf: everywhere.
+        How far landmarks are seen; 4 is everywhere in the cube.
     accuracy, target_accuracy : float
         Standard deviations below which landmarks and targets belong to ``A``.
     com_range : float
@@ -92,6 +93,8 @@ class TrackScenario:
         NGCUV12: as soon as one vehicle surfaces all are localized. Otherwise each needs its own fix, or ranges.
     cooperative : bool
         Whether vehicles range to each other.
+    plain_ekf : bool
+        Whether landmarks are estimated by one first-order filter each, as in MED13's figure 1.
     """
 
     terrain: Terrain | None = None
@@ -109,6 +112,7 @@ class TrackScenario:
     lost_beyond: float = 0.1
     shared_fix: bool = True
     cooperative: bool = True
+    plain_ekf: bool = False
 
     @property
     def sensor(self) -> RangeSensor:
@@ -146,7 +150,9 @@ class TrackWorld:
         self.half = np.ones(2) if self._cube is None else self._cube.half
         self.truth = self._scatter(rng)
         self.known = Landmarks3D.unknown(len(self.truth))
-        self.estimator = Landmark3DEstimator(scenario.sensor, scenario.accuracy, NEVER)
+        self.estimator: Landmark3DEstimator | PlainEkf = Landmark3DEstimator(scenario.sensor, scenario.accuracy, NEVER)
+        if scenario.plain_ekf:
+            self.estimator = PlainEkf(scenario.sensor.relative_noise, scenario.accuracy, self._presumed_area())
         self.presumed = Presumed(self._presumed_area(), scenario.visibility, flat=self._cube is not None)
         self._low = np.array([*-self.half, CEILING])
         self._high = np.array([*self.half, SHALLOWEST if self._cube is not None else DEEPEST])

@@ -26,7 +26,7 @@ def figures(run):
     return {k: v for k, v in asdict(run).items() if k not in ("wall_s", "plan_ms_median", "plan_ms_p99")}
 
 
-@pytest.mark.parametrize("planner", ["rollout", "cao", "lawnmower", "random", TRACE_GREEDY])
+@pytest.mark.parametrize("planner", ["rollout", "cao", "lawnmower", "random"])
 def test_the_same_seed_gives_the_same_run(planner):
     first, second = (run_track(SMALL, planner, OPTIONS) for _ in range(2))
     assert figures(first) == figures(second)
@@ -36,7 +36,7 @@ def test_the_same_seed_gives_the_same_run(planner):
 def test_vehicles_keep_the_clearance_and_know_where_they_are_without_fading():
     world = TrackWorld(SMALL)
     for _ in range(10):
-        world.move(world.positions + [0.02, 0.01, 0.04])
+        world.move(world.positions + np.array([0.02, 0.01, 0.04]))
         floor = world._cube.depth_at(world.positions[:, :2])
         assert (floor - world.positions[:, 2] >= SMALL.clearance - 1e-9).all()
     assert world.localization_errors().max() == 0.0
@@ -122,7 +122,7 @@ def test_a_report_is_made_taken_up_again_and_counts_what_is_missing(tmp_path):
     ("arguments", "said"),
     [
         (("--setup", "auro15"), "none of med13, ngcuv12"),
-        (("--own-fix",), "use --setup ngcuv12"),
+        (("--own-fix",), "vehicles know where they are"),
         (("--no-run",), "goes with --write only"),
         (("--planner", "osarses"), "choose from"),
         (("--write", "x", "--only", "figure7"), "choose from"),

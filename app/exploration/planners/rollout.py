@@ -51,7 +51,7 @@ LINK_OF_RANGE = 29 / 30
 MAY_BE_LEFT = 0.008
 """Part of all landmarks that a plan may leave over, until the team has come so far."""
 
-SAMPLE, SAMPLE_GRID = 800, 20
+SAMPLE, SAMPLE_GRID = 400, 20
 """Tasks that plans are judged by where whole positions are estimated, and cells per side that they are taken from."""
 
 BUCKETS = 3
@@ -59,6 +59,9 @@ BUCKETS = 3
 
 SWATH_EXCESS = 1.2
 """How far a team may exceed, on average, the landmarks in the swath that it sees."""
+
+BACK_SOON = -1
+"""In place of the number of steps planned so far: a vehicle left on an errand, or came back."""
 
 FIRST_SEARCH = 1500
 LAST_SHARE = 4
@@ -125,9 +128,9 @@ class RolloutPlanner(PlannerBase):
         if self._names != team.vehicles:
             if self._kept is not None:
                 self._kept = with_team(self._kept, self._names, team.vehicles)
-            # On an errand a vehicle is away for a while only: that is no reason to plan everything anew.
+            # On an errand a vehicle is away for a while only: new sweeps may compete, with the usual effort.
             away = team.targets is not None or team.localization is not None
-            self._names, self._planned = team.vehicles, int(away and self._planned > 0)
+            self._names, self._planned = team.vehicles, BACK_SOON if away and self._planned else 0
         if self._free is None or not _same(self._free[0], team.constraints):
             self._free = (team.constraints, free_space(team.constraints))
         self._felt.feel(team)
@@ -139,7 +142,7 @@ class RolloutPlanner(PlannerBase):
             best = mission.plan(self._kept, self._heights)
         # Sweeps over what nobody has seen yet look better than they are: the plan that stands is not given up for one
         # (measured: changing for a new sweep every 8 steps costs 8 steps, only for one better by 10 still costs them).
-        if best is None or self._planned == 0:
+        if best is None or self._planned in (0, BACK_SOON):
             rivals = [mission.refine(start, FRESH_SEARCH) for start in mission.fresh_starts(FRESH_STARTS)]
             best = min([*rivals, *([] if best is None else [best])], key=lambda start: start.score, default=None)
         best = mission.convoy(team.constraints) if best is None else best
@@ -154,7 +157,7 @@ class RolloutPlanner(PlannerBase):
             positions, passed = mission.way_out(team, bottom, wishes[0]), 0
         self._kept = Backbone(best.plan.at_m[passed : best.count].copy(), best.plan.chain.copy())
         self._heights = best.plan.height_m[passed : best.count].copy()
-        self._planned += 1
+        self._planned = max(1, self._planned + 1)
         self._felt.ask(team.vehicles, positions)
         terms = {"finish": team.step - 1 + float(best.course.state[best.count, 0]), "waypoints": float(best.count)}
         return Proposal(positions, -best.score, terms)
@@ -239,7 +242,8 @@ class _Mission:
         self._work: Work = self._left(belief, options)
 
     def _left(self, belief: Belief, options: PlannerOptions) -> Work:
-        left = lacking(belief, options.accuracy_sd_m, HEDGE)
+        hedge = HEDGE if belief.covariance_m2 is None else 1.0
+        left = lacking(belief, options.accuracy_sd_m, hedge)
         shown = _sample(left, belief)
         xyz = np.column_stack([belief.xy_m, belief.depth_m])[left.row[shown]]
         fill_depths(xyz, self._floor)
