@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 
 from app.estimation import Fading
 from app.evaluation.presumed import Presumed
-from app.evaluation.trace_greedy import TRACE_GREEDY, foretold_trace
+from app.evaluation.trace_greedy import foretold_trace
 from app.evaluation.track import run_track
 from app.evaluation.track_cli import evaluate_app
 from app.evaluation.track_world import TrackScenario, TrackWorld

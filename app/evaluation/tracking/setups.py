@@ -86,8 +86,8 @@ def experiments(steps: int = 500) -> tuple[Experiment, ...]:
             Experiment(
                 name,
                 f"MED13 figure 1: greedy on the trace of the covariance, {filter_}",
-                "30 landmarks anywhere in the lower half of the cube, unlimited sight, no targets; every combination of "
-                "moves is weighed.",
+                "30 landmarks anywhere in the lower half of the cube, unlimited sight, no targets; every combination "
+                "of moves is weighed.",
                 (TRACE_GREEDY, "cao"),
                 TrackScenario(
                     landmarks=30,
