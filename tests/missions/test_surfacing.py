@@ -8,9 +8,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
+from sqlalchemy import select
 
 from app.missions.decision import Decision, Place, make_constraints
+from app.missions.states import MissionState
+from app.storage.database import Database
+from app.storage.models import EventRow, WaypointRow
 from tests.missions.builders import make_spec
+from tests.missions.fleet import Harbour, sim_spec, until_state
 from tests.missions.test_safety import decide_for, place
 
 POLICY = {"surface_policy": {"max_position_sd_m": 3.0, "good_position_sd_m": 0.5}}
@@ -87,3 +92,23 @@ def test_coming_up_breaks_no_limit(rows: list[tuple[float, float, float, bool]],
 def test_a_policy_that_cannot_be_kept_is_refused_with_what_would_be_right() -> None:
     with pytest.raises(ValidationError, match="must be known better than the limit"):
         make_spec(surface_policy={"max_position_sd_m": 1.0, "good_position_sd_m": 2.0})
+
+
+async def test_a_running_mission_brings_its_vehicles_up_and_down_again(harbour: Harbour, database: Database) -> None:
+    """Simulated vehicles whose dead reckoning drifts: fixes come at the surface, the log tells of each."""
+    service = await harbour.reopen(simulation={"drift_m2ps": 0.05})
+    spec = sim_spec("a", steps=12, surface_policy={"max_position_sd_m": 1.0, "good_position_sd_m": 0.4})
+    mission = await service.create(spec)
+    await service.act(mission.id, "start", actor="Ana")
+    await until_state(service, mission.id, MissionState.FINISHED)
+    async with database.reading() as session:
+        rows = (
+            await session.execute(select(EventRow).where(EventRow.kind == "surface").order_by(EventRow.id))
+        ).scalars()
+        said = [row.message for row in rows]
+        steps = (await session.execute(select(WaypointRow).order_by(WaypointRow.step))).scalars()
+        depths = [row.depth_m for row in steps]
+    assert "comes up for a fix" in said[0]
+    assert "goes down again" in said[1]
+    assert 0.0 in depths
+    assert max(depths) == pytest.approx(2.0)
