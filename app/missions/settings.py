@@ -115,7 +115,7 @@ class SimulationSettings(Section):
         default=0.0,
         ge=0,
         le=10,
-        description="Growth of the variance of a submerged vehicle's position, m2/s; LAUVs report 0.02. 0: they know it",
+        description="Growth of the variance of a submerged vehicle's position, m2/s; LAUVs report 0.02; 0: none",
     )
 
 
