@@ -1,17 +1,21 @@
-"""What is known: sensor models and the landmark estimators. Pure: numpy in, numpy out."""
+"""What is known: sensor models, landmarks, targets, the vehicles' own places. Pure: numpy in, numpy out."""
 
 from app.estimation.beams import Attitude, BeamSonar, Dvl, Echoes, Multibeam
 from app.estimation.landmarks import LandmarkEstimator, Landmarks, LandmarkSets, landmark_sets
 from app.estimation.landmarks_3d import Landmark3DEstimator, Landmarks3D
 from app.estimation.line_of_sight import in_sight
+from app.estimation.localization import CooperativeLocalizer, Fading, TeamPosition
 from app.estimation.sensors import RangeSensor, Sensor, SingleBeam
+from app.estimation.targets import TargetEstimator, TargetTrack
 from app.estimation.team import SensorTeam
 
 __all__ = [
     "Attitude",
     "BeamSonar",
+    "CooperativeLocalizer",
     "Dvl",
     "Echoes",
+    "Fading",
     "Landmark3DEstimator",
     "LandmarkEstimator",
     "LandmarkSets",
@@ -22,6 +26,9 @@ __all__ = [
     "Sensor",
     "SensorTeam",
     "SingleBeam",
+    "TargetEstimator",
+    "TargetTrack",
+    "TeamPosition",
     "in_sight",
     "landmark_sets",
 ]

@@ -107,7 +107,13 @@ class Landmark3DEstimator:
     visit_cap: int = 200
 
     def update(
-        self, landmarks: Landmarks3D, vehicle: int, position: FloatArray, index: IntArray, ranges: FloatArray
+        self,
+        landmarks: Landmarks3D,
+        vehicle: int,
+        position: FloatArray,
+        index: IntArray,
+        ranges: FloatArray,
+        position_sd_m: float = 0.0,
     ) -> Landmarks3D:
         """Take in the ranges that one vehicle measured.
 
@@ -121,6 +127,9 @@ class Landmark3DEstimator:
             Which landmarks it measured, each at most once.
         ranges : (k,)
             The noisy ranges.
+        position_sd_m : float
+            Standard deviation of the vehicle's own place, along east and along north. It blurs every range, and a
+            landmark is not accurate before both together are, because all ranges of a dive share that error.
         """
         noise = self.sensor.relative_noise
         where = np.asarray(position, dtype=np.float64)
@@ -128,15 +137,17 @@ class Landmark3DEstimator:
         first = index[looks[index] == 0]
         spread = np.concatenate([landmarks.spread, first])
         means, covariances, weights = _start(where, ranges[looks[index] == 0], noise)
+        covariances[..., range(2), range(2)] += position_sd_m**2
         means = np.concatenate([landmarks.means, means])
         covariances = np.concatenate([landmarks.covariances, covariances])
         weights = np.concatenate([landmarks.weights, weights])
         row = np.full(len(looks), -1, dtype=np.int64)
         row[spread] = np.arange(len(spread))
-        single = _take(where, index, ranges, noise, looks, row, mean, covariance, means, covariances, weights)
+        blur = position_sd_m**2
+        single = _take(where, index, ranges, noise, blur, looks, row, mean, covariance, means, covariances, weights)
         looks[index] += 1
 
-        variance = covariance[index][:, range(3), range(3)]
+        variance = covariance[index][:, range(3), range(3)] + np.array([blur, blur, 0.0])
         done = (variance < self.accuracy_sd_m**2).all(axis=1) | (looks[index] > self.visit_cap)
         accurate, credited = landmarks.accurate.copy(), landmarks.credited.copy()
         fresh = index[done & ~accurate[index]]
@@ -178,6 +189,7 @@ def _take(
     index: IntArray,
     ranges: FloatArray,
     noise: float,
+    blur: float,
     looks: IntArray,
     row: IntArray,
     mean: FloatArray,
@@ -192,10 +204,10 @@ def _take(
         m = index[k]
         b = row[m]
         if b < 0:
-            _filter(mean[m], covariance[m], position, ranges[k], noise)
+            _filter(mean[m], covariance[m], position, ranges[k], noise, blur)
             continue
         if looks[m] > 0:
-            _weigh(means[b], covariances[b], weights[b], position, ranges[k], noise)
+            _weigh(means[b], covariances[b], weights[b], position, ranges[k], noise, blur)
         _match(means[b], covariances[b], weights[b], mean[m], covariance[m])
         spread = covariance[m, 0, 0] + covariance[m, 1, 1] + covariance[m, 2, 2]
         single[b] = spread < (NARROW * ranges[k]) ** 2
@@ -203,7 +215,9 @@ def _take(
 
 
 @njit(cache=True, nogil=True)
-def _filter(mean: FloatArray, covariance: FloatArray, position: FloatArray, y: float, noise: float) -> float:
+def _filter(
+    mean: FloatArray, covariance: FloatArray, position: FloatArray, y: float, noise: float, blur: float
+) -> float:
     """Kalman update in place; return the log-likelihood of the range (up to a constant)."""
     u = mean - position
     r = max(np.sqrt((u * u).sum()), 1e-9)
@@ -218,6 +232,7 @@ def _filter(mean: FloatArray, covariance: FloatArray, position: FloatArray, y: f
     twice = ((covariance * covariance).sum() - 2.0 * (Pu * Pu).sum() + along * along) / (r * r)
     predicted = r + 0.5 * across
     variance = along + 0.5 * twice + noise * noise * (predicted * predicted + along)
+    variance += blur * (u[0] * u[0] + u[1] * u[1])
     innovation = y - predicted
     for i in range(3):
         mean[i] += Pu[i] / variance * innovation
@@ -228,13 +243,19 @@ def _filter(mean: FloatArray, covariance: FloatArray, position: FloatArray, y: f
 
 @njit(cache=True, nogil=True)
 def _weigh(
-    means: FloatArray, covariances: FloatArray, weights: FloatArray, position: FloatArray, y: float, noise: float
+    means: FloatArray,
+    covariances: FloatArray,
+    weights: FloatArray,
+    position: FloatArray,
+    y: float,
+    noise: float,
+    blur: float,
 ) -> None:
     """Update a bundle in place; filters that have lost all weight are left as they are."""
     scores = np.full(len(weights), -np.inf)
     for h in range(len(weights)):
         if weights[h] > 0.0:
-            scores[h] = np.log(weights[h]) + _filter(means[h], covariances[h], position, y, noise)
+            scores[h] = np.log(weights[h]) + _filter(means[h], covariances[h], position, y, noise, blur)
     likely = np.exp(scores - scores.max())
     likely = np.where(likely < 1e-9, 0.0, likely)
     weights[:] = likely / likely.sum()

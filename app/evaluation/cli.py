@@ -118,12 +118,12 @@ def explore(
     as_json: Json = False,
 ) -> None:
     """Run the papers' scenario: landmarks in the cube [-1, 1]^3 (AURO15 section 6)."""
-    names = _planners(planner, EXPLORERS)
+    names = planners_named(planner, EXPLORERS)
     if capacity is not None and OSARSES in names:
         raise typer.BadParameter(
             "osarses tries its moves on everything that is known; leave it out", param_hint="--capacity"
         )
-    sea_floor = _terrain(terrain)
+    sea_floor = terrain_of(terrain)
     count = _landmark_count(landmarks)
     changes = TeamChanges(_changes(lose, "--lose"), _changes(join, "--join"))
     runs = []
@@ -131,7 +131,7 @@ def explore(
         options = _options(regressors, None if name == "osarses" else candidates, objective, contribution)
         if name == "osarses":
             options = options.model_copy(update={"tries": candidates or 0})
-        for which in _seed_list(seed, seeds):
+        for which in seed_list(seed, seeds):
             try:
                 scenario = ExploreScenario(
                     sea_floor,
@@ -151,7 +151,7 @@ def explore(
             runs.append(ExploreJob(scenario, name, options))
 
     columns = ("planner", "seed", "remaining_pct", "t99", "broken_constraints", "plan_ms_median")
-    _compare(runs, columns, jobs, as_json=as_json)
+    compare(runs, columns, jobs, as_json=as_json)
 
 
 @evaluate_app.command()
@@ -177,17 +177,17 @@ def survey(
     as_json: Json = False,
 ) -> None:
     """Run the papers' field experiment: map a sea floor with a single beam, beside the usual practice (AURO15)."""
-    names = _planners(planner, tuple(sorted(PLANNERS)))
+    names = planners_named(planner, tuple(sorted(PLANNERS)))
     if sampling not in ("step", "continuous"):
         raise typer.BadParameter(f"{sampling!r} is neither step nor continuous", param_hint="--sampling")
     how: Sampling = "step" if sampling == "step" else "continuous"
     if sounder not in ("single", "dvl", "swath"):
         raise typer.BadParameter(f"{sounder!r} is none of single, dvl, swath", param_hint="--sounder")
     beams: Sounder = "single" if sounder == "single" else "dvl" if sounder == "dvl" else "swath"
-    turns = _seed_list(0, symmetries, "--symmetries")
+    turns = seed_list(0, symmetries, "--symmetries")
     if max(turns) >= SYMMETRIES:
         raise typer.BadParameter(f"{symmetries!r} goes beyond {SYMMETRIES - 1}, the last", param_hint="--symmetries")
-    sea_floor = _terrain(terrain)
+    sea_floor = terrain_of(terrain)
     recorded = recorded_soundings(terrain)
     options = _options(regressors, candidates)
     runs = [
@@ -200,11 +200,11 @@ def survey(
             None if recorded is None else turned_soundings(recorded, sea_floor, turn),
         )
         for name in names
-        for which in _seed_list(seed, seeds)
+        for which in seed_list(seed, seeds)
         for turn in turns
     ]
     columns = ("planner", "seed", "symmetry", "rmse_m", "ratio", "gap_closed", "samples", "distance_m", "plan_ms_p99")
-    _compare(runs, columns, jobs, as_json=as_json)
+    compare(runs, columns, jobs, as_json=as_json)
 
 
 @evaluate_app.command()
@@ -243,12 +243,12 @@ def tables(
         sea_floors, missing = report_terrains(terrains)
     except (TerrainError, OSError) as error:
         raise typer.BadParameter(str(error), param_hint="--terrains") from error
-    seed_list = _seed_list(0, seeds)
+    chosen_seeds = seed_list(0, seeds)
     out.mkdir(parents=True, exist_ok=True)
     results = Results(out / "exploration.jsonl")
-    open_ = [job for job in jobs_of(chosen, sea_floors, seed_list, steps) if job.key not in results.runs]
+    open_ = [job for job in jobs_of(chosen, sea_floors, chosen_seeds, steps) if job.key not in results.runs]
     open_ = [] if no_run else open_
-    with _progress() as bar:
+    with progress_bar() as bar:
         task = bar.add_task("tables", total=len(open_))
         for run in run_jobs(open_, jobs, lambda job, step: bar.update(task, description=job.title)):
             results.add(run)
@@ -261,7 +261,7 @@ def tables(
         chosen,
         [terrain.name for terrain in sea_floors],
         missing,
-        seed_list,
+        chosen_seeds,
         steps,
         made(command + (" --quick" if quick else ""), jobs),
         {},
@@ -272,7 +272,8 @@ def tables(
 
 
 @contextmanager
-def _progress() -> Iterator[Progress]:
+def progress_bar() -> Iterator[Progress]:
+    """Show progress where a person looks on."""
     console = Console(stderr=True)
     with Progress(
         TextColumn("{task.description}"),
@@ -286,9 +287,10 @@ def _progress() -> Iterator[Progress]:
         yield bar
 
 
-def _compare(jobs: Sequence[Job], columns: tuple[str, ...], processes: int, *, as_json: bool) -> None:
+def compare(jobs: Sequence[Job], columns: tuple[str, ...], processes: int, *, as_json: bool) -> None:
+    """Run everything and print a table, or one JSON object."""
     runs: list[dict[str, Any]] = []
-    with _progress() as bar:
+    with progress_bar() as bar:
         task = bar.add_task("", total=sum(job.steps for job in jobs))
 
         def show(job: Job, step: int) -> None:
@@ -307,7 +309,8 @@ def _compare(jobs: Sequence[Job], columns: tuple[str, ...], processes: int, *, a
     Console().print(table)
 
 
-def _planners(text: str, known: tuple[str, ...]) -> list[str]:
+def planners_named(text: str, known: tuple[str, ...]) -> list[str]:
+    """Return the planners that an option names."""
     names = [name.strip() for name in text.split(",") if name.strip()]
     for name in names:
         if name not in known:
@@ -317,7 +320,8 @@ def _planners(text: str, known: tuple[str, ...]) -> list[str]:
     return names
 
 
-def _seed_list(seed: int, seeds: str | None, option: str = "--seeds") -> list[int]:
+def seed_list(seed: int, seeds: str | None, option: str = "--seeds") -> list[int]:
+    """Return the seeds that the options name."""
     if seeds is None:
         return [seed]
     try:
@@ -363,7 +367,8 @@ def _options(
     return PlannerOptions(**settings)
 
 
-def _terrain(path: Path) -> Terrain:
+def terrain_of(path: Path) -> Terrain:
+    """Return the sea floor in a file."""
     try:
         return load_terrain(path)
     except (TerrainError, OSError) as error:

@@ -73,6 +73,8 @@ class Constraints:
         Least distance between two vehicles, horizontally unless they are ``min_vertical_separation_m`` apart in depth.
     min_vertical_separation_m : float
         Difference in depth that makes horizontal separation unnecessary.
+    held_altitude_m : float or None
+        Height above the sea floor that vehicles hold by themselves when they are sent deeper; None: the least altitude.
     """
 
     area: FloatArray
@@ -84,6 +86,12 @@ class Constraints:
     com_range_m: float = np.inf
     min_separation_m: float = 0.0
     min_vertical_separation_m: float = np.inf
+    held_altitude_m: float | None = None
+
+    @property
+    def lowest_m(self) -> float:
+        """Height above the sea floor below which vehicles never are."""
+        return self.min_altitude_m if self.held_altitude_m is None else self.held_altitude_m
 
     def excess(self, origin: FloatArray, candidates: FloatArray, bottom: Bottom) -> FloatArray:
         """Return by how much each limit would be broken.

@@ -35,7 +35,7 @@ class FeltBottom:
         """Return which vehicles (n_vehicles,) were lifted since they were asked, and remember the bottom there."""
         asked = np.array([self._asked.get(name, at) for name, at in zip(team.vehicles, team.positions, strict=True)])
         lifted = asked[:, 2] - team.positions[:, 2] > FELT_OF_STEP * team.constraints.max_step_m
-        felt = team.positions[lifted] + [0.0, 0.0, team.constraints.min_altitude_m]
+        felt = team.positions[lifted] + [0.0, 0.0, team.constraints.lowest_m]
         self.points_m = np.vstack([self.points_m, felt])
         return np.asarray(lifted, dtype=np.bool_)
 

@@ -6,7 +6,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.estimation import LandmarkSets, RangeSensor
-from app.exploration.objective import ObjectiveWeights, closest_squared, med13_objective, objective, with_depths
+from app.exploration.dynamic import dynamic_cost
+from app.exploration.objective import (
+    MED13_K,
+    ObjectiveWeights,
+    closest_squared,
+    med13_objective,
+    objective,
+    with_depths,
+)
 from app.exploration.options import PlannerOptions
 from app.exploration.problem import Belief, Situation
 
@@ -50,13 +58,14 @@ class MeasuredObjective:
     def _landmarks(self, team: Situation, sensor: RangeSensor) -> FloatArray:
         belief, n = team.belief, len(team.vehicles)
         points = np.column_stack([belief.xy_m, belief.depth_m])
-        visible_by = sensor.visible(team.positions, points)
+        measured = np.isfinite(belief.sd_m)
+        visible_by = sensor.visible(team.positions, points) & measured
         first = self._accurate is None or len(self._accurate) != len(belief.accurate)
         known_before = belief.accurate if self._accurate is None or first else self._accurate
         fresh = belief.accurate & ~known_before
-        seen_before = sensor.visible(self._positions, points)
+        seen_before = sensor.visible(self._positions, points) & measured
         points = with_depths(points)
-        value = self._evaluate(team.positions, points, belief, visible_by, int(fresh.sum()))
+        value = self._evaluate(team, team.positions, points, visible_by, int(fresh.sum()))
         if not self._by_vehicle:
             result = np.array([np.nan if first else value])
         elif first or self._names != team.vehicles:
@@ -69,17 +78,19 @@ class MeasuredObjective:
             for j in range(n):
                 without, visible_without = team.positions.copy(), visible_by.copy()
                 without[j], visible_without[j] = self._positions[j], seen_before[j]
-                left_behind = self._evaluate(without, points, belief, visible_without, int(fresh.sum() - gained[j]))
+                left_behind = self._evaluate(team, without, points, visible_without, int(fresh.sum() - gained[j]))
                 result[j] = value - left_behind
         self._accurate, self._names, self._positions = belief.accurate.copy(), team.vehicles, team.positions.copy()
         return result
 
     def _evaluate(
-        self, positions: FloatArray, points: FloatArray, belief: Belief, visible_by: NDArray[np.bool_], gained: int
+        self, team: Situation, positions: FloatArray, points: FloatArray, visible_by: NDArray[np.bool_], gained: int
     ) -> float:
+        belief = team.belief
         sets = belief_sets(belief, visible_by)
         if self._terms == "med13":
-            return med13_objective(positions, points, sets).total
+            moving = dynamic_cost(positions, team.targets, team.localization, MED13_K)
+            return med13_objective(positions, points, sets).total - moving
         weights = ObjectiveWeights.of(self._terms, switched=False)
         return objective(positions, points, sets, int(belief.accurate.sum()) - gained, weights=weights).total
 

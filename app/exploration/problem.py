@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.exploration.constraints import Constraints
+from app.exploration.dynamic import Localization, Targets
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -34,6 +35,11 @@ class Belief:
         How much each landmark matters: local roughness of the sea floor relative to the area's mean, mean about 1.
     correlation_length_m : float
         Distance over which a sounding informs its surroundings.
+    covariance_m2 : (n_landmarks, 3, 3) or None
+        Where whole positions are estimated, their covariances; ``xy_m`` are then estimates too, presumed places for
+        landmarks never seen, and ``sd_m`` the deviation along the worst direction. None: only depths are estimated.
+    on_floor : bool
+        Whether landmarks lie on the sea floor, so that vehicles have to keep above them.
     """
 
     xy_m: FloatArray
@@ -42,6 +48,8 @@ class Belief:
     accurate: BoolArray
     weight: FloatArray
     correlation_length_m: float
+    covariance_m2: FloatArray | None = None
+    on_floor: bool = True
 
 
 @dataclass(frozen=True)
@@ -66,6 +74,10 @@ class Situation:
         Where soundings were taken so far.
     constraints : Constraints
         What every proposed configuration must obey.
+    targets : Targets or None
+        What is known of moving targets, where there are any.
+    localization : Localization or None
+        How well the vehicles know where they are; None: well enough.
     """
 
     step: int
@@ -76,6 +88,8 @@ class Situation:
     belief: Belief
     soundings_en_m: FloatArray
     constraints: Constraints
+    targets: Targets | None = None
+    localization: Localization | None = None
 
 
 @dataclass(frozen=True)

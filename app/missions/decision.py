@@ -1,7 +1,7 @@
 """One step's decision, from the situation to waypoints that may be sent. Pure apart from the planner's memory."""
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,9 +9,11 @@ from shapely.geometry import Polygon
 
 from app.exploration.bottom import Bottom
 from app.exploration.constraints import Constraints
+from app.exploration.dynamic import Localization
+from app.exploration.errands import due_to_rise
 from app.exploration.problem import Belief, Planner, Situation
 from app.missions import safety
-from app.missions.spec import MissionSpec
+from app.missions.spec import MissionSpec, SurfacePolicy
 
 FloatArray = NDArray[np.float64]
 
@@ -21,6 +23,12 @@ NEARBY_OUTSIDE_M = 10.0
 RESERVE = 0.06
 """Share of the remaining steps that a planner is not told of: vehicles turn in circles and pass waypoints at the side,
 so a plan that needs every step would end with its last line half flown. What is not used is released bit by bit."""
+
+RISE_AT = 0.9
+"""Part of the allowed deviation at which a vehicle comes up: the rest is for the way to the surface."""
+
+RISE_OF_STEP = 0.9
+"""Part of a step that a vehicle rises at most, so that a deep one comes up in several steps."""
 
 INSET_M = 1.0
 """Vehicles that come from outside are sent to a point this far inside the border."""
@@ -34,6 +42,15 @@ class Place:
     en_m: FloatArray
     heading_rad: float
     cruise_depth_m: float
+    position_sd_m: float = math.nan
+    """How well it says that it knows where it is; NaN: it does not say."""
+    surfacing_depth_m: float = math.nan
+    """Its depth, when its last waypoint brought it up for a fix; NaN when not."""
+
+    @property
+    def surfacing(self) -> bool:
+        """Whether its last waypoint brought it up for a fix."""
+        return math.isfinite(self.surfacing_depth_m)
 
 
 @dataclass(frozen=True)
@@ -43,6 +60,8 @@ class Leg:
     vehicle: str
     target_m: FloatArray
     refusal: str = ""
+    surfacing: bool = False
+    """Whether it comes up, or stays up, for a fix."""
 
 
 @dataclass(frozen=True)
@@ -57,6 +76,8 @@ class Decision:
     terms: dict[str, float]
     memory: bytes
     notes: list[str] = field(default_factory=list)
+    fixes: dict[str, str] = field(default_factory=dict)
+    """Vehicles that begin or end coming up for a fix, with what there is to say."""
     bottom: Bottom = field(default_factory=Bottom.unknown)
 
 
@@ -106,7 +127,7 @@ def decide(
             legs.append(leg)
         elif outside_m > 0:
             border = safety.nearest_inside(polygon, place.en_m)
-            team.append(Place(place.vehicle, border, place.heading_rad, place.cruise_depth_m))
+            team.append(replace(place, en_m=border))
         else:
             team.append(place)
     if not team:
@@ -125,6 +146,10 @@ def decide(
             for p in team
         ]
     )
+    up, fixes = surfacing(team, spec.surface_policy)
+    for i, place in enumerate(team):
+        if place.surfacing:
+            origin[i, 2] = min(origin[i, 2], max(place.surfacing_depth_m, 0.0))
     situation = Situation(
         step=step,
         steps_total=step - 1 + math.ceil((1 - RESERVE) * (spec.steps - step + 1)),
@@ -143,13 +168,42 @@ def decide(
         proposed[i, 2] = safety.travel_depth_m(
             place.en_m, proposed[i, :2], place.cruise_depth_m, cautious, constraints.min_altitude_m
         )
+        if up[i]:
+            # It goes on along its leg while it rises; the checks below are the same for it as for everyone.
+            proposed[i, 2] = min(proposed[i, 2], max(origin[i, 2] - RISE_OF_STEP * constraints.max_step_m, 0.0))
         proposed[i] = _within_step(origin[i], proposed[i], constraints.max_step_m)
     checked = safety.check_step(names, origin, proposed, constraints, bottom)
     notes += [f"{name}: {reason}" for name, reason in (checked.corrections | checked.refusals).items()]
     for i, place in enumerate(team):
         refusal = checked.refusals.get(place.vehicle, "")
-        legs.append(Leg(place.vehicle, checked.positions[i], refusal))
-    return Decision(legs, proposal.objective, dict(proposal.terms), planner.snapshot(), notes, cautious)
+        legs.append(Leg(place.vehicle, checked.positions[i], refusal, bool(up[i])))
+    return Decision(legs, proposal.objective, dict(proposal.terms), planner.snapshot(), notes, fixes, cautious)
+
+
+def surfacing(team: list[Place], policy: SurfacePolicy | None) -> tuple[list[bool], dict[str, str]]:
+    """Return which vehicles come up or stay up for a fix, and what is to be said of those that begin or end it.
+
+    A vehicle that does not say how well it knows where it is never comes up for that.
+    """
+    if policy is None:
+        return [False] * len(team), {}
+    sd = np.array([place.position_sd_m for place in team])
+    due = due_to_rise(Localization(sd, sd / RISE_AT, policy.max_position_sd_m))
+    up: list[bool] = []
+    told: dict[str, str] = {}
+    for place, late in zip(team, due, strict=True):
+        stays = place.surfacing and not place.position_sd_m <= policy.until_sd_m
+        up.append(bool(late or stays))
+        if up[-1] and not place.surfacing:
+            told[place.vehicle] = (
+                f"{place.vehicle} comes up for a fix: it knows its position to {place.position_sd_m:.2g} m, "
+                f"{policy.max_position_sd_m:g} m are allowed"
+            )
+        elif place.surfacing and not up[-1]:
+            told[place.vehicle] = (
+                f"{place.vehicle} goes down again: it knows its position to {place.position_sd_m:.2g} m"
+            )
+    return up, told
 
 
 def _come_in(place: Place, constraints: Constraints, taken: list[FloatArray]) -> Leg:

@@ -371,6 +371,7 @@ class LiveMission:
             age_s=info.age_s,
             address=info.address,
             imc_id=info.imc_id,
+            surfacing=member.surfacing,
         )
         if report is None:
             return view

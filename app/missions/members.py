@@ -35,6 +35,8 @@ class Member:
     order: WaypointOrder | None = None
     status: WaypointStatus | None = None
     reason: str = ""
+    surfacing: bool = False
+    """Whether its waypoint brings it up for a fix."""
 
     @property
     def name(self) -> str:

@@ -203,6 +203,8 @@ class Runner:
                 else member.place_m(self._live.frame),
                 member.report.heading_rad if member.report and member.report.heading_rad is not None else math.nan,
                 member.cruise_depth_m(self._spec.limits),
+                member.report.position_sd_m if member.report and member.report.position_sd_m is not None else math.nan,
+                member.report.position.depth_m if member.surfacing and member.report else math.nan,
             )
             for member in self._live.team.present
         ]
@@ -276,6 +278,12 @@ class Runner:
                 member_of_row.status = WaypointStatus.PLANNED
         live.show_waypoints([live.waypoint_view(row) for row in rows])
         live.publish_summary()
+        for leg in decision.legs:
+            going = live.team.get(leg.vehicle)
+            if going is not None:
+                going.surfacing = leg.surfacing
+        for vehicle, fix in decision.fixes.items():
+            await live.journal.log(Level.INFO, "surface", fix, step=number, vehicle=vehicle)
         for note in decision.notes:
             await live.journal.log(Level.WARNING, "safety", note, step=number)
 

@@ -111,6 +111,12 @@ class SimulationSettings(Section):
     terrain: Path | None = Field(default=None, description="Terrain file; without one a sea floor is generated")
     family: str = Field(default="harbour", description="Kind of the generated sea floor")
     seed: int = Field(default=0, description="Seed of the generated sea floor and of the vehicles' noise")
+    drift_m2ps: float = Field(
+        default=0.0,
+        ge=0,
+        le=10,
+        description="Growth of the variance of a submerged vehicle's position, m2/s; LAUVs report 0.02; 0: none",
+    )
 
 
 class ProviderSettings(Section):

@@ -169,6 +169,37 @@ class Limits(Model):
         return self
 
 
+class SurfacePolicy(Model):
+    """When a vehicle comes up for a GPS fix: by how well it says that it knows where it is (``position_sd_m``)."""
+
+    max_position_sd_m: float = Field(
+        gt=0,
+        le=1000,
+        description="Standard deviation of its position that a vehicle should not exceed; at 90 % of it it comes up",
+        examples=[3.0],
+    )
+    good_position_sd_m: float | None = Field(
+        default=None,
+        gt=0,
+        le=1000,
+        description="It stays at the surface until its position is known this well; null: a third of the limit",
+    )
+
+    @model_validator(mode="after")
+    def _can_be_reached(self) -> Self:
+        if self.until_sd_m >= self.max_position_sd_m:
+            raise ValueError(
+                f"good_position_sd_m is {self.good_position_sd_m} but max_position_sd_m is {self.max_position_sd_m}: "
+                "a good position must be known better than the limit"
+            )
+        return self
+
+    @property
+    def until_sd_m(self) -> float:
+        """What counts as a good position again."""
+        return self.max_position_sd_m / 3.0 if self.good_position_sd_m is None else self.good_position_sd_m
+
+
 class PlannerSpec(Model):
     """Which planner decides, and its options."""
 
@@ -266,6 +297,9 @@ class MissionSpec(Model):
     cell_m: float = Field(default=1.0, gt=0, le=1000, description="Cell of the map's grid")
     limits: Limits = Field(default_factory=Limits)
     planner: PlannerSpec = Field(default_factory=PlannerSpec)
+    surface_policy: SurfacePolicy | None = Field(
+        default=None, description="When vehicles come up for a GPS fix; null: never because of their position"
+    )
     speed_mps: float = Field(default=1.3, gt=0, le=5, description="Speed asked of the vehicles")
     arrival_radius_m: float = Field(
         default=3.0, gt=0, le=100, description="Horizontal distance at which a waypoint counts as reached"

@@ -41,7 +41,10 @@ class VehicleView(View):
     heading_deg: float | None = None
     speed_mps: float | None = None
     battery_pct: float | None = None
-    position_sd_m: float | None = None
+    position_sd_m: float | None = Field(
+        default=None, description="How well it says that it knows where it is: standard deviation in metres"
+    )
+    surfacing: bool = Field(default=False, description="On its way up, or at the surface, for a GPS fix")
 
 
 class WaypointView(View):

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from app.estimation import RangeSensor, Sensor
 from app.exploration.bottom import Bottom
 from app.exploration.constraints import LEG_CHECKS, Constraints
+from app.exploration.errands import Errand, Errands, errand_move
 from app.exploration.memory import pack, unpack
 from app.exploration.options import PlannerOptions
 from app.exploration.problem import Proposal, Situation
@@ -27,10 +28,14 @@ class PlannerBase(ABC):
 
     name: ClassVar[str]
 
+    runs_errands: ClassVar[bool] = True
+    """Whether single vehicles leave the plan for targets and for the surface; see :mod:`app.exploration.errands`."""
+
     def __init__(self, options: PlannerOptions, sensor: Sensor) -> None:
         self.options = options
         self.sensor = sensor
         self._cruise: dict[str, float] = {}
+        self._errands = Errands()
 
     def propose(self, situation: Situation, rng: np.random.Generator) -> Proposal:
         """Return a configuration that obeys ``situation.constraints``; hold when none is found."""
@@ -43,13 +48,44 @@ class PlannerBase(ABC):
             vehicles=tuple(situation.vehicles[i] for i in order),
             positions=np.asarray(situation.positions, dtype=np.float64)[order],
             headings_rad=np.asarray(situation.headings_rad, dtype=np.float64)[order],
+            localization=None if situation.localization is None else situation.localization.of(np.array(order)),
         )
         for name, depth in zip(team.vehicles, team.positions[:, 2], strict=True):
             wish = self.options.cruise_depth_m
             self._cruise.setdefault(name, float(depth if wish is None else wish))
-        bottom = Bottom.from_landmarks(situation.belief.xy_m, situation.belief.depth_m)
-        proposal = self._decide(team, bottom, int(rng.integers(2**63)))
+        belief = situation.belief
+        bottom = Bottom.from_landmarks(belief.xy_m, belief.depth_m) if belief.on_floor else Bottom.unknown()
+        proposal = self._with_errands(team, bottom, int(rng.integers(2**63)))
         return replace(proposal, positions=proposal.positions[inverse])
+
+    def _with_errands(self, team: Situation, bottom: Bottom, seed: int) -> Proposal:
+        """Decide for the vehicles that are on no errand, then send the others on theirs."""
+        # Bathymeter missions rise along their legs instead; see app.missions.decision.
+        dynamic = team.targets is not None or team.localization is not None
+        if self._surveys or not self.runs_errands or not dynamic:
+            return self._decide(team, bottom, seed)
+        errands = self._errands.assign(team.vehicles, team.positions, team.targets, team.localization)
+        if not errands:
+            return self._decide(team, bottom, seed)
+        rows = {errand.vehicle: team.vehicles.index(errand.vehicle) for errand in errands}
+        positions, objective, terms = team.positions.copy(), 0.0, {}
+        if np.isfinite(team.constraints.com_range_m):  # nobody may go alone
+            first = errands[0]
+            move = self._go(team, bottom, positions, rows[first.vehicle], first) - positions[rows[first.vehicle]]
+            positions, _ = settle(team, bottom, (team.positions + move)[None])
+        else:
+            rest = np.array([i for i in range(len(team.vehicles)) if i not in rows.values()], dtype=np.int64)
+            if len(rest):
+                proposal = self._decide(part_of(team, rest), bottom, seed)
+                positions[rest], objective, terms = proposal.positions, proposal.objective, proposal.terms
+            for errand in errands:
+                positions[rows[errand.vehicle]] = self._go(team, bottom, positions, rows[errand.vehicle], errand)
+        return Proposal(positions, objective, {**terms, "errands": float(len(errands))})
+
+    def _go(self, team: Situation, bottom: Bottom, positions: FloatArray, row: int, errand: Errand) -> FloatArray:
+        return errand_move(
+            row, errand, team.positions, positions, team.constraints, bottom, team.targets, team.localization
+        )
 
     @abstractmethod
     def _decide(self, team: Situation, bottom: Bottom, seed: int) -> Proposal:
@@ -57,13 +93,17 @@ class PlannerBase(ABC):
 
     def snapshot(self) -> bytes:
         """Return the planner's memory."""
-        return pack(self.name, {"cruise": self._cruise, **self._remember()})
+        errands = self._errands.remember()
+        return pack(
+            self.name, {"cruise": self._cruise, **({"errands": errands} if errands else {}), **self._remember()}
+        )
 
     def restore(self, memory: bytes) -> None:
         """Take up a memory made by ``snapshot``. Raises ValueError when it is not one."""
         state = unpack(self.name, memory)
         try:
             self._cruise = {str(k): float(v) for k, v in state.pop("cruise").items()}
+            self._errands.recall(state.pop("errands", {}))
             self._recall(state)
         except (KeyError, TypeError, AttributeError) as error:
             raise ValueError(f"planner memory of {self.name!r} lacks or garbles a field: {error}") from error
@@ -83,6 +123,17 @@ class PlannerBase(ABC):
         """Give targets (..., n_vehicles, 2) the vehicles' cruise depths, clear of the bottom: (..., n_vehicles, 3)."""
         wish = np.array([self._cruise[name] for name in team.vehicles])
         return at_depth(team.constraints, bottom, team.positions, en_m, wish)
+
+
+def part_of(team: Situation, rows: NDArray[np.int64]) -> Situation:
+    """Return the situation of some of the vehicles only."""
+    return replace(
+        team,
+        vehicles=tuple(team.vehicles[i] for i in rows),
+        positions=team.positions[rows],
+        headings_rad=team.headings_rad[rows],
+        localization=None if team.localization is None else team.localization.of(rows),
+    )
 
 
 def vehicle_rng(seed: int, vehicle: str) -> np.random.Generator:

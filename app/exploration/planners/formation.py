@@ -32,8 +32,8 @@ LOOKOUT_OF_VISIBILITY = 0.75
 RING = 0.15
 """Of the visibility: pitch of the places around a vehicle at which the bottom is asked for."""
 
-CLEARANCE_FACTOR = 1.8
-"""Of the least altitude: kept above the estimated bottom, which is uncertain."""
+MARGIN_OF_CLEARANCE, MARGIN_OF_VISIBILITY = 0.8, 0.1
+"""Added to the least altitude above the estimated bottom, which is uncertain: the lesser of these parts."""
 
 STEEPEST = 1.2
 """Slope at which vehicles climb ahead of rising ground."""
@@ -209,11 +209,13 @@ class FormationLawnmower(PlannerBase):
         mean = np.where(known, np.nansum(near, axis=1) / np.maximum(1, np.isfinite(near).sum(axis=1)), 0.0)
         blind = origin[:, 2] + (DESCENT_OF_STEP * step if self._target >= 0 else 0.0)
         wish = np.where(known, mean - HEIGHT_OF_VISIBILITY * self._reach, blind)
-        safe = floor - CLEARANCE_FACTOR * constraints.min_altitude_m + STEEPEST * around
+        clearance = constraints.min_altitude_m
+        clearance += min(MARGIN_OF_CLEARANCE * clearance, MARGIN_OF_VISIBILITY * self._reach)
+        safe = floor - clearance + STEEPEST * around
         wish = np.fmin(wish, np.fmin.reduce(safe, axis=1))
         if len(self._felt.points_m):
             away = np.hypot(*(slots[:, None] - self._felt.points_m[:, :2]).transpose(2, 0, 1))
-            above = self._felt.points_m[:, 2] - CLEARANCE_FACTOR * constraints.min_altitude_m + STEEPEST * away
+            above = self._felt.points_m[:, 2] - clearance + STEEPEST * away
             wish = np.minimum(wish, above.min(axis=1))
             wish = np.where(lifted, np.minimum(wish, origin[:, 2] - ESCAPE_OF_STEP * step), wish)
         wish = np.minimum(wish, origin[:, 2] + DESCENT_OF_STEP * step)

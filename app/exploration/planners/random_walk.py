@@ -19,6 +19,7 @@ class RandomPlanner(PlannerBase):
     """
 
     name: ClassVar[str] = "random"
+    runs_errands: ClassVar[bool] = False
 
     def _decide(self, team: Situation, bottom: Bottom, seed: int) -> Proposal:
         step = team.constraints.max_step_m

@@ -16,12 +16,13 @@ from app.estimation import RangeSensor, Sensor
 from app.exploration.bottom import Bottom
 from app.exploration.constraints import Constraints
 from app.exploration.felt_bottom import FeltBottom
+from app.exploration.lacking import Lacking, lacking
 from app.exploration.options import PlannerOptions
 from app.exploration.planners.base import PlannerBase, settle
-from app.exploration.problem import Proposal, Situation
+from app.exploration.problem import Belief, Proposal, Situation
 from app.exploration.rollout.backbones import Backbone, backbones, with_team
 from app.exploration.rollout.flight import Course, Plan, Rules, Work, begin, fly_plan, fly_step, make_work, new_course
-from app.exploration.rollout.floor import Floor, estimate_floor, fill_depths
+from app.exploration.rollout.floor import Floor, estimate_floor, fill_depths, margin_m
 from app.exploration.rollout.free_space import Free, clear_ways, free_space, settle_waypoint
 from app.exploration.rollout.search import DRAWS, improve
 from app.exploration.routes import FreeSpace
@@ -50,11 +51,17 @@ LINK_OF_RANGE = 29 / 30
 MAY_BE_LEFT = 0.008
 """Part of all landmarks that a plan may leave over, until the team has come so far."""
 
+SAMPLE, SAMPLE_GRID = 400, 20
+"""Tasks that plans are judged by where whole positions are estimated, and cells per side that they are taken from."""
+
 BUCKETS = 3
 """Buckets of landmarks per visibility."""
 
 SWATH_EXCESS = 1.2
 """How far a team may exceed, on average, the landmarks in the swath that it sees."""
+
+BACK_SOON = -1
+"""In place of the number of steps planned so far: a vehicle left on an errand, or came back."""
 
 FIRST_SEARCH = 1500
 LAST_SHARE = 4
@@ -121,7 +128,9 @@ class RolloutPlanner(PlannerBase):
         if self._names != team.vehicles:
             if self._kept is not None:
                 self._kept = with_team(self._kept, self._names, team.vehicles)
-            self._names, self._planned = team.vehicles, 0
+            # On an errand a vehicle is away for a while only: new sweeps may compete, with the usual effort.
+            away = team.targets is not None or team.localization is not None
+            self._names, self._planned = team.vehicles, BACK_SOON if away and self._planned else 0
         if self._free is None or not _same(self._free[0], team.constraints):
             self._free = (team.constraints, free_space(team.constraints))
         self._felt.feel(team)
@@ -133,7 +142,7 @@ class RolloutPlanner(PlannerBase):
             best = mission.plan(self._kept, self._heights)
         # Sweeps over what nobody has seen yet look better than they are: the plan that stands is not given up for one
         # (measured: changing for a new sweep every 8 steps costs 8 steps, only for one better by 10 still costs them).
-        if best is None or self._planned == 0:
+        if best is None or self._planned in (0, BACK_SOON):
             rivals = [mission.refine(start, FRESH_SEARCH) for start in mission.fresh_starts(FRESH_STARTS)]
             best = min([*rivals, *([] if best is None else [best])], key=lambda start: start.score, default=None)
         best = mission.convoy(team.constraints) if best is None else best
@@ -148,7 +157,7 @@ class RolloutPlanner(PlannerBase):
             positions, passed = mission.way_out(team, bottom, wishes[0]), 0
         self._kept = Backbone(best.plan.at_m[passed : best.count].copy(), best.plan.chain.copy())
         self._heights = best.plan.height_m[passed : best.count].copy()
-        self._planned += 1
+        self._planned = max(1, self._planned + 1)
         self._felt.ask(team.vehicles, positions)
         terms = {"finish": team.step - 1 + float(best.course.state[best.count, 0]), "waypoints": float(best.count)}
         return Proposal(positions, -best.score, terms)
@@ -166,6 +175,20 @@ class RolloutPlanner(PlannerBase):
         if self._planned == 0:
             return FIRST_SEARCH
         return self.options.rollouts if mission.far_from_done else self.options.rollouts // LAST_SHARE
+
+
+def _sample(left: Lacking, belief: Belief) -> NDArray[np.int64]:
+    """Return the tasks that plans are judged by: all, or evenly many where a landmark has several.
+
+    Where whole positions are estimated each takes many looks, and flights are long; a sample tells as much.
+    """
+    n = len(left.row)
+    if belief.covariance_m2 is None or n <= SAMPLE:
+        return np.arange(n)
+    xy = belief.xy_m[left.row]
+    east, north = np.floor((xy - xy.min(axis=0)) / (np.ptp(xy) / SAMPLE_GRID + 1e-12)).T
+    order = np.lexsort((np.where(north % 2 == 0, east, -east), north))
+    return np.asarray(order[:: -(-n // SAMPLE)], dtype=np.int64)
 
 
 def _same(a: Constraints, b: Constraints) -> bool:
@@ -199,9 +222,11 @@ class _Mission:
         self._com_range = constraints.com_range_m
         self._link = constraints.com_range_m * LINK_OF_RANGE
         self._horizon = float(max(1, team.steps_total - team.step + 1))
-        unknown = min(constraints.max_depth_m, float(team.positions[:, 2].max()) + HEIGHT * visibility)
+        clearance = constraints.min_altitude_m
+        self._height = max(HEIGHT * visibility, clearance + margin_m(visibility, clearance), constraints.lowest_m)
+        unknown = min(constraints.max_depth_m, float(team.positions[:, 2].max()) + self._height)
         self._floor: Floor = estimate_floor(
-            belief, bottom, felt_m, constraints.area, visibility, constraints.min_altitude_m, unknown
+            belief, bottom, felt_m, constraints.area, visibility, clearance, unknown, constraints.lowest_m
         )
         self._free = free
         self._rules = Rules(
@@ -212,26 +237,28 @@ class _Mission:
             visibility,
             sensor.relative_noise,
             self._free.everywhere,
+            belief.covariance_m2 is not None,
         )
-        self._work: Work = self._left(belief.xy_m, belief.depth_m, belief.sd_m, belief.accurate, options)
+        self._work: Work = self._left(belief, options)
 
-    def _left(
-        self, xy: FloatArray, depth: FloatArray, sd: FloatArray, accurate: NDArray[np.bool_], options: PlannerOptions
-    ) -> Work:
-        open_ = ~accurate
-        xyz = np.column_stack([xy[open_], depth[open_]])
-        unseen = np.isnan(xyz[:, 2])
+    def _left(self, belief: Belief, options: PlannerOptions) -> Work:
+        hedge = HEDGE if belief.covariance_m2 is None else 1.0
+        left = lacking(belief, options.accuracy_sd_m, hedge)
+        shown = _sample(left, belief)
+        xyz = np.column_stack([belief.xy_m, belief.depth_m])[left.row[shown]]
         fill_depths(xyz, self._floor)
-        enough = 1.0 / options.accuracy_sd_m**2
-        have = np.where(np.isfinite(sd[open_]), 1.0 / np.maximum(sd[open_], 1e-9) ** 2, 0.0)
-        need = np.maximum(1e-6 * enough, np.where(unseen, HEDGE * enough, enough - have))
-        allowed = np.floor(MAY_BE_LEFT * len(xy))
-        if open_.sum() <= allowed:
+        tasks = len(belief.xy_m) * len(left.row) / max(1, int((~belief.accurate).sum()))
+        part = len(shown) / max(1, len(left.row))
+        allowed = np.floor(MAY_BE_LEFT * tasks * part)
+        if len(shown) <= allowed:
             allowed = 0.0
-        density = len(xy) / float(Polygon(self._area).area)
+        density = tasks * part / float(Polygon(self._area).area)
         links = min(self._link, 2 * self._sight) * (len(self._start) - 1)
         most = SWATH_EXCESS * density * self._rules.step_m * (2 * self._sight + links)
-        return make_work(xyz, need, self._area, self._sight / BUCKETS, allowed, len(xy), max(1.0, most))
+        return make_work(
+            xyz, left.need[shown], self._area, self._sight / BUCKETS, allowed, round(tasks * part), max(1.0, most),
+            left.direction[shown],
+        )  # fmt: skip
 
     @property
     def far_from_done(self) -> bool:
@@ -277,7 +304,7 @@ class _Mission:
         sweeps = backbones(
             self._work.xyz[:2].T, self._start[:, :2], self._area, self._sight, self._com_range, self._link
         )
-        heights = np.full(ROOM, HEIGHT * self._sight)
+        heights = np.full(ROOM, self._height)
         scratch = new_course(ROOM, len(self._start), len(self._work.need))
         flown = [(self.plan(sweep, heights, scratch), sweep) for sweep in sweeps]
         order = sorted(((best.score, k) for k, (best, _) in enumerate(flown) if best is not None))
@@ -290,7 +317,7 @@ class _Mission:
         For when no sweep finds a way between the zones.
         """
         at = np.repeat(self._way_to_work(constraints)[:, None], len(self._start), axis=1)
-        return self.plan(Backbone(at, np.arange(len(self._start))), np.full(ROOM, HEIGHT * self._sight))
+        return self.plan(Backbone(at, np.arange(len(self._start))), np.full(ROOM, self._height))
 
     def towards_work(self, constraints: Constraints) -> FloatArray:
         """Return a step (n_vehicles, 3) of the whole team in the direction of that way."""

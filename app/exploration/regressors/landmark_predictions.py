@@ -87,6 +87,7 @@ def predict(
     visibility: float,
     noise: float,
     step: float,
+    direction: FloatArray | None = None,
 ) -> FloatArray:
     """Return, for each configuration, expected progress, newly accurate landmarks, and minus the distance left, (c, 3).
 
@@ -108,6 +109,8 @@ def predict(
         Of the range sensor.
     step : float
         Unit of distance.
+    direction : (k, 3) or None
+        Along which each is to be known; None: all of them are depths.
     """
     members, slot = np.unique(index, return_inverse=True)
     unit = 1.0 / (noise * noise * needed[members])
@@ -121,6 +124,9 @@ def predict(
         len(members),
         starts,
         np.float32(visibility * visibility),
+        np.zeros((3, 0), dtype=np.float32)
+        if direction is None
+        else np.ascontiguousarray(direction.T, dtype=np.float32),
     )
     moves = (candidates - positions).astype(np.float32)
     parts = np.array_split(moves, WORKERS) if len(moves) * len(index) >= WORTH_SHARING else [moves]
@@ -170,6 +176,28 @@ def _look(
 
 
 @njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
+def _look_along(
+    px: float,
+    py: float,
+    pz: float,
+    x: Float32Array,
+    y: Float32Array,
+    z: Float32Array,
+    weight: Float32Array,
+    v2: np.float32,
+    direction: Float32Array,
+    gained: Float32Array,
+) -> None:
+    """Write what is gained along the tasks' directions."""
+    for e in range(len(x)):
+        dx, dy, dz = px - x[e], py - y[e], pz - z[e]
+        r2 = dx * dx + dy * dy + dz * dz
+        along = direction[0, e] * dx + direction[1, e] * dy + direction[2, e] * dz
+        value = weight[e] * along * along / (r2 * r2 + np.float32(1e-12))
+        gained[e] = value if r2 < v2 else np.float32(0.0)
+
+
+@njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
 def _predict(
     moves: Float32Array,
     x: Float32Array,
@@ -180,6 +208,7 @@ def _predict(
     members: int,
     starts: NDArray[np.int64],
     v2: np.float32,
+    direction: Float32Array,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return progress (c,), completed landmarks (c,) and squared distances to the closest landmark (c, n_vehicles)."""
     c, n, _ = moves.shape
@@ -196,6 +225,11 @@ def _predict(
                 px, py, pz, x[first:last], y[first:last], z[first:last], weight[first:last], v2,
                 near - first, gained[first:last],
             )  # fmt: skip
+            if direction.shape[1]:
+                _look_along(
+                    px, py, pz, x[first:last], y[first:last], z[first:last], weight[first:last], v2,
+                    direction[:, first:last], gained[first:last],
+                )  # fmt: skip
             for e in range(first, last):
                 progress[slot[e]] += gained[e]
         total, done = none, 0

@@ -14,6 +14,7 @@ from scipy.spatial import cKDTree
 
 from app.estimation import RangeSensor, Sensor
 from app.exploration.bottom import Bottom
+from app.exploration.lacking import lacking
 from app.exploration.measured import MeasuredObjective
 from app.exploration.options import PlannerOptions
 from app.exploration.problem import Situation
@@ -42,7 +43,6 @@ class LandmarkRegressors:
         """See :class:`app.exploration.planners.cao.Regressors`."""
         self._team, self._seed = team, seed
         belief = team.belief
-        open_ = ~belief.accurate
         depth = belief.depth_m.copy()
         known = np.isfinite(depth)
         if known.any() and not known.all():
@@ -52,10 +52,10 @@ class LandmarkRegressors:
             depth[~known] = depth[known][nearest]
         elif not known.any():
             depth[:] = team.positions[:, 2].max() + self._sensor.visibility_m / 2
-        self._points = np.ascontiguousarray(np.column_stack([belief.xy_m, depth])[open_])
-        sd = belief.sd_m[open_]
-        have = np.where(np.isfinite(sd), 1.0 / np.maximum(sd, 1e-9) ** 2, 0.0)
-        self._needed = np.maximum(1e-9, 1.0 / self._options.accuracy_sd_m**2 - have)
+        left = lacking(belief, self._options.accuracy_sd_m)
+        self._points = np.ascontiguousarray(np.column_stack([belief.xy_m, depth])[left.row])
+        self._needed = left.need
+        self._direction = None if belief.covariance_m2 is None else left.direction
         J = self._measured.update(team)
         gained = int(belief.accurate.sum()) > self._accurate
         self._accurate = int(belief.accurate.sum())
@@ -98,6 +98,7 @@ class LandmarkRegressors:
             self._sensor.visibility_m,
             self._sensor.relative_noise,
             self._team.constraints.max_step_m,
+            None if self._direction is None else self._direction[index],
         )
 
     def chosen(self, positions: FloatArray) -> None:

@@ -28,6 +28,9 @@ PER_LEFT = 0.8
 
 CLIMB_PASSES = 4
 
+SINKING = 0.8
+"""Part of a step by which vehicles sink at most where that may not wait."""
+
 NEAREST = 1e-12
 """Square of the least distance of a landmark, in visibilities: a sensor right on it learns no more."""
 
@@ -39,6 +42,8 @@ class Work(NamedTuple):
     ----------
     xyz : (3, m)
         Where they are presumed to be, depth positive down; one row per axis, for loops over neighbours.
+    direction : (3, m)
+        Along which each is to be known; matters only where :class:`Rules` say so.
     need : (m,)
         Information (1/m^2) each still lacks.
     first : (n_rows * n_cols + 1,)
@@ -56,6 +61,7 @@ class Work(NamedTuple):
     """
 
     xyz: FloatArray
+    direction: FloatArray
     need: FloatArray
     first: IntArray
     west_m: float
@@ -69,7 +75,10 @@ class Work(NamedTuple):
 
 
 class Rules(NamedTuple):
-    """What flying obeys, and what the sensor does; lengths in metres."""
+    """What flying obeys, and what the sensor does; lengths in metres.
+
+    ``directed``: tasks have directions of their own; otherwise all of them are depths.
+    """
 
     step_m: float
     com_range_m: float
@@ -78,6 +87,7 @@ class Rules(NamedTuple):
     visibility_m: float
     relative_noise: float
     cut_corners: bool
+    directed: bool = False
 
 
 class Plan(NamedTuple):
@@ -106,8 +116,10 @@ def make_work(
     allowed: float,
     total: int,
     most_per_step: float,
+    direction: FloatArray | None = None,
 ) -> Work:
     """Sort landmarks (m, 3) into buckets over the bounding box of ``area`` (n, 2)."""
+    along = np.zeros_like(xyz) if direction is None else direction
     low, high = area.min(axis=0), area.max(axis=0)
     cols, rows = (max(1, int(k)) for k in np.ceil((high - low) / bucket_m))
     col = np.clip(np.floor((xyz[:, 0] - low[0]) / bucket_m), 0, cols - 1).astype(np.int64)
@@ -118,6 +130,7 @@ def make_work(
     first[1:] = np.cumsum(np.bincount(bucket, minlength=rows * cols))
     return Work(
         np.ascontiguousarray(xyz[order].T, dtype=np.float64),
+        np.ascontiguousarray(along[order].T, dtype=np.float64),
         np.ascontiguousarray(need[order], dtype=np.float64),
         first,
         float(low[0]),
@@ -153,6 +166,9 @@ def look(x: float, y: float, z: float, work: Work, rules: Rules, need: FloatArra
         low_m, high_m = work.first[row * work.cols + left], work.first[row * work.cols + right + 1]
         xs, ys, zs = work.xyz[0, low_m:high_m], work.xyz[1, low_m:high_m], work.xyz[2, low_m:high_m]
         lacks = need[low_m:high_m]
+        if rules.directed:
+            done += _look_along(x, y, z, xs, ys, zs, work.direction[:, low_m:high_m], v2, gain, lacks)
+            continue
         # No branches: such a loop is compiled to take several landmarks at a time.
         for m in range(len(lacks)):
             dx = xs[m] - x
@@ -163,6 +179,35 @@ def look(x: float, y: float, z: float, work: Work, rules: Rules, need: FloatArra
             after = before - (gain * dz * dz / (r2 * r2) if r2 < v2 else 0.0)
             lacks[m] = after
             done += 1 if (before > 0.0) & (after <= 0.0) else 0
+    return done
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _look_along(
+    x: float,
+    y: float,
+    z: float,
+    xs: FloatArray,
+    ys: FloatArray,
+    zs: FloatArray,
+    direction: FloatArray,
+    v2: float,
+    gain: float,
+    lacks: FloatArray,
+) -> int:
+    """Take from ``lacks`` what ranges tell along the tasks' directions (3, m); return how many that completes."""
+    us, vs, ws = direction[0], direction[1], direction[2]
+    done = 0
+    for m in range(len(lacks)):
+        dx = xs[m] - x
+        dy = ys[m] - y
+        dz = zs[m] - z
+        r2 = max(dx * dx + dy * dy + dz * dz, NEAREST * v2)
+        along = us[m] * dx + vs[m] * dy + ws[m] * dz
+        before = lacks[m]
+        after = before - (gain * along * along / (r2 * r2) if r2 < v2 else 0.0)
+        lacks[m] = after
+        done += 1 if (before > 0.0) & (after <= 0.0) else 0
     return done
 
 
@@ -229,8 +274,9 @@ def fly_step(at: FloatArray, plan: Plan, k: int, count: int, floor: Floor, rules
             wish = sample(floor.smooth_m, floor.west_m, floor.south_m, floor.cell_m, x, y) - height
             limit = sample(floor.deepest_m, floor.west_m, floor.south_m, floor.cell_m, x, y)
             spare = np.sqrt(max(0.0, step * step - (x - at[i, 0]) ** 2 - (y - at[i, 1]) ** 2))
-            # Sinking may wait.
-            out[i, 2] = min(max(rules.min_depth_m, min(rules.max_depth_m, wish, limit)), at[i, 2] + spare)
+            # Sinking may wait; not where most of what is in sight would be missed from a little higher up.
+            lowest = at[i, 2] + (SINKING * step if rules.directed else spare)
+            out[i, 2] = min(max(rules.min_depth_m, min(rules.max_depth_m, wish, limit)), lowest)
             out[i, 0] = x
             out[i, 1] = y
         _keep_links(out, plan.chain, rules.com_range_m)

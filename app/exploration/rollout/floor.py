@@ -26,6 +26,9 @@ ENVELOPE_SLOPE = 1.2
 MARGIN = 0.1
 """Clearance that plans add to the required one, in visibilities, because the floor is an estimate."""
 
+MARGIN_OF_ROOM = 0.25
+"""The same as a part of what visibility leaves above the required clearance, where that is less."""
+
 
 class Floor(NamedTuple):
     """Rasters over the area; the first row is the southernmost, the first column the westernmost.
@@ -50,6 +53,11 @@ class Floor(NamedTuple):
     deepest_m: FloatArray
 
 
+def margin_m(visibility_m: float, clearance_m: float) -> float:
+    """Return the clearance that plans add to the required one."""
+    return max(0.0, min(MARGIN * visibility_m, MARGIN_OF_ROOM * (visibility_m - clearance_m)))
+
+
 def estimate_floor(
     belief: Belief,
     bottom: Bottom,
@@ -58,6 +66,7 @@ def estimate_floor(
     visibility_m: float,
     clearance_m: float,
     unknown_m: float,
+    held_m: float = 0.0,
 ) -> Floor:
     """Estimate the floor from a belief.
 
@@ -75,24 +84,28 @@ def estimate_floor(
         Least distance of vehicles above the floor.
     unknown_m : float
         Depth to presume while nothing was seen.
+    held_m : float
+        Height above the floor below which vehicles never are, whatever they are told.
     """
     low, high = area.min(axis=0), area.max(axis=0)
     cell = max(visibility_m / CELLS_PER_VISIBILITY, float((high - low).max()) / MAX_CELLS_PER_SIDE)
     cols, rows = (max(2, int(k)) for k in np.ceil((high - low) / cell) + 1)
     east, north = np.meshgrid(low[0] + cell * np.arange(cols), low[1] + cell * np.arange(rows))
     known = np.isfinite(belief.depth_m)
+    # Where whole positions are estimated their deviation is not that of the depth.
+    trust = belief.sd_m if belief.covariance_m2 is None else np.zeros(len(belief.sd_m))
     if known.any():
         depth = _from_neighbours(
             np.vstack([belief.xy_m[known], felt_m[:, :2]]),
             np.concatenate([belief.depth_m[known], felt_m[:, 2]]),
-            np.concatenate([belief.sd_m[known], np.zeros(len(felt_m))]),
+            np.concatenate([trust[known], np.zeros(len(felt_m))]),
             np.column_stack([east.ravel(), north.ravel()]),
             visibility_m,
         ).reshape(rows, cols)
     else:
         depth = np.full((rows, cols), unknown_m)
     smooth = gaussian_filter(depth, 0.12 * visibility_m / cell, mode="nearest")
-    limit = depth - clearance_m - MARGIN * visibility_m
+    limit = depth - clearance_m - margin_m(visibility_m, clearance_m)
     # The constraints' sea floor has steps between cells: whatever lies within a cell of a node counts there.
     looks = int(np.ceil(2.0 * cell / bottom.cell_m)) + 1  # no cell of the constraints' sea floor is skipped
     shifts = np.stack(np.meshgrid(*[np.linspace(-cell, cell, looks)] * 2), axis=-1).reshape(-1, 1, 1, 2)
@@ -100,8 +113,10 @@ def estimate_floor(
     limit = np.minimum(limit, np.where(np.isnan(around), np.inf, around).min(axis=0) - clearance_m)
     for x, y, z in felt_m:
         away = np.hypot(east - x, north - y)
-        limit = np.minimum(limit, z - clearance_m - MARGIN * visibility_m + ENVELOPE_SLOPE * away)
-    return Floor(float(low[0]), float(low[1]), float(cell), depth, smooth, _envelope(limit, cell))
+        limit = np.minimum(limit, z - clearance_m - margin_m(visibility_m, clearance_m) + ENVELOPE_SLOPE * away)
+    return Floor(
+        float(low[0]), float(low[1]), float(cell), depth, smooth, np.minimum(_envelope(limit, cell), depth - held_m)
+    )
 
 
 def _from_neighbours(

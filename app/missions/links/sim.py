@@ -157,6 +157,7 @@ class SimFleetLink:
             np.random.default_rng(seed),
             noise=SonarNoise(relative_sd=launch.noise),
             start_time_s=now().timestamp(),
+            drift_m2ps=self._settings.drift_m2ps,
         )
         swimmer = _Swimmer(body, terrain)
         swimmer.make_report()

@@ -1506,6 +1506,8 @@ export interface components {
             cell_m: number;
             limits?: components["schemas"]["Limits"];
             planner?: components["schemas"]["PlannerSpec"];
+            /** @description When vehicles come up for a GPS fix; null: never because of their position */
+            surface_policy?: components["schemas"]["SurfacePolicy"] | null;
             /**
              * Speed Mps
              * @description Speed asked of the vehicles
@@ -2222,6 +2224,23 @@ export interface components {
             detail: string;
         };
         /**
+         * SurfacePolicy
+         * @description When a vehicle comes up for a GPS fix: by how well it says that it knows where it is (``position_sd_m``).
+         */
+        SurfacePolicy: {
+            /**
+             * Max Position Sd M
+             * @description Standard deviation of its position that a vehicle should not exceed; at 90 % of it it comes up
+             * @example 3
+             */
+            max_position_sd_m: number;
+            /**
+             * Good Position Sd M
+             * @description It stays at the surface until its position is known this well; null: a third of the limit
+             */
+            good_position_sd_m?: number | null;
+        };
+        /**
          * Tide
          * @description Water level correction: depth below the datum = sounded depth - level + datum_offset_m.
          */
@@ -2458,8 +2477,17 @@ export interface components {
             speed_mps: number | null;
             /** Battery Pct */
             battery_pct: number | null;
-            /** Position Sd M */
+            /**
+             * Position Sd M
+             * @description How well it says that it knows where it is: standard deviation in metres
+             */
             position_sd_m: number | null;
+            /**
+             * Surfacing
+             * @description On its way up, or at the surface, for a GPS fix
+             * @default false
+             */
+            surfacing: boolean;
         };
         /**
          * VehiclesMessage

@@ -28,6 +28,7 @@ const vehicle = (
   speed_mps: null,
   battery_pct: null,
   position_sd_m: null,
+  surfacing: false,
 });
 
 const waypoint = (name: string, step: number, status: WaypointView["status"]): WaypointView => ({

@@ -71,6 +71,7 @@ function Card({ vehicle }: { vehicle: Vehicle }) {
           v.address,
           v.speed_mps === null ? null : `${v.speed_mps.toFixed(1)} m/s`,
           v.position_sd_m === null ? null : `nav ± ${v.position_sd_m.toFixed(1)} m`,
+          v.surfacing ? "up for a GPS fix" : null,
         ]
           .filter((part) => part !== null)
           .map((part) => part?.replaceAll(" ", "\u00a0"))

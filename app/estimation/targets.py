@@ -1,0 +1,267 @@
+"""Moving targets from ranges alone: an extended Kalman filter with a constant-velocity model each (MED13, NGCUV12).
+
+A range says nothing of the direction, and ranges from vehicles in a row leave mirror images. A target's first range
+therefore starts a mixture of filters spread evenly over the water that it may be in; every range updates all of them
+and weighs each by how well it foretold that range. Once the mixture is narrow enough to be linearised about, it becomes
+a single filter. Only while its standard deviations are small does a target belong to the set ``A`` (MED13): unlike a
+landmark it leaves that set again.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from app.estimation.range_filter import update_by_range
+from app.estimation.sensors import RangeSensor
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+EVERYWHERE = np.inf
+
+PER_AXIS = (8, 8, 6)
+"""Filters that a first range starts, along east, north and depth."""
+
+NARROW = 0.15
+"""A mixture becomes one filter when its standard deviation, all axes together, is below this part of the range."""
+
+FORGOTTEN = 1e-6
+"""Weight below which a filter of a mixture is given up."""
+
+DOUBT = 0.95
+"""Power to which weights are taken before each step: linearised filters are surer of each other than they may be."""
+
+MEMORY = 0.9
+"""Weight of the past in the running mean of squared normalised innovations, which is 1 while a filter is right."""
+
+TURNED, WRONG = 1.6, 2.2
+"""Running means that say that a target has turned, and that the filter follows something that is not there (chance:
+3 and 6 standard deviations from 1 for three vehicles)."""
+
+
+@dataclass(frozen=True)
+class TargetTrack:
+    """What is known of one target; every update returns a new object.
+
+    Attributes
+    ----------
+    means : (k, 6)
+        East, north, depth and their rates per step, of each filter of the mixture.
+    covariances : (k, 6, 6)
+        Their covariances.
+    weights : (k,)
+        Their probabilities; empty as long as nothing was heard.
+    surprise : float
+        Mean squared normalised innovation of the last step's ranges; NaN where there were none, and while it is a
+        mixture.
+    unease : float
+        Its running mean.
+    """
+
+    means: FloatArray
+    covariances: FloatArray
+    weights: FloatArray
+    surprise: float = np.nan
+    unease: float = 1.0
+
+    @classmethod
+    def unknown(cls) -> "TargetTrack":
+        """Return a target that nobody has heard."""
+        return cls(np.zeros((0, 6)), np.zeros((0, 6, 6)), np.zeros(0))
+
+    @property
+    def known(self) -> bool:
+        """Whether it was ever heard."""
+        return len(self.weights) > 0
+
+    @property
+    def single(self) -> bool:
+        """Whether it is a single filter by now."""
+        return len(self.weights) == 1
+
+    @property
+    def state(self) -> FloatArray:
+        """Mean of the mixture, (6,); NaN while unknown."""
+        return np.asarray(self.weights @ self.means) if self.known else np.full(6, np.nan)
+
+    @property
+    def covariance(self) -> FloatArray:
+        """Covariance of the mixture, (6, 6); infinite variances while unknown."""
+        if not self.known:
+            return np.diag(np.full(6, np.inf))
+        off = self.means - self.state
+        spread = self.covariances + off[:, :, None] * off[:, None, :]
+        return np.asarray(np.tensordot(self.weights, spread, axes=1))
+
+    @property
+    def sd_m(self) -> FloatArray:
+        """Standard deviations of east, north and depth, (3,)."""
+        return np.sqrt(np.diagonal(self.covariance)[:3])
+
+
+@dataclass(frozen=True)
+class TargetEstimator:
+    """The filter; see the module's text. Time advances by 1 per step.
+
+    Attributes
+    ----------
+    sensor : RangeSensor
+        Gives the noise, and how far a target is heard (infinitely far by default).
+    acceleration_sd : float
+        Standard deviation of the change of each velocity component per step ("zero-acceleration" model).
+    accuracy_sd_m : float
+        A target belongs to ``A`` while its three standard deviations are below this.
+    low_m, high_m : (3,)
+        Box in which a target may be when it is first heard.
+    speed_sd : float
+        Standard deviation of each component of its velocity then.
+    """
+
+    sensor: RangeSensor = RangeSensor(EVERYWHERE, 0.1)  # noqa: RUF009 - frozen
+    acceleration_sd: float = 0.0003
+    accuracy_sd_m: float = 0.1
+    low_m: tuple[float, float, float] = (-1.0, -1.0, -1.0)
+    high_m: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    speed_sd: float = 0.006
+
+    def accurate(self, track: TargetTrack) -> bool:
+        """Return whether a target belongs to ``A`` now."""
+        return bool(track.known and (track.sd_m < self.accuracy_sd_m).all())
+
+    def predict(self, track: TargetTrack) -> TargetTrack:
+        """Let one step pass."""
+        if not track.known:
+            return track
+        F = transition()
+        return replace(
+            track,
+            means=track.means @ F.T,
+            covariances=F @ track.covariances @ F.T + self.process_noise(self._manoeuvre(track)),
+            surprise=np.nan,
+        )
+
+    def process_noise(self, acceleration_sd: float | None = None) -> FloatArray:
+        """Return the noise of one step, (6, 6): the velocity's change acts half on the way of its own step."""
+        G = np.vstack([0.5 * np.eye(3), np.eye(3)])
+        sd = self.acceleration_sd if acceleration_sd is None else acceleration_sd
+        return np.asarray(sd**2 * G @ G.T)
+
+    def _manoeuvre(self, track: TargetTrack) -> float:
+        """Return the sd of the velocity's change: large after ranges that no straight course explains."""
+        return self.speed_sd if track.unease > TURNED else self.acceleration_sd
+
+    def update(
+        self, track: TargetTrack, positions: FloatArray, ranges: FloatArray, blur_m2: FloatArray | None = None
+    ) -> TargetTrack:
+        """Take in the ranges that the vehicles measured to a target in one step.
+
+        Parameters
+        ----------
+        positions : (n_vehicles, 3)
+            Where they measured.
+        ranges : (n_vehicles,)
+            What they measured; NaN where the target was not heard.
+        blur_m2 : (n_vehicles, 3) or None
+            Variances of their own positions.
+        """
+        heard = np.flatnonzero(np.isfinite(ranges))
+        if len(heard) == 0:
+            return track
+        if not track.known:
+            track = self._anywhere()
+        elif track.unease > WRONG:
+            track = _or(self._anywhere(), track)
+        blur = np.zeros((len(positions), 3)) if blur_m2 is None else blur_m2
+        means, covariances = track.means.copy(), track.covariances.copy()
+        weights = track.weights**DOUBT / (track.weights**DOUBT).sum()
+        surprise = _take(
+            means, covariances, weights, np.ascontiguousarray(positions[heard], dtype=np.float64), ranges[heard],
+            self.sensor.relative_noise, np.ascontiguousarray(blur[heard], dtype=np.float64),
+        )  # fmt: skip
+        kept = weights > FORGOTTEN
+        mixture = TargetTrack(means[kept], covariances[kept], weights[kept] / weights[kept].sum())
+        if mixture.single and track.single:
+            mean = surprise / len(heard)
+            return replace(mixture, surprise=mean, unease=MEMORY * track.unease + (1.0 - MEMORY) * mean)
+        if np.sqrt((mixture.sd_m**2).sum()) < NARROW * float(np.abs(ranges[heard]).min()):
+            return TargetTrack(mixture.state[None], mixture.covariance[None], np.ones(1))
+        return mixture
+
+    def _anywhere(self) -> TargetTrack:
+        """Return filters spread evenly over the box."""
+        low, high = np.array(self.low_m), np.array(self.high_m)
+        sides = (high - low) / np.array(PER_AXIS)
+        axes = [low[k] + sides[k] * (np.arange(PER_AXIS[k]) + 0.5) for k in range(3)]
+        places = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+        n = len(places)
+        # Neighbours overlap without a gap: half a side is one standard deviation.
+        variance = np.concatenate([(0.5 * sides) ** 2, np.full(3, self.speed_sd**2)])
+        covariances = np.repeat(np.diag(variance)[None], n, axis=0)
+        return TargetTrack(np.hstack([places, np.zeros((n, 3))]), covariances, np.full(n, 1.0 / n))
+
+
+def _or(one: TargetTrack, other: TargetTrack) -> TargetTrack:
+    """Return the mixture in which either of two may be true, as likely as not."""
+    return TargetTrack(
+        np.concatenate([one.means, other.means]),
+        np.concatenate([one.covariances, other.covariances]),
+        np.concatenate([one.weights, other.weights]) / 2.0,
+    )
+
+
+def transition() -> FloatArray:
+    """Return the constant-velocity transition of one step, (6, 6)."""
+    F = np.eye(6)
+    F[:3, 3:] = np.eye(3)
+    return F
+
+
+@njit(cache=True, nogil=True)
+def _take(
+    means: FloatArray,
+    covariances: FloatArray,
+    weights: FloatArray,
+    positions: FloatArray,
+    ranges: FloatArray,
+    noise: float,
+    blur: FloatArray,
+) -> float:
+    """Update all filters in place by all ranges; return the last one's summed squared normalised innovations."""
+    surprise = 0.0
+    scores = np.log(weights)
+    for h in range(len(weights)):
+        surprise = 0.0
+        for k in range(len(ranges)):
+            innovation, variance = update_by_range(means[h], covariances[h], positions[k], ranges[k], noise, blur[k])
+            surprise += innovation * innovation / variance
+            scores[h] -= 0.5 * (innovation * innovation / variance + np.log(variance))
+    likely = np.exp(scores - scores.max())
+    weights[:] = likely / likely.sum()
+    return surprise
+
+
+@njit(cache=True, nogil=True)
+def foretold_sd(
+    mean: FloatArray, covariance: FloatArray, configurations: FloatArray, noise: float, hearing: float
+) -> FloatArray:
+    """Return, for each team configuration (c, n_vehicles, 3), the greatest standard deviation it would leave, (c,).
+
+    ``mean`` (6,) and ``covariance`` (6, 6) are the target's as foretold for that time; every vehicle closer than
+    ``hearing`` is taken to range to it once, and to find it where it is expected.
+    """
+    result = np.empty(len(configurations))
+    nowhere = np.zeros(3)
+    for c in range(len(configurations)):
+        m, P = mean.copy(), covariance.copy()
+        for i in range(configurations.shape[1]):
+            r = np.sqrt(((m[:3] - configurations[c, i]) ** 2).sum())
+            if r < hearing:
+                here = m.copy()
+                update_by_range(here, P, configurations[c, i], r, noise, nowhere)
+        worst = 0.0
+        for k in range(3):
+            worst = max(worst, P[k, k])
+        result[c] = np.sqrt(worst)
+    return result

@@ -1,0 +1,133 @@
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.stats import chi2
+
+from app.estimation import RangeSensor, TargetEstimator, TargetTrack
+from app.estimation.range_filter import update_by_range
+from app.estimation.targets import foretold_sd, transition
+
+HEARING = RangeSensor(np.inf, 0.1)
+
+
+def pursuit(seed, steps, estimator, vehicles=3, *, found=False):
+    """Vehicles circle a target that keeps its course but for the model's noise; yields truth, track and places.
+
+    ``found``: the filter knows to begin with where the target is, as well as it says.
+    """
+    rng = np.random.default_rng(seed)
+    truth = np.concatenate([rng.uniform(-0.5, 0.5, 3), estimator.speed_sd * rng.standard_normal(3)])
+    track = TargetTrack.unknown()
+    if found:
+        P = np.diag([0.05**2] * 3 + [0.01**2] * 3)
+        track = TargetTrack(rng.multivariate_normal(truth, P)[None], P[None], np.ones(1))
+    phase, turning = rng.uniform(0.0, 2.0 * np.pi, vehicles), rng.uniform(0.05, 0.12, vehicles)
+    for step in range(steps):
+        pull = rng.multivariate_normal(np.zeros(6), estimator.process_noise())
+        truth = transition() @ truth + pull
+        angle = phase + turning * step
+        around = np.column_stack([np.cos(angle), np.sin(angle), 0.8 * np.sin(2.1 * angle + phase)])
+        positions = truth[:3] + 0.5 * around
+        ranges = np.array([HEARING.measure(p, truth[None, :3], rng)[0] for p in positions])
+        track = estimator.update(estimator.predict(track), positions, ranges)
+        yield truth, track, positions
+
+
+def test_a_single_range_update_is_that_of_a_slow_reference():
+    """Joseph form in plain numpy, mean and variance of the range by brute force over the prior."""
+    rng = np.random.default_rng(4)
+    for _ in range(5):
+        A = rng.standard_normal((6, 6))
+        P, mean = 1e-3 * (A @ A.T + np.eye(6)), rng.uniform(-1, 1, 6)
+        position, blur, y = rng.uniform(-1, 1, 3), np.array([1e-4, 2e-4, 0.0]), 0.9
+        cloud = rng.multivariate_normal(mean[:3], P[:3, :3], 400_000) - position
+        r = np.linalg.norm(cloud + rng.standard_normal(cloud.shape) * np.sqrt(blur), axis=1)
+        seen = r * (1.0 + 0.1 * rng.standard_normal(len(r)))
+        after, Q = mean.copy(), P.copy()
+        innovation, variance = update_by_range(after, Q, position, y, 0.1, blur)
+        assert y - innovation == pytest.approx(seen.mean(), rel=0.01)
+        assert variance == pytest.approx(seen.var(), rel=0.05)
+        u = (mean[:3] - position) / np.linalg.norm(mean[:3] - position)
+        H = np.concatenate([u, np.zeros(3)])[None]
+        K = P @ H.T / variance
+        R = variance - H @ P @ H.T
+        expected = (np.eye(6) - K @ H) @ P @ (np.eye(6) - K @ H).T + K @ R @ K.T
+        np.testing.assert_allclose(Q, expected, rtol=1e-9, atol=1e-15)
+        np.testing.assert_allclose(after, mean + (K * innovation).ravel(), rtol=1e-9)
+
+
+def test_errors_are_as_large_as_the_filter_says():
+    """NEES and NIS over 100 runs within their 95 % bounds."""
+    estimator, runs = TargetEstimator(), 100
+    nees, surprise = [], []
+    for seed in range(runs):
+        *_, (truth, track, _) = pursuit(seed, 40, estimator, found=True)
+        error = truth - track.state
+        nees.append(error @ np.linalg.solve(track.covariance, error))
+        surprise.append(3.0 * track.surprise)
+    for values, dimensions in ((nees, 6), (surprise, 3)):
+        low, high = chi2.ppf([0.025, 0.975], dimensions * runs) / runs
+        assert low < np.mean(values) < high
+
+
+def test_a_target_is_found_from_nothing():
+    """A mirror image may be taken for the target now and then, but seldom for long."""
+    right = 0
+    for seed in range(40):
+        *_, (truth, track, _) = pursuit(seed, 60, TargetEstimator())
+        right += np.linalg.norm(truth[:3] - track.state[:3]) < 4.0 * np.linalg.norm(track.sd_m)
+    assert right >= 38
+
+
+def test_it_counts_as_accurate_only_while_it_is_heard():
+    estimator = TargetEstimator()
+    *_, (_, track, _) = pursuit(0, 60, estimator)
+    assert estimator.accurate(track)
+    silent = np.full(3, np.nan)
+    lost = next(
+        step for step in range(1, 200)
+        if not estimator.accurate(track := estimator.update(estimator.predict(track), np.zeros((3, 3)), silent))
+    )  # fmt: skip
+    assert 3 < lost < 60
+
+
+def test_a_turn_is_noticed():
+    """After a target went about, the filter must not go on straight for long."""
+    estimator, rng = TargetEstimator(), np.random.default_rng(3)
+    track, truth = TargetTrack.unknown(), np.array([-0.5, 0.0, 0.0, 0.02, 0.0, 0.0])
+    vehicles = np.array([[0.4, 0.3, 0.3], [-0.4, -0.4, 0.2], [0.0, 0.5, -0.5], [0.2, -0.4, -0.3]])
+    errors = []
+    for step in range(100):
+        if step == 50:
+            truth[3] *= -1.0
+        truth[:3] += truth[3:]
+        ranges = np.array([HEARING.measure(p, truth[None, :3], rng)[0] for p in vehicles])
+        track = estimator.update(estimator.predict(track), vehicles, ranges)
+        errors.append(np.linalg.norm(track.state[:3] - truth[:3]))
+    assert max(errors[75:]) < 0.15
+
+
+def test_what_is_foretold_is_what_the_filter_then_says():
+    estimator = TargetEstimator()
+    *_, (_, track, positions) = pursuit(1, 60, estimator)
+    ahead = estimator.predict(track)
+    configurations = np.stack([positions, positions + 0.05])
+    told = foretold_sd(ahead.state, ahead.covariance, configurations, 0.1, np.inf)
+    ranges = np.linalg.norm(ahead.state[:3] - positions, axis=1)
+    assert told[0] == pytest.approx(estimator.update(ahead, positions, ranges).sd_m.max(), rel=0.02)
+
+
+@given(
+    st.lists(st.floats(-2, 2), min_size=3, max_size=3), st.floats(1e-6, 3.0), st.floats(1e-3, 0.5), st.integers(0, 99)
+)
+@settings(max_examples=60, deadline=None)
+def test_a_covariance_stays_symmetric_and_positive(place, y, noise, seed):
+    rng = np.random.default_rng(seed)
+    A = rng.standard_normal((6, 6)) * 10.0 ** rng.uniform(-6, 0, 6)
+    mean, P = rng.uniform(-1, 1, 6), A @ A.T + 1e-14 * np.eye(6)
+    for _ in range(20):
+        update_by_range(mean, P, np.array(place), y, noise, np.zeros(3))
+        assert np.isfinite(mean).all()
+        np.testing.assert_array_equal(P, P.T)
+        assert np.linalg.eigvalsh(P).min() > -1e-12 * np.abs(P).max()

@@ -1,0 +1,135 @@
+"""The dynamic case in closed loop, small."""
+
+import json
+from dataclasses import asdict, replace
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from app.estimation import Fading
+from app.evaluation.presumed import Presumed
+from app.evaluation.trace_greedy import foretold_trace
+from app.evaluation.track import run_track
+from app.evaluation.track_cli import evaluate_app
+from app.evaluation.track_world import TrackScenario, TrackWorld
+from app.exploration.options import PlannerOptions
+from simulator.seafloors import generate
+
+FLOOR = generate("rugged", 1, width_m=50.0, height_m=50.0)
+OPTIONS = PlannerOptions(rollouts=5, candidates=8)
+SMALL = TrackScenario(FLOOR, landmarks=150, steps=12)
+FADING = TrackScenario(landmarks=60, steps=60, fading=Fading(drift=0.06))
+
+
+def figures(run):
+    return {k: v for k, v in asdict(run).items() if k not in ("wall_s", "plan_ms_median", "plan_ms_p99")}
+
+
+@pytest.mark.parametrize("planner", ["rollout", "cao", "lawnmower", "random"])
+def test_the_same_seed_gives_the_same_run(planner):
+    first, second = (run_track(SMALL, planner, OPTIONS) for _ in range(2))
+    assert figures(first) == figures(second)
+    assert first.broken_constraints == 0
+
+
+def test_vehicles_keep_the_clearance_and_know_where_they_are_without_fading():
+    world = TrackWorld(SMALL)
+    for _ in range(10):
+        world.move(world.positions + np.array([0.02, 0.01, 0.04]))
+        floor = world._cube.depth_at(world.positions[:, :2])
+        assert (floor - world.positions[:, 2] >= SMALL.clearance - 1e-9).all()
+    assert world.localization_errors().max() == 0.0
+
+
+def test_nobody_is_told_where_an_unseen_landmark_is():
+    """Two worlds whose landmarks differ look the same before anything is seen."""
+    far = replace(SMALL, visibility=0.01)
+    one, other = TrackWorld(far), TrackWorld(far)
+    other.truth = np.random.default_rng(5).permutation(other.truth) * [1.0, -1.0, 1.0]
+    np.testing.assert_array_equal(one.belief.xy_m, other.belief.xy_m)
+    assert np.isinf(one.belief.sd_m).all()
+
+
+def test_presumed_places_keep_to_what_nobody_looked_at():
+    presumed = Presumed(np.array([[-1.0, -1.0, 0.0], [1.0, 1.0, 1.0]]), 0.4, flat=True)
+    everywhere = presumed.places(800, np.zeros((0, 3)))
+    assert abs(everywhere[:, 0].mean()) < 0.02
+    cells = len(presumed.middles)
+    for x in np.arange(-1.0, 0.01, 0.1):
+        for y in np.arange(-1.0, 1.01, 0.1):
+            presumed.look(np.array([[x, y, 0.3]]), np.full((1, cells), 0.5))
+    later = presumed.places(800, np.array([[-0.5, -0.5, 0.5]]))
+    assert np.mean(later[:, 0] > 0.0) > 0.7
+    assert presumed.places(0, np.zeros((0, 3))).shape == (0, 3)
+
+
+def test_a_vehicle_surfaces_when_needed_and_localization_becomes_good_again():
+    run = run_track(FADING, "cao", OPTIONS)
+    assert run.resurfacings >= 1
+    assert run.needless_resurfacings == 0
+    assert run.localization_ok_pct > 80.0
+
+
+def test_ranges_and_own_fixes_serve_where_fixes_are_not_shared():
+    run = run_track(replace(FADING, shared_fix=False), "cao", OPTIONS)
+    assert run.resurfacings >= 2
+
+
+def test_the_foretold_trace_is_that_of_a_slow_reference():
+    rng = np.random.default_rng(0)
+    points, team = rng.uniform(-1, 1, (4, 3)), rng.uniform(-1, 1, (1, 3, 3))
+    covariances = np.array([a @ a.T + 0.1 * np.eye(3) for a in rng.standard_normal((4, 3, 3))])
+    expected = 0.0
+    for point, P in zip(points, covariances, strict=True):
+        for place in team[0]:
+            u = point - place
+            r = np.linalg.norm(u)
+            H = u[None] / r
+            S = H @ P @ H.T + 0.01 * (r**2 + H @ P @ H.T)
+            P = P - P @ H.T @ H @ P / S
+        expected += np.trace(P)
+    assert foretold_trace(team, points, covariances, np.full(4, np.inf), 0.1)[0] == pytest.approx(expected)
+
+
+def call(*arguments):
+    return CliRunner().invoke(evaluate_app, ["track", *arguments])
+
+
+def test_the_command_prints_one_object_with_the_contracts_figures():
+    result = call("--landmarks", "40", "--steps", "5", "--planner", "random", "--json")
+    run = json.loads(result.stdout)
+    contract = {
+        "remaining_pct", "target_tracked_pct", "localization_ok_pct", "resurfacings", "needless_resurfacings",
+        "sum_of_error",
+    }  # fmt: skip
+    assert contract <= run.keys()
+    assert run["landmarks"] == 40
+
+
+def test_a_report_is_made_taken_up_again_and_counts_what_is_missing(tmp_path):
+    arguments = ("--write", str(tmp_path), "--only", "ngcuv12-own-fix", "--steps", "12", "--seeds")
+    assert call(*arguments, "0:1").exit_code == 0
+    lines = (tmp_path / "tracking.jsonl").read_text().splitlines()
+    assert len(lines) == 1
+    assert "incomplete" not in (tmp_path / "tracking.md").read_text()
+    assert call(*arguments, "0:2", "--no-run").exit_code == 0
+    assert "1 of 2 runs are still missing" in (tmp_path / "tracking.md").read_text()
+    assert (tmp_path / "tracking.jsonl").read_text().splitlines() == lines
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("--setup", "auro15"), "none of med13, ngcuv12"),
+        (("--own-fix",), "vehicles know where they are"),
+        (("--no-run",), "goes with --write only"),
+        (("--planner", "osarses"), "choose from"),
+        (("--write", "x", "--only", "figure7"), "choose from"),
+    ],
+)
+def test_what_cannot_be_is_refused_with_what_would_be_right(arguments, said, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    result = call(*arguments)
+    assert result.exit_code == 2
+    assert said in " ".join(result.output.split())
