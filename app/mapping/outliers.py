@@ -17,6 +17,11 @@ from app.mapping.types import BoolArray, FloatArray, IntArray, Soundings
 
 PLANE_NEIGHBOURS = 16
 KRIGING_NEIGHBOURS = 24
+WITNESSES = 4
+ALIKE = 0.7
+NEXT_TO = 1.5
+"""Two soundings are next to each other when none is nearer, or not by more than this factor."""
+
 CONVICTION = 5.0
 """Standard deviations from what its unsuspected neighbours predict that make a suspect an outlier."""
 
@@ -71,8 +76,9 @@ def flag_outliers(
     plane through its neighbours (the neighbours' own scatter about their planes sets the scale, so that
     steep or rough places do not raise suspicion); of very many soundings those in one small square are
     neighbours. Second look: a suspect is rejected when it also lies more than ``CONVICTION`` standard
-    deviations from what kriging predicts from unsuspected neighbours. How well leave-one-out prediction works
-    nearby, and how heavy the tail of its errors is, scale the standard deviation.
+    deviations from what kriging predicts from unsuspected neighbours, and from these together with other suspects
+    nearby: soundings that agree with each other show a rock. How well leave-one-out prediction works nearby, and how
+    heavy the tail of its errors is, scale the standard deviation.
 
     Parameters
     ----------
@@ -120,19 +126,32 @@ def flag_outliers(
         variance = np.concatenate([merged.sd_m, soundings.sd_m[rows]]) ** 2 * hyperparameters.noise_scale
         everywhere = np.concatenate([merged_points, points[rows]])
         depth = np.concatenate([merged.depth_m, soundings.depth_m[rows]])
-        error, noise_part, model_part = krige_holes(
-            KERNEL_CODES[kernel],
-            everywhere,
-            depth - trend(everywhere),
-            variance,
-            uniform_scales(len(everywhere)).scaled_metric(hyperparameters.length_m),
-            np.full(len(everywhere), hyperparameters.amplitude_m),
-            np.arange(m, m + len(rows)),
-            near,
-        )
+        excuse = _excuse(kernel, hyperparameters, tree, merged, trend, points[rows])
+
+        def misses(some: IntArray, neighbours: IntArray) -> tuple[FloatArray, FloatArray]:
+            error, noise_part, model_part = krige_holes(
+                KERNEL_CODES[kernel],
+                everywhere,
+                depth - trend(everywhere),
+                variance,
+                uniform_scales(len(everywhere)).scaled_metric(hyperparameters.length_m),
+                np.full(len(everywhere), hyperparameters.amplitude_m),
+                m + some,
+                neighbours,
+            )
+            return error, np.abs(error) / np.sqrt(noise_part + model_part) / excuse[some]
+
+        error, deviations[rows] = misses(np.arange(len(rows)), near)
         predicted[rows] = soundings.depth_m[rows] - error
-        deviations[rows] = np.abs(error) / np.sqrt(noise_part + model_part)
-        deviations[rows] /= _excuse(kernel, hyperparameters, tree, merged, trend, points[rows])
+        accused = np.flatnonzero(np.nan_to_num(deviations[rows]) > CONVICTION)
+        if len(accused) > 1:
+            at = points[rows[accused]]
+            distance, others = nearest(cKDTree(at), at, WITNESSES + 1)
+            everyone = cKDTree(points, balanced_tree=False, compact_nodes=False)
+            agrees = _agrees(error[accused], others, distance, nearest(everyone, at, 2)[0][:, 1:])
+            witnesses = np.where(others == np.arange(len(accused))[:, None], -1, m + accused[others])
+            _, heard = misses(accused, np.hstack([near[accused], witnesses]))
+            deviations[rows[accused]] = np.where(agrees, 0.0, np.fmin(deviations[rows[accused]], heard))
     rejected = np.nan_to_num(deviations) > CONVICTION
     reasons = [""] * n
     for i in np.flatnonzero(rejected):
@@ -141,6 +160,23 @@ def flag_outliers(
             f"{predicted[i]:.2f} m that its neighbours predict"
         )
     return OutlierReport(rejected, predicted, deviations, tuple(reasons), hyperparameters)
+
+
+def _agrees(error: FloatArray, others: IntArray, distance: FloatArray, closest: FloatArray) -> BoolArray:
+    """Which of the accused are two soundings of one rock: next to another one that is off by much the same, (n,).
+
+    Parameters
+    ----------
+    error : (n,)
+        Measured minus predicted.
+    others, distance : (n, k)
+        The nearest accused, and how far off.
+    closest : (n, 1)
+        Distance to the nearest sounding of all.
+    """
+    ratio = error[others] / error[:, None]
+    alike = (ratio >= ALIKE) & (ratio <= 1.0 / ALIKE) & (distance <= NEXT_TO * closest)
+    return np.asarray((alike & (others != np.arange(len(error))[:, None])).any(axis=1))
 
 
 def _excuse(

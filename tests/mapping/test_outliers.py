@@ -46,6 +46,19 @@ def test_a_cliff_is_no_outlier(seed: int) -> None:
     assert np.mean(report.rejected[bad & far]) >= 0.75
 
 
+def test_soundings_of_one_rock_vouch_for_each_other_and_a_lonely_spike_has_nobody() -> None:
+    east, north = (a.ravel() for a in np.meshgrid(np.arange(2.0, 100.0, 4.0), np.arange(1.0, 100.0, 2.5)))
+    rng = np.random.default_rng(4)
+    depth = 15.0 + 0.6 * np.sin(east / 9.0) * np.cos(north / 8.0)
+    rock = (np.abs(east - 50.0) < 1.0) & (np.abs(north - 50.0) < 2.0)
+    spike = (np.abs(east - 22.0) < 1.0) & (np.abs(north - 71.0) < 1.2)
+    depth[rock | spike] -= 7.0
+    sd = 0.01 * depth
+    report = flag_outliers(Soundings(east, north, depth + sd * rng.standard_normal(len(east)), sd))
+    assert (rock.sum(), spike.sum()) == (2, 1)
+    assert np.flatnonzero(report.rejected).tolist() == np.flatnonzero(spike).tolist()
+
+
 @pytest.mark.parametrize("cliff", [False, True], ids=["gentle", "cliff"])
 def test_clean_soundings_are_all_accepted(cliff: bool) -> None:
     report = flag_outliers(survey(7, cliff=cliff))
