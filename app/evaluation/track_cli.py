@@ -92,7 +92,8 @@ def track(
     if own_fix and setup != "ngcuv12":
         raise typer.BadParameter("med13's vehicles know where they are; use --setup ngcuv12", param_hint="--own-fix")
     family, number = GENERATED
-    sea_floor = generate(family, number, width_m=CELLS, height_m=CELLS) if terrain is None else terrain_of(terrain)
+    generated = generate(family, number, width_m=CELLS, height_m=CELLS)
+    sea_floor = generated if terrain is None else replace(terrain_of(terrain), name=terrain.stem)
     chosen = seed_list(seed, seeds)
     if write is not None:
         _report(write, sea_floor, chosen, seeds or str(seed), steps, rollouts, jobs, only, terrain, no_run=no_run)
