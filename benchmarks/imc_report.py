@@ -24,7 +24,8 @@ def command_line(hidden: dict[Path | None, str]) -> str:
 
 def write_section(page: Path, title: str, figures: dict[str, Any], hidden: dict[Path | None, str]) -> None:
     """Write the section ``title`` of a page, in the place of an older one."""
-    facts = made(command_line({page: page.as_posix().rpartition("docs/")[2], **hidden}), 1)
+    shown = f"docs/{page.as_posix().rpartition('docs/')[2]}" if "docs/" in page.as_posix() else page.name
+    facts = made(command_line({page: shown, **hidden}), 1)
     lines = [f"## {title}", "", *(f"- {name}: {facts[name]}" for name in ("command", "date", "machine", "versions"))]
     lines += ["", "| | |", "| --- | --- |", *(f"| {name} | {_shown(value)} |" for name, value in figures.items()), ""]
     text = page.read_text(encoding="utf-8") if page.exists() else HEAD

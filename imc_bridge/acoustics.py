@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import imcpy
 
 from imc_bridge.codec import Message
+from imc_bridge.texts import text
 
 DEADLINE_S = 20.0
 """After this long the gateway gives a message up, and so do we."""
@@ -153,7 +154,7 @@ class SoundPath:
         words = STATES.get(state, f"status {state}")
         self.outcomes[words] += 1
         self.last_problem = f"{busy.what} by sound ({busy.size} bytes): {words}" + (
-            f" ({message.info})" if message.info else ""
+            f" ({info})" if (info := text(message, "info")) else ""
         )
         return ""
 

@@ -31,6 +31,7 @@ from imc_bridge.plans import (
 )
 from imc_bridge.seabed import Seabed
 from imc_bridge.settings import BridgeSettings
+from imc_bridge.texts import text
 
 STOP_RETRY_S = 0.5
 ABANDONED_STOP_RETRY_S = 2.0
@@ -217,7 +218,7 @@ class Control(ABC):
             and kind in (PLAN_CONTROL_SUCCESS, PLAN_CONTROL_FAILURE)
             and (kind == PLAN_CONTROL_SUCCESS or not self.node.executing(self._settings.plan_id))
         ):
-            self._stopped(str(message.info) or "plan stopped", now)
+            self._stopped(text(message, "info") or "plan stopped", now)
 
     def plan_state_changed(self, now: float) -> None:
         """PlanControlState has been taken in by the node."""

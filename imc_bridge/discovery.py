@@ -12,6 +12,7 @@ import imcpy
 
 from imc_bridge.codec import Message
 from imc_bridge.settings import BridgeSettings
+from imc_bridge.texts import text
 from imc_bridge.transport import Address
 
 _SERVICE = re.compile(r"imc\+(udp|tcp)://([0-9.]+):(\d{1,5})/?")
@@ -51,7 +52,7 @@ class Announcement:
 
 def read_announce(message: Message) -> Announcement:
     """Take an Announce apart; addresses that cannot be are left out."""
-    services = str(message.services)
+    services = text(message, "services")
     found: dict[str, list[Address]] = {"udp": [], "tcp": []}
     for kind, host, port_text in _SERVICE.findall(services):
         try:
@@ -65,7 +66,7 @@ def read_announce(message: Message) -> Announcement:
     uid = _UID_SERVICE.search(services)
     return Announcement(
         imc_id=int(message.src),
-        name=str(message.sys_name),
+        name=text(message, "sys_name"),
         system_type=int(message.sys_type),
         addresses=tuple(found["udp"][:MAX_ADDRESSES]),
         streams=tuple(found["tcp"][:MAX_ADDRESSES]),

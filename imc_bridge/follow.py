@@ -16,6 +16,7 @@ from imc_bridge.plans import (
     plan_control,
 )
 from imc_bridge.references import SentReference
+from imc_bridge.texts import text
 
 START_RETRY_S = 2.0
 STARVED_S = 4.0
@@ -56,7 +57,7 @@ class Follower(Control):
 
     def plan_control_reply(self, message: Message, now: float) -> None:
         """PlanControl of the vehicle to us."""
-        kind, info = int(message.type), str(message.info)
+        kind, info = int(message.type), text(message, "info")
         if int(message.op) != OPERATION_START:
             super().plan_control_reply(message, now)
             return

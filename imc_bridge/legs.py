@@ -28,6 +28,7 @@ from imc_bridge.plans import (
     leg_time_s,
     plan_control,
 )
+from imc_bridge.texts import text
 
 END_WITHIN_M = 25.0
 """A leg that ended farther from its waypoint did not lead there: Goto ends some 7 m before, and the vehicle floats."""
@@ -120,7 +121,7 @@ class LegFollower(Control):
             return
         if int(message.request_id) != self._request_id:
             return
-        kind, info = int(message.type), str(message.info)
+        kind, info = int(message.type), text(message, "info")
         if kind == PLAN_CONTROL_SUCCESS and "completed" in info:
             self._plan_since_s = float(message.timestamp)
             self._leg_over()

@@ -32,6 +32,7 @@ from imc_bridge.events import Sounding, SoundingRefused, StateReport
 from imc_bridge.nodes import Node, listed_entities
 from imc_bridge.settings import BridgeSettings
 from imc_bridge.soundings import offer_distance
+from imc_bridge.texts import text
 from imc_bridge.vehicle_clock import Tick
 
 BLOCK_BYTES = 1 << 20
@@ -256,6 +257,6 @@ def _take(node: Node, header: Header, message: Message) -> Iterator[LogEvent]:
 def _note_entities(names: dict[int, str], message: Message) -> None:
     """EntityList lists all of them, EntityInfo describes one."""
     if isinstance(message, imcpy.EntityInfo):
-        names[int(message.id)] = str(message.label)
+        names[int(message.id)] = text(message, "label")
     elif isinstance(message, imcpy.EntityList) and message.op == imcpy.EntityList.OperationEnum.REPORT:
         names.update(listed_entities(message))

@@ -19,6 +19,7 @@ from imc_bridge.discovery import Announcement
 from imc_bridge.events import NodeState, StateReport
 from imc_bridge.settings import BridgeSettings
 from imc_bridge.soundings import SoundingGate, StateHistory, StateSample, beam_table
+from imc_bridge.texts import text
 from imc_bridge.transport import Address
 from imc_bridge.vehicle_clock import Tick, VehicleClock
 
@@ -283,13 +284,13 @@ class Node:
         """VehicleState: the operation mode and the errors that explain it."""
         self.operation_mode = int(message.op_mode)
         self.operation_mode_at = now
-        self.error_text = ", ".join(filter(None, (str(message.error_ents), str(message.last_error))))
+        self.error_text = ", ".join(filter(None, (text(message, "error_ents"), text(message, "last_error"))))
 
     def take_plan_state(self, message: Message, now: float) -> None:
         """PlanControlState."""
         self.plan_state = int(message.state)
         self.plan_state_at = now
-        self.plan_id = str(message.plan_id)
+        self.plan_id = text(message, "plan_id")
         self.plan_outcome = int(message.last_outcome)
         self.plan_state_time_s = float(message.timestamp)
         if self.plan_state not in (PlanState.EXECUTING, PlanState.INITIALIZING):
@@ -439,7 +440,7 @@ class Node:
 def listed_entities(message: Message) -> dict[int, str]:
     """Names by id of an EntityList report; empty when it lists none."""
     entities = {}
-    for item in str(message.list).split(";"):
+    for item in text(message, "list").split(";"):
         name, separator, number = item.rpartition("=")
         if separator and number.isdigit():
             entities[int(number)] = name

@@ -7,6 +7,7 @@ from collections.abc import Callable
 import imcpy
 
 from imc_bridge.codec import Message
+from imc_bridge.texts import text
 
 ENTITY = "UDP"
 PARAMETER = "Rate Limiters"
@@ -23,8 +24,8 @@ RESTORE_RETRY_S = 1.0
 def merge_limiters(former: str, wanted: str) -> str:
     """The former list with the wanted limits in it: ``"GpsFix:1, Distance:0.2"`` + ``"Distance:5"``."""
     limits: dict[str, str] = {}
-    for text in (former, wanted):
-        for item in text.split(","):
+    for limits_text in (former, wanted):
+        for item in limits_text.split(","):
             name, separator, value = item.partition(":")
             if separator:
                 limits[name.strip()] = value.strip()
@@ -104,11 +105,11 @@ class RateRequest:
 
     def answered(self, message: Message, now: float) -> None:
         """EntityParameters of the vehicle: the former value, or the confirmation."""
-        if str(message.name) != ENTITY:
+        if text(message, "name") != ENTITY:
             return
         for parameter in message.params:
-            if isinstance(parameter, imcpy.EntityParameter) and str(parameter.name) == PARAMETER:
-                value = str(parameter.value)
+            if isinstance(parameter, imcpy.EntityParameter) and text(parameter, "name") == PARAMETER:
+                value = text(parameter, "value")
                 if self._set is not None and _same(value, self._set):
                     self._confirmed = True
                 elif self._former is None and self._set is None:
