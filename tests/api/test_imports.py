@@ -88,6 +88,7 @@ async def test_an_import_survives_a_restart(make_settings: Any) -> None:
                 await send(client, path, prior_text())
                 await client.put(f"{path}/reference", content=reference_tif(), params={"filename": "r.tif"})
             quality = (await client.get(f"{path}/quality")).json()
+            quality.pop("version")  # counts how often the map was made since the service began
             first = first or quality
             assert quality == first
 
