@@ -20,7 +20,7 @@ from shapely.geometry import Point, Polygon
 from app.mapping.georeference import LocalFrame
 from tests.missions.polling import PollingVehicle
 
-KILLS = 12
+KILLS = 8
 STEPS = 100
 LONGEST_DELAY_S = 0.4
 SIDE_M = 60.0
