@@ -41,7 +41,6 @@ from simulator.terrain import Terrain
 ORIGIN = (41.185, -8.705)
 SIDE_M = 120.0
 PORT, ANNOUNCE_PORTS = 32210, (32200, 32201, 32202, 32203, 32204)
-GATEWAY = "manta-1"
 NAMES = ("lauv-xplore-1", "lauv-xplore-2")
 BACK_AFTER_WALL_S = 1.0
 
@@ -86,7 +85,7 @@ class Vehicle:
 
 def mission(options: argparse.Namespace) -> MissionSpec:
     """Two vehicles that map a square of 100 m."""
-    led = {"guidance": options.guidance} | ({"gateway": GATEWAY} if options.guidance == "acoustic" else {})
+    led = {"guidance": options.guidance}
     frame = LocalFrame(*ORIGIN)
     corners = [(10, 10), (110, 10), (110, 110), (10, 110), (10, 10)]
     ring = [[float(x) for x in reversed(frame.to_geographic(float(e), float(n)))] for e, n in corners]
@@ -223,7 +222,7 @@ def main() -> None:
     parser.add_argument("--planner", default="cao")
     parser.add_argument("--family", default="harbour")
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--guidance", choices=("follow", "legs", "acoustic"), default="follow")
+    parser.add_argument("--guidance", choices=("follow", "legs"), default="follow")
     parser.add_argument("--progress", action="store_true")
     parser.add_argument("--write", type=Path, help="page of results in which this run gets a section")
     options = parser.parse_args()
