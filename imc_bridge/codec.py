@@ -34,6 +34,12 @@ _SYNC_LITTLE = struct.pack("<H", SYNC)
 _SYNC_BIG = struct.pack(">H", SYNC)
 
 PLAN_CONTROL, PLAN_DB = 559, 556
+_TEXT = -1
+_CARRIED = {
+    564: (_TEXT, 2, _TEXT, _TEXT, _TEXT, _TEXT),  # PlanStatistics
+    558: (_TEXT, 12, _TEXT, _TEXT),  # PlanDBInformation; its checksum is written as texts are
+}
+"""What vehicles' plan messages carry: texts, and bytes of other fields between them, by message id."""
 _BEFORE_NAME = 4
 """Bytes of either plan message before the plan's name: type, operation, number of the request."""
 NO_MESSAGE = 0xFFFF
@@ -127,27 +133,36 @@ def checksum(data: bytes) -> int:
 
 
 def without_argument(packet: bytes) -> bytes:
-    """Return a plan message's packet without the message that it carries inside (and the text after that).
+    """Return a plan message's packet without what it carries inside (and the text after that), unless that is sound.
 
-    Nobody here needs what a vehicle's plan messages carry, and imcpy 1.1.2 loses memory for good with every one that it
-    cannot read: whoever sent many would bring the service down. All other packets are returned as they are.
+    What vehicles answer with stays where it can be read to its end (:data:`_CARRIED`). imcpy 1.1.2 loses
+    memory for good with every inner message that it cannot read: whoever sent many would bring the service down. All
+    other packets are returned as they are.
     """
-    little = packet[:2] == _SYNC_LITTLE
-    order: Literal["little", "big"] = "little" if little else "big"
+    order: Literal["little", "big"] = "little" if packet[:2] == _SYNC_LITTLE else "big"
     msg_id = int.from_bytes(packet[2:4], order)
     if msg_id not in (PLAN_CONTROL, PLAN_DB):
         return packet
-    end = HEADER_SIZE + _BEFORE_NAME
-    end += 2 + int.from_bytes(packet[end : end + 2], order)
+    end = _after_text(packet, HEADER_SIZE + _BEFORE_NAME, order)
     end += 2 if msg_id == PLAN_CONTROL else 0  # flags
     carried = int.from_bytes(packet[end : end + 2], order)
     if end + 2 > len(packet) - FOOTER_SIZE or carried == NO_MESSAGE:
         return packet
+    if carried in _CARRIED:
+        at = end + 2
+        for size in (*_CARRIED[carried], _TEXT):  # the last one is the text after the inner message
+            at = _after_text(packet, at, order) if size == _TEXT else at + size
+        if at == len(packet) - FOOTER_SIZE:
+            return packet
     if checksum(packet[:-FOOTER_SIZE]) != int.from_bytes(packet[-FOOTER_SIZE:], order):
         return packet  # which imcpy notices before it reads further
     bare = packet[:end] + NO_MESSAGE.to_bytes(2, order) + bytes(2)
     bare = bare[:4] + (len(bare) - HEADER_SIZE).to_bytes(2, order) + bare[6:]
     return bare + checksum(bare).to_bytes(2, order)
+
+
+def _after_text(packet: bytes, at: int, order: Literal["little", "big"]) -> int:
+    return at + 2 + int.from_bytes(packet[at : at + 2], order)
 
 
 class Decoder:

@@ -69,6 +69,8 @@ def service(empty_database: Path) -> Iterator[Service]:
     ):
         mission = client.post("/missions", json=mission_spec()).json()
         client.post(f"/missions/{mission['id']}/measurements", json={"items": soundings(12)})
+        # The first map of a fresh checkout waits for the compiler, longer than schemathesis waits for an answer.
+        client.get(f"/missions/{mission['id']}/map", timeout=120.0)
         document = schemathesis.openapi.from_url(f"{server.url}/api/openapi.json")
         found = [result.ok() for result in document.get_all_operations()]
         operations = {operation.definition.raw["operationId"]: operation for operation in found}

@@ -132,12 +132,43 @@ def plan_control(argument=None):
     return message
 
 
-def test_what_a_plan_message_carries_is_left_out_and_the_rest_stays():
-    statistics = imcpy.PlanStatistics()
-    statistics.plan_id = "survey-7"
-    bare = imcpy.Packet.deserialize(without_argument(packet_of(plan_control(statistics))))
+def statistics():
+    carried = imcpy.PlanStatistics()
+    carried.plan_id, carried.durations, carried.fuel = "survey-7", "Total=12", "Total=1.5"
+    return carried
+
+
+def test_sound_statistics_and_the_text_after_them_stay():
+    packet = packet_of(plan_control(statistics()))
+    assert without_argument(packet) == packet
+    assert imcpy.Packet.deserialize(packet).info == "said the vehicle"
+
+
+@pytest.mark.parametrize("session", SESSIONS)
+def test_what_recorded_vehicles_answer_stays_as_it_is(captures: Path, session: str):
+    for record in read_capture(captures / f"{session}.jsonl.gz"):
+        message = Decoder(WANTED).message(record.packet)
+        if isinstance(message, imcpy.PlanControl | imcpy.PlanDB) and int(message.type) != 0:
+            assert without_argument(record.packet) == record.packet
+
+
+def test_what_else_a_plan_message_carries_is_left_out_and_the_rest_stays():
+    plan = imcpy.PlanSpecification()
+    plan.plan_id = "survey-7"
+    bare = imcpy.Packet.deserialize(without_argument(packet_of(plan_control(plan))))
     assert (bare.type, bare.op, bare.request_id, bare.flags) == (1, 2, 777, 3)
     assert (bare.plan_id, bare.arg, bare.src, bare.timestamp) == ("survey-7", None, 0x1E, 1.5)
+
+
+@given(cut=st.integers(1, 60))
+def test_statistics_that_end_too_early_are_left_out(cut: int):
+    packet = bytearray(packet_of(plan_control(statistics())))
+    packet = packet[: max(22, len(packet) - cut)]
+    packet[4:6] = (len(packet) - 22).to_bytes(2, "little")
+    packet[-2:] = checksum(bytes(packet[:-2])).to_bytes(2, "little")
+    decoder = Decoder(WANTED)
+    message = decoder.message(without_argument(bytes(packet)))
+    assert message is None or message.arg is None
 
 
 @pytest.mark.parametrize("message", [plan_control(), imcpy.PlanDB(), imcpy.Heartbeat(), imcpy.VehicleState()])
