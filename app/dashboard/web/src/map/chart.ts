@@ -1,45 +1,18 @@
-/** The map: MapLibre with a style drawn here and nothing fetched, so that it works without internet. */
+/**
+ * The map. MapLibre moves it and shows charts where there are some; everything else is drawn here on sheets over it.
+ * Nothing is fetched, so it works without internet.
+ */
 
 import "maplibre-gl/dist/maplibre-gl.css";
-import {
-  type AllLayoutProperties,
-  type AllPaintProperties,
-  type GeoJSONSource,
-  type ImageSource,
-  Map as MapLibreMap,
-  Marker,
-  NavigationControl,
-  ScaleControl,
-  setWorkerUrl,
-} from "maplibre-gl";
+import { Map as MapLibreMap, Marker, NavigationControl, ScaleControl, setWorkerUrl } from "maplibre-gl";
 import workerUrl from "maplibre-gl/dist/maplibre-gl-worker.mjs?url";
 import type { LngLat, PolygonGeometry } from "../api/types";
-import {
-  type Bounds,
-  boundsOf,
-  circle,
-  contains,
-  type Graticule,
-  graticule,
-  graticuleStep,
-  grown,
-  pieces,
-} from "./geo";
+import { type Bounds, boundsOf, type Graticule, graticule, graticuleStep } from "./geo";
+import { type LivelyContent, NOTHING, paintLively, type Sketch } from "./lively";
+import { type Look, PAPER } from "./paper";
 import type { PictureResult } from "./picture.worker";
-import { placeIn } from "./seafloor";
-import {
-  collection,
-  type Feature,
-  feature,
-  type Look,
-  layers,
-  line,
-  PAPER,
-  point,
-  type SourceName,
-  stripes,
-  style,
-} from "./style";
+import { Sheets } from "./sheets";
+import { imageOf, paintStill, type StillContent } from "./still";
 
 setWorkerUrl(workerUrl);
 
@@ -91,45 +64,60 @@ export interface Padding {
   left: number;
 }
 
-/** Every so many contours one is drawn stronger and labelled. */
-const MAIN_EVERY = 2;
+/** How near to a sounding a click has to be. */
+const SPOT_PX = 10;
+/** Of MapLibre's own canvas while there is nothing on it: without a graphics card every pixel of it costs time. */
+const EMPTY_RATIO = 0.1;
 
 export class Chart {
   readonly #map: MapLibreMap;
+  readonly #sheets: Sheets;
   readonly #pins = new Map<string, Marker>();
+  #look: Look;
+  #still: StillContent = { floor: null, area: null, keepOut: [], tracks: [] };
+  #lively: LivelyContent = NOTHING;
   #areaBounds: Bounds | null = null;
   #fitting: (() => Padding) | null = null;
-  /** The lines that are drawn reach beyond the window, so that most moves need no new ones. */
-  #grid: { step: number; bounds: Bounds } | null = null;
   #tiles = "";
 
   private constructor(
     map: MapLibreMap,
+    look: Look,
     readonly hooks: ChartHooks,
   ) {
     this.#map = map;
+    this.#look = look;
+    this.#sheets = new Sheets(
+      map,
+      (context, at) => paintStill(context, at, this.#sheets.projection, this.#still, PAPER[this.#look]),
+      (context, at) => paintLively(context, at, this.#lively, PAPER[this.#look]),
+    );
     map.on("mousemove", (e) => hooks.onCursor([e.lngLat.lng, e.lngLat.lat]));
     map.on("mouseout", () => hooks.onCursor(null));
     map.on("click", (e) => {
       hooks.onCursor([e.lngLat.lng, e.lngLat.lat]);
-      const [spot] = map.queryRenderedFeatures(e.point, { layers: ["soundings"] });
-      if (spot) hooks.onSpot(Number(spot.properties.id));
+      const spot = this.#spotAt(e.point.x, e.point.y);
+      if (spot) hooks.onSpot(spot.id);
       else hooks.onClick([e.lngLat.lng, e.lngLat.lat]);
     });
-    map.on("move", this.#drawGrid);
-    map.on("resize", this.#drawGrid);
+    map.on("move", this.#tellFrame);
+    map.on("resize", this.#tellFrame);
     map.on("resize", this.#fitAgain);
     map.on("movestart", (e) => {
       if ("originalEvent" in e && e.originalEvent) this.#fitting = null;
     });
-    this.#drawGrid();
+    this.#tellFrame();
   }
 
   /** Makes the map inside an element; resolves when it can be drawn on. */
   static create(container: HTMLElement, centre: LngLat, look: Look, hooks: ChartHooks): Promise<Chart> {
     const map = new MapLibreMap({
       container,
-      style: style(look),
+      style: {
+        version: 8,
+        sources: {},
+        layers: [{ id: "sea", type: "background", paint: { "background-color": PAPER[look].sea } }],
+      },
       center: centre,
       zoom: 18,
       minZoom: 2,
@@ -140,21 +128,14 @@ export class Chart {
       touchPitch: false,
       attributionControl: false,
       fadeDuration: 0,
-      // Smooth edges cost a machine that draws without a graphics card six times as much as everything else.
-      canvasContextAttributes: { antialias: !drawsInSoftware() },
+      pixelRatio: EMPTY_RATIO,
+      canvasContextAttributes: { antialias: false },
     });
     map.touchZoomRotate.disableRotation();
     map.keyboard.disableRotation();
     map.addControl(new NavigationControl({ showCompass: false }), "bottom-right");
     map.addControl(new ScaleControl({ maxWidth: 140, unit: "metric" }), "bottom-left");
-    return new Promise((resolve) =>
-      map.once("style.load", () => {
-        for (const [name, { keepOut }] of Object.entries(PAPER)) {
-          map.addImage(`forbidden-${name}`, stripes([[keepOut, 0.75, 4, 0]], 24), { pixelRatio: 2 });
-        }
-        resolve(new Chart(map, hooks));
-      }),
-    );
+    return new Promise((resolve) => map.once("style.load", () => resolve(new Chart(map, look, hooks))));
   }
 
   destroy(): void {
@@ -167,11 +148,9 @@ export class Chart {
   }
 
   setLook(look: Look): void {
-    for (const { id, ...spec } of layers(look)) {
-      for (const [property, value] of Object.entries("paint" in spec ? (spec.paint ?? {}) : {})) {
-        this.#map.setPaintProperty(id, property as keyof AllPaintProperties, value);
-      }
-    }
+    this.#look = look;
+    this.#map.setPaintProperty("sea", "background-color", PAPER[look].sea);
+    this.#sheets.redraw();
   }
 
   /** Charts under everything else, from a server of raster tiles; none without an address. */
@@ -180,6 +159,7 @@ export class Chart {
     if (this.#map.getLayer("tiles")) this.#map.removeLayer("tiles");
     if (this.#map.getSource("tiles")) this.#map.removeSource("tiles");
     this.#tiles = address;
+    this.#map.setPixelRatio(address ? devicePixelRatio : EMPTY_RATIO);
     if (!address) return;
     this.#map.addSource(
       "tiles",
@@ -187,23 +167,16 @@ export class Chart {
         ? { type: "raster", url: address, tileSize: 256 }
         : { type: "raster", tiles: [address], tileSize: 256, maxzoom: 19 },
     );
-    this.#map.addLayer({ id: "tiles", type: "raster", source: "tiles" }, "sea-floor");
+    this.#map.addLayer({ id: "tiles", type: "raster", source: "tiles" });
   }
 
   setMission(area: PolygonGeometry | null, keepOut: readonly PolygonGeometry[]): void {
-    this.#set("area", area ? [feature(area)] : []);
-    this.#set(
-      "keep-out",
-      keepOut.map((zone) => feature(zone)),
-    );
     this.#areaBounds = boundsOf(area?.coordinates[0] ?? []);
+    this.#lay({ area, keepOut });
   }
 
   setDraft(area: PolygonGeometry | null, keepOut: readonly PolygonGeometry[]): void {
-    this.#set("draft", [
-      ...(area ? [feature(area, { kind: "area" })] : []),
-      ...keepOut.map((zone) => feature(zone, { kind: "keep-out" })),
-    ]);
+    this.#show({ draft: { area, keepOut } });
   }
 
   /** Shows the mission's area with room for what lies over the map's edges, and goes on to until the map is moved. */
@@ -227,77 +200,49 @@ export class Chart {
     scale: number,
     interval: number,
   ): void {
-    this.#layout("sea-floor", "visibility", picture ? "visible" : "none");
-    if (!picture) {
-      this.#set("contours", []);
-      return;
-    }
-    (this.#map.getSource("sea-floor") as ImageSource).updateImage({
-      image: new ImageData(picture.pixels, picture.width, picture.height),
-      coordinates: corners.slice(0, 4) as [LngLat, LngLat, LngLat, LngLat],
-    });
-    const digits = Math.max(0, -Math.floor(Math.log10(interval / scale) + 1e-9));
-    this.#set(
-      "contours",
-      picture.contours.map(({ level, points }) => {
-        const places = points.map(([col, row]) => placeIn(corners, col / cols, row / rows));
-        const main = Math.round(level / interval) % MAIN_EVERY === 0;
-        return {
-          type: "Feature",
-          geometry: line(places),
-          properties: { main, label: (level / scale).toFixed(digits) },
-        } as unknown as Feature;
-      }),
-    );
+    if (!picture && !this.#still.floor) return;
+    const floor = picture && {
+      corners,
+      rows,
+      cols,
+      image: imageOf(picture, this.#still.floor?.image),
+      contours: picture.contours,
+      scale,
+      interval,
+    };
+    this.#lay({ floor });
   }
 
   /** The long part of the vehicles' ways; changes seldom. */
   setTracks(tracks: readonly Track[]): void {
-    this.#set("tracks", lines(tracks));
+    this.#lay({ tracks });
   }
 
   /** The newest part of the vehicles' ways. */
-  setTails(tracks: readonly Track[]): void {
-    this.#set("tails", lines(tracks));
+  setTails(tails: readonly Track[]): void {
+    this.#show({ tails });
   }
 
   setRoutes(routes: readonly Route[]): void {
-    this.#set(
-      "routes",
-      routes.map((r) =>
-        feature(line(r.points), { colour: r.colour, state: r.acknowledged ? "acknowledged" : "sent" }),
-      ),
-    );
-    this.#set(
-      "arrival",
-      routes.flatMap(({ points, colour, arrivalRadius_m }) => {
-        const to = points.at(-1);
-        return to ? [feature(line(circle(to, arrivalRadius_m)), { colour })] : [];
-      }),
-    );
+    this.#show({ routes });
   }
 
   /** How far each vehicle's messages reach. */
-  setRanges(rings: readonly { at: LngLat; radius_m: number; colour: string }[]): void {
-    this.#set(
-      "com-range",
-      rings.map(({ at, radius_m, colour }) => feature(line(circle(at, radius_m, 72)), { colour })),
-    );
+  setRanges(ranges: LivelyContent["ranges"]): void {
+    this.#show({ ranges });
   }
 
   setSpots(spots: readonly Spot[]): void {
-    this.#set(
-      "soundings",
-      spots.map(({ id, at, state, chosen }) => feature(point(at), { id, state, chosen: chosen ? 1 : 0 })),
-    );
+    this.#show({ spots });
   }
 
-  setMeasure(points: readonly LngLat[]): void {
-    this.#set("measure", [
-      ...(points.length > 1 ? [feature(line(points))] : []),
-      ...points.map((at) => feature(point(at))),
-    ]);
-    this.#map.getCanvas().style.cursor = points.length > 0 ? "crosshair" : "";
+  setMeasure(measure: readonly LngLat[]): void {
+    this.#show({ measure });
+    this.#map.getCanvas().style.cursor = measure.length > 0 ? "crosshair" : "";
+  }
+
+  setSketch(sketch: Sketch | null): void {
+    this.#show({ sketch });
   }
 
   setPins(pins: readonly Pin[]): void {
@@ -320,12 +265,25 @@ export class Chart {
     }
   }
 
-  #set(name: SourceName, features: Feature[]): void {
-    void (this.#map.getSource(name) as GeoJSONSource).setData(collection(features));
+  #lay(content: Partial<StillContent>): void {
+    this.#still = { ...this.#still, ...content };
+    this.#sheets.redraw();
   }
 
-  #layout(id: string, property: keyof AllLayoutProperties, value: string): void {
-    if (this.#map.getLayoutProperty(id, property) !== value) this.#map.setLayoutProperty(id, property, value);
+  #show(content: Partial<LivelyContent>): void {
+    this.#lively = { ...this.#lively, ...content };
+    this.#sheets.refresh();
+  }
+
+  #spotAt(x: number, y: number): Spot | null {
+    const at = this.#sheets.projection;
+    let nearest: Spot | null = null;
+    let least = SPOT_PX;
+    for (const spot of this.#lively.spots) {
+      const away = Math.hypot(at.x(spot.at[0]) - x, at.y(spot.at[1]) - y);
+      if (away <= least) [nearest, least] = [spot, away];
+    }
+    return nearest;
   }
 
   #fitAgain = (): void => {
@@ -334,39 +292,16 @@ export class Chart {
     }
   };
 
-  #drawGrid = (): void => {
-    const map = this.#map;
-    const box = map.getBounds();
-    const bounds: Bounds = [box.getWest(), box.getSouth(), box.getEast(), box.getNorth()];
-    const step = graticuleStep(bounds);
-    if (this.#grid?.step !== step || !contains(this.#grid.bounds, bounds)) {
-      this.#grid = { step, bounds: grown(bounds, 1) };
-      const [west, south, east, north] = this.#grid.bounds;
-      const { meridians, parallels } = graticule(this.#grid.bounds, step);
-      const across = (a: LngLat, b: LngLat) => feature(line([a, b]));
-      this.#set("grid", [
-        ...meridians.map((lng) => across([lng, south], [lng, north])),
-        ...parallels.map((lat) => across([west, lat], [east, lat])),
-      ]);
-    }
-    const centre = map.getCenter();
-    this.hooks.onCentre([centre.lng, centre.lat]);
+  #tellFrame = (): void => {
+    const at = this.#sheets.projection;
+    const [west, north] = at.place(0, 0);
+    const [east, south] = at.place(at.width, at.height);
+    const bounds: Bounds = [west, south, east, north];
+    this.hooks.onCentre(at.camera.centre);
     this.hooks.onFrame({
-      ...graticule(bounds, step),
-      xOf: (lng) => map.project([lng, centre.lat]).x,
-      yOf: (lat) => map.project([centre.lng, lat]).y,
+      ...graticule(bounds, graticuleStep(bounds)),
+      xOf: (lng) => at.x(lng),
+      yOf: (lat) => at.y(lat),
     });
   };
 }
-
-/** Whether the browser draws without a graphics card. */
-function drawsInSoftware(): boolean {
-  const gl = document.createElement("canvas").getContext("webgl2");
-  const names = gl?.getExtension("WEBGL_debug_renderer_info");
-  const name = gl && names ? String(gl.getParameter(names.UNMASKED_RENDERER_WEBGL)) : "";
-  gl?.getExtension("WEBGL_lose_context")?.loseContext();
-  return /swiftshader|llvmpipe|software|basic render/i.test(name);
-}
-
-const lines = (tracks: readonly Track[]) =>
-  tracks.flatMap((t) => pieces(t.points).map((piece) => feature(line(piece), { colour: t.colour })));

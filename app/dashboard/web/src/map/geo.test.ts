@@ -1,15 +1,6 @@
 import { describe, expect, it } from "vitest";
 import type { LngLat } from "../api/types";
-import {
-  boundsOf,
-  contains,
-  graticule,
-  graticuleStep,
-  grown,
-  metresPerDegree,
-  pieces,
-  rectangle,
-} from "./geo";
+import { boundsOf, graticule, graticuleStep, metresPerDegree, rectangle } from "./geo";
 
 describe("metres per degree", () => {
   it.each([
@@ -56,24 +47,3 @@ describe("the graticule", () => {
   );
 });
 
-it("grown bounds contain the old ones, not the other way round", () => {
-  const bounds = [1, 2, 3, 4] as [number, number, number, number];
-  expect(contains(grown(bounds, 0.5), bounds)).toBe(true);
-  expect(contains(bounds, grown(bounds, 0.5))).toBe(false);
-});
-
-describe("pieces of a line", () => {
-  const line = Array.from({ length: 25 }, (_, i): LngLat => [i, 0]);
-
-  it.each([2, 3, 7, 24, 25, 26])("of at most %i points touch and make up the whole", (most) => {
-    const parts = pieces(line, most);
-    expect(Math.max(...parts.map((part) => part.length))).toBeLessThanOrEqual(most);
-    for (let i = 1; i < parts.length; i++) expect(parts[i]?.[0]).toEqual(parts[i - 1]?.at(-1));
-    expect([...(parts[0] ?? []), ...parts.slice(1).flatMap((part) => part.slice(1))]).toEqual(line);
-  });
-
-  it("do not exist for fewer than two points", () => {
-    expect(pieces([])).toEqual([]);
-    expect(pieces([[1, 1]])).toEqual([]);
-  });
-});

@@ -84,27 +84,8 @@ export function graticule([west, south, east, north]: Bounds, step: number): Gra
   return { meridians: multiples(west, east, step), parallels: multiples(south, north, step), decimals };
 }
 
-/** Bounds grown by a share of their size on every side. */
-export function grown([west, south, east, north]: Bounds, share: number): Bounds {
-  const x = (east - west) * share;
-  const y = (north - south) * share;
-  return [west - x, south - y, east + x, north + y];
-}
-
-export function contains(outer: Bounds, inner: Bounds): boolean {
-  return outer[0] <= inner[0] && outer[1] <= inner[1] && outer[2] >= inner[2] && outer[3] >= inner[3];
-}
-
 function multiples(low: number, high: number, step: number): number[] {
   const first = Math.ceil(low / step);
   const last = Math.floor(high / step);
   return Array.from({ length: Math.max(0, last - first + 1) }, (_, i) => (first + i) * step);
-}
-
-/** A line as several shorter ones that touch: a line of too many points does not fit into one buffer of the map. */
-export function pieces(line: readonly LngLat[], most = 1000): (readonly LngLat[])[] {
-  const count = Math.ceil((line.length - 1) / (most - 1));
-  return Array.from({ length: Math.max(0, count) }, (_, i) =>
-    line.slice(i * (most - 1), (i + 1) * (most - 1) + 1),
-  );
 }

@@ -8,8 +8,8 @@ import { contourInterval } from "../map/contours";
 import { KINDS, paletteOf } from "../map/layers";
 import { Painter } from "../map/painter";
 import { lookupTable } from "../map/palette";
+import type { Look } from "../map/paper";
 import type { SeaFloor } from "../map/seafloor";
-import type { Look } from "../map/style";
 import { replayed } from "../state/replay";
 import {
   chosenSounding,

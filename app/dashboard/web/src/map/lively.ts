@@ -1,0 +1,92 @@
+/** What moves on the map, or is being pointed at: the newest ways, routes, ranges, soundings, what is being drawn. */
+
+import type { LngLat, PolygonGeometry } from "../api/types";
+import type { Route, Spot, Track } from "./chart";
+import { circle } from "./geo";
+import type { Paper } from "./paper";
+import { dot, line, stroke, trace, way } from "./pen";
+import type { Projection } from "./projection";
+
+const SKETCH = "#1d5c94";
+
+/** What is under the hand while an area is drawn or its corners are dragged. */
+export interface Sketch {
+  lines: readonly (readonly LngLat[])[];
+  handles: readonly { at: LngLat; strong: boolean }[];
+}
+
+export interface LivelyContent {
+  draft: { area: PolygonGeometry | null; keepOut: readonly PolygonGeometry[] };
+  ranges: readonly { at: LngLat; radius_m: number; colour: string }[];
+  tails: readonly Track[];
+  routes: readonly Route[];
+  spots: readonly Spot[];
+  measure: readonly LngLat[];
+  sketch: Sketch | null;
+}
+
+export const NOTHING: LivelyContent = {
+  draft: { area: null, keepOut: [] },
+  ranges: [],
+  tails: [],
+  routes: [],
+  spots: [],
+  measure: [],
+  sketch: null,
+};
+
+const SPOT_COLOURS: Record<string, string> = { restored: "#ffffff", doubted: "#ffd24d" };
+
+export function paintLively(
+  context: CanvasRenderingContext2D,
+  at: Projection,
+  content: LivelyContent,
+  paper: Paper,
+): void {
+  const { draft, ranges, tails, routes, spots, measure, sketch } = content;
+  context.lineJoin = context.lineCap = "round";
+  for (const ring of draft.area?.coordinates ?? []) {
+    line(context, at, ring as LngLat[], { colour: paper.area, width: 2.5, dash: [5, 5] });
+  }
+  for (const zone of draft.keepOut) {
+    for (const ring of zone.coordinates) {
+      line(context, at, ring as LngLat[], { colour: paper.keepOut, width: 2.5, dash: [5, 5] });
+    }
+  }
+  for (const { at: place, radius_m, colour } of ranges) {
+    line(context, at, circle(place, radius_m, 72), { colour, width: 1, dash: [4, 3] });
+  }
+  for (const tail of tails) way(context, at, tail, paper.casing);
+  for (const { points, colour, acknowledged, arrivalRadius_m } of routes) {
+    const to = points.at(-1);
+    if (to) line(context, at, circle(to, arrivalRadius_m), { colour, width: 1.5, opacity: 0.8 });
+    line(context, at, points, acknowledged ? { colour, width: 2.5 } : { colour, width: 2, dash: [3, 4] });
+  }
+  for (const { at: place, state, chosen } of spots) {
+    const edge = { colour: "#10181d", width: chosen ? 3 : 1.5 };
+    dot(context, at, place, chosen ? 9 : 5.5, SPOT_COLOURS[state] ?? "#e0452f", edge);
+  }
+  if (measure.length > 0) {
+    context.beginPath();
+    trace(context, at, measure);
+    stroke(context, { colour: paper.casing, width: 5 });
+    stroke(context, { colour: paper.ink, width: 2 });
+    for (const place of measure) dot(context, at, place, 4, paper.casing, { colour: paper.ink, width: 2 });
+  }
+  if (sketch) paintSketch(context, at, sketch);
+}
+
+function paintSketch(context: CanvasRenderingContext2D, at: Projection, { lines, handles }: Sketch): void {
+  for (const ring of lines) {
+    context.beginPath();
+    trace(context, at, ring);
+    context.globalAlpha = 0.18;
+    context.fillStyle = SKETCH;
+    context.fill();
+    stroke(context, { colour: SKETCH, width: 3 });
+  }
+  for (const { at: place, strong } of handles) {
+    const edge = { colour: SKETCH, width: 2, opacity: strong ? 1 : 0.7 };
+    dot(context, at, place, strong ? 6.5 : 4, strong ? "#ffffff" : "#cfe0ee", edge);
+  }
+}

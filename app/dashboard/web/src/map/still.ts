@@ -1,0 +1,177 @@
+/** What lies still on the map: the sea floor with its contours, the grid, area and zones, where vehicles have been. */
+
+import type { LngLat, PolygonGeometry } from "../api/types";
+import type { Track } from "./chart";
+import type { Contour } from "./contours";
+import { graticule, graticuleStep } from "./geo";
+import { type Paper, striped } from "./paper";
+import { line, stroke, trace, way } from "./pen";
+import type { PictureResult } from "./picture.worker";
+import type { Projection } from "./projection";
+import { labelPlaces, type Pixel, simplified } from "./strokes";
+
+const INK = "#0b1b24";
+const HALO = "rgba(255,255,255,0.85)";
+const LABEL_PX = 12;
+const LABEL_SPACING_PX = 260;
+/** Free room around a label. */
+const LABEL_PADDING_PX = 8;
+/** Every so many contours one is drawn stronger and labelled. */
+const MAIN_EVERY = 2;
+
+export interface FloorPicture {
+  corners: readonly LngLat[];
+  rows: number;
+  cols: number;
+  image: HTMLCanvasElement;
+  contours: readonly Contour[];
+  /** Contours' levels are whole numbers: so many make a metre. */
+  scale: number;
+  interval: number;
+}
+
+export interface StillContent {
+  floor: FloorPicture | null;
+  area: PolygonGeometry | null;
+  keepOut: readonly PolygonGeometry[];
+  tracks: readonly Track[];
+}
+
+/** A picture as something that can be drawn again and again. */
+export function imageOf(picture: PictureResult, before: HTMLCanvasElement | undefined): HTMLCanvasElement {
+  const canvas = before ?? document.createElement("canvas");
+  if (canvas.width !== picture.width || canvas.height !== picture.height) {
+    canvas.width = picture.width;
+    canvas.height = picture.height;
+  }
+  canvas.getContext("2d")?.putImageData(new ImageData(picture.pixels, picture.width, picture.height), 0, 0);
+  return canvas;
+}
+
+export function paintStill(
+  context: CanvasRenderingContext2D,
+  at: Projection,
+  window: Projection,
+  { floor, area, keepOut, tracks }: StillContent,
+  paper: Paper,
+): void {
+  context.lineCap = context.lineJoin = "round";
+  if (floor) paintFloor(context, at, floor);
+  paintGrid(context, at, window, paper);
+  for (const zone of keepOut) {
+    const pattern = context.createPattern(striped(paper.keepOut), "repeat");
+    context.beginPath();
+    for (const ring of zone.coordinates) trace(context, at, ring as LngLat[], true);
+    if (pattern) context.fillStyle = pattern;
+    context.fill("evenodd");
+    stroke(context, { colour: paper.keepOut, width: 2 });
+  }
+  for (const ring of area?.coordinates ?? []) {
+    line(context, at, ring as LngLat[], { colour: paper.area, width: 2 }, true);
+  }
+  for (const track of tracks) way(context, at, track, paper.casing);
+}
+
+function paintFloor(context: CanvasRenderingContext2D, at: Projection, floor: FloorPicture): void {
+  const [northWest, northEast, , southWest] = floor.corners.map(
+    ([lng, lat]): Pixel => [at.x(lng), at.y(lat)],
+  );
+  if (!northWest || !northEast || !southWest) return;
+  const { image, rows, cols } = floor;
+  // The grid is a parallelogram: its picture's pixels, and its columns and rows, become those of the sheet.
+  const east: Pixel = [northEast[0] - northWest[0], northEast[1] - northWest[1]];
+  const south: Pixel = [southWest[0] - northWest[0], southWest[1] - northWest[1]];
+  context.save();
+  context.transform(
+    east[0] / image.width,
+    east[1] / image.width,
+    south[0] / image.height,
+    south[1] / image.height,
+    northWest[0],
+    northWest[1],
+  );
+  // Enlarged, cells stay cells.
+  context.imageSmoothingEnabled = Math.hypot(...east) < image.width;
+  context.drawImage(image, 0, 0);
+  context.restore();
+  const pixel = ([col, row]: [number, number]): Pixel => {
+    const [u, v] = [col / cols, 1 - row / rows];
+    return [northWest[0] + u * east[0] + v * south[0], northWest[1] + u * east[1] + v * south[1]];
+  };
+  paintContours(context, at, floor, pixel);
+}
+
+function paintContours(
+  context: CanvasRenderingContext2D,
+  at: Projection,
+  { contours, interval, scale }: FloorPicture,
+  pixel: (place: [number, number]) => Pixel,
+): void {
+  const lines = contours.map(({ level, points }) => ({
+    level,
+    main: Math.round(level / interval) % MAIN_EVERY === 0,
+    points: simplified(points.length, (i) => pixel(points[i] as [number, number])),
+  }));
+  for (const main of [false, true]) {
+    context.beginPath();
+    for (const one of lines) {
+      if (one.main !== main) continue;
+      one.points.forEach(([x, y], i) => {
+        if (i === 0) context.moveTo(x, y);
+        else context.lineTo(x, y);
+      });
+    }
+    stroke(context, { colour: INK, width: main ? 1.4 : 0.7, opacity: 0.75 });
+  }
+  context.font = `${LABEL_PX}px system-ui, sans-serif`;
+  context.textAlign = "center";
+  context.textBaseline = "middle";
+  const digits = Math.max(0, -Math.floor(Math.log10(interval / scale) + 1e-9));
+  const taken: { x: number; y: number; radius: number }[] = [];
+  for (const { level, main, points } of lines) {
+    if (!main) continue;
+    const label = (level / scale).toFixed(digits);
+    const width = context.measureText(label).width;
+    const radius = width / 2 + LABEL_PADDING_PX;
+    for (const { x, y, angle } of labelPlaces(points, width, LABEL_SPACING_PX)) {
+      if (x < 0 || y < 0 || x > at.width || y > at.height) continue;
+      if (taken.some((other) => Math.hypot(other.x - x, other.y - y) < other.radius + radius)) continue;
+      taken.push({ x, y, radius });
+      context.save();
+      context.translate(x, y);
+      context.rotate(angle);
+      context.lineWidth = 3.2;
+      context.setLineDash([]);
+      context.strokeStyle = HALO;
+      context.strokeText(label, 0, 0);
+      context.fillStyle = INK;
+      context.fillText(label, 0, 0);
+      context.restore();
+    }
+  }
+}
+
+/** The lines lie where the window's labels say, and reach over the whole sheet. */
+function paintGrid(
+  context: CanvasRenderingContext2D,
+  at: Projection,
+  window: Projection,
+  paper: Paper,
+): void {
+  const bounds = (of: Projection) => {
+    const [west, north] = of.place(0, 0);
+    const [east, south] = of.place(of.width, of.height);
+    return [west, south, east, north] as [number, number, number, number];
+  };
+  const { meridians, parallels } = graticule(bounds(at), graticuleStep(bounds(window)));
+  context.beginPath();
+  for (const lng of meridians) {
+    context.moveTo(at.x(lng), 0);
+    context.lineTo(at.x(lng), at.height);
+  }
+  for (const lat of parallels) {
+    context.moveTo(0, at.y(lat));
+    context.lineTo(at.width, at.y(lat));
+  }
+  stroke(context, { colour: paper.grid, width: 1, opacity: 0.7 });
+}
