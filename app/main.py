@@ -137,6 +137,8 @@ class Server(uvicorn.Server):
                 access_log=False,
                 timeout_graceful_shutdown=GRACE_S,
                 server_header=False,
+                # Messages are small; to deflate each of them for each viewer costs more than all else of the live view.
+                ws_per_message_deflate=False,
             )
         )
         self._app = app

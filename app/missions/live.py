@@ -1,6 +1,7 @@
 """The side of a mission that lives in memory: its map, its journal, its vehicles' reports and its watchers."""
 
 import asyncio
+import math
 from collections.abc import Callable
 from concurrent.futures import Executor
 from dataclasses import dataclass
@@ -35,6 +36,7 @@ from app.missions.maps import MapSnapshot, MissionFacts
 from app.missions.members import Member, Team
 from app.missions.spec import MissionSpec, VehicleSpec
 from app.missions.states import MissionState
+from app.missions.trails import Trails
 from app.missions.views import (
     MapMessage,
     MissionSummary,
@@ -102,6 +104,7 @@ class LiveMission:
         self.revision = 0
         """Counts changes of what the map is shown with."""
         self.tiles = TileCache()
+        self.trails = Trails(database, row.id)
         self.journal = Journal(database, row.id, self.gate, counts, self.broadcaster, self.builder.add)
         self.changed = asyncio.Event()
         """Set whenever a vehicle reported something that the step loop may be waiting for."""
@@ -368,7 +371,7 @@ class LiveMission:
             mission_id=self.id,
             link=info.state,
             reason=member.refusal or info.reason,
-            age_s=info.age_s,
+            age_s=rounded(info.age_s, 2),
             address=info.address,
             imc_id=info.imc_id,
             surfacing=member.surfacing,
@@ -379,16 +382,17 @@ class LiveMission:
         place = self.local_place(position)
         return view.model_copy(
             update={
-                "lat_deg": position.lat_deg,
-                "lon_deg": position.lon_deg,
+                # No more digits than mean anything: this goes to every viewer several times a second.
+                "lat_deg": round(position.lat_deg, 8),
+                "lon_deg": round(position.lon_deg, 8),
                 "east_m": place and round(place[0], 3),
                 "north_m": place and round(place[1], 3),
-                "depth_m": position.depth_m,
-                "altitude_m": report.altitude_m,
-                "heading_deg": None if report.heading_rad is None else float(np.degrees(report.heading_rad) % 360),
-                "speed_mps": report.speed_mps,
-                "battery_pct": report.battery_pct,
-                "position_sd_m": report.position_sd_m,
+                "depth_m": round(position.depth_m, 3),
+                "altitude_m": rounded(report.altitude_m, 3),
+                "heading_deg": rounded(report.heading_rad and math.degrees(report.heading_rad) % 360, 2),
+                "speed_mps": rounded(report.speed_mps, 3),
+                "battery_pct": rounded(report.battery_pct, 2),
+                "position_sd_m": rounded(report.position_sd_m, 3),
             }
         )
 
@@ -416,6 +420,11 @@ class LiveMission:
             self._ticker.cancel()
             await asyncio.gather(self._ticker, return_exceptions=True)
         await self.journal.close()
+
+
+def rounded(value: float | None, digits: int) -> float | None:
+    """Return a value with so many decimals; None stays."""
+    return None if value is None else round(value, digits)
 
 
 def _last_report(row: PositionRow | None) -> VehicleReport | None:

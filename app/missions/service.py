@@ -60,6 +60,7 @@ from app.missions.reviewing import rule, soundings_page
 from app.missions.settings import ServiceSettings
 from app.missions.spec import MissionSpec, SoundSpeed, VehicleKind, VehicleSpec
 from app.missions.states import ENDED, MissionState
+from app.missions.trails import Trail
 from app.missions.views import (
     ActionView,
     BatchVerdict,
@@ -95,7 +96,6 @@ from app.storage.models import MissionRow, MissionVehicleRow, SoundingRow
 
 Action = Literal["start", "pause", "resume", "abort", "finish"]
 
-MAX_TRACK_POINTS = 5000
 ENDED_MISSIONS_IN_MEMORY = 8
 WORKERS = 2
 
@@ -542,12 +542,9 @@ class MissionService:
         async with self._database.reading() as session:
             return await sounding_queries.all_soundings(session, mission_id)
 
-    async def tracks(self, mission_id: str) -> dict[str, list[tuple[float, float]]]:
-        """Return each vehicle's track, thinned, as (longitude, latitude)."""
-        await self._get(mission_id)
-        async with self._database.reading() as session:
-            tracks = await mission_queries.tracks(session, mission_id)
-        return {name: track[:: -(-len(track) // MAX_TRACK_POINTS)] for name, track in tracks.items()}
+    async def tracks(self, mission_id: str) -> dict[str, Trail]:
+        """Return each vehicle's track as (longitude, latitude, depth), without the places that nobody would miss."""
+        return await (await self._get(mission_id)).trails.newest()
 
     async def events(self, mission_id: str, *, after: int = 0, limit: int = 1000) -> list[EventView]:
         """Return up to ``limit`` lines of the log with an id above ``after``, oldest first."""
@@ -662,7 +659,7 @@ class MissionService:
         )
 
     async def _snapshot(self, live: LiveMission) -> SnapshotMessage:
-        tracks = await self.tracks(live.id)
+        tracks = await live.trails.newest()
         async with self._database.reading() as session:
             last_event_id = await event_queries.last_event_id(session, live.id)
         built = live.builder.newest

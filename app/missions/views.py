@@ -470,8 +470,8 @@ class SnapshotMessage(View):
 
     type: Literal["snapshot"] = "snapshot"
     mission: MissionView
-    tracks: dict[str, list[tuple[float, float]]] = Field(
-        description="Per vehicle its track so far, thinned, [longitude, latitude]"
+    tracks: dict[str, list[tuple[float, float, float]]] = Field(
+        description="Per vehicle its track so far as [longitude, latitude, depth], to within 0.2 m"
     )
     map_version: int
     last_event_id: int

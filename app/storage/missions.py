@@ -121,6 +121,23 @@ async def tracks(session: AsyncSession, mission_id: str) -> dict[str, list[tuple
     return result
 
 
+async def positions_after(session: AsyncSession, mission_id: str, after_id: int) -> Sequence[Any]:
+    """Return places that were written after the one of this id, oldest first."""
+    query = (
+        select(
+            PositionRow.id,
+            PositionRow.vehicle,
+            PositionRow.time_s,
+            PositionRow.lon_deg,
+            PositionRow.lat_deg,
+            PositionRow.depth_m,
+        )
+        .where(PositionRow.mission_id == mission_id, PositionRow.id > after_id)
+        .order_by(PositionRow.id)
+    )
+    return (await session.execute(query)).all()
+
+
 async def last_positions(session: AsyncSession, mission_id: str) -> dict[str, PositionRow]:
     """Return each vehicle's newest position by its own clock; what a log brought later may be older."""
     newest = (

@@ -15,7 +15,8 @@ PATIENCE_MS = 90_000
 """Only how long a missing thing is waited for: the first map waits for numba to compile."""
 
 
-@pytest.fixture(scope="module")
+# One service for all files that a process runs: its start and the compiling of its first map are most of their time.
+@pytest.fixture(scope="session")
 def service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Service]:
     if not (STATIC / "index.html").is_file():
         pytest.skip("the dashboard is not built: 'pip install -e .' builds it")
@@ -35,6 +36,18 @@ def browser() -> Iterator[Browser]:
         chromium = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
         yield chromium
         chromium.close()
+
+
+@pytest.fixture(autouse=True)
+def nothing_goes_on(request: pytest.FixtureRequest) -> Iterator[None]:
+    """Vehicles are free for the next test, and nobody steers for nothing."""
+    yield
+    if "service" not in request.fixturenames:
+        return
+    service: Service = request.getfixturevalue("service")
+    for mission in service.get("/missions"):
+        if mission["state"] in ("running", "paused"):
+            service.act(mission["id"], "abort")
 
 
 class Watched:

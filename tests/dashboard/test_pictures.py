@@ -10,7 +10,7 @@ from PIL import Image
 from playwright.sync_api import Page, expect
 
 from .service import Service
-from .test_flows import by_id, show
+from .steps import by_id, show
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(400)]
 

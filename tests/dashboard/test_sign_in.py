@@ -1,9 +1,29 @@
+from collections.abc import Iterator
+
 import pytest
 from playwright.sync_api import Page, expect
+
+from app.dashboard.serve import STATIC
 
 from .service import Service
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(400)]
+
+
+@pytest.fixture(scope="module")
+def service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Service]:
+    """A service of its own: once it has a token it asks everyone for one."""
+    if not (STATIC / "index.html").is_file():
+        pytest.skip("the dashboard is not built: 'pip install -e .' builds it")
+    running = Service(tmp_path_factory.mktemp("guarded"))
+    running.start()
+    yield running
+    running.kill()
+
+
+@pytest.fixture(autouse=True)
+def nothing_goes_on() -> None:
+    """No vehicle is engaged here, and the service would ask for a token."""
 
 
 def test_a_service_with_tokens_asks_for_one_and_takes_it(page: Page, service: Service) -> None:

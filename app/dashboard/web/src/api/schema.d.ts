@@ -2045,10 +2045,11 @@ export interface components {
             mission: components["schemas"]["MissionView"];
             /**
              * Tracks
-             * @description Per vehicle its track so far, thinned, [longitude, latitude]
+             * @description Per vehicle its track so far as [longitude, latitude, depth], to within 0.2 m
              */
             tracks: {
                 [key: string]: [
+                    number,
                     number,
                     number
                 ][];

@@ -8,6 +8,8 @@ type Schemas = components["schemas"];
 type Complete<T> = T extends object ? { [K in keyof T]-?: Complete<T[K]> } : T;
 
 export type LngLat = [longitude: number, latitude: number];
+/** A place where something was, with its depth in metres where that is known. */
+export type Place = readonly [longitude: number, latitude: number, depth_m?: number | undefined];
 
 export type MissionState = Schemas["MissionState"];
 export type LinkState = Schemas["LinkState"];

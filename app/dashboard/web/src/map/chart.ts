@@ -6,7 +6,7 @@
 import "maplibre-gl/dist/maplibre-gl.css";
 import { Map as MapLibreMap, Marker, NavigationControl, ScaleControl, setWorkerUrl } from "maplibre-gl";
 import workerUrl from "maplibre-gl/dist/maplibre-gl-worker.mjs?url";
-import type { LngLat, PolygonGeometry } from "../api/types";
+import type { LngLat, Place, PolygonGeometry } from "../api/types";
 import { type Bounds, boundsOf, type Graticule, graticule, graticuleStep } from "./geo";
 import { type LivelyContent, NOTHING, paintLively, type Sketch } from "./lively";
 import { type Look, PAPER } from "./paper";
@@ -18,7 +18,7 @@ setWorkerUrl(workerUrl);
 
 /** Line on the map: a vehicle's track or its route to a waypoint. */
 export interface Track {
-  points: readonly LngLat[];
+  points: readonly Place[];
   colour: string;
 }
 
@@ -182,6 +182,11 @@ export class Chart {
   /** Shows the mission's area with room for what lies over the map's edges, and goes on to until the map is moved. */
   fit(padding: () => Padding): void {
     this.#fitting = padding;
+    this.#fitAgain();
+  }
+
+  /** What lies over the map has changed: shows the area in what is left of it, unless the map was moved by hand. */
+  refit(): void {
     this.#fitAgain();
   }
 

@@ -1,6 +1,6 @@
 /** Geometry on the ellipsoid, small areas only. */
 
-import type { LngLat, PolygonGeometry } from "../api/types";
+import type { LngLat, Place, PolygonGeometry } from "../api/types";
 import { niceStep } from "./palette";
 
 const WGS84_A = 6_378_137;
@@ -54,7 +54,7 @@ export function wayBetween(from: LngLat, to: LngLat): { metres: number; bearing_
 }
 
 /** A ring about a place, closed, as a line. */
-export function circle([lng, lat]: LngLat, radius_m: number, corners = 36): LngLat[] {
+export function circle([lng, lat]: Place, radius_m: number, corners = 36): LngLat[] {
   const scale = metresPerDegree(lat);
   return Array.from({ length: corners + 1 }, (_, i): LngLat => {
     const angle = (i * 2 * Math.PI) / corners;

@@ -1,6 +1,6 @@
 /** Lines and rings of places on a sheet. */
 
-import type { LngLat } from "../api/types";
+import type { LngLat, Place } from "../api/types";
 import type { Projection } from "./projection";
 import { simplified } from "./strokes";
 
@@ -15,11 +15,11 @@ export interface Stroke {
 export function trace(
   context: CanvasRenderingContext2D,
   at: Projection,
-  places: readonly LngLat[],
+  places: readonly Place[],
   closed = false,
 ): void {
   const points = simplified(places.length, (i) => {
-    const place = places[i] as LngLat;
+    const place = places[i] as Place;
     return [at.x(place[0]), at.y(place[1])];
   });
   points.forEach(([x, y], i) => {
@@ -44,7 +44,7 @@ export function stroke(
 export function line(
   context: CanvasRenderingContext2D,
   at: Projection,
-  places: readonly LngLat[],
+  places: readonly Place[],
   how: Stroke,
   closed = false,
 ): void {
@@ -72,7 +72,7 @@ export function dot(
 export function way(
   context: CanvasRenderingContext2D,
   at: Projection,
-  { points, colour }: { points: readonly LngLat[]; colour: string },
+  { points, colour }: { points: readonly Place[]; colour: string },
   casing: string,
 ): void {
   context.beginPath();

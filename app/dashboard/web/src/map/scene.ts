@@ -19,7 +19,7 @@ import {
   WebGLRenderer,
 } from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
-import type { LngLat } from "../api/types";
+import type { LngLat, Place } from "../api/types";
 import { colourAt, type Palette } from "./palette";
 import { cellOf, type SeaFloor, valueAt } from "./seafloor";
 
@@ -29,9 +29,8 @@ export interface SceneVehicle {
   place: LngLat | null;
   depth_m: number | null;
   heading_deg: number | null;
-  way: readonly LngLat[];
-  /** Of every place of the way; where they are not known it lies at the vehicle's depth. */
-  depths_m: readonly number[];
+  /** Where no depth is known it lies at the vehicle's. */
+  way: readonly Place[];
 }
 
 /** East is x, up is y, south is z; metres from the middle of the map. */
@@ -152,8 +151,8 @@ export class SeaFloorScene {
     const size = Math.max(map.rows, map.cols) * map.cell_m;
     for (const vehicle of vehicles) {
       const material = new LineBasicMaterial({ color: vehicle.colour });
-      const points = vehicle.way.flatMap((place, i) => {
-        const at = this.#at(map, place, vehicle.depths_m[i] ?? vehicle.depth_m ?? 0);
+      const points = vehicle.way.flatMap((place) => {
+        const at = this.#at(map, place, place[2] ?? vehicle.depth_m ?? 0);
         return at ? [at] : [];
       });
       if (points.length > 1) this.#fleet.add(new Line(new BufferGeometry().setFromPoints(points), material));
@@ -176,7 +175,7 @@ export class SeaFloorScene {
     this.#draw();
   }
 
-  #at(map: SeaFloor, place: LngLat, depth_m: number): Vector3 | null {
+  #at(map: SeaFloor, place: Place, depth_m: number): Vector3 | null {
     const cell = cellOf(map, place);
     return cell
       ? new Vector3((cell.col - map.cols / 2) * map.cell_m, -depth_m, (map.rows / 2 - cell.row) * map.cell_m)

@@ -1,6 +1,6 @@
 /** The map as this page holds it: whole numbers per cell and layer, kept up to date with the tiles that changed. */
 
-import type { LngLat } from "../api/types";
+import type { LngLat, Place } from "../api/types";
 
 export type LayerName = "depth" | "uncertainty" | "count" | "flags" | "slope" | "tvu_fraction" | "difference";
 
@@ -91,7 +91,7 @@ export interface CellReading {
 }
 
 /** Row and column of a place, with fractions; null outside the grid, which is a parallelogram between its corners. */
-export function cellOf(map: SeaFloor, [lng, lat]: LngLat): { row: number; col: number } | null {
+export function cellOf(map: SeaFloor, [lng, lat]: Place): { row: number; col: number } | null {
   const [northWest, , southEast, southWest] = map.corners;
   if (!northWest || !southEast || !southWest) return null;
   const eastward = [southEast[0] - southWest[0], southEast[1] - southWest[1]] as const;

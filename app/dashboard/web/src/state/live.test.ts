@@ -58,7 +58,7 @@ const mission = (id: string): MissionView =>
 const snapshot = (id: string): LiveMessage => ({
   type: "snapshot",
   mission: mission(id),
-  tracks: { a: [[1, 1]] },
+  tracks: { a: [[1, 1, 2]] },
   map_version: 4,
   last_event_id: 0,
 });
@@ -95,15 +95,15 @@ describe("live messages", () => {
       3000,
     );
     expect(moved.tracks.a).toEqual({
-      old: [[1, 1]],
+      old: [[1, 1, 2]],
       tail: [
-        [1, 1],
-        [1.1, 1],
+        [1, 1, 2],
+        [1.1, 1, 2],
       ],
     });
     // What is drawn seldom stays the same object.
     expect(moved.tracks.a?.old).toBe(started.tracks.a?.old);
-    expect(started.tracks.a).toEqual({ old: [[1, 1]], tail: [[1, 1]] });
+    expect(started.tracks.a).toEqual({ old: [[1, 1, 2]], tail: [[1, 1, 2]] });
   });
 
   it("replace a waypoint by its next state and by later steps, never by earlier ones", () => {
@@ -132,8 +132,8 @@ describe("live messages", () => {
       view = reduce(view, { type: "vehicles", time: "", vehicles: [vehicle("a", 1 + i / 1000, 1)] }, i);
     }
     expect(view.tracks.a?.old.length).toBeLessThanOrEqual(8200);
-    expect(view.tracks.a?.tail.at(-1)).toEqual([10, 1]);
-    expect(view.tracks.a?.old[0]).toEqual([1, 1]);
+    expect(view.tracks.a?.tail.at(-1)).toEqual([10, 1, 2]);
+    expect(view.tracks.a?.old[0]).toEqual([1, 1, 2]);
   });
 });
 

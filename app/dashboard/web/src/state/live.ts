@@ -1,11 +1,11 @@
 /** What the page knows of one mission, and how each live message changes it. Pure: no socket, no page, no clock. */
 
-import type { EventView, LiveMessage, LngLat, MissionView, VehicleView, WaypointView } from "../api/types";
+import type { EventView, LiveMessage, MissionView, Place, VehicleView, WaypointView } from "../api/types";
 
 /** A vehicle's way: the long part behind it, which changes seldom, and the newest part, which begins where that ends. */
 export interface TrackView {
-  old: readonly LngLat[];
-  tail: readonly LngLat[];
+  old: readonly Place[];
+  tail: readonly Place[];
 }
 
 /** What a vehicle told at one moment, for the charts. */
@@ -115,24 +115,24 @@ function newest(old: readonly WaypointView[], changed: readonly WaypointView[]):
 
 function extendTracks(tracks: LiveView["tracks"], vehicles: readonly VehicleView[]): LiveView["tracks"] {
   let changed: Record<string, TrackView> | null = null;
-  for (const { name, lon_deg, lat_deg } of vehicles) {
+  for (const { name, lon_deg, lat_deg, depth_m } of vehicles) {
     if (lon_deg === null || lat_deg === null) continue;
     const track = tracks[name] ?? { old: [], tail: [] };
     const last = track.tail.at(-1);
     if (last && Math.hypot(last[0] - lon_deg, last[1] - lat_deg) < LEAST_MOVE_DEG) continue;
     changed ??= { ...tracks };
-    changed[name] = extended(track, [lon_deg, lat_deg]);
+    changed[name] = extended(track, depth_m === null ? [lon_deg, lat_deg] : [lon_deg, lat_deg, depth_m]);
   }
   return changed ?? tracks;
 }
 
-function extended({ old, tail }: TrackView, place: LngLat): TrackView {
+function extended({ old, tail }: TrackView, place: Place): TrackView {
   if (tail.length < MOST_TAIL_POINTS) return { old, tail: [...tail, place] };
   return { old: [...thinned(old), ...tail.slice(old.length > 0 ? 1 : 0), place], tail: [place] };
 }
 
 /** Drops every other point of the older half once a track is full, so that the shape of the recent part stays. */
-function thinned(track: readonly LngLat[]): readonly LngLat[] {
+function thinned(track: readonly Place[]): readonly Place[] {
   if (track.length < MOST_TRACK_POINTS) return track;
   const half = track.length >> 1;
   return [...track.slice(0, half).filter((_, i) => i % 2 === 0), ...track.slice(half)];

@@ -127,6 +127,11 @@ export interface DraftShapes {
 export const draftShapes = signal<DraftShapes | null>(null);
 export type Drawing = { shape: "polygon" | "rectangle"; onDrawn: (ring: LngLat[]) => void };
 export const drawing = signal<Drawing | null>(null);
+/** Corners that can be dragged; told of every change. */
+export type Editing = { ring: readonly LngLat[]; onChanged: (ring: LngLat[]) => void };
+export const editing = signal<Editing | null>(null);
+/** Whether the corners can be dragged already. */
+export const editingReady = signal(false);
 /** Whether the map takes the clicks of what is being drawn; its tools are fetched when first used. */
 export const drawingReady = signal(false);
 
@@ -138,11 +143,16 @@ export const replayStep = signal<number | null>(null);
 export const reviewed = signal<readonly SoundingView[] | null>(null);
 export const chosenSounding = signal<number | null>(null);
 
+/** Height of the closed bottom strip as it came out, pixels: how much of the map lies under it. */
+export const stripHeight = signal(0);
+
 export const panelOpen = signal(matchMedia("(min-width: 1180px)").matches);
 export const describing = signal(false);
 /** What is being asked before an abort: of the whole team, or of one vehicle. */
 export const abortDialogOpen = signal(false);
 export const abortOne = signal<string | null>(null);
+/** Whether the table of all vehicles is shown. */
+export const fleetOpen = signal(false);
 export const preflightOpen = signal(false);
 /** Whether the link doctor is shown. */
 export const linksOpen = signal(false);

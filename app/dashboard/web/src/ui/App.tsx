@@ -1,8 +1,9 @@
-import { in3d, mission, panelOpen } from "../state/store";
+import { in3d, mission, panelOpen, stripHeight } from "../state/store";
 import { AbortDialog } from "./AbortDialog";
 import { BottomStrip } from "./BottomStrip";
 import { ChartPane } from "./ChartPane";
 import { Alarms } from "./EventLog";
+import { FleetDialog } from "./FleetDialog";
 import { Legend } from "./Legend";
 import { LinksDialog } from "./LinksDialog";
 import { MissionPanel } from "./MissionPanel";
@@ -16,7 +17,7 @@ import { VehicleCards } from "./VehicleCards";
 export function App() {
   const classes = ["app", panelOpen.value ? "with-missions" : "", mission.value ? "with-mission" : ""];
   return (
-    <div class={classes.join(" ")}>
+    <div class={classes.join(" ")} style={{ "--strip": `${stripHeight.value}px` }}>
       <TopBar />
       <main class="stage">
         <ChartPane />
@@ -33,6 +34,7 @@ export function App() {
       <PreflightDialog />
       <AbortDialog />
       <LinksDialog />
+      <FleetDialog />
     </div>
   );
 }

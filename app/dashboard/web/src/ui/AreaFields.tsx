@@ -1,9 +1,10 @@
 import { useSignal } from "@preact/signals";
+import { useEffect, useRef } from "preact/hooks";
 import type { LngLat } from "../api/types";
 import { areasIn, sizeOf } from "../map/area";
 import { centred, cornersOf } from "../state/draft";
 import { distance } from "../state/format";
-import { type Drawing, drawing, drawingReady, mapCentre } from "../state/store";
+import { type Drawing, drawing, drawingReady, editing, editingReady, mapCentre } from "../state/store";
 import { Fault, Text, useForm } from "./Fields";
 
 /** Where to map: drawn on the map, typed as a rectangle, or read from a file; and where not to go. */
@@ -12,6 +13,27 @@ export function AreaFields() {
   const note = useSignal("");
   const corners = cornersOf(draft);
   const size = corners.length > 2 ? sizeOf(corners) : null;
+  const dragged = useRef<readonly LngLat[] | null>(null);
+  const busy = drawing.value !== null;
+  useEffect(() => {
+    if (draft.source !== "drawn" || draft.ring.length < 3 || busy) editing.value = null;
+    else if (draft.ring !== dragged.current) {
+      editing.value = {
+        ring: draft.ring,
+        onChanged: (ring) => {
+          dragged.current = ring;
+          set({ ring });
+        },
+      };
+    }
+    if (busy) dragged.current = null;
+  }, [draft.source, draft.ring, busy]);
+  useEffect(
+    () => () => {
+      editing.value = null;
+    },
+    [],
+  );
   const begin = (shape: Drawing["shape"], onDrawn: (ring: LngLat[]) => void) => {
     drawing.value = { shape, onDrawn };
   };
@@ -69,6 +91,12 @@ export function AreaFields() {
           {drawing.value.shape === "polygon"
             ? "Click corner after corner on the map; click the first one again to close. Escape ends drawing."
             : "Click one corner on the map, then the opposite one. Escape ends drawing."}
+        </p>
+      ) : null}
+      {editing.value ? (
+        <p class="hint" role="status" data-testid="editing" data-ready={editingReady.value}>
+          Drag a corner on the map to move it, a point between two corners to add one; right-click takes a
+          corner away.
         </p>
       ) : null}
       {note.value ? (

@@ -1,6 +1,7 @@
 import type { ComponentChildren } from "preact";
+import { useEffect, useRef } from "preact/hooks";
 import { count, distance, metres, percent } from "../state/format";
-import { mission, type Tab, tab, view } from "../state/store";
+import { mission, stripHeight, type Tab, tab, view } from "../state/store";
 import { Charts } from "./Charts";
 import { Compare } from "./Compare";
 import { EventLog } from "./EventLog";
@@ -10,11 +11,22 @@ import { TimeSlider } from "./TimeSlider";
 
 export function BottomStrip() {
   const present = mission.value;
+  const strip = useRef<HTMLElement>(null);
+  useEffect(() => {
+    const element = strip.current;
+    if (!element) return;
+    // Its lines wrap as the window says: what of the map it covers is measured.
+    const watcher = new ResizeObserver(() => {
+      if (tab.peek() === null) stripHeight.value = element.offsetHeight;
+    });
+    watcher.observe(element);
+    return () => watcher.disconnect();
+  }, [present === null]);
   if (!present) return null;
   const p = present.progress;
   const newest = view.value.events.at(-1);
   return (
-    <section class="bottom" aria-label="Progress and log">
+    <section ref={strip} class="bottom" aria-label="Progress and log">
       {tab.value === "log" ? <EventLog /> : null}
       {tab.value === "files" ? <Files /> : null}
       {tab.value === "charts" ? <Charts /> : null}

@@ -1,6 +1,6 @@
 import { count } from "../state/format";
 import { selectMission } from "../state/session";
-import { describing, missions, selectedId, serviceFault } from "../state/store";
+import { describing, fleetOpen, missions, selectedId, serviceFault } from "../state/store";
 import { MISSION_SIGNS, MISSION_WORDS } from "../state/words";
 import { NewMissionForm } from "./NewMissionForm";
 
@@ -18,6 +18,16 @@ function MissionList() {
     <>
       <header class="panel-head">
         <h2>Missions</h2>
+        <button
+          type="button"
+          class="command"
+          data-testid="open-fleet"
+          onClick={() => {
+            fleetOpen.value = true;
+          }}
+        >
+          Fleet
+        </button>
         <button
           type="button"
           class="command"

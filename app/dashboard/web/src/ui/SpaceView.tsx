@@ -105,8 +105,7 @@ function fleetInSpace(): SceneVehicle[] {
       place: p.place,
       depth_m: p.depth_m,
       heading_deg: null,
-      way: p.track,
-      depths_m: p.depths_m,
+      way: p.track.map(([lng, lat], i) => [lng, lat, p.depths_m[i]]),
     }));
   }
   return vehicles.value.map(({ view: v, colour }) => {
@@ -118,7 +117,6 @@ function fleetInSpace(): SceneVehicle[] {
       depth_m: v.depth_m,
       heading_deg: v.heading_deg,
       way: track ? [...track.old, ...track.tail] : [],
-      depths_m: [],
     };
   });
 }

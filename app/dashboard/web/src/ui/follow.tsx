@@ -2,7 +2,7 @@
 
 import { effect } from "@preact/signals";
 import { render } from "preact";
-import type { LngLat, WaypointView } from "../api/types";
+import type { LngLat, Place, WaypointView } from "../api/types";
 import type { Chart, Padding, Pin, Route, Track } from "../map/chart";
 import { contourInterval } from "../map/contours";
 import { KINDS, paletteOf } from "../map/layers";
@@ -18,6 +18,8 @@ import {
   draftShapes,
   drawing,
   drawingReady,
+  editing,
+  editingReady,
   isDark,
   layer,
   measured,
@@ -30,6 +32,7 @@ import {
   shownRange,
   showRanges,
   showTracks,
+  stripHeight,
   theme,
   vehicles,
   view,
@@ -62,7 +65,12 @@ export function follow(chart: Chart): () => void {
       });
     }),
     effect(() => chart.setDraft(draftShapes.value?.area ?? null, draftShapes.value?.keepOut ?? [])),
+    effect(() => {
+      stripHeight.value;
+      requestAnimationFrame(() => chart.refit());
+    }),
     followDrawing(chart),
+    followEditing(chart),
     followSeaFloor(chart),
     followTracks(chart),
     effect(() => {
@@ -101,17 +109,32 @@ function followDrawing(chart: Chart): () => void {
     let end = () => {};
     void import("../map/draw").then(async ({ draw }) => {
       if (ended) return;
-      end = await draw(
-        chart,
-        wanted.shape,
-        () => {},
-        (ring) => {
-          wanted.onDrawn(ring);
-          if (drawing.peek() === wanted) drawing.value = null;
-        },
-      );
+      end = await draw(chart, wanted.shape, (ring) => {
+        wanted.onDrawn(ring);
+        if (drawing.peek() === wanted) drawing.value = null;
+      });
       if (ended) end();
       else drawingReady.value = true;
+    });
+    return () => {
+      ended = true;
+      end();
+    };
+  });
+}
+
+function followEditing(chart: Chart): () => void {
+  return effect(() => {
+    const wanted = editing.value;
+    editingReady.value = false;
+    if (!wanted) return;
+    let ended = false;
+    let end = () => {};
+    void import("../map/draw").then(async ({ edit }) => {
+      if (ended) return;
+      end = await edit(chart, wanted.ring, wanted.onChanged);
+      if (ended) end();
+      else editingReady.value = true;
     });
     return () => {
       ended = true;
@@ -168,7 +191,7 @@ function followSeaFloor(chart: Chart): () => void {
 }
 
 function followTracks(chart: Chart): () => void {
-  let shown: readonly (readonly LngLat[])[] = [];
+  let shown: readonly (readonly Place[])[] = [];
   return effect(() => {
     const past = replayed.value;
     const present = Object.entries(view.value.tracks);

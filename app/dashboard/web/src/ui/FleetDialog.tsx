@@ -1,0 +1,100 @@
+import { useEffect, useRef } from "preact/hooks";
+import type { VehicleView } from "../api/types";
+import { age, metres, percent, place } from "../state/format";
+import { coordinateFormat, fleet, fleetOpen, missions } from "../state/store";
+import { vehicleState } from "../state/words";
+
+/** Every vehicle that the service knows of, in a mission or not, one a line. */
+export function FleetDialog() {
+  const dialog = useRef<HTMLDialogElement>(null);
+  const open = fleetOpen.value;
+  useEffect(() => {
+    if (open) dialog.current?.showModal();
+    else dialog.current?.close();
+  }, [open]);
+  const close = () => {
+    fleetOpen.value = false;
+  };
+  return (
+    <dialog
+      ref={dialog}
+      class="dialog fleet"
+      data-testid="fleet-dialog"
+      aria-labelledby="fleet-title"
+      onClose={close}
+    >
+      <h2 id="fleet-title">Fleet</h2>
+      {fleet.value.length === 0 ? (
+        <p class="empty">
+          No vehicle was heard yet. Switch one on within reach of this network; the link check says what is
+          missing.
+        </p>
+      ) : (
+        // biome-ignore lint/a11y/noNoninteractiveTabindex: a table wider than the window is scrolled with the keyboard
+        <div class="fleet-scroll" tabIndex={0}>
+          <table>
+            <thead>
+              <tr>
+                {[
+                  "Vehicle",
+                  "State",
+                  "Mission",
+                  "Heard",
+                  "Battery",
+                  "Depth",
+                  "Altitude",
+                  "Speed",
+                  "Place",
+                  "Link",
+                ].map((title) => (
+                  <th key={title} scope="col">
+                    {title}
+                  </th>
+                ))}
+              </tr>
+            </thead>
+            <tbody>
+              {fleet.value.map((vehicle) => (
+                <Line key={`${vehicle.kind} ${vehicle.name}`} vehicle={vehicle} />
+              ))}
+            </tbody>
+          </table>
+        </div>
+      )}
+      <div class="dialog-actions">
+        <button type="button" class="command" data-testid="fleet-close" onClick={close}>
+          Close
+        </button>
+      </div>
+    </dialog>
+  );
+}
+
+function Line({ vehicle: v }: { vehicle: VehicleView }) {
+  const state = vehicleState(v, undefined);
+  const name = missions.value?.find((m) => m.id === v.mission_id)?.name;
+  const link = [v.kind, v.imc_id === null ? null : `0x${v.imc_id.toString(16).padStart(4, "0")}`, v.address];
+  return (
+    <tr data-testid={`fleet-${v.name}`}>
+      <th scope="row">{v.name}</th>
+      <td>
+        <span class={`tone ${state.tone}`}>{state.words}</span>
+        {v.reason ? <small>{v.reason}</small> : null}
+      </td>
+      <td>
+        {v.mission_id === null ? "free" : <a href={`#/missions/${v.mission_id}`}>{name ?? "shown below"}</a>}
+      </td>
+      <td>{age(v.age_s)}</td>
+      <td>{percent(v.battery_pct)}</td>
+      <td>{metres(v.depth_m)}</td>
+      <td>{metres(v.altitude_m)}</td>
+      <td>{v.speed_mps === null ? "–" : `${v.speed_mps.toFixed(1)} m/s`}</td>
+      <td>
+        {v.lon_deg === null || v.lat_deg === null
+          ? "–"
+          : place([v.lon_deg, v.lat_deg], coordinateFormat.value)}
+      </td>
+      <td>{link.filter((part) => part !== null).join(" · ")}</td>
+    </tr>
+  );
+}

@@ -1,0 +1,153 @@
+"""What came of a mission: replay, charts, layers, files, soundings in doubt, in Chromium against the real service."""
+
+import re
+import time
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from .conftest import Watched
+from .service import ROOT, Service
+from .steps import by_id, show
+
+pytestmark = [pytest.mark.browser, pytest.mark.timeout(400)]
+
+
+@pytest.fixture(scope="module")
+def flown(service: Service) -> str:
+    """A mission of two vehicles that has finished after a few steps."""
+    vehicles = [{"name": f"sim-{n}", "kind": "sim", "sensor": "dvl"} for n in (1, 2)]
+    limits = {"max_step_m": 15}
+    mission = service.create(name="Flown", vehicles=vehicles, steps=4, limits=limits, step_deadline_s=60)
+    service.act(mission, "start")
+    end = time.monotonic() + 120
+    while service.get(f"/missions/{mission}")["state"] != "finished":
+        assert time.monotonic() < end
+        time.sleep(0.3)
+    return mission
+
+
+def test_a_finished_mission_is_replayed_step_by_step(page: Page, service: Service, flown: str) -> None:
+    show(page, flown)
+    expect(by_id(page, "step")).to_have_text("4")
+    by_id(page, "slider").fill("2")
+    expect(by_id(page, "replayed-at")).to_contain_text("UTC")
+    expect(by_id(page, "step")).to_have_text("2")
+    marker = page.locator(".maplibregl-marker", has=by_id(page, "vehicle-mark-sim-1"))
+    expect(marker).to_be_visible()
+    place = marker.get_attribute("style")
+    assert place is not None
+    by_id(page, "slider").fill("4")
+    expect(marker).not_to_have_attribute("style", place)
+    by_id(page, "to-present").click()
+    expect(by_id(page, "replayed-at")).to_be_hidden()
+    by_id(page, "play").click()
+    expect(by_id(page, "replayed-at")).to_be_visible()
+    expect(by_id(page, "step")).to_have_text("4")
+
+
+def test_charts_layers_space_and_comparison_of_a_finished_mission(
+    watched: Watched, service: Service, flown: str
+) -> None:
+    page = watched.page
+    show(page, flown)
+    by_id(page, "toggle-charts").click()
+    expect(by_id(page, "charts").locator("canvas")).not_to_have_count(0)
+    expect(by_id(page, "charts")).to_contain_text(re.compile(r"covered \d"))
+    by_id(page, "toggle-charts").click()
+    for name in ("uncertainty", "count", "slope", "tvu_fraction"):
+        by_id(page, "layer").select_option(name)
+        expect(by_id(page, "range-low")).to_be_visible()
+    by_id(page, "layer").select_option("landmarks")
+    expect(by_id(page, "landmarks")).to_contain_text(re.compile(r"accurate \d+ %"))
+    by_id(page, "layer").select_option("difference")
+    expect(page.get_by_text("There is no reference grid to differ from")).to_be_visible()
+    by_id(page, "layer").select_option("depth")
+    expect(by_id(page, "range-low")).to_be_visible()
+    by_id(page, "measure").click()
+    page.mouse.click(560, 350)
+    page.mouse.click(700, 350)
+    expect(by_id(page, "measured-all")).to_contain_text(re.compile(r"\d m"))
+    by_id(page, "measure").click()
+    by_id(page, "coordinates").click()
+    page.mouse.move(620, 430)
+    expect(by_id(page, "readout")).to_contain_text(re.compile(r"41°11\.\d{4}′ N 008°42\.\d{4}′ W"))
+    by_id(page, "open-3d").click()
+    expect(by_id(page, "space").locator("canvas")).to_be_visible()
+    page.wait_for_load_state("networkidle")
+    by_id(page, "exaggeration").fill("8")
+    by_id(page, "close-3d").click()
+    other = service.create(name="Never flown")
+    page.reload()
+    by_id(page, "toggle-compare").click()
+    by_id(page, "compare-with").select_option(other)
+    expect(by_id(page, "compare-table")).to_contain_text("Never flown")
+    expect(by_id(page, "compare-maps")).to_contain_text("do not overlap")
+    assert watched.complaints == []
+
+
+def test_the_files_of_a_mission_are_downloaded_from_a_list(page: Page, service: Service) -> None:
+    mission = service.create(vehicles=[{"name": "rover", "kind": "rest"}])
+    items = [
+        {"vehicle": "rover", "time_s": 1.79e9 + i, "lat_deg": 41.1851 + 1e-5 * i, "lon_deg": -8.7049 + 2e-5 * i}
+        | {"depth_m": 2.0, "range_m": 8.0 + 0.1 * i}
+        for i in range(12)
+    ]
+    show(page, mission)
+    by_id(page, "toggle-files").click()
+    expect(by_id(page, "file-tif")).to_be_disabled()
+    service.post(f"/missions/{mission}/measurements", {"items": items})
+    service.get(f"/missions/{mission}/map")
+    expect(by_id(page, "file-tif")).to_be_enabled()
+    expect(by_id(page, "quality")).to_contain_text("TVU estimate meets Order 1a in")
+    for name, begin in (("tif", b"II*\0"), ("soundings.csv", b"#"), ("bag", b"\x89HDF")):
+        with page.expect_download() as waited:
+            by_id(page, f"file-{name}").click()
+        assert waited.value.suggested_filename.endswith(name.rpartition(".")[2])
+        assert waited.value.path().read_bytes().startswith(begin)
+    by_id(page, "file-soundings.geojson").click()
+    expect(by_id(page, "file-fault")).to_contain_text("set provider.organization and provider.email")
+
+
+def test_a_rejected_sounding_is_found_on_the_map_restored_and_rejected_again(page: Page, service: Service) -> None:
+    mission = service.create(vehicles=[{"name": "rover", "kind": "rest"}])
+    items = [
+        {"vehicle": "rover", "time_s": 1.79e9 + 30 * i, "lat_deg": 41.1851 + 4e-5 * (i // 8), "depth_m": 2.0}
+        | {"lon_deg": -8.7049 + 6e-5 * (i % 8), "range_m": 8.0 + 0.1 * (i % 8) if i != 27 else 3.0}
+        for i in range(64)
+    ]
+    service.post(f"/missions/{mission}/measurements", {"items": items})
+    service.get(f"/missions/{mission}/map")
+    show(page, mission)
+    by_id(page, "toggle-soundings").click()
+    row = by_id(page, "review").locator("li")
+    expect(row).to_have_count(1)
+    expect(row).to_have_attribute("data-state", "doubted")
+    expect(row).to_contain_text("that its neighbours predict")
+    by_id(page, "review-note").fill("seen by divers")
+    row.get_by_role("button", name="Restore").click()
+    expect(row).to_have_attribute("data-state", "restored")
+    assert "seen by divers" in service.get(f"/missions/{mission}/soundings")["items"][0]["reason"]
+    row.get_by_role("button", name="Reject").click()
+    expect(row).to_have_attribute("data-state", "withdrawn")
+    by_id(page, "toggle-log").click()
+    expect(by_id(page, "log")).to_contain_text("restored by local operator: seen by divers")
+
+
+def test_no_serious_fault_for_people_who_see_or_steer_otherwise(page: Page, service: Service, flown: str) -> None:
+    axe = ROOT / "app" / "dashboard" / "web" / "node_modules" / "axe-core" / "axe.min.js"
+    if not axe.is_file():
+        pytest.skip("axe-core is missing: npm ci in app/dashboard/web")
+    show(page, flown)
+    expect(by_id(page, "range-low")).to_be_visible()
+    for prepare in ("", "toggle-log", "toggle-charts", "toggle-soundings", "new-mission"):
+        if prepare:
+            by_id(page, prepare).click()
+        page.evaluate(axe.read_text())
+        found = page.evaluate("axe.run(document, {resultTypes: ['violations']})")
+        serious = [
+            (v["id"], [n["html"][:120] for n in v["nodes"]])
+            for v in found["violations"]
+            if v["impact"] in ("serious", "critical")
+        ]
+        assert serious == [], prepare

@@ -1,0 +1,152 @@
+"""Missions that run: start, pause, abort, a service that dies, in Chromium with simulated vehicles."""
+
+import re
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from .conftest import Watched
+from .service import Service
+from .steps import by_id, colours_in_the_middle, expect_state, show, start
+
+pytestmark = [pytest.mark.browser, pytest.mark.timeout(400)]
+
+
+def test_a_mission_from_the_form_to_its_abort(watched: Watched, service: Service) -> None:
+    page = watched.page
+    page.goto("/")
+    by_id(page, "new-mission").click()
+    for field, value in {
+        "name": "Quay <b>north</b>",
+        "latitude": "41.185",
+        "longitude": "-8.705",
+        "east_m": "60",
+        "north_m": "60",
+        "steps": "400",
+        "simulated": "2",
+    }.items():
+        by_id(page, f"field-{field}").fill(value)
+    by_id(page, "planner-random").check()
+    by_id(page, "create-mission").click()
+
+    expect(by_id(page, "mission-name")).to_have_text("Quay <b>north</b>")
+    expect_state(page, "ready")
+    assert colours_in_the_middle(page) < 20
+    start(page)
+
+    for name in ("sim-1", "sim-2"):
+        expect(by_id(page, f"card-{name}")).to_have_attribute("data-link", "engaged")
+        expect(by_id(page, f"vehicle-mark-{name}")).to_be_visible()
+        expect(by_id(page, f"depth-{name}")).to_have_text(re.compile(r"\d\.\d m"))
+    marker = page.locator(".maplibregl-marker", has=by_id(page, "vehicle-mark-sim-1"))
+    place = marker.get_attribute("style")
+    assert place is not None
+    expect(marker).not_to_have_attribute("style", place)
+    expect(by_id(page, "waypoint-sim-1")).to_have_attribute("data-status", re.compile("acknowledged|reached"))
+
+    expect(by_id(page, "range-low")).to_be_visible()
+    expect(by_id(page, "step")).not_to_have_text("0")
+    page.mouse.move(620, 430)
+    expect(by_id(page, "readout")).to_contain_text(re.compile(r"\d+\.\d\d m ± \d+\.\d\d m"))
+    assert colours_in_the_middle(page) > 20
+
+    by_id(page, "pause").click()
+    expect_state(page, "paused")
+    expect(by_id(page, "card-sim-1")).to_have_attribute("data-link", "ready")
+    by_id(page, "resume").click()
+    expect_state(page, "running")
+
+    by_id(page, "abort").click()
+    by_id(page, "abort-close").click()
+    expect_state(page, "running")
+    by_id(page, "abort").click()
+    by_id(page, "abort-confirm").click()
+    for name in ("sim-1", "sim-2"):
+        expect(by_id(page, f"receipt-{name}")).to_contain_text("acknowledged the stop")
+    expect_state(page, "aborted")
+    by_id(page, "abort-close").click()
+    expect(by_id(page, "abort")).to_be_disabled()
+
+    by_id(page, "toggle-log").click()
+    expect(by_id(page, "log")).to_contain_text("aborted by")
+    assert watched.complaints == []
+
+
+def test_the_checklist_names_what_stands_in_the_way_and_lets_go_once_it_is_gone(page: Page, service: Service) -> None:
+    rover = [{"name": "rover", "kind": "rest"}]
+    first = service.create(name="First come", vehicles=rover)
+    service.act(first, "start")
+    show(page, service.create(name="Second", vehicles=rover))
+    by_id(page, "start").click()
+    expect(by_id(page, "preflight")).to_have_attribute("data-ready", "false")
+    link = by_id(page, "check-link.rover")
+    expect(link).to_have_attribute("data-status", "problem")
+    expect(link).to_contain_text(f"it takes part in mission {first}")
+    expect(by_id(page, "check-tide")).to_contain_text("no tide is applied")
+    expect(by_id(page, "confirm-start")).to_be_disabled()
+    service.act(first, "abort")
+    expect(by_id(page, "preflight")).to_have_attribute("data-ready", "true")
+    by_id(page, "confirm-start").click()
+    expect_state(page, "running")
+
+
+def test_one_vehicle_is_aborted_the_others_go_on_and_it_is_noted(page: Page, service: Service) -> None:
+    vehicles = [{"name": f"sim-{n}", "kind": "sim", "sensor": "dvl"} for n in (1, 2)]
+    show(page, service.create(name="One of two", vehicles=vehicles))
+    start(page)
+    expect(by_id(page, "card-sim-2")).to_have_attribute("data-link", "engaged")
+    by_id(page, "abort-sim-1").click()
+    by_id(page, "abort-confirm").click()
+    expect(by_id(page, "receipt-sim-1")).to_contain_text("acknowledged the stop")
+    by_id(page, "abort-close").click()
+    expect(by_id(page, "card-sim-1")).to_be_hidden()
+    expect_state(page, "running")
+    by_id(page, "toggle-log").click()
+    by_id(page, "note").fill("sim-1 taken out, its battery")
+    by_id(page, "note").press("Enter")
+    by_id(page, "log-level").select_option("notes")
+    expect(by_id(page, "log")).to_contain_text("sim-1 taken out, its battery")
+    expect(by_id(page, "log").locator("li")).to_have_count(1)
+
+
+def test_the_page_survives_a_killed_service(watched: Watched, service: Service) -> None:
+    page = watched.page
+    mission = service.create(name="Crossing")
+    service.act(mission, "start")
+    show(page, mission)
+    expect(by_id(page, "step")).not_to_have_text("0")
+    service.kill()
+    try:
+        expect(by_id(page, "link")).to_have_text(re.compile("Service gone, data .* old; trying again in"))
+        expect(by_id(page, "service-fault")).to_contain_text("does not answer")
+        expect(by_id(page, "card-sim-1")).to_have_class(re.compile("stale"))
+        expect(by_id(page, "vehicle-mark-sim-1")).to_contain_text("old")
+        expect(by_id(page, "mission-name")).to_have_text("Crossing")
+    finally:
+        service.start()
+    expect(by_id(page, "link")).to_have_attribute("data-status", "open")
+    expect(by_id(page, "service-fault")).to_be_hidden()
+    expect_state(page, "running")
+    before = int(by_id(page, "step").inner_text())
+    expect(by_id(page, "step")).not_to_have_text(str(before))
+    expect(by_id(page, "card-sim-1")).not_to_have_class(re.compile("stale"))
+
+
+def test_a_fixed_range_and_the_colours_outlive_the_page(page: Page, service: Service) -> None:
+    mission = service.create(name="Ranges")
+    service.act(mission, "start")
+    show(page, mission)
+    by_id(page, "range-fix").click()
+    by_id(page, "range-high").fill("33")
+    by_id(page, "range-high").press("Enter")
+    by_id(page, "theme").click()
+    by_id(page, "theme").click()
+    expect(page.locator("html")).to_have_attribute("data-theme", "dark")
+    page.reload()
+    expect(by_id(page, "range-high")).to_have_value("33")
+    expect(page.locator("html")).to_have_attribute("data-theme", "dark")
+    by_id(page, "layer").select_option("uncertainty")
+    expect(by_id(page, "range-low")).to_have_value("0")
+    by_id(page, "layer").select_option("depth")
+    by_id(page, "range-fit").click()
+    expect(by_id(page, "range-high")).not_to_have_value("33")

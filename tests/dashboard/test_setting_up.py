@@ -1,0 +1,187 @@
+"""Before a start: the page itself, its dialogs, and describing a mission, in Chromium against the real service."""
+
+import json
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from .conftest import Watched
+from .service import Service
+from .steps import by_id, click_round, drag, show
+
+pytestmark = [pytest.mark.browser, pytest.mark.timeout(400)]
+
+
+def test_the_page_loads_without_complaints_and_asks_nobody_else(watched: Watched, service: Service) -> None:
+    mission = service.create()
+    show(watched.page, mission)
+    expect(watched.page).to_have_title("bathyfleet")
+    assert watched.complaints == []
+    assert [a for a in watched.addresses if not a.startswith((service.url, "data:", "blob:"))] == []
+
+
+def test_without_a_mission_the_page_says_what_to_do_next(page: Page) -> None:
+    page.goto("/")
+    expect(by_id(page, "no-mission")).to_contain_text("No mission is shown")
+    expect(by_id(page, "abort")).to_be_disabled()
+
+
+def test_an_unknown_mission_is_named(page: Page, service: Service) -> None:
+    service.create()
+    page.goto("/#/missions/nonexistent")
+    expect(by_id(page, "unknown-mission")).to_contain_text("There is no mission nonexistent")
+
+
+def test_the_form_names_wrong_values_and_creates_nothing(page: Page, service: Service) -> None:
+    before = len(service.get("/missions"))
+    page.goto("/")
+    by_id(page, "new-mission").click()
+    by_id(page, "field-steps").fill("0")
+    by_id(page, "create-mission").click()
+    expect(page.get_by_text("Give the mission a name")).to_be_visible()
+    expect(page.get_by_text("Steps must be between 1 and 100000")).to_be_visible()
+    expect(by_id(page, "field-steps")).to_have_attribute("aria-invalid", "true")
+    assert len(service.get("/missions")) == before
+
+
+def test_what_only_the_service_can_refuse_is_shown_beside_its_field(page: Page) -> None:
+    page.goto("/")
+    by_id(page, "new-mission").click()
+    by_id(page, "field-name").fill("One cell")
+    page.get_by_text("Limits and grid").click()
+    by_id(page, "field-cell_m").fill("90")
+    by_id(page, "create-mission").click()
+    expect(by_id(page, "mission-form").get_by_role("alert")).to_contain_text("cannot be taken")
+
+
+def test_an_area_is_drawn_with_a_keep_out_zone_and_judged_at_once(page: Page, service: Service) -> None:
+    page.goto("/")
+    expect(by_id(page, "map")).to_have_attribute("data-ready", "true")
+    by_id(page, "new-mission").click()
+    by_id(page, "draw-polygon").click()
+    expect(by_id(page, "drawing")).to_have_attribute("data-ready", "true")
+    corners = [(520, 300), (900, 320), (880, 640), (540, 600)]
+    click_round(page, corners)
+    expect(by_id(page, "drawing")).to_be_hidden()
+    expect(by_id(page, "area-size")).to_contain_text("4 corners")
+    by_id(page, "draw-keep-out").click()
+    expect(by_id(page, "drawing")).to_have_attribute("data-ready", "true")
+    zone = [(640, 400), (700, 400), (690, 460)]
+    click_round(page, zone)
+    expect(page.get_by_text("Zone 1")).to_be_visible()
+    by_id(page, "field-name").fill("Drawn")
+    by_id(page, "create-mission").click()
+    expect(by_id(page, "mission-name")).to_have_text("Drawn")
+    made = next(m for m in service.get("/missions") if m["name"] == "Drawn")
+    spec = service.get(f"/missions/{made['id']}")["spec"]
+    assert len(spec["area"]["coordinates"][0]) == 5
+    assert len(spec["keep_out"]) == 1
+    crossed = {"type": "Polygon", "coordinates": [[[0, 0], [1, 1], [1, 0], [0, 1], [0, 0]]]}
+    by_id(page, "new-mission").click()
+    file = {"name": "crossed.geojson", "mimeType": "application/json", "buffer": json.dumps(crossed).encode()}
+    by_id(page, "area-file").set_input_files(file)
+    expect(by_id(page, "fault-ring")).to_contain_text("crosses itself")
+
+
+KML = """<?xml version="1.0"?><kml xmlns="http://www.opengis.net/kml/2.2"><Placemark><name>Basin</name><Polygon>
+<outerBoundaryIs><LinearRing><coordinates>-8.705,41.185,0 -8.7043,41.185,0 -8.7043,41.1855,0 -8.705,41.185,0
+</coordinates></LinearRing></outerBoundaryIs></Polygon></Placemark></kml>"""
+
+
+def test_an_area_comes_from_a_kml_file(page: Page, service: Service) -> None:
+    page.goto("/")
+    by_id(page, "new-mission").click()
+    file = {"name": "basin.kml", "mimeType": "application/vnd.google-earth.kml+xml", "buffer": KML.encode()}
+    by_id(page, "area-file").set_input_files(file)
+    expect(by_id(page, "area-note")).to_contain_text("basin.kml: area of 3 corners")
+    expect(by_id(page, "estimate")).to_contain_text("At most")
+    by_id(page, "field-name").fill("From a file")
+    by_id(page, "create-mission").click()
+    expect(by_id(page, "mission-name")).to_have_text("From a file")
+
+
+def test_the_link_doctor_says_what_is_missing_and_what_to_do(page: Page) -> None:
+    page.goto("/")
+    by_id(page, "open-links").click()
+    dialog = by_id(page, "links-dialog")
+    expect(dialog).to_contain_text("does not listen for IMC vehicles")
+    expect(dialog).to_contain_text("Set imc.enabled = true")
+    by_id(page, "links-close").click()
+    expect(dialog).not_to_be_visible()
+
+
+def test_everything_can_be_reached_with_the_keyboard(page: Page, service: Service) -> None:
+    show(page, service.create(name="Keys"))
+    reached: set[str] = set()
+    for _ in range(60):
+        page.keyboard.press("Tab")
+        name = page.evaluate("document.activeElement?.dataset?.testid ?? ''")
+        reached.add(str(name))
+    assert {"toggle-missions", "theme", "start", "abort", "new-mission", "toggle-log"} <= reached
+
+
+def test_the_page_has_no_unlabelled_controls(page: Page, service: Service) -> None:
+    show(page, service.create(name="Labels"))
+    by_id(page, "new-mission").click()
+    unlabelled = page.evaluate(
+        """() => [...document.querySelectorAll("button, input, select")]
+            .filter(e => !e.ariaLabel && !e.textContent.trim() && !(e.labels?.length) && !e.title)
+            .map(e => e.outerHTML)"""
+    )
+    assert unlabelled == []
+
+
+def test_narrow_windows_scroll_nothing_sideways_and_keep_abort_in_reach(page: Page, service: Service) -> None:
+    page.set_viewport_size({"width": 420, "height": 900})
+    vehicles = [{"name": f"sim-{n}", "kind": "sim"} for n in range(1, 5)]
+    show(page, service.create(name="A rather long name for a mission in a narrow window", vehicles=vehicles))
+    assert page.evaluate("document.documentElement.scrollWidth") <= 420
+    expect(by_id(page, "abort")).to_be_in_viewport()
+    box = by_id(page, "map").bounding_box()
+    assert box is not None
+    assert box["height"] > 250
+    expect(by_id(page, "card-sim-4")).not_to_be_in_viewport()
+    by_id(page, "card-sim-4").scroll_into_view_if_needed()
+    expect(by_id(page, "card-sim-4")).to_be_in_viewport()
+
+
+def test_the_corners_of_a_drawn_area_are_dragged_and_added(page: Page) -> None:
+    page.goto("/")
+    expect(by_id(page, "map")).to_have_attribute("data-ready", "true")
+    by_id(page, "new-mission").click()
+    by_id(page, "draw-polygon").click()
+    expect(by_id(page, "drawing")).to_have_attribute("data-ready", "true")
+    click_round(page, [(560, 300), (900, 300), (900, 600), (560, 600)])
+    expect(by_id(page, "area-size")).to_contain_text("4 corners")
+    before = by_id(page, "area-size").inner_text()
+    expect(by_id(page, "editing")).to_have_attribute("data-ready", "true")
+    drag(page, (900, 600), (960, 660))
+    expect(by_id(page, "area-size")).not_to_have_text(before)
+    expect(by_id(page, "area-size")).to_contain_text("4 corners")
+    drag(page, (560, 450), (520, 470))
+    expect(by_id(page, "area-size")).to_contain_text("5 corners")
+
+
+def test_the_whole_fleet_is_one_table(page: Page, service: Service) -> None:
+    mission = service.create(name="Of the fleet", vehicles=[{"name": "rover", "kind": "rest"}])
+    place = {"vehicle": "rover", "time_s": 1.79e9, "lat_deg": 41.1852, "lon_deg": -8.7046, "depth_m": 1.5}
+    service.post(f"/missions/{mission}/measurements", {"items": [place | {"battery_pct": 61}]})
+    page.goto("/")
+    by_id(page, "open-fleet").click()
+    line = by_id(page, "fleet-rover")
+    expect(line).to_contain_text("61 %")
+    expect(line).to_contain_text("1.5 m")
+    expect(line).to_contain_text("free")
+    by_id(page, "fleet-close").click()
+    expect(by_id(page, "fleet-dialog")).not_to_be_visible()
+
+
+@pytest.mark.parametrize("width", [390, 1200, 1600])
+def test_nothing_hides_the_areas_lower_edge(page: Page, service: Service, width: int) -> None:
+    page.set_viewport_size({"width": width, "height": 900})
+    show(page, service.create(name="Edge"))
+    strip = page.locator(".bottom").bounding_box()
+    scale = page.locator(".maplibregl-ctrl-scale").bounding_box()
+    assert strip is not None
+    assert scale is not None
+    assert scale["y"] + scale["height"] <= strip["y"] + 1

@@ -1,0 +1,46 @@
+import numpy as np
+import pytest
+from shapely.geometry import LineString, Point
+
+from app.missions.journal import METRES_PER_DEGREE
+from app.missions.trails import TOLERANCE_M, worth_drawing
+
+
+def wandering(seed: int, count: int = 400) -> np.ndarray:
+    rng = np.random.default_rng(seed)
+    heading = np.cumsum(rng.normal(0, 0.2, count))
+    east, north = np.cumsum(np.cos(heading)), np.cumsum(np.sin(heading))
+    depth = 5 + np.cumsum(rng.normal(0, 0.1, count))
+    lat0 = 41.0
+    return np.column_stack(
+        [-8.7 + east / METRES_PER_DEGREE / np.cos(np.radians(lat0)), lat0 + north / METRES_PER_DEGREE, depth]
+    )
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_no_place_and_no_depth_is_further_than_the_tolerance_from_what_is_drawn(seed: int) -> None:
+    places = wandering(seed)
+    kept = worth_drawing(places)
+    assert kept[0] == 0
+    assert kept[-1] == len(places) - 1
+    assert len(kept) < len(places)
+    metres = (places[:, :2] - places[0, :2]) * METRES_PER_DEGREE * [np.cos(np.radians(places[0, 1])), 1.0]
+    line = LineString(metres[kept])
+    assert max(line.distance(Point(place)) for place in metres) <= TOLERANCE_M + 1e-9
+    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(metres, axis=0).T))])
+    profile = LineString(np.column_stack([along, places[:, 2]])[kept])
+    off = [profile.distance(Point(a, d)) for a, d in zip(along, places[:, 2], strict=True)]
+    assert max(off) <= TOLERANCE_M + 1e-9
+
+
+def test_a_straight_way_is_two_places_and_a_dive_on_it_stays() -> None:
+    straight = np.column_stack([np.full(100, -8.7), 41 + np.arange(100) * 1e-5, np.full(100, 3.0)])
+    assert worth_drawing(straight).tolist() == [0, 99]
+    dived = straight.copy()
+    dived[50:, 2] = 9.0
+    assert worth_drawing(dived).tolist() == [0, 49, 50, 99]
+
+
+@pytest.mark.parametrize("count", [0, 1, 2])
+def test_the_shortest_ways_stay_as_they_are(count: int) -> None:
+    assert len(worth_drawing(np.full((count, 3), 4.0))) == count
