@@ -13,7 +13,7 @@ import httpx
 
 ROOT = Path(__file__).parents[2]
 BATHYFLEET = [sys.executable, "-c", "from app.cli import main; main()"]
-START_LIMIT_S = 60
+START_LIMIT_S = 180
 
 # About 59 m by 56 m.
 AREA = {
@@ -70,6 +70,7 @@ class Service:
             with contextlib.suppress(httpx.TransportError):
                 if httpx.get(f"{self.url}/api/v1/health/live").is_success:
                     return
+        self.kill()
         raise AssertionError(f"the service did not start:\n{self._log.read_text()}")
 
     def kill(self) -> None:
