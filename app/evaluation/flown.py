@@ -1,4 +1,4 @@
-"""Survey lines flown by simulated vehicles, which build up speed, turn in circles and dive, instead of along ideal lines."""
+"""Survey lines flown by simulated vehicles, which build up speed, turn in circles and dive."""
 
 import numpy as np
 
