@@ -107,11 +107,13 @@ def decide(
     belief: Belief,
     soundings_en_m: FloatArray,
     water_level_m: float = 0.0,
+    doubtful_en_m: FloatArray | None = None,
 ) -> Decision:
     """Decide one step for the vehicles at ``places``; vehicles far outside the area are sent to its border.
 
     ``water_level_m`` is how high the water stands above the datum of the belief's depths. Vehicles count their depth
     from the water level: below the datum it leaves them less room; above it the room to spare is not used.
+    ``doubtful_en_m`` (k, 2) is where the map left soundings out as outliers.
     """
     polygon = Polygon(constraints.area)
     notes: list[str] = []
@@ -159,6 +161,7 @@ def decide(
         belief=belief,
         soundings_en_m=soundings_en_m,
         constraints=constraints,
+        doubtful_en_m=np.zeros((0, 2)) if doubtful_en_m is None else doubtful_en_m,
     )
     proposal = planner.propose(situation, np.random.default_rng([spec.seed, step]))
     proposed = np.array(proposal.positions, dtype=float)

@@ -280,10 +280,17 @@ class MapBuilder:
             correlation_length_m=bathymetry.correlation_length_m,
         )
 
-    def sounded_at_m(self) -> FloatArray:
-        """Return where was sounded, shape (n, 2), also what came since the newest map was begun."""
+    def sounded_at_m(self) -> tuple[FloatArray, FloatArray]:
+        """Return where was sounded, (n, 2), and where soundings are left out as outliers, (k, 2).
+
+        What came since the newest map was begun counts as sounded.
+        """
         since = [item for item in self._pending.copy() if not isinstance(item, _Everything)]
-        return np.concatenate([self._soundings, *since])[:, :2]
+        places = np.concatenate([self._soundings, *since])[:, :2]
+        rejected = self._learned.rejected[: len(places)]
+        doubtful = np.zeros(len(places), dtype=bool)
+        doubtful[: len(rejected)] = rejected
+        return places[~doubtful], places[doubtful]
 
 
 def _new_model() -> GaussianProcessMap:

@@ -261,6 +261,7 @@ class Runner:
         await self._renew_map()
 
         def work() -> Decision:
+            sounded_m, doubtful_m = live.builder.sounded_at_m()
             return decide(
                 live.header.step + 1,
                 self._spec,
@@ -268,8 +269,9 @@ class Runner:
                 planner,
                 places,
                 live.builder.belief(),
-                live.builder.sounded_at_m(),
+                sounded_m,
                 live.gate.corrections.water_level_m(now().timestamp()),
+                doubtful_m,
             )
 
         with metrics.PLANNING_SECONDS.time():
