@@ -93,7 +93,7 @@ def even_lines(low_u: float, high_u: float, n: int, to_low: float = 0.5, to_high
 
     ``to_low`` and ``to_high`` are the distances of the outer ones from the ends, in spacings.
     """
-    return low_u + (np.arange(n) + to_low) * (high_u - low_u) / (n - 1 + to_low + to_high)
+    return np.asarray(low_u + (np.arange(n) + to_low) * (high_u - low_u) / (n - 1 + to_low + to_high))
 
 
 def route_length(start: FloatArray, stops: FloatArray) -> float:
