@@ -45,7 +45,7 @@ HEAT = 0.01
 POWER = 2.0
 REACH = 4.0
 """Line spacings beyond which a place counts as quite unknown."""
-LEAVE_BACKBONE = 0.93
+LEAVE_BACKBONE = 0.98
 """The freer plan must promise at most this part of the squared error that the backbone promises."""
 LEAVE_PLAN = 0.02
 """A leg off the plan must promise a squared error smaller by this part: predictions are noisy, and a choice among many
