@@ -84,9 +84,12 @@ class Decision:
 def make_constraints(spec: MissionSpec) -> Constraints:
     """Return a mission's limits in its local frame."""
     limits = spec.limits
+    zones = [spec.to_local(zone) for zone in spec.keep_out]
+    margins = [safety.widened(zone, limits.keep_out_margin_m) for zone in zones if limits.keep_out_margin_m > 0]
     return Constraints(
         area=spec.local_area(),
-        keep_out=tuple(spec.to_local(zone) for zone in spec.keep_out),
+        # A vehicle that came too near by turning may leave the margin by any way but one through the zone itself.
+        keep_out=(*zones, *margins),
         max_step_m=limits.max_step_m,
         # Depths are chosen here and may be shallower than asked where the water is; see safety.travel_depth_m.
         min_depth_m=0.0,
