@@ -1,14 +1,13 @@
-"""What a user would do instead: lawnmowers, reconstructed with the same default map as ours."""
+"""What a user would do instead: lawnmowers, flown by the same vehicles and mapped with the same default map as ours."""
 
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from app.estimation import SingleBeam
-from app.evaluation.survey_world import SOUNDING_RATE_HZ, SPEED_MPS, Log, default_map, fly_routes, rmse_m
+from app.evaluation.flown import fly_lawnmower
+from app.evaluation.survey_world import SOUNDING_RATE_HZ, SPEED_MPS, default_map, rmse_m
 from app.exploration.constraints import Constraints
-from app.exploration.planners.lawnmower import lawnmower_routes
 from app.mapping.types import Grid
 from simulator.terrain import Terrain
 
@@ -40,7 +39,6 @@ def lawnmower_baseline(
     distance_m: float,
     grid: Grid,
     *,
-    spacing_m: float = SPEED_MPS / SOUNDING_RATE_HZ,
     relative_noise: float = 0.01,
     seed: int = 0,
 ) -> Baseline:
@@ -51,19 +49,17 @@ def lawnmower_baseline(
     constraints : Constraints
         Give the area and its keep-out zones.
     starts_m : (n_vehicles, 3)
-        Where the vehicles start; they keep that depth.
+        Where the vehicles start, at the surface, and the depth that they keep.
     distance_m : float
-        Distance that each vehicle travels at most; as many lines as it pays for.
+        Distance that each vehicle travels at most, circles included; as many lines as it pays for.
     grid : Grid
         Where the map is judged.
-    spacing_m : float
-        Distance between soundings along the lines.
     """
-    log = Log(SingleBeam(relative_noise), terrain, np.random.default_rng([seed, 2]))
-    routes = lawnmower_routes(constraints, starts_m[:, :2], distance_m)
-    flown = fly_routes(log, starts_m, routes, distance_m, spacing_m)
-    rmse, l2 = rmse_m(default_map(log.soundings, grid), terrain)
-    return Baseline(rmse, l2, len(log.soundings), float(flown.sum()))
+    soundings, flown_m = fly_lawnmower(
+        terrain, constraints, starts_m, distance_m, relative_noise=relative_noise, seed=seed
+    )
+    rmse, l2 = rmse_m(default_map(soundings, grid), terrain)
+    return Baseline(rmse, l2, len(soundings), flown_m)
 
 
 def lawnmower_baselines(
@@ -88,9 +84,7 @@ def lawnmower_baselines(
     """
     spacing = SPEED_MPS / SOUNDING_RATE_HZ
     by_distance, by_soundings = (
-        lawnmower_baseline(
-            terrain, constraints, starts_m, metres, grid, spacing_m=spacing, relative_noise=relative_noise, seed=seed
-        )
+        lawnmower_baseline(terrain, constraints, starts_m, metres, grid, relative_noise=relative_noise, seed=seed)
         for metres in (distance_m, soundings * spacing / len(starts_m))
     )
     return Baselines(by_distance, by_soundings)

@@ -183,6 +183,7 @@ def even_coverage(scenario: SurveyScenario, distance_m: float) -> list[FloatArra
         nodes,
         max(belief.correlation_length_m, spacing),
         2.0,
+        to_border=0.5,
     )
     return [share.stops for share in shares]
 

@@ -14,6 +14,7 @@ from app.exploration.options import PlannerOptions
 from app.exploration.planners import create_planner
 from app.exploration.problem import Belief, Situation
 from app.mapping.gp import GaussianProcessMap
+from app.mapping.outliers import OutlierReport
 from app.mapping.types import BathymetricMap, Grid, Soundings
 from simulator.terrain import Terrain
 
@@ -231,12 +232,17 @@ def fly_planner(
     headings = np.full(scenario.vehicles, np.nan)
     history, times = [positions], []
     belief = unknown_belief(grid) if known is None else known
+    verdict: OutlierReport | None = None
     every = max(1, scenario.steps // MAPS)
     for step in range(1, scenario.steps + 1):
         if known is None and ((step > 2 and step % every == 0) or step in learn_at):
             estimate = gp.fit(log.soundings, learn=step in learn_at).predict(grid)
-            belief = belief_of(estimate)
+            belief, verdict = belief_of(estimate), gp.outliers_
         soundings = log.soundings
+        doubted = np.zeros(len(soundings), dtype=np.bool_)
+        if verdict is not None:
+            doubted[: len(verdict.rejected)] = verdict.rejected
+        places = np.column_stack([soundings.east_m, soundings.north_m])
         situation = Situation(
             step,
             scenario.steps,
@@ -244,8 +250,9 @@ def fly_planner(
             positions,
             headings,
             belief,
-            np.column_stack([soundings.east_m, soundings.north_m]),
+            places[~doubted],
             scenario.constraints,
+            doubtful_en_m=places[doubted],
         )
         begun = time.perf_counter()
         proposal = chooser.propose(situation, rng)

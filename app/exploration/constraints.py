@@ -270,12 +270,12 @@ def _excess(
     out = np.zeros((n_candidates, n, 10))
     area_now = np.empty(n)
     round_area = convex(area)
-    forbidden_now = np.zeros(n)
+    outside_now = np.empty((n, len(starts) - 1))
     for i in range(n):
         area_now[i] = signed_distance(area, origin[i, 0], origin[i, 1])
         for z in range(len(starts) - 1):
             zone = keep_out[starts[z] : starts[z + 1]]
-            forbidden_now[i] = max(forbidden_now[i], -signed_distance(zone, origin[i, 0], origin[i, 1]))
+            outside_now[i, z] = signed_distance(zone, origin[i, 0], origin[i, 1])
     for c in range(n_candidates):
         for i in range(n):
             ax, ay, az = origin[i, 0], origin[i, 1], origin[i, 2]
@@ -288,7 +288,7 @@ def _excess(
             for z in range(len(starts) - 1):
                 zone = keep_out[starts[z] : starts[z + 1]]
                 out[c, i, 2] = max(out[c, i, 2], -signed_distance(zone, bx, by))
-                if forbidden_now[i] <= 1e-6 and enters(zone, ax, ay, bx, by, 1e-6):
+                if outside_now[i, z] >= -1e-6 and enters(zone, ax, ay, bx, by, 1e-6):
                     out[c, i, 3] = np.inf
             out[c, i, 2] = max(0.0, out[c, i, 2])
             step = np.sqrt((bx - ax) ** 2 + (by - ay) ** 2 + (bz - az) ** 2)

@@ -88,9 +88,12 @@ class Sweep:
         return np.vstack(stops) if stops else np.zeros((0, 2))
 
 
-def even_lines(low_u: float, high_u: float, n: int) -> FloatArray:
-    """Return the middles of ``n`` equal parts of the interval."""
-    return low_u + (np.arange(n) + 0.5) * (high_u - low_u) / n
+def even_lines(low_u: float, high_u: float, n: int, to_low: float = 0.5, to_high: float = 0.5) -> FloatArray:
+    """Return ``n`` evenly spaced lines in the interval; by default the middles of ``n`` equal parts.
+
+    ``to_low`` and ``to_high`` are the distances of the outer ones from the ends, in spacings.
+    """
+    return np.asarray(low_u + (np.arange(n) + to_low) * (high_u - low_u) / (n - 1 + to_low + to_high))
 
 
 def route_length(start: FloatArray, stops: FloatArray) -> float:

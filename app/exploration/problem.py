@@ -71,13 +71,15 @@ class Situation:
     belief : Belief
         What is known of the sea floor.
     soundings_en_m : (n_soundings, 2)
-        Where soundings were taken so far.
+        Where soundings were taken so far that the map is made of.
     constraints : Constraints
         What every proposed configuration must obey.
     targets : Targets or None
         What is known of moving targets, where there are any.
     localization : Localization or None
         How well the vehicles know where they are; None: well enough.
+    doubtful_en_m : (k, 2)
+        Soundings that the map leaves out because their neighbours contradict them: a fish, or a rock.
     """
 
     step: int
@@ -90,6 +92,7 @@ class Situation:
     constraints: Constraints
     targets: Targets | None = None
     localization: Localization | None = None
+    doubtful_en_m: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt, gaussian_filter
 from scipy.spatial import cKDTree
 
-from app.exploration.problem import Belief
+from app.exploration.problem import Belief, Situation
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -33,6 +33,13 @@ NEAR_PART = 0.3
 WEIGHT_RANGE = (0.02, 50.0)
 HEDGE = 0.25
 """Part of the roughness that is spread evenly: what no sounding has met may be anywhere."""
+
+SECOND_LOOK = 30.0
+"""Weight of a place whose only sounding is doubted: is there a rock, or was it a fish?"""
+LOOK_WITHIN = 0.6
+"""How far around, in spacings of the survey lines."""
+MOST_DOUBTS = 0.01
+"""Where a larger part of the soundings is doubted the sounder is to blame, and second looks would cost the survey."""
 
 
 @dataclass(frozen=True)
@@ -97,6 +104,15 @@ def expected_roughness(belief: Belief, distance_m: FloatArray, spacing_m: float)
     roughness = roughness.ravel()[raster.cell]
     roughness = np.clip(roughness / roughness.mean(), *WEIGHT_RANGE)
     return np.asarray((1.0 - HEDGE) * roughness / roughness.mean() + HEDGE)
+
+
+def with_second_looks(roughness: FloatArray, team: Situation, spacing_m: float) -> FloatArray:
+    """Return the landmarks' roughness (n,) raised around soundings that are doubted."""
+    doubtful = team.doubtful_en_m
+    if not 0 < len(doubtful) <= max(1.0, MOST_DOUBTS * (len(doubtful) + len(team.soundings_en_m))):
+        return roughness
+    away = np.asarray(cKDTree(doubtful).query(team.belief.xy_m)[0])
+    return np.where(away <= LOOK_WITHIN * spacing_m, np.maximum(roughness, SECOND_LOOK), roughness)
 
 
 def _averaged(squared: FloatArray, smoothing: float) -> FloatArray:

@@ -5,7 +5,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from app.exploration.geometry import enters, leaves, signed_distance
-from app.exploration.survey_value import Nodes, Objective, lower_to_route, unknown_part
+from app.exploration.survey_value import Nodes, Objective, expected_error, lower_to_route
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -98,7 +98,7 @@ def _left(d2: FloatArray, after: FloatArray, weight: FloatArray, scale_m: float,
         least = d2[i]
         for j in range(len(after)):
             least = min(least, after[j, i])
-        total += unknown_part(least, weight[i], inverse2, power)
+        total += expected_error(least, weight[i], inverse2, power)
         running[i] = total
     return running
 

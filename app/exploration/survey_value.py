@@ -1,11 +1,9 @@
 """What a survey plan is worth: the squared interpolation error that is expected after it.
 
-Where the sea floor is rough, soundings inform their surroundings less far, but what may be wrong has the same size
-everywhere: a node at distance D from the nearest sounding has an expected squared error, as a part of what is quite
-unknown, of x / (1 + x) with x = a (D / l)^p, where ``a`` is the local roughness, ``l`` the correlation length where it
-is 1, and p the exponent of short distances. So rough places are worth close lines only as far as these can still
-resolve them, and a smooth place must not be left out altogether. ``U`` is the sum over the nodes. Soundings are taken
-all along the legs.
+A node at distance D from the nearest sounding has an expected squared error of a x / (1 + x) with x = (D / l)^p, where
+``a`` is the local roughness, ``l`` the correlation length, and p the exponent of short distances. It grows with the
+distance and ends at ``a``, the most that can be wrong there: far less on sand than among rocks. ``U`` is the sum over
+the nodes. Soundings are taken all along the legs.
 """
 
 from typing import NamedTuple
@@ -163,13 +161,13 @@ def lower_to_route(
 
 
 @njit(cache=True, nogil=True, inline="always")
-def unknown_part(d2: float, weight: float, inverse2: float, power: float) -> float:
-    """Return x / (1 + x) for a squared distance; ``inverse2`` is 1 / l^2."""
+def expected_error(d2: float, weight: float, inverse2: float, power: float) -> float:
+    """Return a x / (1 + x) for a squared distance and the roughness a, ``weight``; ``inverse2`` is 1 / l^2."""
     r2 = d2 * inverse2
     if r2 > 1e6:
-        return 1.0
-    x = weight * (r2 if power == 2.0 else r2 * np.sqrt(r2) if power == 3.0 else r2 ** (0.5 * power))
-    part: float = x / (1.0 + x)
+        return weight
+    x = r2 if power == 2.0 else r2 * np.sqrt(r2) if power == 3.0 else r2 ** (0.5 * power)
+    part: float = weight * x / (1.0 + x)
     return part
 
 
@@ -179,7 +177,7 @@ def uncertainty(d2: FloatArray, weight: FloatArray, scale_m: float, power: float
     total = 0.0
     inverse2 = 1.0 / (scale_m * scale_m)
     for i in range(len(d2)):
-        total += unknown_part(d2[i], weight[i], inverse2, power)
+        total += expected_error(d2[i], weight[i], inverse2, power)
     return total
 
 

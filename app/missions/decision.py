@@ -84,9 +84,12 @@ class Decision:
 def make_constraints(spec: MissionSpec) -> Constraints:
     """Return a mission's limits in its local frame."""
     limits = spec.limits
+    zones = [spec.to_local(zone) for zone in spec.keep_out]
+    margins = [safety.widened(zone, limits.keep_out_margin_m) for zone in zones if limits.keep_out_margin_m > 0]
     return Constraints(
         area=spec.local_area(),
-        keep_out=tuple(spec.to_local(zone) for zone in spec.keep_out),
+        # A vehicle that came too near by turning may leave the margin by any way but one through the zone itself.
+        keep_out=(*zones, *margins),
         max_step_m=limits.max_step_m,
         # Depths are chosen here and may be shallower than asked where the water is; see safety.travel_depth_m.
         min_depth_m=0.0,
@@ -107,11 +110,13 @@ def decide(
     belief: Belief,
     soundings_en_m: FloatArray,
     water_level_m: float = 0.0,
+    doubtful_en_m: FloatArray | None = None,
 ) -> Decision:
     """Decide one step for the vehicles at ``places``; vehicles far outside the area are sent to its border.
 
     ``water_level_m`` is how high the water stands above the datum of the belief's depths. Vehicles count their depth
     from the water level: below the datum it leaves them less room; above it the room to spare is not used.
+    ``doubtful_en_m`` (k, 2) is where the map left soundings out as outliers.
     """
     polygon = Polygon(constraints.area)
     notes: list[str] = []
@@ -159,6 +164,7 @@ def decide(
         belief=belief,
         soundings_en_m=soundings_en_m,
         constraints=constraints,
+        doubtful_en_m=np.zeros((0, 2)) if doubtful_en_m is None else doubtful_en_m,
     )
     proposal = planner.propose(situation, np.random.default_rng([spec.seed, step]))
     proposed = np.array(proposal.positions, dtype=float)

@@ -196,7 +196,9 @@ class MapBuilder:
 
         Slower than a build, so it is done while the vehicles travel. The next ``build`` uses what was found.
         """
-        with self._learning:
+        if not self._learning.acquire(blocking=always):
+            return  # somebody is at it
+        try:
             generation = self._generation
             model, before = self._learned.model, self._learned.reasons
             known, trusted = self._soundings, self._trusted
@@ -213,6 +215,8 @@ class MapBuilder:
             fitted = copy.copy(model).fit(soundings.take(used), learn=True)
             if generation == self._generation:
                 self._learned = _Learned(fitted, tuple(reasons))
+        finally:
+            self._learning.release()
 
     def doubted(self) -> list[tuple[NDArray[np.float64], str]]:
         """Return the soundings, rows of shape (4,), that the map leaves out as outliers, each with the reason."""
@@ -276,9 +280,17 @@ class MapBuilder:
             correlation_length_m=bathymetry.correlation_length_m,
         )
 
-    def sounded_at_m(self) -> FloatArray:
-        """Return where the soundings of the newest map were taken, shape (n, 2)."""
-        return self._soundings[:, :2].copy()
+    def sounded_at_m(self) -> tuple[FloatArray, FloatArray]:
+        """Return where was sounded, (n, 2), and where soundings are left out as outliers, (k, 2).
+
+        What came since the newest map was begun counts as sounded.
+        """
+        since = [item for item in self._pending.copy() if not isinstance(item, _Everything)]
+        places = np.concatenate([self._soundings, *since])[:, :2]
+        rejected = self._learned.rejected[: len(places)]
+        doubtful = np.zeros(len(places), dtype=bool)
+        doubtful[: len(rejected)] = rejected
+        return places[~doubtful], places[doubtful]
 
 
 def _new_model() -> GaussianProcessMap:

@@ -164,17 +164,18 @@ def _room(live: LiveMission) -> Iterator[CheckView]:
     side, limits = float(min(high - low)), live.spec.limits
     words = f"{high[0] - low[0]:.0f} x {high[1] - low[1]:.0f} m, {area.area / 1e4:.2f} ha"
     if live.spec.keep_out:
-        zones = unary_union([Polygon(live.spec.to_local(zone)) for zone in live.spec.keep_out])
+        margin_m = limits.keep_out_margin_m
+        zones = unary_union([Polygon(live.spec.to_local(zone)).buffer(margin_m) for zone in live.spec.keep_out])
         free = area.difference(zones)
         taken = 100 * (1 - free.area / area.area)
-        words += f", keep-out zones take {taken:.0f} %"
+        words += f", keep-out zones with their margin of {margin_m:g} m take {taken:.0f} %"
         if free.is_empty or taken > 99:
             yield CheckView(
                 id="area",
                 title="Area",
                 status=PROBLEM,
                 message=f"{words}: nothing is left to map",
-                remedy="Make the zones smaller",
+                remedy="Make the zones or limits.keep_out_margin_m smaller",
             )
             return
         if isinstance(free, MultiPolygon):
@@ -183,7 +184,7 @@ def _room(live: LiveMission) -> Iterator[CheckView]:
                 title="Area",
                 status=WARNING,
                 message=f"{words} and divide it into {len(free.geoms)} parts",
-                remedy="A vehicle stays in the part that it starts in; leave a passage",
+                remedy="A vehicle stays in the part that it starts in; leave a passage, or a smaller margin",
             )
             return
     if limits.max_step_m > side:

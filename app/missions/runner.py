@@ -52,6 +52,9 @@ SOUND_S = 60.0
 LEAD_M = 25.0
 """How far beyond a waypoint a vehicle may be sent to pass it straight; more than the 15 m from which DUNE circles."""
 
+PATIENCE_S = 2.0
+"""How much of the vehicles' time a decision may wait for a newer map."""
+
 REPORT_DELAY_S = 0.1
 """How old a vehicle's last report is at most, on the wall clock."""
 
@@ -80,6 +83,8 @@ class Runner:
         self._spec = live.spec
         self._constraints = make_constraints(live.spec)
         self._decision_s = EXPECTED_DECISION_S
+        self._mapping_s = 0.0
+        self._mapping: asyncio.Task[None] | None = None
         self._bottom = Bottom.unknown()
 
     async def run(self) -> None:
@@ -101,15 +106,17 @@ class Runner:
                     decision = await self._decide(planner, self._places())
                 await self._commit(decision)
                 await self._send()
-                # The map's model is refined while the vehicles travel; nobody waits for it.
+                # The map is made and its model refined while the vehicles travel.
+                self._begin_map()
                 self._executor.submit(live.builder.learn).add_done_callback(_log_failure)
                 decision = await self._travel(planner)
                 self._keep_pace(asyncio.get_running_loop().time() - started_s)
         finally:
             metrics.RUNNING.dec()
-            for keeper in keepers:
-                keeper.cancel()
-            await asyncio.gather(*keepers, return_exceptions=True)
+            helpers = [*keepers, *([self._mapping] if self._mapping else [])]
+            for helper in helpers:
+                helper.cancel()
+            await asyncio.gather(*helpers, return_exceptions=True)
             await to_the_end(self._save_elapsed())
             live.running_since_s = None
 
@@ -217,16 +224,44 @@ class Runner:
             np.linalg.norm(there[place.vehicle] - place.en_m) <= tolerance_m for place in expected
         )
 
-    async def _decide(self, planner: Planner, places: list[Place]) -> Decision:
-        """Make the map, then the decision, in a worker thread."""
+    def _begin_map(self) -> None:
+        """Make a map of what has been sounded so far, unless one is being made."""
+        if self._mapping is None:
+            self._mapping = asyncio.create_task(self._make_map())
+
+    async def _make_map(self) -> None:
+        live, loop = self._live, asyncio.get_running_loop()
+        started_s = loop.time()
+        await live.journal.flush()
+        before = live.builder.newest
+        built = await loop.run_in_executor(self._executor, live.builder.build)
+        if built is not None and built is not before:
+            live.publish_map(built)
+        self._mapping_s = loop.time() - started_s
+
+    async def _renew_map(self) -> None:
+        """Bring the map up to date, unless vehicles would circle for long meanwhile: then the newest has to do.
+
+        That is so where many soundings are mapped, or time runs fast. A failure to make the map comes out here.
+        """
         live = self._live
-        started_s = asyncio.get_running_loop().time()
+        patient = live.builder.newest is None or self._mapping_s * self._time_scale <= PATIENCE_S
+        if self._mapping is not None and (patient or self._mapping.done()):
+            await self._mapping
+            self._mapping = None
         await live.journal.flush()
         await live.notice_imports()
-        before = live.builder.newest
+        if patient and live.builder.stale:
+            await self._make_map()
+
+    async def _decide(self, planner: Planner, places: list[Place]) -> Decision:
+        """Bring the map up to date, then make the decision, in a worker thread."""
+        live = self._live
+        started_s = asyncio.get_running_loop().time()
+        await self._renew_map()
 
         def work() -> Decision:
-            live.builder.build()
+            sounded_m, doubtful_m = live.builder.sounded_at_m()
             return decide(
                 live.header.step + 1,
                 self._spec,
@@ -234,17 +269,16 @@ class Runner:
                 planner,
                 places,
                 live.builder.belief(),
-                live.builder.sounded_at_m(),
+                sounded_m,
                 live.gate.corrections.water_level_m(now().timestamp()),
+                doubtful_m,
             )
 
         with metrics.PLANNING_SECONDS.time():
             decision = await asyncio.get_running_loop().run_in_executor(self._executor, work)
-        built = live.builder.newest
-        if built is not None and built is not before:
-            live.publish_map(built)
         took_s = asyncio.get_running_loop().time() - started_s
-        self._decision_s = PACE_MEMORY * self._decision_s + (1 - PACE_MEMORY) * took_s
+        # Some decisions take longer than most. Vehicles would circle for them if the usual one were allowed for.
+        self._decision_s = max(took_s, PACE_MEMORY * self._decision_s + (1 - PACE_MEMORY) * took_s)
         return decision
 
     async def _commit(self, decision: Decision) -> None:

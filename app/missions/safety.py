@@ -10,6 +10,7 @@ import shapely
 from numpy.typing import NDArray
 from shapely.geometry import LineString, Point, Polygon
 from shapely.geometry.base import BaseGeometry
+from shapely.geometry.polygon import orient
 from shapely.ops import nearest_points
 
 from app.exploration.bottom import Bottom
@@ -148,6 +149,12 @@ def lead_point(constraints: Constraints, start: FloatArray, target: FloatArray, 
         return target
     ends = np.array(first.coords)
     return np.asarray(ends[np.argmax(np.linalg.norm(ends - target, axis=1))])
+
+
+def widened(zone: FloatArray, margin_m: float) -> FloatArray:
+    """Return a keep-out zone (n, 2) with a margin around it, (m, 2), counter-clockwise and not closed."""
+    wide = orient(Polygon(zone).buffer(margin_m, join_style="mitre"))
+    return np.asarray(wide.exterior.coords)[:-1]
 
 
 def nearest_inside(area: Polygon, place: FloatArray) -> FloatArray:

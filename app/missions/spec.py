@@ -143,6 +143,12 @@ class Limits(Model):
     min_depth_m: float = Field(default=2.0, ge=0, le=6000, description="Shallowest depth of travel under water")
     max_depth_m: float = Field(default=30.0, gt=0, le=6000, description="Deepest depth of travel")
     min_altitude_m: float = Field(default=1.0, ge=0, le=1000, description="Least clearance above the sea floor")
+    keep_out_margin_m: float = Field(
+        default=5.0,
+        ge=0,
+        le=1000,
+        description="Legs stay this far from keep-out zones: vehicles turn in circles and drift",
+    )
     com_range_m: float | None = Field(
         default=None, gt=0, description="Every vehicle keeps another one within this range; null: unlimited"
     )

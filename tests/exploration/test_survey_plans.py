@@ -1,9 +1,17 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.spatial import cKDTree
+from situations import make_situation
 
+from app.estimation import SingleBeam
+from app.exploration.options import PlannerOptions
+from app.exploration.planners import create_planner
 from app.exploration.routes import fly, next_waypoint
+from app.exploration.survey_error import MOST_DOUBTS, SECOND_LOOK, with_second_looks
 from app.exploration.survey_search import DRAWS, improve
 from app.exploration.survey_value import Objective, lower_to_segment, make_nodes, plan_value
 
@@ -72,3 +80,44 @@ def test_searching_never_worsens_a_plan_and_says_truly_what_it_is_worth():
     for j in range(2):
         route = after[j, : after_counts[j]]
         assert ((route >= 0.5 - 1e-9) & (route <= 99.5 + 1e-9)).all()
+
+
+def test_doubted_soundings_raise_the_weight_around_them_unless_they_are_many():
+    situation = make_situation(soundings=np.random.default_rng(0).uniform(0.0, 100.0, (1000, 2)))
+    even = np.ones(len(situation.belief.xy_m))
+    few, many = (np.random.default_rng(1).uniform(0.0, 100.0, (n, 2)) for n in (3, int(3000 * MOST_DOUBTS)))
+    raised = with_second_looks(even, replace(situation, doubtful_en_m=few), 10.0)
+    near = cKDTree(few).query(situation.belief.xy_m)[0] <= 6.0
+    assert near.any()
+    np.testing.assert_array_equal(raised, np.where(near, SECOND_LOOK, 1.0))
+    np.testing.assert_array_equal(with_second_looks(even, replace(situation, doubtful_en_m=many), 10.0), even)
+    np.testing.assert_array_equal(with_second_looks(even, situation, 10.0), even)
+
+
+def closest_m(place: np.ndarray, *, doubted: bool) -> float:
+    """Fly a survey of a flat floor; return how close its legs come to a place that is doubted from step six on."""
+    situation = make_situation()
+    xy, positions = situation.belief.xy_m, situation.positions
+    planner, rng = create_planner("cao", PlannerOptions(search=400), SingleBeam(0.01)), np.random.default_rng(0)
+    sounded, closest = positions[:, :2], np.inf
+    for step in range(1, situation.steps_total + 1):
+        away = np.asarray(cKDTree(sounded).query(xy)[0])
+        belief = replace(
+            situation.belief, depth_m=np.full(len(xy), 12.0), sd_m=0.05 + 0.02 * away, weight=np.ones(len(xy))
+        )
+        doubtful = place[None] if doubted and step > 5 else np.zeros((0, 2))
+        now = replace(
+            situation, step=step, positions=positions, belief=belief, soundings_en_m=sounded, doubtful_en_m=doubtful
+        )
+        after = planner.propose(now, rng).positions
+        for a, b in zip(positions[:, :2], after[:, :2], strict=True):
+            sounded = np.vstack([sounded, np.linspace(a, b, 9)])
+            closest = min(closest, float(distance_to_segment(place[None], a, b)[0]))
+        positions = after
+    return closest
+
+
+def test_a_doubted_sounding_is_looked_at_again():
+    place = np.array([29.0, 50.0])  # between two lines
+    assert closest_m(place, doubted=False) > 2.5
+    assert closest_m(place, doubted=True) < 1.5

@@ -112,7 +112,7 @@ def test_soundings_that_come_while_a_map_is_built_are_in_the_next_one() -> None:
     assert final is not None
     assert final.soundings == 7 * 40
     assert versions == sorted(versions)
-    np.testing.assert_array_equal(np.sort(builder.sounded_at_m()[:, 0]), np.sort(np.concatenate(batches)[:, 0]))
+    np.testing.assert_array_equal(np.sort(builder.sounded_at_m()[0][:, 0]), np.sort(np.concatenate(batches)[:, 0]))
 
 
 def test_one_gross_outlier_does_not_bend_a_product() -> None:

@@ -246,7 +246,7 @@ def test_without_anyone_to_plan_for_the_planner_is_not_asked() -> None:
 
 def test_the_way_in_goes_round_keep_out_zones() -> None:
     quay = rectangle(-5, 10, 8, 60)  # along the western border, open in the south
-    decision, _, spec = decide_for([place("a", -40, 35)], [], keep_out=[quay])
+    decision, _, spec = decide_for([place("a", -40, 35)], [], keep_out=[quay], limits={"keep_out_margin_m": 1.0})
     (leg,) = decision.legs
     assert leg.refusal == ""
     zone, area = Polygon(spec.to_local(spec.keep_out[0])), Polygon(spec.local_area())
@@ -298,3 +298,29 @@ def test_no_decision_breaks_a_limit_wherever_the_vehicles_are(
         if not zone.buffer(1e-3).contains(Point(start)):
             assert not zone.buffer(-1e-3).intersects(LineString([start, leg.target_m[:2]]))
         assert 0.0 <= leg.target_m[2] <= max(0.0, depth_m - 2 * 0.5 - 1.0) + 1e-6
+
+
+def test_legs_keep_a_margin_from_keep_out_zones_which_a_vehicle_inside_it_may_only_leave() -> None:
+    spec = make_spec(60.0, keep_out=[rectangle(20, 20, 40, 40)], limits={"keep_out_margin_m": 5.0})
+    constraints = make_constraints(spec)
+    clear, near, within = 14.0, 17.0, 21.0
+
+    def allowed(start: tuple[float, float], end: tuple[float, float]) -> bool:
+        origin = np.array([[*start, 2.0]])
+        return bool(constraints.feasible(origin, np.array([[[*end, 2.0]]]))[0])
+
+    assert allowed((clear, 28.0), (clear, 33.0))
+    assert not allowed((clear, 28.0), (near, 28.0))
+    assert not allowed((near, 28.0), (near + 1.0, 28.0))
+    assert not allowed((near, 28.0), (within, 28.0))
+    assert allowed((near, 28.0), (clear, 28.0))
+    assert allowed((near, 28.0), (near - 0.5, 28.0))
+    # Out of the margin, but across the zone's corner.
+    assert not allowed((19.0, 36.0), (22.0, 44.0))
+
+
+def test_without_a_margin_legs_may_pass_along_a_zone() -> None:
+    spec = make_spec(60.0, keep_out=[rectangle(20, 20, 40, 40)], limits={"keep_out_margin_m": 0.0})
+    constraints = make_constraints(spec)
+    assert len(constraints.keep_out) == 1
+    assert constraints.feasible(np.array([[19.5, 28.0, 2.0]]), np.array([[[19.5, 33.0, 2.0]]]))[0]

@@ -28,7 +28,7 @@ from app.exploration.planners.handover import hand_over
 from app.exploration.problem import Belief, Situation
 from app.exploration.routes import next_waypoint
 from app.exploration.survey_backbone import MARGIN_M, backbone
-from app.exploration.survey_error import expected_roughness
+from app.exploration.survey_error import expected_roughness, with_second_looks
 from app.exploration.survey_search import DRAWS, improve
 from app.exploration.survey_value import Nodes, Objective, make_nodes, plan_value, values_after_first_leg
 
@@ -45,7 +45,7 @@ HEAT = 0.01
 POWER = 2.0
 REACH = 4.0
 """Line spacings beyond which a place counts as quite unknown."""
-LEAVE_BACKBONE = 0.93
+LEAVE_BACKBONE = 0.98
 """The freer plan must promise at most this part of the squared error that the backbone promises."""
 LEAVE_PLAN = 0.02
 """A leg off the plan must promise a squared error smaller by this part: predictions are noisy, and a choice among many
@@ -114,7 +114,8 @@ class SurveyRegressors:
         self._spacing = _free_area(constraints) / (len(self._en) * team.steps_total * constraints.max_step_m)
         tree = cKDTree(np.vstack([team.soundings_en_m, self._en]), balanced_tree=False)
         distance = np.asarray(tree.query(team.belief.xy_m)[0])
-        self._nodes = thin_nodes(team, expected_roughness(team.belief, distance, self._spacing))
+        roughness = expected_roughness(team.belief, distance, self._spacing)
+        self._nodes = thin_nodes(team, with_second_looks(roughness, team, self._spacing))
         self._scale = max(team.belief.correlation_length_m, self._spacing)
         self._objective = Objective(self._step_m, self._steps, self._scale, POWER, TURN_PENALTY, REACH * self._spacing)
         self._d2 = np.asarray(tree.query(self._nodes.en_m)[0]) ** 2
