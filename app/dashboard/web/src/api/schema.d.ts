@@ -1243,6 +1243,12 @@ export interface components {
              */
             min_altitude_m: number;
             /**
+             * Keep Out Margin M
+             * @description Legs stay this far from keep-out zones: vehicles turn in circles and drift
+             * @default 5
+             */
+            keep_out_margin_m: number;
+            /**
              * Com Range M
              * @description Every vehicle keeps another one within this range; null: unlimited
              */
