@@ -80,16 +80,16 @@ def main(
     target: Annotated[
         list[str] | None,
         typer.Option(
-            help="NAME:EAST,NORTH,DEPTH[,HEADING,SPEED] of a target with a transponder (metres, degrees, m/s), to which "
-            "the vehicles range; repeatable."
+            help="NAME:EAST,NORTH,DEPTH[,HEADING,SPEED] of a target with a transponder (metres, degrees, m/s), which "
+            "the vehicles range to; repeatable."
         ),
     ] = None,
     range_noise: Annotated[
         float, typer.Option(help="Relative standard deviation of ranges to targets.", min=0.0)
-    ] = RangingNoise.relative_sd,
+    ] = 0.01,
     range_period: Annotated[
         float, typer.Option(help="Seconds between two ranges of a vehicle to a target.", min=0.1)
-    ] = RangingNoise.period_s,
+    ] = 2.0,
     hearing: Annotated[
         float, typer.Option(help="Metres at which targets are no longer heard; 0: they are heard everywhere.", min=0.0)
     ] = 0.0,

@@ -8,7 +8,7 @@ from app.missions.spec_base import Name
 
 
 class Measurement(BaseModel):
-    """One measurement posted by a vehicle: its position, with a sounding or with a range to a target where it has one."""
+    """One measurement posted by a vehicle: its position, and a sounding or a range to a target where it has one."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 

@@ -98,9 +98,13 @@ def _stranger(live: LiveMission, item: Measurement) -> str:
         return f"vehicle: {item.vehicle!r} takes no part in this mission"
     if member.spec.kind is not VehicleKind.REST:
         return f"vehicle: {item.vehicle!r} is of kind {member.spec.kind}; only vehicles of kind rest post measurements"
-    return _impossible_place(item, live.frame) or (
-        live.ranges.tracking.stranger(item.target) if item.target is not None else ""
-    )
+    return _impossible_place(item, live.frame) or _useless_range(item, live)
+
+
+def _useless_range(item: Measurement, live: LiveMission) -> str:
+    if item.target is None:
+        return ""
+    return live.ranges.tracking.stranger(item.target) or live.ranges.not_yet(item.time_s)
 
 
 def _ranges(live: LiveMission, items: Sequence[Measurement], strangers: Mapping[int, str]) -> dict[int, Arrived]:
@@ -109,7 +113,7 @@ def _ranges(live: LiveMission, items: Sequence[Measurement], strangers: Mapping[
     for item in items:
         newest[item.vehicle] = max(newest.get(item.vehicle, -math.inf), item.time_s)
     return {
-        i: live.ranges.arrived(
+        i: live.ranges.posted(
             RangeReport(
                 vehicle=item.vehicle,
                 time_s=item.time_s,

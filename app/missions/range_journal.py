@@ -1,7 +1,9 @@
 """Ranges to moving targets as they come: judged in the order of their time, written down, and only then used.
 
-A range counts once it is committed, like a sounding. Vehicles' clocks differ, and simulated ones run fast; so a
-range's time is our own clock at its arrival, less what has passed since by the clock of the vehicle that measured it.
+A range counts once it is committed, like a sounding. Vehicles' clocks differ, and simulated ones run fast; so the time
+of a range that a link heard is our own clock at its arrival, less what has passed since by the clock of the vehicle that
+measured it. What vehicles post may have been gathered for hours; they are taken at their word that their clock shows
+Unix seconds. Where vehicles live faster than the wall clock it cannot: then their clock is set by their first post.
 """
 
 import asyncio
@@ -56,6 +58,7 @@ class RangeJournal:
         self._journal = journal
         self._time_scale = time_scale
         self._noted: list[Arrived] = []
+        self._offsets: dict[str, float] = {}
         self._strangers: set[str] = set()
         self._telling: set[asyncio.Task[Any]] = set()
         self._pump: asyncio.Task[None] | None = None
@@ -108,9 +111,23 @@ class RangeJournal:
             self._start_pump()
 
     def arrived(self, report: RangeReport, newest_s: float | None) -> Arrived:
-        """Return a range with its time by the service's clock."""
+        """Return a range that a link heard with its time by the service's clock."""
         since = 0.0 if newest_s is None else max(0.0, newest_s - report.time_s)
         return Arrived(report, self.now_s() - since)
+
+    def posted(self, report: RangeReport, newest_s: float) -> Arrived:
+        """Return a range that a vehicle posted with its time; ``newest_s``: of its batch, by the vehicle's clock."""
+        if self._time_scale == 1.0:
+            return Arrived(report, report.time_s)
+        offset = self._offsets.setdefault(report.vehicle, self.now_s() - newest_s)
+        return Arrived(report, report.time_s + offset)
+
+    def not_yet(self, time_s: float) -> str:
+        """Return why a time that a vehicle posted with a range cannot be; empty when it can."""
+        ahead = time_s - now().timestamp()
+        if self._time_scale != 1.0 or ahead <= AHEAD_S:
+            return ""
+        return f"time_s: {time_s:.0f} is {ahead:.0f} s ahead of this service's clock; ranges to targets need Unix seconds"
 
     async def take(self, arrived: Sequence[Arrived], session: AsyncSession) -> tuple[list[ItemVerdict], Committed]:
         """Judge and store ranges in the caller's transaction; the caller holds :attr:`writing`.
@@ -128,7 +145,7 @@ class RangeJournal:
                 seen.add(identities[i])
                 fresh.append(i)
         judged, known = self.tracking.judge(arrived[i] for i in fresh)
-        verdicts = {i: verdict for i, verdict in zip(fresh, judged, strict=True)}
+        verdicts = dict(zip(fresh, judged, strict=True))
         rows = [self._row(verdict) for verdict in judged if not self.tracking.implausible(verdict.arrived.report)]
         last_id = await range_queries.add_ranges(session, rows)
 

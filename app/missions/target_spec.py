@@ -78,8 +78,8 @@ class Tracking(Model):
     )
     pursue: bool = Field(
         default=True,
-        description="Whether a vehicle leaves the mapping for a target that is not known well enough: one of three, and "
-        "none of a vehicle alone",
+        description="Whether a vehicle leaves the mapping for a target that is not known well enough: one of three, "
+        "none of a team of one",
     )
     standoff_m: float = Field(
         default=10.0, ge=0, le=1000, description="A vehicle that goes for a target comes no closer to any"

@@ -1,6 +1,6 @@
 """The moving targets of one mission: ranges in, what is known of each out. Without a clock, a database or a link.
 
-Times are seconds of the service's own clock as vehicles count them; what makes them is :mod:`app.missions.range_journal`.
+Times are seconds of the service's own clock as vehicles count them; :mod:`app.missions.range_journal` makes them.
 The same ranges in the same order give the same filters, so that a restart takes them up exactly where they were.
 """
 
@@ -33,7 +33,7 @@ FAR_OFF = 6.0
 """A range so many standard deviations from what its filter expects is an echo, not the target."""
 
 ECHOES = 6
-"""So many of them one after the other are the target after all, and its filter is wrong: it is begun anew."""
+"""So many of them more than of others are the target after all, and its filter is wrong: it is begun anew."""
 
 MINUTE_S = 60.0
 VERTICAL = 0.3
@@ -77,7 +77,7 @@ class Known:
     used: int = 0
     rejected: int = 0
     echoes: int = 0
-    """Ranges in a row that its filter did not expect."""
+    """Ranges that its filter did not expect, less those that it did since."""
     last_refusal: str = ""
 
 
@@ -145,14 +145,14 @@ class Tracking:
         if track.single:
             expected, sd = expected_range(track, place, self._spec.range_noise, blur)
             if abs(report.range_m - expected) > FAR_OFF * sd:
-                reason = f"range_m: {report.range_m:.1f} m where {expected:.1f} ± {sd:.1f} m were expected"
+                reason = f"target_range_m: {report.range_m:.1f} m where {expected:.1f} ± {sd:.1f} m were expected"
                 if known.echoes + 1 < ECHOES:
                     echoes, rejected = known.echoes + 1, known.rejected + 1
                     return replace(known, echoes=echoes, rejected=rejected, last_refusal=reason), reason
                 track = TargetTrack.unknown()
         track = self._estimators[name].update(track, place[None], np.array([report.range_m]), blur[None])
         at_s = max(arrived.at_s, known.at_s)
-        return replace(known, track=track, at_s=at_s, used=known.used + 1, echoes=0), ""
+        return replace(known, track=track, at_s=at_s, used=known.used + 1, echoes=max(known.echoes - 1, 0)), ""
 
     def implausible(self, report: RangeReport) -> str:
         """Return which value of a range cannot be; empty when all can."""
@@ -201,7 +201,7 @@ class Tracking:
         return TargetTrack.unknown() if (track.sd_m[:2] > reach[:2]).any() else track
 
     def at(self, name: str, at_s: float) -> TargetTrack:
-        """Return what is known of a target, foretold for a time."""
+        """Return what is known of a target, foretold for a time; as the last range left it where that is later."""
         return self._ahead(name, self.known[name], at_s)
 
     def accurate(self, track: TargetTrack) -> bool:

@@ -159,9 +159,8 @@ class SimFleetLink:
         terrain = self._terrain(launch)
         seed = [self._settings.seed, *launch.vehicle.encode()]
         started_s = now().timestamp()
-        targets = [
-            Target(_simulated(target, terrain), terrain, started_s) for target in launch.targets if target.simulated
-        ]
+        moving = [target for target in launch.targets if target.simulated is not None]
+        targets = [Target(_simulated(target, terrain), terrain, started_s) for target in moving]
         body = SimulatedVehicle(
             launch.vehicle,
             terrain,
