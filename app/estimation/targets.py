@@ -121,7 +121,9 @@ class TargetEstimator:
     speed_sd : float
         Standard deviation of each component of its velocity then.
     vertical : float
-        Part of ``speed_sd`` and ``acceleration_sd`` that counts along depth.
+        Part of all these deviations that counts along depth.
+    turn_sd : float or None
+        In place of ``acceleration_sd`` while a target turns; None: ``speed_sd``.
     """
 
     sensor: RangeSensor = RangeSensor(EVERYWHERE, 0.1)  # noqa: RUF009 - frozen
@@ -131,6 +133,7 @@ class TargetEstimator:
     high_m: tuple[float, float, float] = (1.0, 1.0, 1.0)
     speed_sd: float = 0.006
     vertical: float = 1.0
+    turn_sd: float | None = None
 
     def accurate(self, track: TargetTrack) -> bool:
         """Return whether a target belongs to ``A`` now."""
@@ -160,7 +163,9 @@ class TargetEstimator:
 
     def _manoeuvre(self, track: TargetTrack) -> float:
         """Return the sd of the velocity's change: large after ranges that no straight course explains."""
-        return self.speed_sd if track.unease > TURNED else self.acceleration_sd
+        if track.unease <= TURNED:
+            return self.acceleration_sd
+        return self.speed_sd if self.turn_sd is None else self.turn_sd
 
     def update(
         self, track: TargetTrack, positions: FloatArray, ranges: FloatArray, blur_m2: FloatArray | None = None

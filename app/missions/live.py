@@ -225,6 +225,8 @@ class LiveMission:
                     return
                 member.report = event
                 self.journal.position(event)
+                if self.spec.targets:
+                    self.ranges.times.heard(event.vehicle, event.time_s)
             case SoundingReport():
                 self.journal.sounding(event)
                 return
@@ -385,7 +387,7 @@ class LiveMission:
     def target_views(self) -> list[TargetView]:
         """Return the moving targets, foretold for now."""
         pursuers = {member.pursuing: member.name for member in self.team if member.pursuing is not None}
-        return target_views(self.ranges.tracking, self.frame, self.area, self.ranges.now_s(), pursuers)
+        return target_views(self.ranges.tracking, self.frame, self.area, self.ranges.times.now_s(), pursuers)
 
     def _vehicle_view(self, member: Member) -> VehicleView:
         info = self._hub.info(member.key)

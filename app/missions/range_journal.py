@@ -1,9 +1,7 @@
 """Ranges to moving targets as they come: judged in the order of their time, written down, and only then used.
 
-A range counts once it is committed, like a sounding. Vehicles' clocks differ, and simulated ones run fast; so the time
-of a range that a link heard is our own clock at its arrival, less what has passed since by the clock of the vehicle that
-measured it. What vehicles post may have been gathered for hours; they are taken at their word that their clock shows
-Unix seconds. Where vehicles live faster than the wall clock it cannot: then their clock is set by their first post.
+A range counts once it is committed, like a sounding. What vehicles post may have been gathered for hours; they are
+taken at their word that their clock shows Unix seconds. All other times are as :mod:`app.missions.vehicle_times` has them.
 """
 
 import asyncio
@@ -17,6 +15,7 @@ from app.missions.clock import now
 from app.missions.fleet import Position, RangeReport
 from app.missions.journal import Journal
 from app.missions.tracking import Arrived, Judged, Tracking
+from app.missions.vehicle_times import VehicleTimes
 from app.missions.views import ItemVerdict, Level, Verdict
 from app.storage import target_ranges as range_queries
 from app.storage.database import Database
@@ -51,6 +50,7 @@ class RangeJournal:
         self, database: Database, mission_id: str, tracking: Tracking, journal: Journal, time_scale: float
     ) -> None:
         self.tracking = tracking
+        self.times = VehicleTimes(time_scale, lambda: now().timestamp())
         self.last_id = 0
         """Of the stored ranges the last one that the filters know."""
         self._database = database
@@ -58,16 +58,11 @@ class RangeJournal:
         self._journal = journal
         self._time_scale = time_scale
         self._noted: list[Arrived] = []
-        self._offsets: dict[str, float] = {}
         self._strangers: set[str] = set()
         self._telling: set[asyncio.Task[Any]] = set()
         self._pump: asyncio.Task[None] | None = None
         self.writing = asyncio.Lock()
         """Held while ranges are judged and stored, so that filters and database agree."""
-
-    def now_s(self) -> float:
-        """Return the service's clock as vehicles count seconds; it goes on over restarts."""
-        return now().timestamp() * self._time_scale
 
     async def load(self, session: AsyncSession, step: StepRow | None) -> None:
         """Take the filters up where they were: as the last step kept them, and what came after it."""
@@ -107,27 +102,23 @@ class RangeJournal:
             self._tell_once(report, stranger)
             return
         if not too_new(report, newest_s):
-            self._noted.append(self.arrived(report, newest_s))
+            self.times.heard(report.vehicle, report.time_s if newest_s is None else newest_s)
+            self._noted.append(Arrived(report, self.times.of(report.vehicle, report.time_s)))
             self._start_pump()
-
-    def arrived(self, report: RangeReport, newest_s: float | None) -> Arrived:
-        """Return a range that a link heard with its time by the service's clock."""
-        since = 0.0 if newest_s is None else max(0.0, newest_s - report.time_s)
-        return Arrived(report, self.now_s() - since)
 
     def posted(self, report: RangeReport, newest_s: float) -> Arrived:
         """Return a range that a vehicle posted with its time; ``newest_s``: of its batch, by the vehicle's clock."""
         if self._time_scale == 1.0:
             return Arrived(report, report.time_s)
-        offset = self._offsets.setdefault(report.vehicle, self.now_s() - newest_s)
-        return Arrived(report, report.time_s + offset)
+        self.times.heard(report.vehicle, newest_s)
+        return Arrived(report, self.times.of(report.vehicle, report.time_s))
 
     def not_yet(self, time_s: float) -> str:
         """Return why a time that a vehicle posted with a range cannot be; empty when it can."""
         ahead = time_s - now().timestamp()
         if self._time_scale != 1.0 or ahead <= AHEAD_S:
             return ""
-        return f"time_s: {time_s:.0f} is {ahead:.0f} s ahead of this service's clock; ranges to targets need Unix seconds"
+        return f"time_s: {time_s:.0f} is {ahead:.0f} s ahead of this service's clock; ranges need Unix seconds"
 
     async def take(self, arrived: Sequence[Arrived], session: AsyncSession) -> tuple[list[ItemVerdict], Committed]:
         """Judge and store ranges in the caller's transaction; the caller holds :attr:`writing`.

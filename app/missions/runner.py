@@ -227,7 +227,7 @@ class Runner:
 
         step_s = self._spec.limits.max_step_m / self._spec.speed_mps
         await live.ranges.flush()
-        targets = live.ranges.tracking.told(live.ranges.now_s(), step_s)
+        targets = live.ranges.tracking.told(live.ranges.times.now_s(), step_s)
 
         def work() -> Decision:
             live.builder.build()

@@ -1,6 +1,6 @@
 """The moving targets of one mission: ranges in, what is known of each out. Without a clock, a database or a link.
 
-Times are seconds of the service's own clock as vehicles count them; :mod:`app.missions.range_journal` makes them.
+Times are seconds of the service's own clock as vehicles count them; :mod:`app.missions.vehicle_times` makes them.
 The same ranges in the same order give the same filters, so that a restart takes them up exactly where they were.
 """
 
@@ -35,9 +35,15 @@ FAR_OFF = 6.0
 ECHOES = 6
 """So many of them more than of others are the target after all, and its filter is wrong: it is begun anew."""
 
+WIDE = 0.7
+"""Standard deviation, in ranges, beyond which a filter cannot be linearised about its mean: it is begun anew."""
+
 MINUTE_S = 60.0
 VERTICAL = 0.3
 """How much less targets move up and down than over ground."""
+
+TURN_S = 20.0
+"""Time within which a target that turns may have turned round."""
 
 SPEEDS = 2.0
 """Standard deviations that the greatest plausible speed is taken to be."""
@@ -150,7 +156,11 @@ class Tracking:
                     echoes, rejected = known.echoes + 1, known.rejected + 1
                     return replace(known, echoes=echoes, rejected=rejected, last_refusal=reason), reason
                 track = TargetTrack.unknown()
-        track = self._estimators[name].update(track, place[None], np.array([report.range_m]), blur[None])
+        estimator = self._estimators[name]
+        if track.single and float(np.sqrt((track.sd_m**2).sum())) > WIDE * report.range_m:
+            track = TargetTrack.unknown()
+        track = estimator.update(track, place[None], np.array([report.range_m]), blur[None])
+        track = in_the_water(track, estimator.low_m[2], estimator.high_m[2])
         at_s = max(arrived.at_s, known.at_s)
         return replace(known, track=track, at_s=at_s, used=known.used + 1, echoes=max(known.echoes - 1, 0)), ""
 
@@ -262,6 +272,29 @@ class Tracking:
         self.adopt(known)
 
 
+def in_the_water(track: TargetTrack, top_m: float, bottom_m: float) -> TargetTrack:
+    """Return a single filter that has not forgotten between which depths its target is.
+
+    Vehicles at about a target's depth learn nothing of it, and what is not measured drifts without bounds. A depth that
+    is known worse than an even spread over the water is known that well again.
+    """
+    variance = float(track.covariance[2, 2]) if track.single else 0.0
+    spread = (bottom_m - top_m) ** 2 / 12.0
+    if variance <= spread:
+        return track
+    P, mean = track.covariances[0], track.means[0]
+    noise = 1.0 / (1.0 / spread - 1.0 / variance)
+    gain = P[:, 2] / (variance + noise)
+    A = np.eye(6)
+    A[:, 2] -= gain
+    covariance = A @ P @ A.T + noise * np.outer(gain, gain)
+    return replace(
+        track,
+        means=(mean + gain * (0.5 * (top_m + bottom_m) - mean[2]))[None],
+        covariances=0.5 * (covariance + covariance.T)[None],
+    )
+
+
 def _known(state: Mapping[str, Any]) -> Known:
     track = TargetTrack(
         np.array(state["means"], dtype=np.float64).reshape(-1, 6),
@@ -288,6 +321,7 @@ def _estimator(target: TargetSpec, spec: MissionSpec, low_m: FloatArray, high_m:
         low_m=(float(low_m[0]) - around, float(low_m[1]) - around, target.min_depth_m),
         high_m=(float(high_m[0]) + around, float(high_m[1]) + around, deepest),
         speed_sd=target.max_speed_mps / SPEEDS,
+        turn_sd=target.max_speed_mps / SPEEDS / math.sqrt(TURN_S),
         vertical=VERTICAL,
     )
 

@@ -36,6 +36,8 @@ CONTRACT = {
     "GET /missions/{mission_id}/soundings": "listSoundings",
     "POST /missions/{mission_id}/soundings/{sounding_id}/restore": "restoreSounding",
     "POST /missions/{mission_id}/soundings/{sounding_id}/reject": "rejectSounding",
+    "GET /missions/{mission_id}/targets": "listTargets",
+    "GET /missions/{mission_id}/targets/ranges": "listTargetRanges",
     "GET /missions/{mission_id}/map/tiles": "getMapTiles",
     "POST /missions/{mission_id}/pause": "pauseMission",
     "POST /missions/{mission_id}/resume": "resumeMission",

@@ -285,6 +285,10 @@ export class Chart {
     );
   }
 
+  setTargets(features: Feature[]): void {
+    this.#set("targets", features);
+  }
+
   setSpots(spots: readonly Spot[]): void {
     this.#set(
       "soundings",

@@ -10,6 +10,7 @@ import { Painter } from "../map/painter";
 import { lookupTable } from "../map/palette";
 import type { SeaFloor } from "../map/seafloor";
 import type { Look } from "../map/style";
+import { targetFeatures } from "../map/targets";
 import { replayed } from "../state/replay";
 import {
   chosenSounding,
@@ -29,6 +30,7 @@ import {
   showHatching,
   shownRange,
   showRanges,
+  showTargets,
   showTracks,
   theme,
   vehicles,
@@ -75,6 +77,11 @@ export function follow(chart: Chart): () => void {
         showRanges.value && range ? places().map(({ at, colour }) => ({ at, colour, radius_m: range })) : [],
       );
     }),
+    effect(() =>
+      chart.setTargets(
+        showTargets.value && replayStep.value === null ? targetFeatures(mission.value?.targets ?? []) : [],
+      ),
+    ),
     effect(() =>
       chart.setSpots(
         (reviewed.value ?? []).map((s) => ({
