@@ -203,6 +203,8 @@ class LiveMission:
     def halt(self) -> None:
         """Keep the step loop from sending anything more, and wake everyone who waits for a waypoint."""
         self.halted = True
+        for member in self.team:
+            member.pursuing = None
         self.changed.set()
         self.publish_summary()
 

@@ -1,7 +1,7 @@
 """Ranges to moving targets as they come: judged in the order of their time, written down, and only then used.
 
 A range counts once it is committed, like a sounding. What vehicles post may have been gathered for hours; they are
-taken at their word that their clock shows Unix seconds. All other times are as :mod:`app.missions.vehicle_times` has them.
+taken at their word that their clock shows Unix seconds. Other times are as :mod:`app.missions.vehicle_times` has them.
 """
 
 import asyncio

@@ -4,7 +4,7 @@ They are the same for noise of a fixed size and while the second order of a rang
 large beside the target's deviation.
 """
 
-from datetime import datetime, timedelta
+from datetime import UTC, datetime, timedelta
 
 import numpy as np
 import pytest
@@ -17,16 +17,16 @@ stonesoup = pytest.importorskip("stonesoup", reason="pip install stonesoup, whic
 ACCELERATION, NOISE_M = 0.02, 2.0
 START = np.array([120.0, -80.0, 30.0, 0.4, 0.1, 0.0])
 PRIOR = np.diag([25.0, 25.0, 25.0, 0.04, 0.04, 0.04])
-BUOYS = np.array([[0.0, 0.0, 0.0], [4000.0, 200.0, 5.0], [300.0, 3800.0, 10.0], [900.0, 700.0, 2500.0]])
+BUOYS = np.array([[-3000.0, -1500.0, 0.0], [4000.0, 200.0, 5.0], [300.0, 3800.0, 10.0], [900.0, 700.0, 2500.0]])
 
 
 def test_the_filter_agrees_with_stone_soups_step_by_step() -> None:
-    from stonesoup.functions import cart2sphere  # noqa: F401 - fails early where the package is broken
     from stonesoup.models.measurement.nonlinear import CartesianToElevationBearingRange
     from stonesoup.models.transition.linear import LinearGaussianTimeInvariantTransitionModel
     from stonesoup.predictor.kalman import KalmanPredictor
     from stonesoup.types.array import CovarianceMatrix, StateVector
     from stonesoup.types.detection import Detection
+    from stonesoup.types.hypothesis import SingleHypothesis
     from stonesoup.types.state import GaussianState
     from stonesoup.updater.kalman import ExtendedKalmanUpdater
 
@@ -35,13 +35,14 @@ def test_the_filter_agrees_with_stone_soups_step_by_step() -> None:
     F = np.eye(6)
     F[:3, 3:] = np.eye(3)
     Q = ours.process_noise()
-    begin = datetime(2026, 1, 1)
+    begin = datetime(2026, 1, 1, tzinfo=UTC)
     predictor = KalmanPredictor(
         LinearGaussianTimeInvariantTransitionModel(transition_matrix=F, covariance_matrix=CovarianceMatrix(Q))
     )
     updater = ExtendedKalmanUpdater(None)
     theirs = GaussianState(StateVector(START), CovarianceMatrix(PRIOR), timestamp=begin)
-    truth, rng = START + [4.0, -3.0, 2.0, 0.1, 0.05, 0.0], np.random.default_rng(3)
+    rng = np.random.default_rng(3)
+    truth = START + np.array([4.0, -3.0, 2.0, 0.1, 0.05, 0.0])
     for step in range(1, 21):
         truth = F @ truth
         when = begin + timedelta(seconds=step)
@@ -60,8 +61,6 @@ def test_the_filter_agrees_with_stone_soups_step_by_step() -> None:
             angles = model.function(theirs, noise=False)
             measured = StateVector([angles[0, 0], angles[1, 0], y])
             detection = Detection(measured, timestamp=when, measurement_model=model)
-            from stonesoup.types.hypothesis import SingleHypothesis
-
             theirs = updater.update(SingleHypothesis(theirs, detection))
             update_by_range(mean, covariance, buoy, y, 0.0, np.full(3, NOISE_M**2))
         track = TargetTrack(mean[None], covariance[None], np.ones(1))

@@ -16,7 +16,7 @@ from app.missions.views import MissionView
 from app.storage.database import Database
 from tests.missions.builders import lon_lat, spec_json
 
-PATIENCE_S = 25.0
+PATIENCE_S = 180.0
 CLOCK_S = 1_795_225_140.0
 
 
