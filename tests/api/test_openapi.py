@@ -109,7 +109,8 @@ async def test_every_reference_leads_somewhere(document: dict[str, Any]) -> None
 async def test_live_messages_are_in_the_document_for_generated_clients(document: dict[str, Any]) -> None:
     branches = document["components"]["schemas"]["LiveMessage"]["anyOf"]
     assert {"$ref": "#/components/schemas/SnapshotMessage"} in branches
-    assert len(branches) == 6
+    assert {"$ref": "#/components/schemas/TargetsMessage"} in branches
+    assert len(branches) == 7
 
 
 async def test_what_is_always_sent_is_required_in_the_document(document: dict[str, Any]) -> None:
