@@ -27,6 +27,7 @@ from app.api import (
     problems,
     soundings,
     streams,
+    targets,
 )
 from app.api.auth import console_log_in
 from app.api.health import health_router
@@ -106,6 +107,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         imports.router,
         maps.router,
         soundings.router,
+        targets.router,
         streams.router,
         fleet.router,
         health_router(API),

@@ -132,6 +132,21 @@ class SoundingRefused:
 
 
 @dataclass(frozen=True, slots=True)
+class TargetRange:
+    """A range that a vehicle measured by sound to a system named ``target``, and where the vehicle was then."""
+
+    vehicle: str
+    time_s: float
+    target: str
+    range_m: float
+    vehicle_lat_deg: float
+    vehicle_lon_deg: float
+    vehicle_depth_m: float
+    source: str
+    position_sd_m: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class WaypointChange:
     """What became of a waypoint; ``reason`` explains whatever is not plain progress."""
 
@@ -155,7 +170,7 @@ class LinkChange:
     """When, by our wall clock (Unix seconds)."""
 
 
-BridgeEvent = StateReport | Sounding | SoundingRefused | WaypointChange | LinkChange
+BridgeEvent = StateReport | Sounding | SoundingRefused | TargetRange | WaypointChange | LinkChange
 EventCallback = Callable[[BridgeEvent], None]
 
 

@@ -13,6 +13,7 @@ from imc_bridge.discovery import Announcement, read_announce
 from imc_bridge.events import BridgeEvent, Sounding
 from imc_bridge.links import Links
 from imc_bridge.nodes import Node
+from imc_bridge.ranges import MESSAGES as RANGE_MESSAGES
 from imc_bridge.roster import Roster
 from imc_bridge.settings import BridgeSettings
 from imc_bridge.soundings import offer_distance
@@ -35,6 +36,7 @@ WANTED = (
     "TransmissionStatus",
     "VehicleMedium",
     "VehicleState",
+    *RANGE_MESSAGES,
 )
 SIMULATED_STATE = int(imcpy.SimulatedState().msg_id)
 MAX_PLAUSIBLE_VEHICLE_TIME_S = 4e9
@@ -231,6 +233,8 @@ class Hearing:
                 self._take_distance(node, message)
             case "NavigationUncertainty":
                 node.take_uncertainty(message)
+            case _ if name in RANGE_MESSAGES:
+                node.ranges.offer(name, message)
             case "PlanControlState" if node.in_order(name, message.timestamp):
                 node.take_plan_state(message, now)
                 if control is not None:
@@ -269,6 +273,8 @@ class Hearing:
             if control is not None and isinstance(result, Sounding):
                 control.guard.add(result.time_s, result.lat_deg, result.lon_deg, result.bottom_depth_m, now)
             self._tell(result)
+        for measured in node.ranges.resolve(node.history, node.position_sd_m()):
+            self._tell(measured)
 
     def _take_distance(self, node: Node, message: Message) -> None:
         refused = offer_distance(node.gate, node.entity_name(int(message.src_ent)), message)

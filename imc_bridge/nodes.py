@@ -17,6 +17,7 @@ from imcpy.coordinates import toWGS84
 from imc_bridge.codec import Message
 from imc_bridge.discovery import Announcement
 from imc_bridge.events import NodeState, StateReport
+from imc_bridge.ranges import RangeGate
 from imc_bridge.settings import BridgeSettings
 from imc_bridge.soundings import SoundingGate, StateHistory, StateSample, beam_table
 from imc_bridge.texts import text
@@ -153,6 +154,7 @@ class Node:
         self.history = StateHistory()
         self.report: StateReport | None = None
         self.gate = SoundingGate(name, beam_table(settings.altimeter), settings.max_range_m)
+        self.ranges = RangeGate(name)
         self._uncertainty: tuple[float, float] | None = None
         self._settings = settings
         self._latest: dict[str, float] = {}
@@ -228,6 +230,7 @@ class Node:
             self._latest.clear()
             self.history.clear()
             self.gate.clear()
+            self.ranges.clear()
             self._uncertainty = None
         return tick
 

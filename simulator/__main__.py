@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import json
 import logging
+import math
 import signal
 import sys
 from pathlib import Path
@@ -18,6 +19,7 @@ from simulator.dune import DuneFleet, DuneOptions, default_specs
 from simulator.dune.node import DEFAULT_ANNOUNCE_PORTS
 from simulator.network import NetworkFaults
 from simulator.sensors import SensorKind, SonarNoise
+from simulator.targets import RangingNoise, TargetSpec
 from simulator.terrain import Terrain
 from simulator.terrain_files import load_terrain
 
@@ -75,6 +77,22 @@ def main(
     log_dir: Annotated[
         Path | None, typer.Option(help="Folder in which every vehicle keeps its log (Data.lsf), as DUNE does on board.")
     ] = None,
+    target: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="NAME:EAST,NORTH,DEPTH[,HEADING,SPEED] of a target with a transponder (metres, degrees, m/s), which "
+            "the vehicles range to; repeatable."
+        ),
+    ] = None,
+    range_noise: Annotated[
+        float, typer.Option(help="Relative standard deviation of ranges to targets.", min=0.0)
+    ] = 0.01,
+    range_period: Annotated[
+        float, typer.Option(help="Seconds between two ranges of a vehicle to a target.", min=0.1)
+    ] = 2.0,
+    hearing: Annotated[
+        float, typer.Option(help="Metres at which targets are no longer heard; 0: they are heard everywhere.", min=0.0)
+    ] = 0.0,
     json_ready: Annotated[
         bool, typer.Option(help="Print one JSON line with names, ids and ports when all vehicles are up.")
     ] = False,
@@ -116,6 +134,8 @@ def main(
                 log_dir=log_dir,
             ),
             seed=seed,
+            targets=[_target(text) for text in target or []],
+            ranging=RangingNoise(relative_sd=range_noise, period_s=range_period, hearing_m=hearing or math.inf),
         )
         asyncio.run(_run(fleet, json_ready))
     except (ValueError, OSError) as error:
@@ -138,6 +158,8 @@ def _fleet(
     base_port: int,
     options: DuneOptions,
     seed: int,
+    targets: list[TargetSpec],
+    ranging: RangingNoise,
 ) -> DuneFleet:
     places = []
     for text in starts:
@@ -155,7 +177,21 @@ def _fleet(
         current=(east, north),
         options=options,
         seed=seed,
+        targets=targets,
+        ranging=ranging,
     )
+
+
+def _target(text: str) -> TargetSpec:
+    name, colon, rest = text.partition(":")
+    if not (name and colon):
+        raise ValueError(
+            f"--target is {text!r}; it must be NAME:EAST,NORTH,DEPTH or NAME:EAST,NORTH,DEPTH,HEADING,SPEED"
+        )
+    east, north, depth, *course = _numbers("target", rest, 3, 5)
+    if not course:
+        return TargetSpec(name, (east, north, depth), speed_mps=0.0)
+    return TargetSpec(name, (east, north, depth), math.radians(course[0]), course[1])
 
 
 async def _run(fleet: DuneFleet, json_ready: bool) -> None:

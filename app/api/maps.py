@@ -18,7 +18,7 @@ from app.mapping.s44 import Order
 from app.missions.maps import MapSnapshot
 from app.missions.products import MAP, PRODUCTS, SOUNDINGS, TRACKS, ProductOptions, layers_of
 from app.missions.quality import quality_of
-from app.missions.spec import Name
+from app.missions.spec_base import Name
 from app.missions.views import MapView, ProductView, QualityView
 
 router = APIRouter(

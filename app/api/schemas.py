@@ -6,8 +6,8 @@ from fastapi import Path
 from pydantic import BaseModel, ConfigDict, Field, PlainValidator, ValidationError
 
 from app.api.problems import field_problem
-from app.missions.spec import Name
-from app.missions.views import Measurement
+from app.missions.measurement import Measurement
+from app.missions.spec_base import Name
 
 API = "/api/v1"
 

@@ -36,9 +36,12 @@ DOUBT = 0.95
 MEMORY = 0.9
 """Weight of the past in the running mean of squared normalised innovations, which is 1 while a filter is right."""
 
+MEMORY_RANGES = 3.0
+"""Ranges that count as one step in that mean: fewer at a time change it less, so that its spread stays the same."""
+
 TURNED, WRONG = 1.6, 2.2
 """Running means that say that a target has turned, and that the filter follows something that is not there (chance:
-3 and 6 standard deviations from 1 for three vehicles)."""
+3 and 6 standard deviations from 1)."""
 
 
 @dataclass(frozen=True)
@@ -103,20 +106,24 @@ class TargetTrack:
 
 @dataclass(frozen=True)
 class TargetEstimator:
-    """The filter; see the module's text. Time advances by 1 per step.
+    """The filter; see the module's text. Time advances by 1 per step, or by as much as :meth:`predict` is told.
 
     Attributes
     ----------
     sensor : RangeSensor
         Gives the noise, and how far a target is heard (infinitely far by default).
     acceleration_sd : float
-        Standard deviation of the change of each velocity component per step ("zero-acceleration" model).
+        Standard deviation of the change of each velocity component within a unit of time ("zero-acceleration" model).
     accuracy_sd_m : float
         A target belongs to ``A`` while its three standard deviations are below this.
     low_m, high_m : (3,)
         Box in which a target may be when it is first heard.
     speed_sd : float
         Standard deviation of each component of its velocity then.
+    vertical : float
+        Part of all these deviations that counts along depth.
+    turn_sd : float or None
+        In place of ``acceleration_sd`` while a target turns; None: ``speed_sd``.
     """
 
     sensor: RangeSensor = RangeSensor(EVERYWHERE, 0.1)  # noqa: RUF009 - frozen
@@ -125,32 +132,40 @@ class TargetEstimator:
     low_m: tuple[float, float, float] = (-1.0, -1.0, -1.0)
     high_m: tuple[float, float, float] = (1.0, 1.0, 1.0)
     speed_sd: float = 0.006
+    vertical: float = 1.0
+    turn_sd: float | None = None
 
     def accurate(self, track: TargetTrack) -> bool:
         """Return whether a target belongs to ``A`` now."""
         return bool(track.known and (track.sd_m < self.accuracy_sd_m).all())
 
-    def predict(self, track: TargetTrack) -> TargetTrack:
-        """Let one step pass."""
-        if not track.known:
+    def predict(self, track: TargetTrack, time: float = 1.0) -> TargetTrack:
+        """Let some time pass."""
+        if not track.known or time <= 0.0:
             return track
-        F = transition()
+        F = transition(time)
         return replace(
             track,
             means=track.means @ F.T,
-            covariances=F @ track.covariances @ F.T + self.process_noise(self._manoeuvre(track)),
+            covariances=F @ track.covariances @ F.T + self.process_noise(self._manoeuvre(track), time),
             surprise=np.nan,
         )
 
-    def process_noise(self, acceleration_sd: float | None = None) -> FloatArray:
-        """Return the noise of one step, (6, 6): the velocity's change acts half on the way of its own step."""
-        G = np.vstack([0.5 * np.eye(3), np.eye(3)])
+    def process_noise(self, acceleration_sd: float | None = None, time: float = 1.0) -> FloatArray:
+        """Return the noise of some time, (6, 6): the velocity's change acts half on the way meanwhile."""
+        G = np.vstack([0.5 * time * np.eye(3), np.eye(3)]) * self._axes
         sd = self.acceleration_sd if acceleration_sd is None else acceleration_sd
-        return np.asarray(sd**2 * G @ G.T)
+        return np.asarray(sd**2 * time * G @ G.T)
+
+    @property
+    def _axes(self) -> FloatArray:
+        return np.array([1.0, 1.0, self.vertical])
 
     def _manoeuvre(self, track: TargetTrack) -> float:
         """Return the sd of the velocity's change: large after ranges that no straight course explains."""
-        return self.speed_sd if track.unease > TURNED else self.acceleration_sd
+        if track.unease <= TURNED:
+            return self.acceleration_sd
+        return self.speed_sd if self.turn_sd is None else self.turn_sd
 
     def update(
         self, track: TargetTrack, positions: FloatArray, ranges: FloatArray, blur_m2: FloatArray | None = None
@@ -180,11 +195,12 @@ class TargetEstimator:
             means, covariances, weights, np.ascontiguousarray(positions[heard], dtype=np.float64), ranges[heard],
             self.sensor.relative_noise, np.ascontiguousarray(blur[heard], dtype=np.float64),
         )  # fmt: skip
-        kept = weights > FORGOTTEN
-        mixture = TargetTrack(means[kept], covariances[kept], weights[kept] / weights[kept].sum())
+        likely = weights > FORGOTTEN
+        mixture = TargetTrack(means[likely], covariances[likely], weights[likely] / weights[likely].sum())
         if mixture.single and track.single:
             mean = surprise / len(heard)
-            return replace(mixture, surprise=mean, unease=MEMORY * track.unease + (1.0 - MEMORY) * mean)
+            kept = MEMORY ** (len(heard) / MEMORY_RANGES)
+            return replace(mixture, surprise=mean, unease=kept * track.unease + (1.0 - kept) * mean)
         if np.sqrt((mixture.sd_m**2).sum()) < NARROW * float(np.abs(ranges[heard]).min()):
             return TargetTrack(mixture.state[None], mixture.covariance[None], np.ones(1))
         return mixture
@@ -197,9 +213,20 @@ class TargetEstimator:
         places = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
         n = len(places)
         # Neighbours overlap without a gap: half a side is one standard deviation.
-        variance = np.concatenate([(0.5 * sides) ** 2, np.full(3, self.speed_sd**2)])
+        variance = np.concatenate([(0.5 * sides) ** 2, (self.speed_sd * self._axes) ** 2])
         covariances = np.repeat(np.diag(variance)[None], n, axis=0)
         return TargetTrack(np.hstack([places, np.zeros((n, 3))]), covariances, np.full(n, 1.0 / n))
+
+
+def expected_range(track: TargetTrack, position: FloatArray, noise: float, blur: FloatArray) -> tuple[float, float]:
+    """Return the range that a single filter expects from ``position`` (3,), and its standard deviation.
+
+    ``noise`` and ``blur`` (3,) as for :func:`app.estimation.range_filter.update_by_range`.
+    """
+    innovation, variance = update_by_range(
+        track.means[0].copy(), track.covariances[0].copy(), np.asarray(position, dtype=np.float64), 0.0, noise, blur
+    )
+    return -float(innovation), float(np.sqrt(variance))
 
 
 def _or(one: TargetTrack, other: TargetTrack) -> TargetTrack:
@@ -211,10 +238,10 @@ def _or(one: TargetTrack, other: TargetTrack) -> TargetTrack:
     )
 
 
-def transition() -> FloatArray:
-    """Return the constant-velocity transition of one step, (6, 6)."""
+def transition(time: float = 1.0) -> FloatArray:
+    """Return the constant-velocity transition of some time, (6, 6)."""
     F = np.eye(6)
-    F[:3, 3:] = np.eye(3)
+    F[:3, 3:] = time * np.eye(3)
     return F
 
 
@@ -244,22 +271,23 @@ def _take(
 
 @njit(cache=True, nogil=True)
 def foretold_sd(
-    mean: FloatArray, covariance: FloatArray, configurations: FloatArray, noise: float, hearing: float
+    mean: FloatArray, covariance: FloatArray, configurations: FloatArray, noise: float, hearing: float, sd: float
 ) -> FloatArray:
     """Return, for each team configuration (c, n_vehicles, 3), the greatest standard deviation it would leave, (c,).
 
     ``mean`` (6,) and ``covariance`` (6, 6) are the target's as foretold for that time; every vehicle closer than
-    ``hearing`` is taken to range to it once, and to find it where it is expected.
+    ``hearing`` is taken to range to it once, and to find it where it is expected. ``sd`` is the part of the
+    noise that is the same at any distance.
     """
     result = np.empty(len(configurations))
-    nowhere = np.zeros(3)
+    blur = np.full(3, sd * sd)
     for c in range(len(configurations)):
         m, P = mean.copy(), covariance.copy()
         for i in range(configurations.shape[1]):
             r = np.sqrt(((m[:3] - configurations[c, i]) ** 2).sum())
             if r < hearing:
                 here = m.copy()
-                update_by_range(here, P, configurations[c, i], r, noise, nowhere)
+                update_by_range(here, P, configurations[c, i], r, noise, blur)
         worst = 0.0
         for k in range(3):
             worst = max(worst, P[k, k])

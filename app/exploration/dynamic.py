@@ -34,6 +34,10 @@ class Targets:
         Of ranges to them.
     hearing_m : float
         How far they are heard; inf: everywhere.
+    range_sd_m : float
+        Part of the ranges' deviation that is the same at any distance.
+    standoff_m : float
+        Vehicles on an errand come no closer to any target.
     """
 
     state: FloatArray
@@ -42,6 +46,8 @@ class Targets:
     accuracy_sd_m: float
     relative_noise: float
     hearing_m: float = np.inf
+    range_sd_m: float = 0.0
+    standoff_m: float = 0.0
 
     @property
     def sd_m(self) -> FloatArray:

@@ -6,6 +6,7 @@ localization fades. Both are given to one vehicle each; the others go on with th
 to keep within communication range the whole team goes along.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -112,7 +113,7 @@ def most_away(vehicles: int) -> int:
 
     One vehicle that goes from target to target serves all of them, because every vehicle ranges to each.
     """
-    return max(1, vehicles // VEHICLES_PER_CHASER)
+    return max(1, vehicles // VEHICLES_PER_CHASER) if vehicles > 1 else 0
 
 
 def due_to_rise(localization: Localization) -> NDArray[np.bool_]:
@@ -129,6 +130,7 @@ def errand_move(
     bottom: Bottom,
     targets: Targets | None,
     localization: Localization | None,
+    at_depth: Callable[[FloatArray], FloatArray] | None = None,
 ) -> FloatArray:
     """Return where the vehicle in a row goes on its errand, (3,); where it is, when nothing else is feasible.
 
@@ -136,12 +138,21 @@ def errand_move(
     ----------
     origin, planned : (n_vehicles, 3)
         Where the vehicles are, and where the others go.
+    at_depth
+        Gives team configurations (k, n_vehicles, 3) the depths that they have to have; None: any depth is free.
     """
     goal = np.append(origin[row, :2], localization.surface_m) if localization is not None else origin[row]
     if errand.target != RISE and targets is not None:
         goal = targets.state[errand.target, :3]
     candidates = np.repeat(planned[None], len(PARTS) * (1 + len(_DIRECTIONS)) + 1, axis=0)
-    candidates[:, row] = origin[row] + _moves(goal - origin[row], constraints.max_step_m * (1.0 - 1e-9))
+    way = goal - origin[row]
+    if at_depth is not None:
+        way = np.append(way[:2], 0.0)
+    candidates[:, row] = origin[row] + _moves(way, constraints.max_step_m * (1.0 - 1e-9))
+    if at_depth is not None:
+        candidates[:, row] = at_depth(candidates)[:, row]
+    if targets is not None and errand.target != RISE:
+        candidates = candidates[_keeps_off(candidates[:, row], origin[row], targets)]
     candidates = candidates[constraints.feasible(origin, candidates, bottom)]
     if len(candidates) == 0:
         return np.asarray(origin[row])
@@ -152,9 +163,20 @@ def errand_move(
     value = np.maximum(distance - close, 0.0) / constraints.max_step_m
     for state, covariance in zip(targets.state, targets.covariance, strict=True):
         if np.isfinite(state).all():
-            sd = foretold_sd(state, covariance, candidates, targets.relative_noise, targets.hearing_m)
+            sd = foretold_sd(
+                state, covariance, candidates, targets.relative_noise, targets.hearing_m, targets.range_sd_m
+            )
             value += sd / targets.accuracy_sd_m
     return np.asarray(candidates[np.argmin(value), row])
+
+
+def _keeps_off(places: FloatArray, here: FloatArray, targets: Targets) -> NDArray[np.bool_]:
+    """Return which places (k, 3) are not too close to where any target is expected, or at least no closer than here."""
+    kept = np.ones(len(places), dtype=np.bool_)
+    for target in targets.state[np.isfinite(targets.state).all(axis=1), :3]:
+        distance = np.linalg.norm(places - target, axis=1)
+        kept &= distance >= min(targets.standoff_m, float(np.linalg.norm(here - target)) - 1e-9)
+    return kept
 
 
 def _directions() -> FloatArray:

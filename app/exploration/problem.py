@@ -97,11 +97,15 @@ class Situation:
 
 @dataclass(frozen=True)
 class Proposal:
-    """A planner's answer: the next team configuration, (n_vehicles, 3), and figures for the operator."""
+    """A planner's answer: the next team configuration, (n_vehicles, 3), and figures for the operator.
+
+    ``errands`` names vehicles that left the plan, with the number of the target they go for; negative: the surface.
+    """
 
     positions: FloatArray
     objective: float
     terms: dict[str, float] = field(default_factory=dict)
+    errands: dict[str, int] = field(default_factory=dict)
 
 
 class Planner(Protocol):

@@ -1,5 +1,6 @@
 """Which mission has which vehicle: every vehicle belongs to one at most."""
 
+import math
 from collections.abc import Callable, Sequence
 
 from app.missions.errors import ConflictError
@@ -8,6 +9,7 @@ from app.missions.hub import FleetHub
 from app.missions.links.sim import Launch, SimFleetLink
 from app.missions.live import LiveMission
 from app.missions.spec import VehicleKind, VehicleSpec
+from simulator.targets import RangingNoise
 
 Lead = Callable[[str, str, str | None], None]
 """How a vehicle is led from now on: its name, the guidance, the gateway."""
@@ -85,6 +87,12 @@ class Claims:
             height_m=float(size[1]),
             start=start,
             noise=live.spec.sounding_noise,
+            targets=tuple(live.spec.targets),
+            ranging=RangingNoise(
+                relative_sd=live.spec.tracking.range_noise,
+                sd_m=live.spec.tracking.range_sd_m,
+                hearing_m=live.spec.tracking.hearing_m or math.inf,
+            ),
         )
         try:
             self._sim.launch(launch)

@@ -9,7 +9,7 @@ from shapely.geometry import Polygon
 
 from app.exploration.bottom import Bottom
 from app.exploration.constraints import Constraints
-from app.exploration.dynamic import Localization
+from app.exploration.dynamic import Localization, Targets
 from app.exploration.errands import due_to_rise
 from app.exploration.problem import Belief, Planner, Situation
 from app.missions import safety
@@ -79,6 +79,8 @@ class Decision:
     fixes: dict[str, str] = field(default_factory=dict)
     """Vehicles that begin or end coming up for a fix, with what there is to say."""
     bottom: Bottom = field(default_factory=Bottom.unknown)
+    pursuits: dict[str, str] = field(default_factory=dict)
+    """Vehicles that leave the mapping for a target, with its name."""
 
 
 def make_constraints(spec: MissionSpec) -> Constraints:
@@ -111,12 +113,14 @@ def decide(
     soundings_en_m: FloatArray,
     water_level_m: float = 0.0,
     doubtful_en_m: FloatArray | None = None,
+    targets: Targets | None = None,
 ) -> Decision:
     """Decide one step for the vehicles at ``places``; vehicles far outside the area are sent to its border.
 
     ``water_level_m`` is how high the water stands above the datum of the belief's depths. Vehicles count their depth
     from the water level: below the datum it leaves them less room; above it the room to spare is not used.
     ``doubtful_en_m`` (k, 2) is where the map left soundings out as outliers.
+    ``targets`` are the mission's, in the order of its description.
     """
     polygon = Polygon(constraints.area)
     notes: list[str] = []
@@ -165,6 +169,7 @@ def decide(
         soundings_en_m=soundings_en_m,
         constraints=constraints,
         doubtful_en_m=np.zeros((0, 2)) if doubtful_en_m is None else doubtful_en_m,
+        targets=targets,
     )
     proposal = planner.propose(situation, np.random.default_rng([spec.seed, step]))
     proposed = np.array(proposal.positions, dtype=float)
@@ -183,7 +188,10 @@ def decide(
     for i, place in enumerate(team):
         refusal = checked.refusals.get(place.vehicle, "")
         legs.append(Leg(place.vehicle, checked.positions[i], refusal, bool(up[i])))
-    return Decision(legs, proposal.objective, dict(proposal.terms), planner.snapshot(), notes, fixes, cautious)
+    pursuits = {name: spec.targets[number].name for name, number in proposal.errands.items() if number >= 0}
+    return Decision(
+        legs, proposal.objective, dict(proposal.terms), planner.snapshot(), notes, fixes, cautious, pursuits
+    )
 
 
 def surfacing(team: list[Place], policy: SurfacePolicy | None) -> tuple[list[bool], dict[str, str]]:

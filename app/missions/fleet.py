@@ -109,6 +109,23 @@ class SoundingReport:
 
 
 @dataclass(frozen=True, slots=True)
+class RangeReport:
+    """A range that a vehicle measured to a moving target.
+
+    ``target`` is what its modem calls the target, ``position`` where the vehicle was, ``position_sd_m`` how well it
+    says that it knew that, ``source`` what told of the range.
+    """
+
+    vehicle: str
+    time_s: float
+    target: str
+    range_m: float
+    position: Position
+    source: str
+    position_sd_m: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class WaypointOrder:
     """One waypoint for one vehicle, checked by the safety gate before it reaches a link.
 
@@ -150,7 +167,7 @@ class LinkReport:
     reason: str = ""
 
 
-FleetEvent = VehicleReport | SoundingReport | WaypointReport | LinkReport
+FleetEvent = VehicleReport | SoundingReport | RangeReport | WaypointReport | LinkReport
 EventSink = Callable[[FleetEvent], None]
 
 

@@ -23,6 +23,7 @@ from app.missions.fleet import (
     LinkReport,
     LinkState,
     Position,
+    RangeReport,
     SoundingReport,
     VehicleReport,
     WaypointReport,
@@ -34,14 +35,21 @@ from app.missions.map_builder import BuiltMap, MapBuilder
 from app.missions.map_tiles import TileCache
 from app.missions.maps import MapSnapshot, MissionFacts
 from app.missions.members import Member, Team
+from app.missions.position_quality import position_quality
+from app.missions.range_journal import RangeJournal
 from app.missions.spec import MissionSpec, VehicleSpec
 from app.missions.states import MissionState
+from app.missions.target_showing import target_views
+from app.missions.target_views import TargetView
+from app.missions.tracking import Tracking
+from app.missions.tracking import warm_up as tracking_warm_up
 from app.missions.trails import Trails
 from app.missions.views import (
     MapMessage,
     MissionSummary,
     Progress,
     StateMessage,
+    TargetsMessage,
     VehiclesMessage,
     VehicleView,
     WaypointsMessage,
@@ -54,6 +62,8 @@ from app.storage.database import Database
 from app.storage.models import MissionRow, PositionRow, TideTableRow, WaypointRow
 
 LIVE_PERIOD_S = 0.2
+RISES = "rises"
+"""Marks events that tell of a vehicle sent up for a fix."""
 
 log = structlog.get_logger(__name__)
 
@@ -86,6 +96,7 @@ class LiveMission:
         spec: MissionSpec,
         counts: Counts,
         tide_table: TideTable | None = None,
+        time_scale: float = 1.0,
     ) -> None:
         self.id = row.id
         self.spec = spec
@@ -106,6 +117,8 @@ class LiveMission:
         self.tiles = TileCache()
         self.trails = Trails(database, row.id)
         self.journal = Journal(database, row.id, self.gate, counts, self.broadcaster, self.builder.add)
+        self.ranges = RangeJournal(database, row.id, Tracking(spec, self.frame), self.journal, time_scale)
+        """Ranges to moving targets, and what they tell."""
         self.changed = asyncio.Event()
         """Set whenever a vehicle reported something that the step loop may be waiting for."""
         self.halted = False
@@ -120,7 +133,9 @@ class LiveMission:
         self._imports_noticed = 0
 
     @classmethod
-    async def load(cls, database: Database, hub: FleetHub, executor: Executor, row: MissionRow) -> "LiveMission":
+    async def load(
+        cls, database: Database, hub: FleetHub, executor: Executor, row: MissionRow, time_scale: float = 1.0
+    ) -> "LiveMission":
         """Take a mission up from the database, as it was last committed."""
         async with database.reading() as session:
             counted = await sounding_queries.counts(session, row.id)
@@ -134,6 +149,7 @@ class LiveMission:
             reference = await sounding_queries.reference_grid(session, row.id)
             tide = await session.get(TideTableRow, row.id)
             imported = await event_queries.last_event_id(session, row.id, kind="import")
+            risings = await event_queries.count_by_vehicle(session, row.id, "surface", RISES)
         # Building the spec checks geometry, which takes milliseconds: not on the event loop.
         loop = asyncio.get_running_loop()
         spec = await loop.run_in_executor(executor, MissionSpec.model_validate, row.spec)
@@ -141,7 +157,11 @@ class LiveMission:
         if tide is not None:
             table = await loop.run_in_executor(executor, partial(parse_tid, tide.text, name=tide.name))
         counts = Counts(counted.get("accepted", 0), counted.get("rejected", 0))
-        live = cls(database, hub, executor, row, spec, counts, table)
+        live = cls(database, hub, executor, row, spec, counts, table, time_scale)
+        if spec.targets:
+            await loop.run_in_executor(executor, tracking_warm_up)
+            async with database.reading() as session:
+                await live.ranges.load(session, step)
         if len(accepted.table) + len(prior):
             live.builder.replace(accepted.table, prior, accepted.trusted)
         live.reference_m = reference
@@ -153,6 +173,7 @@ class LiveMission:
             if vehicle.left_at is None:
                 member = live.team.join(VehicleSpec.model_validate(vehicle.spec), vehicle.slot)
                 member.report = _last_report(positions.get(member.name))
+                member.risings = risings.get(member.name, 0)
         live.show_waypoints([live.waypoint_view(waypoint) for waypoint in waypoints])
         return live
 
@@ -185,6 +206,8 @@ class LiveMission:
     def halt(self) -> None:
         """Keep the step loop from sending anything more, and wake everyone who waits for a waypoint."""
         self.halted = True
+        for member in self.team:
+            member.pursuing = None
         self.changed.set()
         self.publish_summary()
 
@@ -207,8 +230,13 @@ class LiveMission:
                     return
                 member.report = event
                 self.journal.position(event)
+                if self.spec.targets:
+                    self.ranges.times.heard(event.vehicle, event.time_s)
             case SoundingReport():
                 self.journal.sounding(event)
+                return
+            case RangeReport():
+                self.ranges.note(event, member.report.time_s if member.report else None)
                 return
             case LinkReport():
                 member.link = event.state
@@ -361,6 +389,11 @@ class LiveMission:
         """Return the vehicles that take part."""
         return [self._vehicle_view(member) for member in self.team]
 
+    def target_views(self) -> list[TargetView]:
+        """Return the moving targets, foretold for now."""
+        pursuers = {member.pursuing: member.name for member in self.team if member.pursuing is not None}
+        return target_views(self.ranges.tracking, self.frame, self.area, self.ranges.times.now_s(), pursuers)
+
     def _vehicle_view(self, member: Member) -> VehicleView:
         info = self._hub.info(member.key)
         report = member.report or info.report
@@ -375,6 +408,8 @@ class LiveMission:
             address=info.address,
             imc_id=info.imc_id,
             surfacing=member.surfacing,
+            risings=member.risings,
+            pursuing=member.pursuing,
         )
         if report is None:
             return view
@@ -393,6 +428,7 @@ class LiveMission:
                 "speed_mps": rounded(report.speed_mps, 3),
                 "battery_pct": rounded(report.battery_pct, 2),
                 "position_sd_m": rounded(report.position_sd_m, 3),
+                "localization": position_quality(report.position_sd_m, self.spec.surface_policy),
             }
         )
 
@@ -412,6 +448,8 @@ class LiveMission:
     async def _tick(self) -> None:
         while self.broadcaster.watched:
             self.broadcaster.publish(VehiclesMessage(time=now(), vehicles=self.vehicle_views()))
+            if self.spec.targets:
+                self.broadcaster.publish(TargetsMessage(time=now(), targets=self.target_views()))
             await asyncio.sleep(LIVE_PERIOD_S)
 
     async def close(self) -> None:
@@ -419,6 +457,7 @@ class LiveMission:
         if self._ticker is not None:
             self._ticker.cancel()
             await asyncio.gather(self._ticker, return_exceptions=True)
+        await self.ranges.close()
         await self.journal.close()
 
 

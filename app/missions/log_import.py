@@ -20,7 +20,7 @@ from app.missions.journal import TRACK_SPACING_M, position_row, track_length_m
 from app.missions.links.imc import bridge_settings, sounding_report, vehicle_report
 from app.missions.live import LiveMission
 from app.missions.settings import ServiceSettings
-from app.missions.spec import Name
+from app.missions.spec_base import Name
 from app.missions.views import Level, LogImportView, Verdict
 from app.storage import missions as mission_queries
 from app.storage import soundings as sounding_queries

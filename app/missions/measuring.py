@@ -9,13 +9,15 @@ import orjson
 from app.mapping.georeference import LocalFrame
 from app.missions.clock import now
 from app.missions.errors import ConflictError, InvalidRequestError
-from app.missions.fleet import BeamGeometry, Position, SoundingReport, VehicleReport
+from app.missions.fleet import BeamGeometry, Position, RangeReport, SoundingReport, VehicleReport
 from app.missions.hub import FleetHub
 from app.missions.links.rest import RestFleetLink
 from app.missions.live import LiveMission
+from app.missions.measurement import Measurement
 from app.missions.spec import VehicleKind
 from app.missions.states import MissionState
-from app.missions.views import BatchVerdict, ItemVerdict, Measurement, Verdict
+from app.missions.tracking import Arrived
+from app.missions.views import BatchVerdict, ItemVerdict, Verdict
 from app.storage import soundings as sounding_queries
 from app.storage.database import Database
 from app.storage.models import BatchRow
@@ -47,7 +49,8 @@ async def measure(
     digest = hashlib.sha256(orjson.dumps([item.model_dump() for item in items])).hexdigest()
     strangers = {i: _stranger(live, item) for i, item in enumerate(items)}
     reports = {i: report for i, item in enumerate(items) if not strangers[i] and (report := _sounding(item))}
-    async with live.journal.writing, database.writing() as session:
+    ranges = _ranges(live, items, strangers)
+    async with live.journal.writing, live.ranges.writing, database.writing() as session:
         if idempotency_key is not None:
             known = await sounding_queries.answer_to(session, live.id, idempotency_key)
             if known is not None:
@@ -60,7 +63,9 @@ async def measure(
                 _hear(hub, rest, [item for i, item in enumerate(items) if not strangers[i]], only_unknown=True)
                 return BatchVerdict.model_validate(known.answer | {"replayed": True})
         verdicts, committed = await live.journal.take(list(reports.values()), session)
-        answer = _batch_verdict(len(items), dict(zip(reports, verdicts, strict=True)), strangers)
+        on_ranges, used = await live.ranges.take(list(ranges.values()), session)
+        taken = dict(zip(reports, verdicts, strict=True)) | dict(zip(ranges, on_ranges, strict=True))
+        answer = _batch_verdict(len(items), taken, strangers)
         if idempotency_key is not None:
             session.add(
                 BatchRow(
@@ -72,6 +77,7 @@ async def measure(
                 )
             )
     committed()
+    used()
     _hear(hub, rest, [item for i, item in enumerate(items) if not strangers[i]])
     # Where the vehicle is, and whether it arrived, is on disk as well before it is answered.
     await live.journal.flush()
@@ -92,7 +98,36 @@ def _stranger(live: LiveMission, item: Measurement) -> str:
         return f"vehicle: {item.vehicle!r} takes no part in this mission"
     if member.spec.kind is not VehicleKind.REST:
         return f"vehicle: {item.vehicle!r} is of kind {member.spec.kind}; only vehicles of kind rest post measurements"
-    return _impossible_place(item, live.frame)
+    return _impossible_place(item, live.frame) or _useless_range(item, live)
+
+
+def _useless_range(item: Measurement, live: LiveMission) -> str:
+    if item.target is None:
+        return ""
+    return live.ranges.tracking.stranger(item.target) or live.ranges.not_yet(item.time_s)
+
+
+def _ranges(live: LiveMission, items: Sequence[Measurement], strangers: Mapping[int, str]) -> dict[int, Arrived]:
+    """Return the ranges to targets by their item; each is as old as its vehicle's newest item says."""
+    newest: dict[str, float] = {}
+    for item in items:
+        newest[item.vehicle] = max(newest.get(item.vehicle, -math.inf), item.time_s)
+    return {
+        i: live.ranges.posted(
+            RangeReport(
+                vehicle=item.vehicle,
+                time_s=item.time_s,
+                target=item.target,
+                range_m=item.target_range_m,
+                position=Position(item.lat_deg, item.lon_deg, item.depth_m),
+                source="rest",
+                position_sd_m=item.position_sd_m,
+            ),
+            newest[item.vehicle],
+        )
+        for i, item in enumerate(items)
+        if item.target is not None and item.target_range_m is not None and not strangers[i]
+    }
 
 
 def _impossible_place(item: Measurement, frame: LocalFrame) -> str:

@@ -37,6 +37,10 @@ class Member:
     reason: str = ""
     surfacing: bool = False
     """Whether its waypoint brings it up for a fix."""
+    risings: int = 0
+    """How often it was sent up for one."""
+    pursuing: str | None = None
+    """The target for which it left the mapping."""
 
     @property
     def name(self) -> str:

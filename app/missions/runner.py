@@ -29,7 +29,7 @@ from app.missions.fleet import (
     WaypointStatus,
 )
 from app.missions.hub import FleetHub
-from app.missions.live import LiveMission
+from app.missions.live import RISES, LiveMission
 from app.missions.members import SETTLED, Member
 from app.missions.spec import Guidance
 from app.missions.views import Level
@@ -260,6 +260,10 @@ class Runner:
         started_s = asyncio.get_running_loop().time()
         await self._renew_map()
 
+        step_s = self._spec.limits.max_step_m / self._spec.speed_mps
+        await live.ranges.flush()
+        targets = live.ranges.tracking.told(live.ranges.times.now_s(), step_s)
+
         def work() -> Decision:
             sounded_m, doubtful_m = live.builder.sounded_at_m()
             return decide(
@@ -272,6 +276,7 @@ class Runner:
                 sounded_m,
                 live.gate.corrections.water_level_m(now().timestamp()),
                 doubtful_m,
+                targets,
             )
 
         with metrics.PLANNING_SECONDS.time():
@@ -297,6 +302,7 @@ class Runner:
             soundings=built.soundings if built else 0,
             map_digest=built.digest if built else "",
             memory=decision.memory,
+            targets=live.ranges.memory(),
         )
         await to_the_end(self._store(step, rows))
         metrics.STEPS.inc()
@@ -315,11 +321,24 @@ class Runner:
         for leg in decision.legs:
             going = live.team.get(leg.vehicle)
             if going is not None:
+                going.risings += leg.surfacing and not going.surfacing
                 going.surfacing = leg.surfacing
         for vehicle, fix in decision.fixes.items():
-            await live.journal.log(Level.INFO, "surface", fix, step=number, vehicle=vehicle)
+            rises = any(leg.surfacing for leg in decision.legs if leg.vehicle == vehicle)
+            await live.journal.log(Level.INFO, "surface", fix, step=number, vehicle=vehicle, **{RISES: rises})
+        await self._tell_of_pursuits(decision, number)
         for note in decision.notes:
             await live.journal.log(Level.WARNING, "safety", note, step=number)
+
+    async def _tell_of_pursuits(self, decision: Decision, number: int) -> None:
+        """Say which vehicles left the mapping for a target, and which came back."""
+        for member in self._live.team:
+            target, before = decision.pursuits.get(member.name), member.pursuing
+            member.pursuing = target
+            if target == before:
+                continue
+            words = f"{member.name} goes on with the mapping" if target is None else f"{member.name} goes for {target}"
+            await self._live.journal.log(Level.INFO, "target", words, step=number, vehicle=member.name)
 
     async def _store(self, step: StepRow, waypoints: list[WaypointRow]) -> None:
         async with self._database.writing() as session:

@@ -14,11 +14,12 @@ import structlog
 
 from app.estimation import SingleBeam
 from app.exploration.options import PlannerOptions
-from app.exploration.planners import ONLY_IN_SIMULATION, PLANNERS, REFUSAL
+from app.exploration.planners import PLANNERS
 from app.exploration.planners import warm_up as planning_warm_up
 from app.mapping.gp import warm_up as mapping_warm_up
 from app.mapping.products.tracks import Track, TrackPoint
 from app.missions import importing, states
+from app.missions.admission import check_spec, check_vehicle
 from app.missions.broadcast import Subscription
 from app.missions.claims import Claims, Lead, ShowArea
 from app.missions.clock import now
@@ -27,7 +28,6 @@ from app.missions.correcting import check_level_is_known, corrections_view, set_
 from app.missions.doctoring import DoctorView, Examine, doctor_view, switched_off
 from app.missions.errors import (
     ConflictError,
-    InvalidRequestError,
     MapNotReadyError,
     MissionNotFoundError,
     VehicleNotFoundError,
@@ -43,6 +43,7 @@ from app.missions.links.rest import RestFleetLink
 from app.missions.links.sim import SimFleetLink
 from app.missions.live import LiveMission
 from app.missions.maps import MapSnapshot
+from app.missions.measurement import Measurement
 from app.missions.measuring import measure
 from app.missions.polling import waypoint
 from app.missions.preflight import preflight
@@ -60,6 +61,8 @@ from app.missions.reviewing import rule, soundings_page
 from app.missions.settings import ServiceSettings
 from app.missions.spec import MissionSpec, SoundSpeed, VehicleKind, VehicleSpec
 from app.missions.states import ENDED, MissionState
+from app.missions.target_pages import target_ranges_page
+from app.missions.target_views import TargetRangePage, TargetView
 from app.missions.trails import Trail
 from app.missions.views import (
     ActionView,
@@ -71,7 +74,6 @@ from app.missions.views import (
     Level,
     LiveMessage,
     LogImportView,
-    Measurement,
     MissionSummary,
     MissionView,
     PlannerView,
@@ -203,9 +205,7 @@ class MissionService:
 
     async def create(self, spec: MissionSpec, *, actor: str = "operator") -> MissionView:
         """Store a new mission; it is ready when it has a vehicle. Raises InvalidRequestError, ConflictError."""
-        self._check_planner(spec)
-        for index, vehicle in enumerate(spec.vehicles):
-            self._check_vehicle(vehicle, spec, f"vehicles.{index}")
+        check_spec(spec, self._hub.kinds)
         created = now()
         row = MissionRow(
             id=str(uuid.uuid4()),
@@ -275,7 +275,7 @@ class MissionService:
         live = await self._get(mission_id)
         async with self._conductor.acting(mission_id):
             self._refuse_ended(live, "takes no more vehicles")
-            self._check_vehicle(vehicle, live.spec, "")
+            check_vehicle(vehicle, live.spec, self._hub.kinds)
             if live.team.get(vehicle.name) is not None:
                 raise ConflictError(
                     f"vehicle {vehicle.name!r} takes part already", "choose another name, or remove the vehicle first"
@@ -412,6 +412,18 @@ class MissionService:
     ) -> SoundingView:
         """Restore a sounding or reject it; see ``reviewing.rule``."""
         return await rule(await self._get(mission_id), self._database, sounding_id, ruling, note, actor)
+
+    # Moving targets
+
+    async def targets(self, mission_id: str) -> list[TargetView]:
+        """Return what is known of a mission's moving targets now."""
+        return (await self._get(mission_id)).target_views()
+
+    async def target_ranges(
+        self, mission_id: str, *, target: str | None = None, after: int = 0, limit: int = 200
+    ) -> TargetRangePage:
+        """Return ranges to targets, a page of them."""
+        return await target_ranges_page(await self._get(mission_id), self._database, target, after, limit)
 
     # Corrections
 
@@ -613,7 +625,7 @@ class MissionService:
                 row = await session.get(MissionRow, mission_id)
             if row is None:
                 raise MissionNotFoundError(f"there is no mission {mission_id!r}", "GET /api/v1/missions lists all")
-            live = await LiveMission.load(self._database, self._hub, self._executor, row)
+            live = await LiveMission.load(self._database, self._hub, self._executor, row, self._settings.time_scale)
             await self._make_room()
             self._live[mission_id] = live
             self._map_soon(live)
@@ -656,6 +668,7 @@ class MissionService:
             origin=(frame.origin_lon_deg, frame.origin_lat_deg),
             vehicles=live.vehicle_views(),
             waypoints=live.waypoints,
+            targets=live.target_views(),
         )
 
     async def _snapshot(self, live: LiveMission) -> SnapshotMessage:
@@ -669,28 +682,6 @@ class MissionService:
             map_version=built.version if built else 0,
             last_event_id=last_event_id,
         )
-
-    def _check_planner(self, spec: MissionSpec) -> None:
-        name, use = spec.planner.name, f"use one of {', '.join(PLANNERS)}"
-        if name in ONLY_IN_SIMULATION:
-            raise InvalidRequestError("planner.name", REFUSAL.format(name=name), use)
-        if name not in PLANNERS:
-            raise InvalidRequestError("planner.name", f"there is no planner {name!r}", use)
-
-    def _check_vehicle(self, vehicle: VehicleSpec, spec: MissionSpec, path: str) -> None:
-        prefix = f"{path}." if path else ""
-        if vehicle.kind not in self._hub.kinds:
-            raise InvalidRequestError(
-                f"{prefix}kind",
-                f"links of kind {vehicle.kind} are switched off",
-                f"use one of {', '.join(self._hub.kinds)} or switch them on in the settings",
-            )
-        if vehicle.depth_m is not None and vehicle.depth_m > spec.limits.max_depth_m:
-            raise InvalidRequestError(
-                f"{prefix}depth_m",
-                f"{vehicle.depth_m:g} m is deeper than limits.max_depth_m, {spec.limits.max_depth_m:g} m",
-                "make it shallower or raise the limit",
-            )
 
     def _refuse_ended(self, live: LiveMission, words: str) -> None:
         if live.header.state in ENDED:

@@ -8,17 +8,15 @@ from itertools import pairwise
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+from pydantic import Field, field_validator, model_validator
 from shapely.geometry import Polygon
 from shapely.validation import explain_validity
 
 from app.exploration.options import PlannerOptions
 from app.mapping.georeference import LocalFrame
 from app.mapping.vertical import LOWEST_ASTRONOMICAL_TIDE, check_depth_datum
-
-Latitude = Annotated[float, Field(ge=-90, le=90, description="Latitude, WGS84 degrees")]
-Longitude = Annotated[float, Field(ge=-180, le=180, description="Longitude, WGS84 degrees")]
-Name = Annotated[str, Field(min_length=1, max_length=64, pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$")]
+from app.missions.spec_base import Latitude, Longitude, Model, Name
+from app.missions.target_spec import MOST_TARGETS, TargetSpec, Tracking
 
 ProfileDepth = Annotated[float, Field(ge=0, le=12_000)]
 ProfileSpeed = Annotated[float, Field(ge=1300, le=1700)]
@@ -26,12 +24,6 @@ ProfileSpeed = Annotated[float, Field(ge=1300, le=1700)]
 MAX_GRID_CELLS = 4_000_000
 
 NO_TIDE = "none applied"
-
-
-class Model(BaseModel):
-    """Base: unknown fields are refused, so that a misspelt limit is an error and not a default."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
 class PolygonGeometry(Model):
@@ -306,6 +298,10 @@ class MissionSpec(Model):
     surface_policy: SurfacePolicy | None = Field(
         default=None, description="When vehicles come up for a GPS fix; null: never because of their position"
     )
+    targets: list[TargetSpec] = Field(
+        default_factory=list, max_length=MOST_TARGETS, description="Moving targets to keep track of"
+    )
+    tracking: Tracking = Field(default_factory=Tracking)
     speed_mps: float = Field(default=1.3, gt=0, le=5, description="Speed asked of the vehicles")
     arrival_radius_m: float = Field(
         default=3.0, gt=0, le=100, description="Horizontal distance at which a waypoint counts as reached"
@@ -342,6 +338,18 @@ class MissionSpec(Model):
         if twice:
             raise ValueError(f"vehicle {twice[0]!r} is listed twice: every vehicle takes part once")
         return vehicles
+
+    @model_validator(mode="after")
+    def _targets_can_be_told_apart(self) -> Self:
+        taken = {vehicle.name: "a vehicle" for vehicle in self.vehicles}
+        for target in self.targets:
+            for name in {target.name, target.called}:
+                if name in taken:
+                    raise ValueError(
+                        f"target {target.name!r}: {name!r} is the name of {taken[name]} already: give it another one"
+                    )
+            taken |= dict.fromkeys((target.name, target.called), f"target {target.name!r}")
+        return self
 
     @model_validator(mode="after")
     def _area_is_of_a_sensible_size(self) -> Self:

@@ -2,21 +2,31 @@
 
 from datetime import datetime
 from enum import StrEnum
-from typing import Any, Literal, Self
+from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field
 
 from app.mapping.s44 import Order
 from app.missions.fleet import LinkState, WaypointStatus
-from app.missions.spec import Latitude, Longitude, MissionSpec, Name, Sensor, SoundSpeed, Tide, VehicleKind
+from app.missions.spec import MissionSpec, Sensor, SoundSpeed, Tide, VehicleKind
+from app.missions.spec_base import Latitude, Longitude
 from app.missions.states import MissionState
+from app.missions.target_views import TargetView
+from app.missions.view_base import View
 
 
-class View(BaseModel):
-    """Base of everything that is sent out."""
+class PositionQuality(StrEnum):
+    """How well a vehicle knows where it is."""
 
-    # Every field is always sent; generated clients need not ask whether it is there.
-    model_config = ConfigDict(frozen=True, json_schema_serialization_defaults_required=True)
+    UNTOLD = "untold"
+    """It does not say."""
+    STATED = "stated"
+    """It says, and the mission has no surface_policy to judge it by."""
+    GOOD = "good"
+    """As well as after a fix."""
+    FADING = "fading"
+    POOR = "poor"
+    """Worse than the mission allows."""
 
 
 class VehicleView(View):
@@ -44,7 +54,12 @@ class VehicleView(View):
     position_sd_m: float | None = Field(
         default=None, description="How well it says that it knows where it is: standard deviation in metres"
     )
+    localization: PositionQuality = Field(
+        default=PositionQuality.UNTOLD, description="What that is worth beside the mission's surface_policy"
+    )
     surfacing: bool = Field(default=False, description="On its way up, or at the surface, for a GPS fix")
+    risings: int = Field(default=0, description="How often it was sent up for a fix in this mission")
+    pursuing: str | None = Field(default=None, description="The target that it leaves the mapping for")
 
 
 class WaypointView(View):
@@ -100,6 +115,7 @@ class MissionView(MissionSummary):
     origin: tuple[Longitude, Latitude] = Field(description="Origin of the local frame, [longitude, latitude]")
     vehicles: list[VehicleView]
     waypoints: list[WaypointView] = Field(description="The newest waypoint of each vehicle")
+    targets: list[TargetView] = Field(default_factory=list, description="What is known of the moving targets")
 
 
 class Verdict(StrEnum):
@@ -159,47 +175,6 @@ class SoundingPage(View):
     total: int = Field(description="Of all pages")
     items: list[SoundingView]
     next_after: int | None = Field(description="Give it as `after` for the next page; null: this is the last")
-
-
-class Measurement(BaseModel):
-    """One measurement posted by a vehicle: a sounding, a position report, or both."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
-
-    vehicle: Name
-    time_s: float = Field(description="The vehicle's clock, Unix seconds", ge=0, lt=1e11, examples=[1795225140.5])
-    lat_deg: float = Field(description="Latitude of the vehicle, WGS84 degrees")
-    lon_deg: float = Field(description="Longitude of the vehicle, WGS84 degrees")
-    depth_m: float = Field(description="Depth of the vehicle below the surface, metres")
-    range_m: float | None = Field(
-        default=None,
-        description="Range from the vehicle to the bottom: vertical, or along the beam where beam_off_nadir_deg is "
-        "given; null: position report only",
-    )
-    beam: int = Field(default=0, ge=0, lt=4096)
-    beam_off_nadir_deg: float | None = Field(
-        default=None,
-        ge=0,
-        lt=90,
-        description="Angle of the beam from straight down in the vehicle; the footprint is then computed from it and "
-        "the vehicle's attitude",
-    )
-    beam_azimuth_deg: float = Field(
-        default=0.0, ge=-360, le=360, description="Direction of the beam in the vehicle, from the bow to starboard"
-    )
-    roll_deg: float = Field(default=0.0, ge=-180, le=180, description="Starboard down is positive")
-    pitch_deg: float = Field(default=0.0, ge=-90, le=90, description="Nose up is positive")
-    range_sd_m: float | None = Field(default=None, gt=0)
-    position_sd_m: float | None = Field(default=None, ge=0)
-    heading_deg: float | None = None
-    speed_mps: float | None = Field(default=None, ge=0)
-    battery_pct: float | None = Field(default=None, ge=0, le=100)
-
-    @model_validator(mode="after")
-    def _slanted_beams_have_a_heading(self) -> Self:
-        if self.beam_off_nadir_deg is not None and self.heading_deg is None:
-            raise ValueError("beam_off_nadir_deg is given but heading_deg is not: a slanted beam needs both")
-        return self
 
 
 class TideCorrection(Tide):
@@ -485,6 +460,14 @@ class VehiclesMessage(View):
     vehicles: list[VehicleView]
 
 
+class TargetsMessage(View):
+    """What is known of the moving targets, a few times per second where a mission has any."""
+
+    type: Literal["targets"] = "targets"
+    time: datetime
+    targets: list[TargetView]
+
+
 class WaypointsMessage(View):
     """Waypoints whose state changed."""
 
@@ -516,7 +499,9 @@ class EventMessage(View):
     event: EventView
 
 
-LiveMessage = SnapshotMessage | VehiclesMessage | WaypointsMessage | StateMessage | MapMessage | EventMessage
+LiveMessage = (
+    SnapshotMessage | VehiclesMessage | TargetsMessage | WaypointsMessage | StateMessage | MapMessage | EventMessage
+)
 
 
 class StopView(View):

@@ -1,5 +1,6 @@
 """Queries on the missions' logs."""
 
+from collections import Counter
 from collections.abc import Sequence
 
 from sqlalchemy import func, select
@@ -29,3 +30,9 @@ async def newest_of_kind(session: AsyncSession, mission_id: str, kind: str) -> E
     """Return the newest event of a kind."""
     query = select(EventRow).where(EventRow.mission_id == mission_id, EventRow.kind == kind)
     return (await session.scalars(query.order_by(EventRow.id.desc()).limit(1))).first()
+
+
+async def count_by_vehicle(session: AsyncSession, mission_id: str, kind: str, mark: str) -> dict[str, int]:
+    """Return how many events of a kind each vehicle has whose data are marked so."""
+    query = select(EventRow.data).where(EventRow.mission_id == mission_id, EventRow.kind == kind)
+    return dict(Counter(str(data.get("vehicle")) for data in await session.scalars(query) if data.get(mark)))

@@ -109,6 +109,8 @@ class StepRow(Base):
     soundings: Mapped[int]
     map_digest: Mapped[str] = mapped_column(String(64))
     memory: Mapped[bytes] = mapped_column(LargeBinary)
+    targets: Mapped[bytes | None] = mapped_column(LargeBinary)
+    """What was known of moving targets; None where the mission has none."""
 
 
 class WaypointRow(Base):
@@ -171,6 +173,34 @@ class SoundingRow(Base):
     reason: Mapped[str] = mapped_column(Text, default="")
     ruling: Mapped[str | None] = mapped_column(String(16))
     """What an operator said of it, whatever gate and map think: restored or rejected."""
+
+
+class TargetRangeRow(Base):
+    """A range that a vehicle measured to a moving target, in the order in which they were judged."""
+
+    __tablename__ = "target_ranges"
+    __table_args__ = (
+        UniqueConstraint("mission_id", "target", "vehicle", "time_s", name="uq_target_ranges_identity"),
+        Index("ix_target_ranges_mission", "mission_id", "id"),
+    )
+
+    id: Mapped[int] = mapped_column(_BigId, primary_key=True, autoincrement=True)
+    mission_id: Mapped[str] = mapped_column(ForeignKey("missions.id", ondelete="CASCADE"))
+    target: Mapped[str] = mapped_column(String(64))
+    vehicle: Mapped[str] = mapped_column(String(64))
+    time_s: Mapped[float]
+    at_s: Mapped[float]
+    """When it was measured by the service's clock, as vehicles count seconds."""
+    received_at: Mapped[datetime]
+    step: Mapped[int]
+    source: Mapped[str] = mapped_column(String(64))
+    range_m: Mapped[float]
+    lat_deg: Mapped[float]
+    lon_deg: Mapped[float]
+    depth_m: Mapped[float]
+    position_sd_m: Mapped[float | None]
+    verdict: Mapped[str] = mapped_column(String(16))
+    reason: Mapped[str] = mapped_column(Text, default="")
 
 
 class TideTableRow(Base):

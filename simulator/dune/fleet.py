@@ -18,6 +18,7 @@ from simulator.dune.discovery import listen_for_announces
 from simulator.dune.node import DuneOptions, FakeDune
 from simulator.network import Address, UdpEndpoint
 from simulator.sensors import SensorKind, SonarNoise
+from simulator.targets import Ranging, RangingNoise, Target, TargetSpec
 from simulator.terrain import Terrain
 from simulator.vehicle import STEP_S, VehicleLimits
 from simulator.world import SimulatedVehicle
@@ -102,6 +103,8 @@ class DuneFleet:
         How far the vehicles' clocks are ahead of this machine's.
     seed
         Of all randomness.
+    targets, ranging
+        What moves about in the water, and how well the vehicles' modems range to it.
     """
 
     def __init__(
@@ -119,12 +122,15 @@ class DuneFleet:
         options: DuneOptions | None = None,
         clock_offset_s: float = 0.0,
         seed: int = 0,
+        targets: Sequence[TargetSpec] = (),
+        ranging: RangingNoise | None = None,
     ) -> None:
         self.terrain = terrain
         self.options = options or DuneOptions()
         self.clock = SimulationClock(speed, start_s=time.time() + clock_offset_s)
         self._simulated_s = self.clock.now()
-        rngs = np.random.default_rng(seed).spawn(2 * len(specs))
+        rngs = np.random.default_rng(seed).spawn(3 * len(specs))
+        self.targets = [Target(spec, terrain, self._simulated_s) for spec in targets]
         self.nodes = [
             FakeDune(
                 SimulatedVehicle(
@@ -146,6 +152,9 @@ class DuneFleet:
                 self.clock,
                 self.options,
                 rngs[2 * k + 1],
+                Ranging(self.targets, ranging or RangingNoise(), rngs[2 * len(specs) + k], self._simulated_s)
+                if targets
+                else None,
             )
             for k, spec in enumerate(specs)
         ]
@@ -222,6 +231,7 @@ class DuneFleet:
                 "min_depth_m": self.terrain.min_depth_m,
                 "max_depth_m": self.terrain.max_depth_m,
             },
+            "targets": [target.name for target in self.targets],
             "speed": self.clock.speed,
             "announce_ports": list(self.options.announce_ports),
         }

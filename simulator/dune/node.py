@@ -24,6 +24,7 @@ from simulator.dune.tcp import FIRST_PORT, TcpServer
 from simulator.dune.telemetry import Telemetry
 from simulator.network import Address, Endpoint, NetworkFaults, UdpEndpoint
 from simulator.sensors import SensorKind, cast_rays, to_local_frame
+from simulator.targets import Ranging
 from simulator.vehicle import STEP_S
 from simulator.world import SimulatedVehicle
 
@@ -135,6 +136,8 @@ class FakeDune:
         Shared settings.
     rng
         Source of the network's faults.
+    ranging
+        Its acoustic modem, where there are targets to range to.
     """
 
     def __init__(
@@ -145,6 +148,7 @@ class FakeDune:
         clock: SimulationClock,
         options: DuneOptions,
         rng: np.random.Generator,
+        ranging: Ranging | None = None,
     ) -> None:
         if not 0 < imc_id < _BROADCAST:
             raise ValueError(f"{vehicle.name}: IMC id is {imc_id:#x}; it must be 0x0001 to 0xfffe")
@@ -158,6 +162,7 @@ class FakeDune:
         self._clock = clock
         self._options = options
         self._rng = rng
+        self._ranging = ranging
         self._entities = dict(SIMULATION)
         self._extra: dict[str, int] = {}
         if vehicle.sonar.kind is SensorKind.DVL:
@@ -322,6 +327,9 @@ class FakeDune:
                 emit()
         if ping:
             self._send_ranges()
+        if self._ranging is not None and self._telemetry is not None:
+            for system, range_m in self._ranging.step(now_s, self.vehicle.true_position):
+                self.send(self._telemetry.acoustic_range(system, range_m), self._entities["Acoustic Modem"])
         if self._options.chatter:
             self._send_chatter()
 

@@ -142,6 +142,14 @@ class Telemetry:
         message.value = range_m
         return message
 
+    def acoustic_range(self, system: str, range_m: float) -> imcpy.AcousticOperation:
+        """The answer to a range request: of DUNE's messages on ranges the one that its radio carries by default."""
+        message = imcpy.AcousticOperation()
+        message.op = imcpy.AcousticOperation.OperationEnum.RANGE_RECVED
+        message.system = system
+        message.range = range_m
+        return message
+
     def sonar_data(self, swath: Sequence[Measurement], swath_rad: float, max_range_m: float) -> imcpy.SonarData:
         """One multibeam ping in IMC's format: count, start angle, flags, 16-bit ranges (0 for no return)."""
         message = imcpy.SonarData()

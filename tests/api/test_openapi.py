@@ -36,6 +36,8 @@ CONTRACT = {
     "GET /missions/{mission_id}/soundings": "listSoundings",
     "POST /missions/{mission_id}/soundings/{sounding_id}/restore": "restoreSounding",
     "POST /missions/{mission_id}/soundings/{sounding_id}/reject": "rejectSounding",
+    "GET /missions/{mission_id}/targets": "listTargets",
+    "GET /missions/{mission_id}/targets/ranges": "listTargetRanges",
     "GET /missions/{mission_id}/map/tiles": "getMapTiles",
     "POST /missions/{mission_id}/pause": "pauseMission",
     "POST /missions/{mission_id}/resume": "resumeMission",
@@ -107,7 +109,8 @@ async def test_every_reference_leads_somewhere(document: dict[str, Any]) -> None
 async def test_live_messages_are_in_the_document_for_generated_clients(document: dict[str, Any]) -> None:
     branches = document["components"]["schemas"]["LiveMessage"]["anyOf"]
     assert {"$ref": "#/components/schemas/SnapshotMessage"} in branches
-    assert len(branches) == 6
+    assert {"$ref": "#/components/schemas/TargetsMessage"} in branches
+    assert len(branches) == 7
 
 
 async def test_what_is_always_sent_is_required_in_the_document(document: dict[str, Any]) -> None:

@@ -113,7 +113,7 @@ def test_what_is_foretold_is_what_the_filter_then_says():
     *_, (_, track, positions) = pursuit(1, 60, estimator)
     ahead = estimator.predict(track)
     configurations = np.stack([positions, positions + 0.05])
-    told = foretold_sd(ahead.state, ahead.covariance, configurations, 0.1, np.inf)
+    told = foretold_sd(ahead.state, ahead.covariance, configurations, 0.1, np.inf, 0.0)
     ranges = np.linalg.norm(ahead.state[:3] - positions, axis=1)
     assert told[0] == pytest.approx(estimator.update(ahead, positions, ranges).sd_m.max(), rel=0.02)
 

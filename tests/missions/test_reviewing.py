@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from app.missions.errors import ConflictError, SoundingNotFoundError
+from app.missions.measurement import Measurement
 from app.missions.service import MissionService
-from app.missions.views import Measurement, Ruling, SoundingState
+from app.missions.views import Ruling, SoundingState
 from tests.missions.builders import lon_lat, make_spec
 from tests.missions.fleet import CLOCK_S, Harbour, until
 

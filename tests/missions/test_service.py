@@ -27,12 +27,13 @@ from app.missions.errors import (
     VehicleNotFoundError,
 )
 from app.missions.fleet import LinkState, WaypointStatus
+from app.missions.measurement import Measurement
 from app.missions.products import PRODUCTS
 from app.missions.service import MissionService
 from app.missions.settings import ServiceSettings
 from app.missions.spec import MissionSpec, VehicleKind, VehicleSpec
 from app.missions.states import MissionState, MoveRefusedError
-from app.missions.views import EventMessage, Level, Measurement, SnapshotMessage, StateMessage, Verdict
+from app.missions.views import EventMessage, Level, SnapshotMessage, StateMessage, Verdict
 from app.storage.database import Database
 from app.storage.models import MissionRow, MissionVehicleRow, SoundingRow, StepRow, WaypointRow
 from tests.missions.builders import lon_lat, make_spec, rectangle

@@ -15,6 +15,7 @@ from app.storage.models import (
     ReferenceRow,
     SoundingRow,
     StepRow,
+    TargetRangeRow,
     TideTableRow,
     TokenRow,
     WaypointRow,
@@ -112,6 +113,26 @@ def position(mission_id: str = "m1", name: str = "a", time_s: float = 1.0, lat_d
     }
 
 
+def target_range(mission_id: str = "m1", target: str = "tag-1", time_s: float = 1.0) -> dict[str, Any]:
+    return {
+        "mission_id": mission_id,
+        "target": target,
+        "vehicle": "a",
+        "time_s": time_s,
+        "at_s": time_s,
+        "received_at": TIME,
+        "step": 0,
+        "source": "rest",
+        "range_m": 42.0,
+        "lat_deg": 41.18,
+        "lon_deg": -8.7,
+        "depth_m": 2.0,
+        "position_sd_m": None,
+        "verdict": "accepted",
+        "reason": "",
+    }
+
+
 def one_of_each() -> list[list[Any]]:
     """Rows in the order in which foreign keys allow them."""
     return [
@@ -121,6 +142,7 @@ def one_of_each() -> list[list[Any]]:
         [
             SoundingRow(**sounding()),
             PositionRow(**position()),
+            TargetRangeRow(**target_range()),
             BatchRow(mission_id="m1", key="k", digest="d", answer={"accepted": 1}, created_at=TIME),
             EventRow(mission_id="m1", time=TIME, level="info", kind="state", message="made", data={"by": "me"}),
             TideTableRow(mission_id="m1", name="Leixoes", text="2026/01/01 00:00 1.0"),

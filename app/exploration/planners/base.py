@@ -61,10 +61,10 @@ class PlannerBase(ABC):
     def _with_errands(self, team: Situation, bottom: Bottom, seed: int) -> Proposal:
         """Decide for the vehicles that are on no errand, then send the others on theirs."""
         # Bathymeter missions rise along their legs instead; see app.missions.decision.
-        dynamic = team.targets is not None or team.localization is not None
-        if self._surveys or not self.runs_errands or not dynamic:
+        localization = None if self._surveys else team.localization
+        if not self.runs_errands or (team.targets is None and localization is None):
             return self._decide(team, bottom, seed)
-        errands = self._errands.assign(team.vehicles, team.positions, team.targets, team.localization)
+        errands = self._errands.assign(team.vehicles, team.positions, team.targets, localization)
         if not errands:
             return self._decide(team, bottom, seed)
         rows = {errand.vehicle: team.vehicles.index(errand.vehicle) for errand in errands}
@@ -80,11 +80,23 @@ class PlannerBase(ABC):
                 positions[rest], objective, terms = proposal.positions, proposal.objective, proposal.terms
             for errand in errands:
                 positions[rows[errand.vehicle]] = self._go(team, bottom, positions, rows[errand.vehicle], errand)
-        return Proposal(positions, objective, {**terms, "errands": float(len(errands))})
+        named = {errand.vehicle: errand.target for errand in errands}
+        return Proposal(positions, objective, {**terms, "errands": float(len(errands))}, named)
 
     def _go(self, team: Situation, bottom: Bottom, positions: FloatArray, row: int, errand: Errand) -> FloatArray:
+        def at_cruise(configurations: FloatArray) -> FloatArray:
+            return self._at_cruise(team, bottom, configurations[..., :2])
+
         return errand_move(
-            row, errand, team.positions, positions, team.constraints, bottom, team.targets, team.localization
+            row,
+            errand,
+            team.positions,
+            positions,
+            team.constraints,
+            bottom,
+            team.targets,
+            team.localization,
+            at_cruise if self._surveys else None,
         )
 
     @abstractmethod

@@ -10,6 +10,7 @@ from app.missions.fleet import (
     LinkReport,
     LinkState,
     Position,
+    RangeReport,
     SoundingReport,
     StopReceipt,
     VehicleInfo,
@@ -32,6 +33,7 @@ from imc_bridge import (
     RefusedError,
     Sounding,
     StateReport,
+    TargetRange,
     Waypoint,
     WaypointChange,
 )
@@ -177,6 +179,8 @@ def _translate(event: BridgeEvent) -> FleetEvent | None:
             return vehicle_report(event)
         case Sounding():
             return sounding_report(event)
+        case TargetRange():
+            return range_report(event)
         case WaypointChange():
             return WaypointReport(
                 vehicle=event.vehicle,
@@ -225,6 +229,19 @@ def sounding_report(event: Sounding) -> SoundingReport:
         beam=event.beam,
         position_sd_m=event.position_sd_m,
         beam_geometry=_beam_geometry(event),
+    )
+
+
+def range_report(event: TargetRange) -> RangeReport:
+    """A range that the bridge heard of, as missions know it."""
+    return RangeReport(
+        vehicle=event.vehicle,
+        time_s=event.time_s,
+        target=event.target,
+        range_m=event.range_m,
+        position=Position(event.vehicle_lat_deg, event.vehicle_lon_deg, event.vehicle_depth_m),
+        source=event.source,
+        position_sd_m=event.position_sd_m,
     )
 
 

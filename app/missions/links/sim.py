@@ -15,6 +15,7 @@ from app.missions.fleet import (
     LinkReport,
     LinkState,
     Position,
+    RangeReport,
     SoundingReport,
     StopReceipt,
     VehicleInfo,
@@ -26,8 +27,11 @@ from app.missions.fleet import (
 )
 from app.missions.settings import SimulationSettings
 from app.missions.spec import Sensor
+from app.missions.target_spec import TargetSpec
 from simulator.seafloors import generate
 from simulator.sensors import SensorKind, SonarNoise
+from simulator.targets import Ranging, RangingNoise, Target
+from simulator.targets import TargetSpec as SimulatedTarget
 from simulator.terrain import Terrain
 from simulator.terrain_files import load_terrain
 from simulator.world import Measurement, Place, SimulatedVehicle
@@ -60,6 +64,8 @@ class Launch:
         Latitude and longitude; None: in the south-western corner, beside those already there.
     noise
         Standard deviation of a range as a fraction of it.
+    targets, ranging
+        What moves about there, and how well it ranges to that.
     """
 
     vehicle: str
@@ -69,11 +75,14 @@ class Launch:
     height_m: float
     start: tuple[float, float] | None
     noise: float
+    targets: tuple[TargetSpec, ...] = ()
+    ranging: RangingNoise = RangingNoise()  # noqa: RUF009 - frozen
 
 
 class _Swimmer:
-    def __init__(self, body: SimulatedVehicle, terrain: Terrain) -> None:
+    def __init__(self, body: SimulatedVehicle, terrain: Terrain, ranging: Ranging) -> None:
         self.body = body
+        self.ranging = ranging
         self.terrain = terrain
         self.state = LinkState.READY
         self.order: WaypointOrder | None = None
@@ -149,6 +158,9 @@ class SimFleetLink:
             return
         terrain = self._terrain(launch)
         seed = [self._settings.seed, *launch.vehicle.encode()]
+        started_s = now().timestamp()
+        moving = [target for target in launch.targets if target.simulated is not None]
+        targets = [Target(_simulated(target, terrain), terrain, started_s) for target in moving]
         body = SimulatedVehicle(
             launch.vehicle,
             terrain,
@@ -156,10 +168,11 @@ class SimFleetLink:
             (*self._start(launch, terrain), 0.0),
             np.random.default_rng(seed),
             noise=SonarNoise(relative_sd=launch.noise),
-            start_time_s=now().timestamp(),
+            start_time_s=started_s,
             drift_m2ps=self._settings.drift_m2ps,
         )
-        swimmer = _Swimmer(body, terrain)
+        ranging = Ranging(targets, launch.ranging, np.random.default_rng([*seed, 1]), started_s)
+        swimmer = _Swimmer(body, terrain, ranging)
         swimmer.make_report()
         self._swimmers[launch.vehicle] = swimmer
 
@@ -242,6 +255,7 @@ class SimFleetLink:
         if order is not None:
             events += [_sounding(swimmer, m) for m in measurements if m.valid]
             self._keep_clear_of_bottom(swimmer, order)
+        events += _ranges(swimmer)
         if swimmer.body.time_s - swimmer.reported_s >= REPORT_PERIOD_S:
             events.append(swimmer.make_report())
         if order is not None and not swimmer.reached and swimmer.body.arrived:
@@ -257,6 +271,31 @@ class SimFleetLink:
         if too_low and not swimmer.raised and not swimmer.body.arrived:
             swimmer.raised = True
             swimmer.head_for(order, max(0.0, swimmer.body.bottom_m - order.min_altitude_m))
+
+
+def _simulated(target: TargetSpec, terrain: Terrain) -> SimulatedTarget:
+    asked = target.simulated
+    if asked is None:
+        raise ValueError(f"target {target.name} is a real one")
+    lon, lat = asked.start
+    place = (*terrain.frame.to_local(lat, lon), asked.depth_m)
+    return SimulatedTarget(target.called, place, math.radians(asked.course_deg), asked.speed_mps)
+
+
+def _ranges(swimmer: _Swimmer) -> list[FleetEvent]:
+    body = swimmer.body
+    return [
+        RangeReport(
+            vehicle=body.name,
+            time_s=body.time_s,
+            target=target,
+            range_m=range_m,
+            position=swimmer.position(body.position),
+            source="sim",
+            position_sd_m=math.sqrt(body.state.position_variance_m2),
+        )
+        for target, range_m in swimmer.ranging.step(body.time_s, body.true_position)
+    ]
 
 
 def _sounding(swimmer: _Swimmer, measurement: Measurement) -> SoundingReport:

@@ -676,6 +676,46 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/missions/{mission_id}/targets": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * See what is known of a mission's moving targets
+         * @description Return every target of the mission, foretold from its last range until now.
+         */
+        get: operations["listTargets"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/missions/{mission_id}/targets/ranges": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * See the ranges to targets, and which were used
+         * @description Return ranges as they were measured, with the verdict on each, in the order they were judged.
+         */
+        get: operations["listTargetRanges"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/missions/{mission_id}/events": {
         parameters: {
             query?: never;
@@ -1040,6 +1080,21 @@ export interface components {
             vehicles: components["schemas"]["VehicleDiagnosis"][];
         };
         /**
+         * EllipseView
+         * @description Where the target is with 95 % probability, in the plane.
+         */
+        EllipseView: {
+            /** Semi Major M */
+            semi_major_m: number;
+            /** Semi Minor M */
+            semi_minor_m: number;
+            /**
+             * Orientation Deg
+             * @description Of the longer axis, clockwise from north, 0 to 180
+             */
+            orientation_deg: number;
+        };
+        /**
          * EventMessage
          * @description A new line of the log.
          */
@@ -1294,7 +1349,7 @@ export interface components {
          * @enum {string}
          */
         LinkState: "unknown" | "lost" | "expected_offline" | "heard" | "ready" | "engaged";
-        LiveMessage: components["schemas"]["SnapshotMessage"] | components["schemas"]["VehiclesMessage"] | components["schemas"]["WaypointsMessage"] | components["schemas"]["StateMessage"] | components["schemas"]["MapMessage"] | components["schemas"]["EventMessage"];
+        LiveMessage: components["schemas"]["SnapshotMessage"] | components["schemas"]["VehiclesMessage"] | components["schemas"]["TargetsMessage"] | components["schemas"]["WaypointsMessage"] | components["schemas"]["StateMessage"] | components["schemas"]["MapMessage"] | components["schemas"]["EventMessage"];
         /**
          * Liveness
          * @description The process answers.
@@ -1388,7 +1443,7 @@ export interface components {
         };
         /**
          * Measurement
-         * @description One measurement posted by a vehicle: a sounding, a position report, or both.
+         * @description One measurement posted by a vehicle: its position, and a sounding or a range to a target where it has one.
          */
         Measurement: {
             /** Vehicle */
@@ -1451,6 +1506,16 @@ export interface components {
             range_sd_m?: number | null;
             /** Position Sd M */
             position_sd_m?: number | null;
+            /**
+             * Target
+             * @description The moving target that target_range_m was measured to
+             */
+            target?: string | null;
+            /**
+             * Target Range M
+             * @description Range from the vehicle to that target, metres
+             */
+            target_range_m?: number | null;
             /** Heading Deg */
             heading_deg?: number | null;
             /** Speed Mps */
@@ -1514,6 +1579,12 @@ export interface components {
             planner?: components["schemas"]["PlannerSpec"];
             /** @description When vehicles come up for a GPS fix; null: never because of their position */
             surface_policy?: components["schemas"]["SurfacePolicy"] | null;
+            /**
+             * Targets
+             * @description Moving targets to keep track of
+             */
+            targets?: components["schemas"]["TargetSpec"][];
+            tracking?: components["schemas"]["Tracking"];
             /**
              * Speed Mps
              * @description Speed asked of the vehicles
@@ -1631,6 +1702,11 @@ export interface components {
              * @description The newest waypoint of each vehicle
              */
             waypoints: components["schemas"]["WaypointView"][];
+            /**
+             * Targets
+             * @description What is known of the moving targets
+             */
+            targets: components["schemas"]["TargetView"][];
         };
         /**
          * NodeState
@@ -1837,6 +1913,12 @@ export interface components {
             ][][];
         };
         /**
+         * PositionQuality
+         * @description How well a vehicle knows where it is.
+         * @enum {string}
+         */
+        PositionQuality: "untold" | "stated" | "good" | "fading" | "poor";
+        /**
          * PreflightView
          * @description What stands before a start.
          */
@@ -2037,6 +2119,36 @@ export interface components {
          * @enum {string}
          */
         Severity: "ok" | "note" | "problem";
+        /**
+         * SimulatedTarget
+         * @description A target that moves about in the service's own simulation; vehicles of kind ``sim`` range to it.
+         */
+        SimulatedTarget: {
+            /**
+             * Start
+             * @description Where it starts, [longitude, latitude]
+             */
+            start: [
+                number,
+                number
+            ];
+            /**
+             * Depth M
+             * @default 2
+             */
+            depth_m: number;
+            /**
+             * Course Deg
+             * @description Clockwise from north; it turns at the sea's edge
+             * @default 0
+             */
+            course_deg: number;
+            /**
+             * Speed Mps
+             * @default 0.3
+             */
+            speed_mps: number;
+        };
         /**
          * SnapshotMessage
          * @description First message on the live socket: everything needed to draw the picture.
@@ -2248,6 +2360,206 @@ export interface components {
             good_position_sd_m?: number | null;
         };
         /**
+         * TargetRangePage
+         * @description Some ranges, in the order they were judged.
+         */
+        TargetRangePage: {
+            /** Items */
+            items: components["schemas"]["TargetRangeView"][];
+            /**
+             * Next After
+             * @description Give it as `after` for the next page; null: this is the last
+             */
+            next_after: number | null;
+        };
+        /**
+         * TargetRangeView
+         * @description A range to a target as it was measured, and whether it was used.
+         */
+        TargetRangeView: {
+            /** Id */
+            id: number;
+            /** Target */
+            target: string;
+            /** Vehicle */
+            vehicle: string;
+            /**
+             * Time S
+             * @description The vehicle's clock, Unix seconds
+             */
+            time_s: number;
+            /**
+             * Received At
+             * Format: date-time
+             */
+            received_at: string;
+            /** Step */
+            step: number;
+            /**
+             * Source
+             * @description What told of it: rest, sim, or an IMC message
+             */
+            source: string;
+            /** Range M */
+            range_m: number;
+            /**
+             * Lat Deg
+             * @description Where the vehicle was
+             */
+            lat_deg: number;
+            /** Lon Deg */
+            lon_deg: number;
+            /** Depth M */
+            depth_m: number;
+            /** Used */
+            used: boolean;
+            /**
+             * Reason
+             * @description Why it was not used
+             * @default
+             */
+            reason: string;
+        };
+        /**
+         * TargetSpec
+         * @description A moving target with something on it that vehicles range to by sound.
+         */
+        TargetSpec: {
+            /**
+             * Name
+             * @description Its name
+             * @example tag-1
+             */
+            name: string;
+            /**
+             * Acoustic Name
+             * @description What vehicles' modems call it; lbl-7 is transponder 7 of a long base line; null: its name
+             */
+            acoustic_name?: string | null;
+            /**
+             * Max Speed Mps
+             * @description How fast it may be
+             * @default 1
+             */
+            max_speed_mps: number;
+            /**
+             * Velocity Change Mps
+             * @description Standard deviation by which its velocity along east and along north changes within a minute
+             * @default 0.1
+             */
+            velocity_change_mps: number;
+            /**
+             * Min Depth M
+             * @description Shallowest depth at which it may be found
+             * @default 0
+             */
+            min_depth_m: number;
+            /**
+             * Max Depth M
+             * @description Deepest; null: limits.max_depth_m of the vehicles
+             */
+            max_depth_m?: number | null;
+            /** @description Let it move about in the service's own simulation; null: it is a real one */
+            simulated?: components["schemas"]["SimulatedTarget"] | null;
+        };
+        /**
+         * TargetState
+         * @description How far the search for a target has come.
+         * @enum {string}
+         */
+        TargetState: "unheard" | "searching" | "uncertain" | "accurate";
+        /**
+         * TargetView
+         * @description A moving target as an operator sees it now: foretold from the last range until this moment.
+         */
+        TargetView: {
+            /** Name */
+            name: string;
+            state: components["schemas"]["TargetState"];
+            /**
+             * Accurate
+             * @description Known as well as tracking.accuracy_m asks: within A
+             */
+            accurate: boolean;
+            /**
+             * In Area
+             * @description Whether it is thought to be above the area to map
+             */
+            in_area: boolean | null;
+            /** Lat Deg */
+            lat_deg: number | null;
+            /** Lon Deg */
+            lon_deg: number | null;
+            /** East M */
+            east_m: number | null;
+            /** North M */
+            north_m: number | null;
+            /** Depth M */
+            depth_m: number | null;
+            /**
+             * Speed Mps
+             * @description Over ground, horizontally
+             */
+            speed_mps: number | null;
+            /**
+             * Course Deg
+             * @description Clockwise from north
+             */
+            course_deg: number | null;
+            /** Sd East M */
+            sd_east_m: number | null;
+            /** Sd North M */
+            sd_north_m: number | null;
+            /** Sd Depth M */
+            sd_depth_m: number | null;
+            ellipse: components["schemas"]["EllipseView"] | null;
+            /**
+             * Age S
+             * @description Seconds since a range to it was used, as vehicles count them; null: never
+             */
+            age_s: number | null;
+            /**
+             * Ranges
+             * @description Ranges that were used
+             */
+            ranges: number;
+            /**
+             * Rejected
+             * @description Ranges that were not
+             */
+            rejected: number;
+            /**
+             * Last Refusal
+             * @description Why the last of those was not used
+             * @default
+             */
+            last_refusal: string;
+            /**
+             * Pursued By
+             * @description The vehicle that left the mapping for it
+             */
+            pursued_by: string | null;
+        };
+        /**
+         * TargetsMessage
+         * @description What is known of the moving targets, a few times per second where a mission has any.
+         */
+        TargetsMessage: {
+            /**
+             * Type
+             * @default targets
+             * @constant
+             */
+            type: "targets";
+            /**
+             * Time
+             * Format: date-time
+             */
+            time: string;
+            /** Targets */
+            targets: components["schemas"]["TargetView"][];
+        };
+        /**
          * Tide
          * @description Water level correction: depth below the datum = sounded depth - level + datum_offset_m.
          */
@@ -2356,6 +2668,47 @@ export interface components {
              * @description Of the table as it was sent
              */
             sha256: string;
+        };
+        /**
+         * Tracking
+         * @description How well targets are to be known, and how well vehicles range to them.
+         */
+        Tracking: {
+            /**
+             * Accuracy M
+             * @description A target counts as accurately known while its standard deviations along east, north and depth are below this
+             * @default 5
+             */
+            accuracy_m: number;
+            /**
+             * Range Noise
+             * @description Standard deviation of a range to a target as a fraction of it
+             * @default 0.01
+             */
+            range_noise: number;
+            /**
+             * Range Sd M
+             * @description The part of it that is the same at any range, metres
+             * @default 0.5
+             */
+            range_sd_m: number;
+            /**
+             * Hearing M
+             * @description Farther than this no target is heard; null: unlimited
+             */
+            hearing_m?: number | null;
+            /**
+             * Pursue
+             * @description Whether a vehicle leaves the mapping for a target that is not known well enough: one of three, none of a team of one
+             * @default true
+             */
+            pursue: boolean;
+            /**
+             * Standoff M
+             * @description A vehicle that goes for a target comes no closer to any
+             * @default 10
+             */
+            standoff_m: number;
         };
         /**
          * VehicleDiagnosis
@@ -2490,11 +2843,27 @@ export interface components {
              */
             position_sd_m: number | null;
             /**
+             * @description What that is worth beside the mission's surface_policy
+             * @default untold
+             */
+            localization: components["schemas"]["PositionQuality"];
+            /**
              * Surfacing
              * @description On its way up, or at the surface, for a GPS fix
              * @default false
              */
             surfacing: boolean;
+            /**
+             * Risings
+             * @description How often it was sent up for a fix in this mission
+             * @default 0
+             */
+            risings: number;
+            /**
+             * Pursuing
+             * @description The target that it leaves the mapping for
+             */
+            pursuing: string | null;
         };
         /**
          * VehiclesMessage
@@ -5458,6 +5827,131 @@ export interface operations {
             };
             /** @description The body's media type is not supported */
             415: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    listTargets: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description The mission's id */
+                mission_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["TargetView"][];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such mission */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    listTargetRanges: {
+        parameters: {
+            query?: {
+                /** @description Only ranges to this target */
+                target?: string;
+                /** @description Only ranges with a larger id */
+                after?: number;
+                /** @description Most ranges in the answer */
+                limit?: number;
+            };
+            header?: never;
+            path: {
+                /** @description The mission's id */
+                mission_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["TargetRangePage"];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such mission */
+            404: {
                 headers: {
                     [name: string]: unknown;
                 };

@@ -20,6 +20,9 @@ export type MissionAction = "start" | "pause" | "resume" | "abort" | "finish";
 
 export type PolygonGeometry = Schemas["PolygonGeometry"];
 export type VehicleView = Complete<Schemas["VehicleView"]>;
+export type PositionQuality = Schemas["PositionQuality"];
+export type TargetState = Schemas["TargetState"];
+export type TargetView = Complete<Schemas["TargetView"]>;
 export type WaypointView = Complete<Schemas["WaypointView"]>;
 export type MissionSummary = Complete<Schemas["MissionSummary"]>;
 export type MissionView = Complete<Schemas["MissionView"]>;

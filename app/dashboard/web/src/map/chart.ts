@@ -13,6 +13,7 @@ import { type Look, PAPER } from "./paper";
 import type { PictureResult } from "./picture.worker";
 import { Sheets } from "./sheets";
 import { imageOf, paintStill, type StillContent } from "./still";
+import type { TargetMark } from "./targets";
 
 setWorkerUrl(workerUrl);
 
@@ -235,6 +236,11 @@ export class Chart {
   /** How far each vehicle's messages reach. */
   setRanges(ranges: LivelyContent["ranges"]): void {
     this.#show({ ranges });
+  }
+
+  /** Where moving targets are thought to be. */
+  setTargets(targets: readonly TargetMark[]): void {
+    this.#show({ targets });
   }
 
   setSpots(spots: readonly Spot[]): void {

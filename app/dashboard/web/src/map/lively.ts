@@ -6,6 +6,7 @@ import { circle } from "./geo";
 import type { Paper } from "./paper";
 import { dot, line, stroke, trace, way } from "./pen";
 import type { Projection } from "./projection";
+import type { TargetMark } from "./targets";
 
 const SKETCH = "#1d5c94";
 
@@ -20,6 +21,7 @@ export interface LivelyContent {
   ranges: readonly { at: LngLat; radius_m: number; colour: string }[];
   tails: readonly Track[];
   routes: readonly Route[];
+  targets: readonly TargetMark[];
   spots: readonly Spot[];
   measure: readonly LngLat[];
   sketch: Sketch | null;
@@ -30,6 +32,7 @@ export const NOTHING: LivelyContent = {
   ranges: [],
   tails: [],
   routes: [],
+  targets: [],
   spots: [],
   measure: [],
   sketch: null,
@@ -43,7 +46,7 @@ export function paintLively(
   content: LivelyContent,
   paper: Paper,
 ): void {
-  const { draft, ranges, tails, routes, spots, measure, sketch } = content;
+  const { draft, ranges, tails, routes, targets, spots, measure, sketch } = content;
   context.lineJoin = context.lineCap = "round";
   for (const ring of draft.area?.coordinates ?? []) {
     line(context, at, ring as LngLat[], { colour: paper.area, width: 2.5, dash: [5, 5] });
@@ -62,6 +65,7 @@ export function paintLively(
     if (to) line(context, at, circle(to, arrivalRadius_m), { colour, width: 1.5, opacity: 0.8 });
     line(context, at, points, acknowledged ? { colour, width: 2.5 } : { colour, width: 2, dash: [3, 4] });
   }
+  for (const target of targets) paintTarget(context, at, target, paper);
   for (const { at: place, state, chosen } of spots) {
     const edge = { colour: "#10181d", width: chosen ? 3 : 1.5 };
     dot(context, at, place, chosen ? 9 : 5.5, SPOT_COLOURS[state] ?? "#e0452f", edge);
@@ -74,6 +78,23 @@ export function paintLively(
     for (const place of measure) dot(context, at, place, 4, paper.casing, { colour: paper.ink, width: 2 });
   }
   if (sketch) paintSketch(context, at, sketch);
+}
+
+function paintTarget(
+  context: CanvasRenderingContext2D,
+  at: Projection,
+  { name, accurate, at: place, ring }: TargetMark,
+  paper: Paper,
+): void {
+  line(context, at, ring, { colour: paper.ink, width: accurate ? 2 : 1.5, dash: [6, 4] });
+  dot(context, at, place, 6, accurate ? paper.ink : paper.casing, { colour: paper.ink, width: 2 });
+  context.font = "12px sans-serif";
+  context.textBaseline = "middle";
+  context.lineWidth = 3.2;
+  context.strokeStyle = paper.casing;
+  context.strokeText(name, at.x(place[0]) + 11, at.y(place[1]));
+  context.fillStyle = paper.ink;
+  context.fillText(name, at.x(place[0]) + 11, at.y(place[1]));
 }
 
 function paintSketch(context: CanvasRenderingContext2D, at: Projection, { lines, handles }: Sketch): void {

@@ -28,7 +28,10 @@ const vehicle = (
   speed_mps: null,
   battery_pct: null,
   position_sd_m: null,
+  localization: "stated",
   surfacing: false,
+  risings: 0,
+  pursuing: null,
 });
 
 const waypoint = (name: string, step: number, status: WaypointView["status"]): WaypointView => ({

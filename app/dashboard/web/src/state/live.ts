@@ -79,6 +79,8 @@ export function reduce(view: LiveView, message: LiveMessage, at: number): LiveVi
           ? { samples: sampled(view.samples, message.vehicles, at), sampledAt: at }
           : {}),
       };
+    case "targets":
+      return view.mission ? { ...view, mission: { ...view.mission, targets: message.targets } } : view;
     case "waypoints":
       if (!view.mission) return view;
       return {

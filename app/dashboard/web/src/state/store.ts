@@ -99,6 +99,7 @@ export const showHatching = kept("hatching", true);
 export const showContours = kept("contours", true);
 export const showTracks = kept("tracks", true);
 export const showRanges = kept("com-range", false);
+export const showTargets = kept("targets", true);
 /** Ranges that the operator fixed, for each layer; a layer without one takes a fitting range. */
 export const fixedRanges = kept<Partial<Record<Shown, Range>>>("ranges", {});
 export const shownRange = computed<Range | null>(() => {

@@ -1,7 +1,16 @@
 import type { ComponentChildren } from "preact";
 import { wayBetween } from "../map/geo";
 import { distance } from "../state/format";
-import { coordinateFormat, in3d, measured, mission, seaFloor, showRanges, showTracks } from "../state/store";
+import {
+  coordinateFormat,
+  in3d,
+  measured,
+  mission,
+  seaFloor,
+  showRanges,
+  showTargets,
+  showTracks,
+} from "../state/store";
 
 /** Buttons on the map's edge: show the area, measure, what is drawn, look at it in space. */
 export function MapTools({ onFit }: { onFit: () => void }) {
@@ -31,6 +40,18 @@ export function MapTools({ onFit }: { onFit: () => void }) {
         >
           <path d="M3,17 C3,9 10,13 10,8 S17,9 17,3" />
         </Tool>
+        {mission.value?.targets.length ? (
+          <Tool
+            label={`Targets: ${showTargets.value ? "shown" : "hidden"}`}
+            pressed={showTargets.value}
+            id="show-targets"
+            onClick={() => {
+              showTargets.value = !showTargets.value;
+            }}
+          >
+            <path d="M10,2 v4 M10,14 v4 M2,10 h4 M14,10 h4 M10,6 a4,4 0 1 1 -0.01,0" />
+          </Tool>
+        ) : null}
         {mission.value?.spec.limits.com_range_m ? (
           <Tool
             label={`Communication range: ${showRanges.value ? "shown" : "hidden"}`}

@@ -1,7 +1,9 @@
 import { age, metres, percent } from "../state/format";
+import { localizationWords } from "../state/localization";
 import { abortDialogOpen, abortOne, mission, socketStatus, type Vehicle, vehicles } from "../state/store";
 import { hasEnded, vehicleState, WAYPOINT_WORDS } from "../state/words";
 import { WaypointShape } from "./marks";
+import { TargetCards } from "./TargetCards";
 
 export function VehicleCards() {
   const present = mission.value;
@@ -16,6 +18,7 @@ export function VehicleCards() {
       ) : (
         vehicles.value.map((vehicle) => <Card key={vehicle.view.name} vehicle={vehicle} />)
       )}
+      <TargetCards />
     </section>
   );
 }
@@ -70,8 +73,8 @@ function Card({ vehicle }: { vehicle: Vehicle }) {
             : v.kind,
           v.address,
           v.speed_mps === null ? null : `${v.speed_mps.toFixed(1)} m/s`,
-          v.position_sd_m === null ? null : `nav ± ${v.position_sd_m.toFixed(1)} m`,
-          v.surfacing ? "up for a GPS fix" : null,
+          ...localizationWords(v),
+          v.pursuing === null ? null : `goes for ${v.pursuing}`,
         ]
           .filter((part) => part !== null)
           .map((part) => part?.replaceAll(" ", "\u00a0"))

@@ -10,6 +10,7 @@ import { Painter } from "../map/painter";
 import { lookupTable } from "../map/palette";
 import type { Look } from "../map/paper";
 import type { SeaFloor } from "../map/seafloor";
+import { targetMarks } from "../map/targets";
 import { replayed } from "../state/replay";
 import {
   chosenSounding,
@@ -31,6 +32,7 @@ import {
   showHatching,
   shownRange,
   showRanges,
+  showTargets,
   showTracks,
   stripHeight,
   theme,
@@ -83,6 +85,11 @@ export function follow(chart: Chart): () => void {
         showRanges.value && range ? places().map(({ at, colour }) => ({ at, colour, radius_m: range })) : [],
       );
     }),
+    effect(() =>
+      chart.setTargets(
+        showTargets.value && replayStep.value === null ? targetMarks(mission.value?.targets ?? []) : [],
+      ),
+    ),
     effect(() =>
       chart.setSpots(
         (reviewed.value ?? []).map((s) => ({

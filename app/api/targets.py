@@ -1,0 +1,37 @@
+"""Moving targets: what is known of them, and the ranges that it is known from."""
+
+from typing import Annotated
+
+from fastapi import APIRouter, Query
+
+from app.api.auth import Reader
+from app.api.problems import problems
+from app.api.schemas import API, MissionId
+from app.api.state import Service
+from app.missions.spec_base import Name
+from app.missions.target_views import TargetRangePage, TargetView
+
+router = APIRouter(
+    prefix=f"{API}/missions/{{mission_id}}/targets",
+    tags=["targets"],
+    responses=problems("unauthenticated", "forbidden", "mission-not-found", "invalid-request"),
+)
+
+
+@router.get("", operation_id="listTargets", summary="See what is known of a mission's moving targets")
+async def list_targets(mission_id: MissionId, service: Service, reader: Reader) -> list[TargetView]:
+    """Return every target of the mission, foretold from its last range until now."""
+    return await service.targets(mission_id)
+
+
+@router.get("/ranges", operation_id="listTargetRanges", summary="See the ranges to targets, and which were used")
+async def list_target_ranges(
+    mission_id: MissionId,
+    service: Service,
+    reader: Reader,
+    target: Annotated[Name | None, Query(description="Only ranges to this target")] = None,
+    after: Annotated[int, Query(ge=0, lt=2**62, description="Only ranges with a larger id")] = 0,
+    limit: Annotated[int, Query(ge=1, le=1000, description="Most ranges in the answer")] = 200,
+) -> TargetRangePage:
+    """Return ranges as they were measured, with the verdict on each, in the order they were judged."""
+    return await service.target_ranges(mission_id, target=target, after=after, limit=limit)
