@@ -36,7 +36,9 @@ class Service:
 
     @property
     def _environment(self) -> dict[str, str]:
-        return os.environ | {
+        # Settings of whoever runs the tests are not this service's.
+        kept = {name: value for name, value in os.environ.items() if not name.startswith("BATHYFLEET_")}
+        return kept | {
             "BATHYFLEET_DATABASE_URL": f"sqlite+aiosqlite:///{self._folder / 'service.db'}",
             "BATHYFLEET_IMC__ENABLED": "false",
             "BATHYFLEET_TIME_SCALE": "5",

@@ -27,8 +27,8 @@ def test_an_operator_sees_where_a_target_is_thought_to_be(watched: Watched, serv
     service.act(mission, "start")
     try:
         expect(card).to_have_attribute("data-state", re.compile("uncertain|accurate"))
-        expect(page.get_by_test_id("target-sd-tag-1")).to_have_text(re.compile(r"± \d"))
-        expect(page.get_by_test_id("card-t-0")).to_contain_text(re.compile(r"nav ± \d+\.\d m, (good|fading)"))
+        expect(page.get_by_test_id("target-sd-tag-1")).to_have_text(re.compile(r"±\s\d"))
+        expect(page.get_by_test_id("card-t-0")).to_contain_text(re.compile(r"nav\s±\s\d+\.\d\sm,\s(good|fading)"))
         expect(page.get_by_test_id("show-targets")).to_have_attribute("aria-pressed", "true")
         page.get_by_test_id("show-targets").click()
         expect(page.get_by_test_id("show-targets")).to_have_attribute("aria-pressed", "false")
