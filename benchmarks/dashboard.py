@@ -245,8 +245,8 @@ class Bench:
             page.wait_for_timeout(3000)
             for how in ("watching", "panning"):
                 page.evaluate(
-                    """() => { window.__frames = []; const tick = t => { window.__frames.push(t);
-                    requestAnimationFrame(tick); }; requestAnimationFrame(tick); }"""
+                    """() => { const frames = window.__frames = []; const tick = t => { frames.push(t);
+                    if (window.__frames === frames) requestAnimationFrame(tick); }; requestAnimationFrame(tick); }"""
                 )
                 end = time.monotonic() + seconds
                 before = browser_cpu_s()
