@@ -21,6 +21,7 @@ from app.missions.errors import (
     MapNotReadyError,
     MissionNotFoundError,
     SoundingNotFoundError,
+    TargetNotFoundError,
     VehicleNotFoundError,
 )
 from app.missions.states import MoveRefusedError
@@ -67,6 +68,7 @@ TITLES: dict[str, tuple[int, str]] = {
     "vehicle-not-found": (404, "There is no such vehicle"),
     "format-not-found": (404, "There is no such format"),
     "sounding-not-found": (404, "There is no such sounding"),
+    "target-not-found": (404, "The mission has no such target"),
     "import-not-found": (404, "There is no such import"),
     "map-not-ready": (404, "There is no map yet"),
     "method-not-allowed": (405, "The method is not allowed here"),
@@ -350,6 +352,7 @@ def describe_mission_error(error: Exception) -> tuple[str, str, str]:
         (MissionNotFoundError, "mission-not-found"),
         (VehicleNotFoundError, "vehicle-not-found"),
         (SoundingNotFoundError, "sounding-not-found"),
+        (TargetNotFoundError, "target-not-found"),
         (ImportNotFoundError, "import-not-found"),
         (MapNotReadyError, "map-not-ready"),
         (MoveRefusedError, "move-refused"),
@@ -393,6 +396,7 @@ def install(app: FastAPI) -> None:
         MissionNotFoundError,
         VehicleNotFoundError,
         SoundingNotFoundError,
+        TargetNotFoundError,
         ImportNotFoundError,
         MapNotReadyError,
         MoveRefusedError,

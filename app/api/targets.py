@@ -24,7 +24,12 @@ async def list_targets(mission_id: MissionId, service: Service, reader: Reader) 
     return await service.targets(mission_id)
 
 
-@router.get("/ranges", operation_id="listTargetRanges", summary="See the ranges to targets, and which were used")
+@router.get(
+    "/ranges",
+    operation_id="listTargetRanges",
+    summary="See the ranges to targets, and which were used",
+    responses=problems("mission-not-found", "target-not-found"),
+)
 async def list_target_ranges(
     mission_id: MissionId,
     service: Service,

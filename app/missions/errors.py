@@ -19,6 +19,10 @@ class VehicleNotFoundError(MissionError):
     """There is no such vehicle, or it takes no part in the mission."""
 
 
+class TargetNotFoundError(MissionError):
+    """The mission has no such target."""
+
+
 class ConflictError(MissionError):
     """The request contradicts the present state of things."""
 

@@ -5950,7 +5950,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description There is no such mission */
+            /** @description There is no such mission; the mission has no such target */
             404: {
                 headers: {
                     [name: string]: unknown;
