@@ -5,6 +5,7 @@ from app.estimation.landmarks import LandmarkEstimator, Landmarks, LandmarkSets,
 from app.estimation.landmarks_3d import Landmark3DEstimator, Landmarks3D
 from app.estimation.line_of_sight import in_sight
 from app.estimation.localization import CooperativeLocalizer, Fading, TeamPosition
+from app.estimation.occupancy import Cell, OccupancyGrid, Scanner
 from app.estimation.sensors import RangeSensor, Sensor, SingleBeam
 from app.estimation.targets import TargetEstimator, TargetTrack
 from app.estimation.team import SensorTeam
@@ -12,6 +13,7 @@ from app.estimation.team import SensorTeam
 __all__ = [
     "Attitude",
     "BeamSonar",
+    "Cell",
     "CooperativeLocalizer",
     "Dvl",
     "Echoes",
@@ -22,7 +24,9 @@ __all__ = [
     "Landmarks",
     "Landmarks3D",
     "Multibeam",
+    "OccupancyGrid",
     "RangeSensor",
+    "Scanner",
     "Sensor",
     "SensorTeam",
     "SingleBeam",

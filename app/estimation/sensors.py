@@ -7,6 +7,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from app.estimation.beams import BeamSonar
+from app.estimation.occupancy import Scanner
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -76,4 +77,4 @@ def _closer(positions: FloatArray, landmarks: FloatArray, reach: float) -> BoolA
     return closer
 
 
-Sensor = RangeSensor | SingleBeam | BeamSonar
+Sensor = RangeSensor | SingleBeam | BeamSonar | Scanner

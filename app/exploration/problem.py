@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from app.exploration.constraints import Constraints
 from app.exploration.dynamic import Localization, Targets
+from app.exploration.search.task import SearchTask
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -80,6 +81,8 @@ class Situation:
         How well the vehicles know where they are; None: well enough.
     doubtful_en_m : (k, 2)
         Soundings that the map leaves out because their neighbours contradict them: a fish, or a rock.
+    search : SearchTask or None
+        What a search mission is about; the belief then says nothing.
     """
 
     step: int
@@ -93,6 +96,7 @@ class Situation:
     targets: Targets | None = None
     localization: Localization | None = None
     doubtful_en_m: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
+    search: SearchTask | None = None
 
 
 @dataclass(frozen=True)

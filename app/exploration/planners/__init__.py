@@ -4,7 +4,7 @@ from functools import cache
 
 import numpy as np
 
-from app.estimation import RangeSensor, Sensor, SingleBeam
+from app.estimation import OccupancyGrid, RangeSensor, Scanner, Sensor, SingleBeam
 from app.exploration.constraints import Constraints
 from app.exploration.options import PlannerOptions
 from app.exploration.planners.base import PlannerBase
@@ -14,12 +14,21 @@ from app.exploration.planners.gradient import FdsaPlanner, SpsaPlanner
 from app.exploration.planners.lawnmower import LawnmowerPlanner
 from app.exploration.planners.random_walk import RandomPlanner
 from app.exploration.planners.rollout import RolloutPlanner
+from app.exploration.planners.search_cao import CaoSearch, SpsaSearch
+from app.exploration.planners.search_frontier import FrontierSearch
+from app.exploration.planners.search_random import RandomSearch
 from app.exploration.problem import Belief, Situation
+from app.exploration.search import SearchTask
 
 PLANNERS: dict[str, type[PlannerBase]] = {
     planner.name: planner
     for planner in (CaoPlanner, LawnmowerPlanner, RandomPlanner, RolloutPlanner, SpsaPlanner, FdsaPlanner)
 }
+
+SEARCHERS: dict[str, type[PlannerBase]] = {
+    planner.name: planner for planner in (FrontierSearch, CaoSearch, SpsaSearch, RandomSearch)
+}
+"""The planners of search missions, by the same names: what is called rollout there goes for the best views."""
 
 ONLY_IN_SIMULATION = ("osarses", "spsa-tried", "fdsa-tried")
 """Yardsticks that really try their moves and take them back, as only ``bathyfleet evaluate explore`` can."""
@@ -58,11 +67,21 @@ def create_planner(
         planner = PLANNERS[name]
     except KeyError:
         raise ValueError(f"planner: there is no {name!r}; choose one of {', '.join(sorted(PLANNERS))}") from None
+    if isinstance(sensor, Scanner):
+        return _searcher(name)(options, sensor)
     if planner is LawnmowerPlanner and isinstance(sensor, RangeSensor):
         return FormationLawnmower(options, sensor)
     if planner is RolloutPlanner and not isinstance(sensor, RangeSensor):
         return CaoPlanner(options, sensor)
     return planner(options, sensor)
+
+
+def _searcher(name: str) -> type[PlannerBase]:
+    try:
+        return SEARCHERS[name]
+    except KeyError:
+        there = ", ".join(sorted(SEARCHERS))
+        raise ValueError(f"planner: {name!r} does not search; choose one of {there}") from None
 
 
 @cache
@@ -72,6 +91,10 @@ def warm_up(*sensors: Sensor) -> None:
     Once in a process is enough: another call does nothing.
     """
     for sensor in sensors:
+        if isinstance(sensor, Scanner):
+            for name in SEARCHERS:
+                create_planner(name, QUICK, sensor).propose(_small_search(sensor), np.random.default_rng(0))
+            continue
         # A sea floor of a few times the sensor's reach: one that a single step surveys needs the same machine code.
         situation = _small_situation(sensor.visibility_m if isinstance(sensor, RangeSensor) else 4.0)
         planners = {type(planner): planner for planner in (create_planner(name, QUICK, sensor) for name in PLANNERS)}
@@ -90,3 +113,22 @@ def _small_situation(unit_m: float) -> Situation:
     constraints = Constraints(area, (zone,), max_step_m=unit_m)
     positions = np.column_stack([unit_m * np.array([[0.5, 0.5], [1.5, 0.5]]), np.ones(2)])
     return Situation(1, 10, ("a", "b"), positions, np.full(2, np.nan), belief, positions[:, :2], constraints)
+
+
+def _small_search(scanner: Scanner) -> Situation:
+    """Return a vehicle that has looked round once, a wall before it."""
+    blueprint = np.zeros((30, 30), dtype=np.bool_)
+    blueprint[20] = True
+    here = np.array([10.5, 10.5, 0.0])
+    unit = scanner.reach_m / 8.0
+    bearings = scanner.bearings_rad
+    grid = OccupancyGrid.from_blueprint(blueprint, unit)
+    grid = grid.seen_from(unit * here, bearings, np.full(len(bearings), np.inf), scanner.reach_m)
+    goal, entry = unit * np.array([25.0, 25.0]), unit * here[:2]
+    task = SearchTask(grid, scanner, goal, 5 * unit, entry, entry, 200 * unit, unit, unit, 90 * unit, 100 * unit)
+    area = unit * np.array([[0.0, 0.0], [30.0, 0.0], [30.0, 30.0], [0.0, 30.0]])
+    nothing = Belief(np.zeros((0, 2)), np.zeros(0), np.zeros(0), np.zeros(0, dtype=np.bool_), np.zeros(0), 1.0)
+    return Situation(
+        1, 10, ("a",), unit * here[None], np.full(1, np.nan), nothing, np.zeros((0, 2)),
+        Constraints(area, max_step_m=10 * unit, min_altitude_m=0.0), search=task,
+    )  # fmt: skip

@@ -1,0 +1,206 @@
+"""Search and rescue without a network (ACCESS13 section V): vehicles with scanners in a world of obstacles."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.estimation.occupancy import Cell, OccupancyGrid, Scanner
+from app.exploration.constraints import Constraints
+from app.exploration.options import PlannerOptions
+from app.exploration.planners import create_planner
+from app.exploration.problem import Belief, Situation
+from app.exploration.search import SearchTask
+from simulator.obstacles import ObstacleWorld
+
+FloatArray = NDArray[np.float64]
+
+BODY_M = 0.35
+"""Half the length of the robot: closer than that to an obstacle is a collision."""
+LONGEST_STEPS = 60.0
+"""How far the supervisor may raise alpha: a leg across the longest free line of sight in sight of anything."""
+CHECK_M = 0.05
+"""Distance between the places on a leg at which that is looked at."""
+STANDSTILL_M = 100.0
+"""How far a team may travel without seeing a new cell before it counts as trapped, while there is something to see."""
+
+
+@dataclass(frozen=True)
+class RescueScenario:
+    """A search in a world of obstacles.
+
+    Attributes
+    ----------
+    world : ObstacleWorld
+        With entry, goal and transmitter.
+    goal_radius_m : float
+        ``r_c``.
+    window_m : float
+        The time window, as the way that a robot can travel in it.
+    robots : int
+        Size of the team, entering side by side.
+    step_m : float
+        First length of a step: alpha = 1.
+    com_range_m : float
+        ``C_r``.
+    safety_m : float
+        ``d_r``.
+    scanner : Scanner
+        Of every robot.
+    clock : "way" or "steps"
+        What uses up the window: the way that is travelled; or steps, however long their legs, as in the paper, where
+        the supervisor's long legs cost nothing.
+    seed : int
+        Of everything random.
+    """
+
+    world: ObstacleWorld
+    goal_radius_m: float = 50.0
+    window_m: float = 2000.0
+    robots: int = 1
+    step_m: float = 1.0
+    com_range_m: float = 200.0
+    safety_m: float = 1.0
+    scanner: Scanner = Scanner()  # noqa: RUF009 - frozen
+    clock: Literal["way", "steps"] = "way"
+    seed: int = 0
+
+    @property
+    def constraints(self) -> Constraints:
+        """The world's rectangle; robots keep 2 m apart. A step may be as long as the supervisor raises it."""
+        width, height = self.world.size_m
+        area = np.array([[0.0, 0.0], [width, 0.0], [width, height], [0.0, height]])
+        return Constraints(area, max_step_m=LONGEST_STEPS * self.step_m, min_altitude_m=0.0, min_separation_m=2.0)
+
+    @property
+    def starts_m(self) -> FloatArray:
+        """Where the robots start, (robots, 3): in a row at the entry, 2.5 m apart."""
+        k = np.arange(self.robots) - (self.robots - 1) / 2
+        return np.column_stack(
+            [self.world.entry_m[0] + 2.5 * k, np.full(self.robots, self.world.entry_m[1]), np.zeros(self.robots)]
+        )
+
+
+@dataclass(frozen=True)
+class RescueTrack:
+    """A search that was run.
+
+    Attributes
+    ----------
+    positions_m : (steps + 1, robots, 3)
+        After every step.
+    explored, explored_goal : (steps + 1,)
+        F_1 and F_2.
+    left_m : (steps + 1,)
+        What was left of the window.
+    grid : OccupancyGrid
+        What was known in the end.
+    collisions, too_close : int
+        Legs on which a robot touched an obstacle, or came closer than the safety distance.
+    longest_standstill_m : float
+        Longest way without a new cell while a reachable view would have shown one.
+    plan_s : (steps,)
+        Time that decisions took.
+    """
+
+    positions_m: FloatArray
+    explored: FloatArray
+    explored_goal: FloatArray
+    left_m: FloatArray
+    grid: OccupancyGrid
+    collisions: int
+    too_close: int
+    longest_standstill_m: float
+    plan_s: FloatArray
+
+
+def run_search(
+    scenario: RescueScenario,
+    planner: str,
+    options: PlannerOptions,
+    progress: Callable[[int], None] = lambda step: None,
+) -> RescueTrack:
+    """Run the closed loop until everybody is home for good or the time is up."""
+    world, scanner = scenario.world, scenario.scanner
+    chooser = create_planner(planner, options, scanner)
+    rng = np.random.default_rng([scenario.seed, 11])
+    names = tuple(f"robot-{k + 1}" for k in range(scenario.robots))
+    positions = scenario.starts_m
+    grid = OccupancyGrid.from_blueprint(world.known, world.cell_m)
+    for position in positions:
+        grid = _scanned(grid, scenario, position)
+    left, standstill, longest = scenario.window_m, 0.0, 0.0
+    task = _task(scenario, grid, left)
+    history, explored, goal, lefts, times = [positions], [task.explored_part], [task.explored_goal_part], [left], []
+    collisions = too_close = 0
+    nothing = Belief(np.zeros((0, 2)), np.zeros(0), np.zeros(0), np.zeros(0, dtype=np.bool_), np.zeros(0), 1.0)
+    total = int(np.ceil(scenario.window_m / scenario.step_m))
+    for step in range(1, total + 1):
+        situation = Situation(
+            step, total, names, positions, np.full(scenario.robots, np.nan), nothing, np.zeros((0, 2)),
+            scenario.constraints, search=task,
+        )  # fmt: skip
+        begun = time.perf_counter()
+        proposal = chooser.propose(situation, rng)
+        times.append(time.perf_counter() - begun)
+        legs = np.linalg.norm(proposal.positions - positions, axis=1)
+        gone = float(legs.max())
+        for start, end in zip(positions, proposal.positions, strict=True):
+            points = _along(start, end, CHECK_M)
+            clearance = float(world.clearance_m(points[:, :2]).min())
+            collisions += clearance < BODY_M
+            too_close += clearance < scenario.safety_m - 1e-6
+            for point in _along(start, end, scenario.step_m):
+                grid = _scanned(grid, scenario, point)
+        positions = proposal.positions
+        left -= gone if gone > 0.0 and scenario.clock == "way" else scenario.step_m
+        before = task.explored_part
+        task = _task(scenario, grid, left)
+        standstill = (
+            0.0
+            if task.explored_part > before or proposal.terms.get("homebound")
+            else standstill + max(gone, scenario.step_m)
+        )
+        longest = max(longest, standstill)
+        history.append(positions)
+        explored.append(task.explored_part)
+        goal.append(task.explored_goal_part)
+        lefts.append(left)
+        progress(step)
+        if left <= 0.0 or (
+            gone == 0.0 and proposal.terms["at_home"] == scenario.robots and proposal.terms["homebound"]
+        ):
+            break
+    return RescueTrack(
+        np.array(history), np.array(explored), np.array(goal), np.array(lefts), grid, collisions, too_close, longest,
+        np.array(times),
+    )  # fmt: skip
+
+
+def seen_of_free(grid: OccupancyGrid, world: ObstacleWorld, within: NDArray[np.bool_]) -> float:
+    """Return the percentage of the truly free cells within a mask that were explored."""
+    free = ~world.solid & within
+    return 100.0 * float(np.count_nonzero(free & (grid.states == Cell.EXPLORED))) / max(1, int(np.count_nonzero(free)))
+
+
+def _task(scenario: RescueScenario, grid: OccupancyGrid, left_m: float) -> SearchTask:
+    world = scenario.world
+    return SearchTask(
+        grid, scenario.scanner, world.goal_m, scenario.goal_radius_m, world.entry_m, world.transmitter_m,
+        scenario.com_range_m, scenario.safety_m, scenario.step_m, left_m, scenario.window_m,
+    )  # fmt: skip
+
+
+def _along(start: FloatArray, end: FloatArray, every_m: float) -> FloatArray:
+    """Return places (n, 3) on a leg, its start left out, its end among them; one place when it has no length."""
+    n = max(1, int(np.ceil(np.linalg.norm(end - start) / every_m - 1e-9)))
+    return start + (np.arange(1, n + 1) / n)[:, None] * (end - start)
+
+
+def _scanned(grid: OccupancyGrid, scenario: RescueScenario, position: FloatArray) -> OccupancyGrid:
+    bearings = scenario.scanner.bearings_rad
+    ranges = scenario.world.scan(position, bearings, scenario.scanner.reach_m)
+    return grid.seen_from(position, bearings, ranges, scenario.scanner.reach_m)

@@ -1,0 +1,130 @@
+"""What all planners of search missions share: where one may go, being back in time, and giving way to each other."""
+
+from abc import abstractmethod
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.exploration.bottom import Bottom
+from app.exploration.planners.base import PlannerBase
+from app.exploration.problem import Proposal, Situation
+from app.exploration.search.criteria import Weights, terms
+from app.exploration.search.ground import Ground
+from app.exploration.search.task import SearchTask
+
+FloatArray = NDArray[np.float64]
+
+HOME_STEPS = 3.0
+"""Steps from the entry, times vehicles, within which a vehicle counts as being there."""
+SPARE_CELLS, SPARE_PART = 3.0, 0.03
+"""What the way home is thought longer than it is measured on cells."""
+
+
+@dataclass(frozen=True)
+class Scene:
+    """One decision of a search: the team, its task, where it may go, and how far home is from there.
+
+    Attributes
+    ----------
+    home_m : (rows, cols)
+        Length of the way to the entry from each cell, with something to spare; inf where there is none.
+    """
+
+    team: Situation
+    task: SearchTask
+    ground: Ground
+    home: NDArray[np.int32]
+    home_m: FloatArray
+
+    @classmethod
+    def of(cls, team: Situation) -> "Scene":
+        """Make it. Raises ValueError when the situation is not that of a search."""
+        task = team.search
+        if task is None:
+            raise ValueError("search: the situation holds no search task; this planner is for missions of that kind")
+        ground = Ground.of(task)
+        home = ground.distances(ground.places(task.entry_m[None]))
+        spare = SPARE_CELLS * task.grid.cell_m
+        return cls(team, task, ground, home, ground.metres(home) * (1.0 + SPARE_PART) + spare)
+
+    @property
+    def step_m(self) -> float:
+        """Length of a leg while alpha is 1."""
+        return min(self.task.step_m, self.longest_m)
+
+    @property
+    def longest_m(self) -> float:
+        """Largest leg that the constraints allow."""
+        return float(self.team.constraints.max_step_m) * (1.0 - 1e-9)
+
+    def in_time(self, end_m: FloatArray, gone_m: float) -> bool:
+        """Return whether from a place (2,) the entry is within the time that is left after a step of ``gone_m``."""
+        spare = SPARE_CELLS * self.task.grid.cell_m
+        way = self.ground.way_m(end_m, self.home) * (1.0 + SPARE_PART) + spare
+        return gone_m + way <= self.task.left_m
+
+
+class SearchPlanner(PlannerBase):
+    """Brings everybody back in time, keeps off what is not known to be free, and lets vehicles give way.
+
+    Positions only change where the whole leg lies over explored ground; who cannot be sure to be back later goes now.
+    """
+
+    runs_errands: ClassVar[bool] = False
+
+    def _decide(self, team: Situation, bottom: Bottom, seed: int) -> Proposal:
+        scene = Scene.of(team)
+        wishes = self._seek(scene, seed)
+        here = team.positions[:, :2]
+        longest = float(np.hypot(*(wishes - here).T).max())
+        gone = max(scene.step_m, float(np.hypot(*(wishes - here).T).max()))
+        late = 0
+        for i in range(len(here)):
+            clear = scene.ground.clear(here[i], wishes[i : i + 1])[0]
+            if not clear or not scene.in_time(wishes[i], gone):
+                late += 1
+                wishes[i] = scene.ground.towards(here[i], scene.home, scene.step_m)
+        positions = give_way(team, bottom, wishes)
+        task = scene.task
+        at_home = np.hypot(*(positions[:, :2] - task.entry_m).T) <= HOME_STEPS * scene.step_m * len(positions)
+        figures = {
+            "F_1": task.explored_part,
+            "F_2": task.explored_goal_part,
+            "homebound": float(late),
+            "at_home": float(at_home.sum()),
+        }
+        return Proposal(positions, self._objective(scene, positions), figures)
+
+    @abstractmethod
+    def _seek(self, scene: Scene, seed: int) -> FloatArray:
+        """Return where every vehicle should go next, (n_vehicles, 2), within one step; they may hold."""
+
+    def _objective(self, scene: Scene, positions: FloatArray) -> float:
+        """Return the criterion that is being followed; ``CF_1`` unless a planner switches."""
+        return float(terms(scene.task, positions[:, :2], homewards=False, weights=Weights()).sum())
+
+
+def give_way(team: Situation, bottom: Bottom, wishes: FloatArray) -> FloatArray:
+    """Return the team's next positions (n_vehicles, 3): the wishes (n_vehicles, 2), or held where a limit is broken.
+
+    Later vehicles wait for earlier ones until nobody breaks a limit; holding breaks none, since it changes nothing.
+    """
+    positions = np.column_stack([wishes, team.positions[:, 2]])
+    for _ in range(len(positions)):
+        broken = {v.vehicle for v in team.constraints.violations(team.vehicles, team.positions, positions, bottom)}
+        moving = [
+            i
+            for i, name in enumerate(team.vehicles)
+            if name in broken and not np.array_equal(positions[i], team.positions[i])
+        ]
+        if not moving:
+            break
+        positions[moving[-1]] = team.positions[moving[-1]]
+    return positions
+
+
+def hold(scene: Scene) -> FloatArray:
+    """Return where the vehicles are, (n_vehicles, 2)."""
+    return np.array(scene.team.positions[:, :2])
