@@ -1,7 +1,7 @@
 """Car parks of 150 x 150 m in three degrees of difficulty (ACCESS13, section V), and a harbour basin.
 
-ACCESS13 shows its car parks in figures only. These are drawn by their descriptions: barrels are known beforehand, parked
-cars are not; the third one holds a wall of vehicles that traps whoever goes straight for the goal.
+ACCESS13 shows its car parks in figures only. These are drawn by their descriptions: barrels are known beforehand,
+parked cars are not; the third one holds a wall of vehicles that traps whoever goes straight for the goal.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ def car_park(scenario: int, seed: int = 0) -> ObstacleWorld:
 
 
 def harbour_basin(seed: int = 0) -> ObstacleWorld:
-    """Draw a harbour of 150 x 150 m: quays and a pier that the chart shows, moored boats and pontoons that it does not."""
+    """Draw a harbour of 150 x 150 m: quays and a pier are on the chart, moored boats and pontoons are not."""
     rng = np.random.default_rng([seed, 7])
     quays = np.zeros((SIDE, SIDE), dtype=np.bool_)
     quays[:, :6] = quays[-6:, :] = quays[:, -6:] = True

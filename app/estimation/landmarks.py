@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from app.estimation.sensors import RangeSensor, Sensor
+from app.estimation.sensors import RangeSensor, Ranging
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -71,7 +71,7 @@ class LandmarkEstimator:
 
     Attributes
     ----------
-    sensor : Sensor
+    sensor : Ranging
         Gives the noise.
     accuracy_sd_m : float
         A landmark whose standard deviation falls below this belongs to ``A``, for ever.
@@ -79,7 +79,7 @@ class LandmarkEstimator:
         A landmark measured more often than this counts as accurate too (AURO15 footnote 3).
     """
 
-    sensor: Sensor = RangeSensor()  # noqa: RUF009 - frozen
+    sensor: Ranging = RangeSensor()  # noqa: RUF009 - frozen
     accuracy_sd_m: float = 0.02
     visit_cap: int = 200
 

@@ -13,7 +13,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from app.estimation.sensors import RangeSensor, Sensor
+from app.estimation.sensors import RangeSensor, Ranging
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -94,7 +94,7 @@ class Landmark3DEstimator:
 
     Attributes
     ----------
-    sensor : Sensor
+    sensor : Ranging
         Gives the noise: ``y = r (1 + noise xi)``.
     accuracy_sd_m : float
         A landmark belongs to ``A`` once all three standard deviations are below this (MED13 footnote 3).
@@ -102,7 +102,7 @@ class Landmark3DEstimator:
         A landmark measured more often than this counts as accurate too (AURO15 footnote 3).
     """
 
-    sensor: Sensor = RangeSensor()  # noqa: RUF009 - frozen
+    sensor: Ranging = RangeSensor()  # noqa: RUF009 - frozen
     accuracy_sd_m: float = 0.02
     visit_cap: int = 200
 

@@ -49,7 +49,7 @@ class Scanner:
     @property
     def bearings_rad(self) -> FloatArray:
         """Bearings (n,) of a scan, clockwise from north."""
-        return np.radians(np.arange(0.0, 360.0, self.resolution_deg))
+        return np.asarray(np.radians(np.arange(0.0, 360.0, self.resolution_deg)), dtype=np.float64)
 
 
 @dataclass(frozen=True)

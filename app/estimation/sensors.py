@@ -77,4 +77,5 @@ def _closer(positions: FloatArray, landmarks: FloatArray, reach: float) -> BoolA
     return closer
 
 
-Sensor = RangeSensor | SingleBeam | BeamSonar | Scanner
+Ranging = RangeSensor | SingleBeam | BeamSonar
+Sensor = Ranging | Scanner

@@ -61,7 +61,8 @@ class RescueJob:
     @property
     def title(self) -> str:
         """What it is, for the progress bar."""
-        return f"{self.scenario.world.name}, r_c {self.scenario.goal_radius_m:g}, {self.planner}, seed {self.scenario.seed}"
+        s = self.scenario
+        return f"{s.world.name}, r_c {s.goal_radius_m:g}, {self.planner}, seed {s.seed}"
 
     @property
     def steps(self) -> int:

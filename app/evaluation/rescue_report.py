@@ -70,10 +70,11 @@ def rescue_report(runs: Sequence[Run], facts: Mapping[str, str]) -> str:
     lines += [f"- {name}: {value}" for name, value in facts.items()]
     lines += [
         "",
-        f"150 x 150 m, cells of 1 m, scanner 8 m and 0.5 degrees; window {WINDOW:g} steps of 1 m. Goal area / map explored,"
-        " % of the cells that are truly free, means ± half their 95 % interval over the car parks of as many seeds. The"
-        " paper shows its car parks in figures only and does not state its window; ours are drawn by their descriptions."
-        " In the paper a step is a step however long the supervisor makes it; *ways count* charges each leg by its length.",
+        f"150 x 150 m, cells of 1 m, scanner 8 m and 0.5 degrees; window {WINDOW:g} steps of 1 m. Goal area and map"
+        " explored, in % of the cells that are truly free: means ± half their 95 % interval over car parks of as many"
+        " seeds. The paper shows its car parks in figures only and does not state its window; ours are drawn by their"
+        " descriptions. In the paper a step is a step however long the supervisor makes it; *ways count* charges each"
+        " leg by its length.",
         "",
         "## Published",
         "",
@@ -105,7 +106,8 @@ def _table(runs: Sequence[Run], name: str) -> list[str]:
         goal, whole = (spread([r[key] for r in mine]) for key in ("goal_area_pct", "map_pct"))
         decision = [sum(r[key] for r in mine) / len(mine) for key in ("plan_ms_median", "plan_ms_p99")]
         rows.append(
-            f"| {scenario}, {radius:g} | {len(mine)} | {goal.mean:.1f} ± {goal.ci95:.1f} | {whole.mean:.1f} ± {whole.ci95:.1f} |"
+            f"| {scenario}, {radius:g} | {len(mine)} |"
+            f" {goal.mean:.1f} ± {goal.ci95:.1f} | {whole.mean:.1f} ± {whole.ci95:.1f} |"
             f" {sum(r['returned_in_time'] for r in mine)} | {sum(r['collisions'] for r in mine)} |"
             f" {sum(r['too_close'] for r in mine)} | {sum(r['trapped'] for r in mine)} |"
             f" {max(r['longest_standstill_m'] for r in mine):.0f} | {decision[0]:.1f}, {decision[1]:.1f} |"

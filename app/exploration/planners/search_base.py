@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.exploration.bottom import Bottom
-from app.exploration.planners.base import PlannerBase
+from app.exploration.planners.base import PlannerBase, vehicle_rng
 from app.exploration.problem import Proposal, Situation
 from app.exploration.search.criteria import Weights, terms
 from app.exploration.search.ground import Ground
@@ -18,8 +18,10 @@ FloatArray = NDArray[np.float64]
 
 HOME_STEPS = 3.0
 """Steps from the entry, times vehicles, within which a vehicle counts as being there."""
+ASIDE = 12
+"""Directions in which a vehicle may step aside for another."""
 SPARE_CELLS, SPARE_PART = 3.0, 0.03
-"""What the way home is thought longer than it is measured on cells."""
+"""By how much the way home is taken to be longer than measured: cells per vehicle (they may be in the way), a part."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +48,7 @@ class Scene:
             raise ValueError("search: the situation holds no search task; this planner is for missions of that kind")
         ground = Ground.of(task)
         home = ground.distances(ground.places(task.entry_m[None]))
-        spare = SPARE_CELLS * task.grid.cell_m
+        spare = SPARE_CELLS * len(team.vehicles) * task.grid.cell_m
         return cls(team, task, ground, home, ground.metres(home) * (1.0 + SPARE_PART) + spare)
 
     @property
@@ -61,7 +63,7 @@ class Scene:
 
     def in_time(self, end_m: FloatArray, gone_m: float) -> bool:
         """Return whether from a place (2,) the entry is within the time that is left after a step of ``gone_m``."""
-        spare = SPARE_CELLS * self.task.grid.cell_m
+        spare = SPARE_CELLS * len(self.team.vehicles) * self.task.grid.cell_m
         way = self.ground.way_m(end_m, self.home) * (1.0 + SPARE_PART) + spare
         return gone_m + way <= self.task.left_m
 
@@ -78,7 +80,6 @@ class SearchPlanner(PlannerBase):
         scene = Scene.of(team)
         wishes = self._seek(scene, seed)
         here = team.positions[:, :2]
-        longest = float(np.hypot(*(wishes - here).T).max())
         gone = max(scene.step_m, float(np.hypot(*(wishes - here).T).max()))
         late = 0
         for i in range(len(here)):
@@ -86,7 +87,7 @@ class SearchPlanner(PlannerBase):
             if not clear or not scene.in_time(wishes[i], gone):
                 late += 1
                 wishes[i] = scene.ground.towards(here[i], scene.home, scene.step_m)
-        positions = give_way(team, bottom, wishes)
+        positions = give_way(scene, bottom, wishes, seed)
         task = scene.task
         at_home = np.hypot(*(positions[:, :2] - task.entry_m).T) <= HOME_STEPS * scene.step_m * len(positions)
         figures = {
@@ -106,23 +107,32 @@ class SearchPlanner(PlannerBase):
         return float(terms(scene.task, positions[:, :2], homewards=False, weights=Weights()).sum())
 
 
-def give_way(team: Situation, bottom: Bottom, wishes: FloatArray) -> FloatArray:
-    """Return the team's next positions (n_vehicles, 3): the wishes (n_vehicles, 2), or held where a limit is broken.
+def give_way(scene: Scene, bottom: Bottom, wishes: FloatArray, seed: int) -> FloatArray:
+    """Return the team's next positions (n_vehicles, 3): the wishes (n_vehicles, 2), a step aside, or where it is.
 
-    Later vehicles wait for earlier ones until nobody breaks a limit; holding breaks none, since it changes nothing.
+    One after the other, beginning with another one each step, vehicles take the first place at which no limit is
+    broken while the others go where they have decided to, or stand. Standing breaks none, since it changes nothing.
     """
-    positions = np.column_stack([wishes, team.positions[:, 2]])
-    for _ in range(len(positions)):
-        broken = {v.vehicle for v in team.constraints.violations(team.vehicles, team.positions, positions, bottom)}
-        moving = [
-            i
-            for i, name in enumerate(team.vehicles)
-            if name in broken and not np.array_equal(positions[i], team.positions[i])
-        ]
-        if not moving:
-            break
-        positions[moving[-1]] = team.positions[moving[-1]]
+    team, positions = scene.team, scene.team.positions.copy()
+    for i in np.roll(np.arange(len(positions)), -team.step):
+        here = positions[i, :2].copy()
+        aside = _aside(scene, int(i), wishes[i], seed) if len(positions) > 1 else np.zeros((0, 2))
+        options = np.repeat(positions[None], 2 + len(aside), axis=0)
+        options[:, i, :2] = np.vstack([wishes[i], aside, here])
+        ok = team.constraints.feasible(team.positions, options, bottom)
+        positions = options[int(np.argmax(ok))] if ok.any() else positions
     return positions
+
+
+def _aside(scene: Scene, i: int, wish: FloatArray, seed: int) -> FloatArray:
+    """Return places (k, 2) a step away, those closest to the wish first, from where the vehicle is still in time."""
+    here = scene.team.positions[i, :2]
+    turn = vehicle_rng(seed, scene.team.vehicles[i]).uniform(0.0, 2.0 * np.pi)
+    bearing = turn + np.linspace(0.0, 2.0 * np.pi, ASIDE, endpoint=False)
+    ends = here + scene.step_m * np.column_stack([np.sin(bearing), np.cos(bearing)])
+    ends = ends[scene.ground.clear(here, ends)]
+    ends = ends[np.argsort(np.hypot(*(ends - wish).T))]
+    return ends[[scene.in_time(end, scene.step_m) for end in ends]] if len(ends) else ends
 
 
 def hold(scene: Scene) -> FloatArray:

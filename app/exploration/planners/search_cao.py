@@ -120,7 +120,7 @@ class CaoSearch(CriterionSearch):
         phi = self._terms(scene, candidates)
         best = int(np.argmax(phi @ np.clip(estimator.theta, 0.2, 5.0)))
         self._last = [float(x) for x in phi[best]]
-        return candidates[best]
+        return np.asarray(candidates[best])
 
     def _candidates(self, scene: Scene, radius_m: float, seed: int) -> FloatArray:
         """Return teams (c, n, 2): every vehicle on its circle where a clear leg leads; where none does, where it is."""

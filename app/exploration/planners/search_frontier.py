@@ -18,7 +18,7 @@ ELSEWHERE = 0.15
 LATTICE = 2
 """Cells between the views that are weighed."""
 NEAR = 0.5
-"""What is added to every distance, as a part of the scanner's reach: it keeps very small gains next door unattractive."""
+"""Added to every distance, as a part of the scanner's reach, so that very small gains next door attract nobody."""
 FARTHEST = 2.0
 """How far the goal area counts as being, in diagonals of the site, where no way is hoped for."""
 KEEP = 2.0

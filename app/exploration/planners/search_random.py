@@ -16,7 +16,7 @@ TRIES = 32
 
 
 class RandomSearch(SearchPlanner):
-    """Flies straight for a length drawn from a power law, then in another direction, or as soon as something is ahead."""
+    """Goes straight for a length drawn from a power law, or until something is ahead, then in another direction."""
 
     name: ClassVar[str] = "random"
 

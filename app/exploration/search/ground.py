@@ -76,16 +76,14 @@ class Ground:
 
     def beside(self, origin_m: FloatArray) -> IntArray:
         """Return the passable cells (n, 2) close to a position (2,) to whose centres a clear leg leads."""
-        grid = self.task.grid
         place = self.places(origin_m[None])[0]
         around = place + _AROUND
         rows, cols = self.passable.shape
         around = around[(around >= 0).all(axis=1) & (around[:, 0] < rows) & (around[:, 1] < cols)]
         around = around[self.passable[around[:, 0], around[:, 1]]]
-        # From where the vehicle came it can always go back: the way there is clear.
         around = around[self.clear(origin_m, self.centre_m(around))] if len(around) else around
         away = self.centre_m(around) - origin_m
-        return around[np.argsort(np.hypot(away[:, 0], away[:, 1]) / grid.cell_m, kind="stable")]
+        return np.asarray(around[np.argsort(np.hypot(away[:, 0], away[:, 1]), kind="stable")])
 
     def distances(self, places: IntArray) -> NDArray[np.int32]:
         """Return how far every passable cell is from the closest of some cells (n, 2), in fifths of a cell."""
