@@ -25,7 +25,7 @@ from app.api.problems import TITLES
 from app.api.schemas import API, MeasurementBatch
 from app.cli import app as command_line
 from app.estimation import SingleBeam
-from app.evaluation.track_cli import evaluate_app
+from app.evaluation.commands import evaluate_app
 from app.exploration.bottom import Bottom
 from app.exploration.constraints import Constraints
 from app.exploration.options import PlannerOptions

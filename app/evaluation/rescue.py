@@ -7,7 +7,7 @@ import numpy as np
 
 from app.estimation import Sensor
 from app.evaluation.jobs import Progress
-from app.evaluation.rescue_world import RescueScenario, run_search, seen_of_free
+from app.evaluation.rescue_world import RescueScenario, explored_pct, fully_explored, run_search
 from app.exploration.options import PlannerOptions
 
 TRAPPED_M = 200.0
@@ -20,8 +20,9 @@ HOME_M = 3.0
 class RescueRun:
     """One run; names as in the command's JSON.
 
-    ``goal_area_pct`` and ``map_pct``: explored part of all cells that are truly free. ``too_close``: legs on which the
-    safety distance was not kept; ``collisions``: legs on which an obstacle was touched.
+    ``goal_area_pct`` and ``map_pct``: explored part of all free cells that a robot could see from anywhere it can get
+    to. ``too_close``: legs on which the safety distance was not kept; ``collisions``: legs on which an obstacle was
+    touched.
     """
 
     planner: str
@@ -87,6 +88,7 @@ def run_rescue(
     world = scenario.world
     north, east = (np.indices(world.solid.shape) + 0.5) * world.cell_m
     goal = np.hypot(east - world.goal_m[0], north - world.goal_m[1]) <= scenario.goal_radius_m
+    whole = fully_explored(scenario)
     away = np.hypot(*(track.positions_m[-1, :, :2] - world.entry_m).T)
     # A first decision compiles or loads machine code.
     plan_ms = 1e3 * track.plan_s[1:] if len(track.plan_s) > 1 else 1e3 * track.plan_s
@@ -98,8 +100,8 @@ def run_rescue(
         robots=scenario.robots,
         clock=scenario.clock,
         window_m=scenario.window_m,
-        goal_area_pct=seen_of_free(track.grid, world, goal),
-        map_pct=seen_of_free(track.grid, world, np.ones_like(goal)),
+        goal_area_pct=explored_pct(track.grid, whole & goal),
+        map_pct=explored_pct(track.grid, whole),
         returned_in_time=bool(away.max() <= HOME_M * scenario.robots and track.left_m[-1] >= -1e-6),
         collisions=track.collisions,
         too_close=track.too_close,

@@ -15,8 +15,6 @@ from app.exploration.planners import SEARCHERS
 from simulator.car_parks import SCENARIOS, car_park, harbour_basin
 from simulator.obstacles import ObstacleWorld
 
-__all__ = ["evaluate_app"]
-
 HARBOUR = "harbour"
 CLOCKS = ("way", "steps")
 COLUMNS = (
@@ -32,7 +30,7 @@ def rescue(
         str, typer.Option(help=f"One or more of {', '.join(sorted(SEARCHERS))}, separated by commas.")
     ] = "rollout",
     robots: Annotated[int, typer.Option(min=1, max=10)] = 1,
-    window: Annotated[float, typer.Option(min=10.0, help="Time window, as metres of way (or steps of 1 m).")] = 2500.0,
+    window: Annotated[float, typer.Option(min=10.0, help="Time window, as metres of way (or steps of 1 m).")] = 3000.0,
     clock: Annotated[
         str, typer.Option(help="What uses up the window: way, or steps of whatever length (as in the paper).")
     ] = "way",

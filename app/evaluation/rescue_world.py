@@ -7,6 +7,7 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import label
 
 from app.estimation.occupancy import Cell, OccupancyGrid, Scanner
 from app.exploration.constraints import Constraints
@@ -59,7 +60,7 @@ class RescueScenario:
 
     world: ObstacleWorld
     goal_radius_m: float = 50.0
-    window_m: float = 2000.0
+    window_m: float = 3000.0
     robots: int = 1
     step_m: float = 1.0
     com_range_m: float = 200.0
@@ -180,10 +181,26 @@ def run_search(
     )  # fmt: skip
 
 
-def seen_of_free(grid: OccupancyGrid, world: ObstacleWorld, within: NDArray[np.bool_]) -> float:
-    """Return the percentage of the truly free cells within a mask that were explored."""
-    free = ~world.solid & within
-    return 100.0 * float(np.count_nonzero(free & (grid.states == Cell.EXPLORED))) / max(1, int(np.count_nonzero(free)))
+def fully_explored(scenario: RescueScenario) -> NDArray[np.bool_]:
+    """Return the free cells (rows, cols) that can be seen from anywhere a robot can get to.
+
+    The paper compares with "the fully explored map". A gap between parked cars may be out of everybody's sight.
+    """
+    world = scenario.world
+    rows, cols = world.solid.shape
+    centres = OccupancyGrid.from_blueprint(world.known, world.cell_m).centres_m
+    open_ = world.clearance_m(centres.reshape(-1, 2)).reshape(rows, cols) >= scenario.safety_m
+    parts, _ = label(open_)
+    row, col = (int(x) for x in world.entry_m[::-1] / world.cell_m)
+    grid = OccupancyGrid.from_blueprint(world.known, world.cell_m)
+    for place in centres[parts == parts[row, col]]:
+        grid = _scanned(grid, scenario, place)
+    return np.asarray(grid.states == Cell.EXPLORED)
+
+
+def explored_pct(grid: OccupancyGrid, all_: NDArray[np.bool_]) -> float:
+    """Return the percentage of some cells (rows, cols) that were explored."""
+    return 100.0 * float(np.count_nonzero(all_ & (grid.states == Cell.EXPLORED))) / max(1, int(np.count_nonzero(all_)))
 
 
 def _task(scenario: RescueScenario, grid: OccupancyGrid, left_m: float) -> SearchTask:

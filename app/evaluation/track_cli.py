@@ -29,8 +29,6 @@ from simulator.terrain import Terrain
 SETUPS = ("med13", "ngcuv12")
 CELLS = 100.0
 GENERATED = ("rugged", 1)
-__all__ = ["evaluate_app"]
-
 COLUMNS = (
     "planner", "seed", "remaining_pct", "target_tracked_pct", "localization_ok_pct", "resurfacings",
     "needless_resurfacings", "sum_of_error", "plan_ms_median",
