@@ -8,26 +8,26 @@ from app.storage.sharing import Shared
 
 
 async def test_all_who_ask_while_an_answer_is_made_share_the_next_one() -> None:
-    stored, gate, begun = 0, asyncio.Event(), 0
+    stored, gate, begun, times = 0, asyncio.Event(), asyncio.Event(), 0
 
     async def read() -> int:
-        nonlocal begun
-        begun += 1
+        nonlocal times
+        times += 1
+        begun.set()
         found = stored
         await gate.wait()
         return found
 
     shared = Shared(read)
     first = asyncio.create_task(shared())
-    while begun < 1:
-        await asyncio.sleep(0)
+    await begun.wait()
     stored = 1  # written after the first answer was begun: only who asks now must have it
     later = [asyncio.create_task(shared()) for _ in range(50)]
     await asyncio.sleep(0)
     gate.set()
     assert await first == 0
     assert set(await asyncio.gather(*later)) == {1}
-    assert begun == 2
+    assert times == 2
     stored = 2
     assert await shared() == 2
 

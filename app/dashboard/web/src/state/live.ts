@@ -97,6 +97,11 @@ export function reduce(view: LiveView, message: LiveMessage, at: number): LiveVi
   }
 }
 
+/** The mission as it was asked for once, until the live view tells more. */
+export function withMission(view: LiveView, mission: MissionView, at: number): LiveView {
+  return { ...view, mission, vehiclesAt: at, progressAt: at };
+}
+
 /** Adds lines to the log: each once, in the order of their numbers, at most the newest 2000. */
 export function withEvents(view: LiveView, more: readonly EventView[]): LiveView {
   const known = new Map(view.events.map((event) => [event.id, event]));

@@ -5,7 +5,7 @@ import { api, liveUrl, ServiceError, token } from "../api/client";
 import { LiveSocket } from "../api/socket";
 import type { ActionView, MissionAction, NewMission } from "../api/types";
 import { withTiles } from "../map/seafloor";
-import { EMPTY_VIEW, reduce, withEvents } from "./live";
+import { EMPTY_VIEW, reduce, withEvents, withMission } from "./live";
 import {
   fleet,
   furtherLayers,
@@ -105,6 +105,15 @@ function followMission(id: string): () => void {
     const events = await api.log(id, known, last);
     if (!closed) view.value = withEvents(view.peek(), events);
   };
+  // What is there and where is shown before the live view has gathered the whole ways there.
+  api
+    .mission(id)
+    .then((mission) => {
+      if (!closed && !view.peek().mission) view.value = withMission(EMPTY_VIEW, mission, Date.now());
+    })
+    .catch(() => {
+      // The live socket tells what is wrong, and tries again.
+    });
   const connections = signal(0);
   const socket = new LiveSocket(liveUrl(id), {
     onStatus: (status) => {

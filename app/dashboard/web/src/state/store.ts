@@ -79,6 +79,16 @@ export const openAlarms = computed(() => {
   return view.value.events.filter((e) => e.level === "alarm" && e.id > taken).reverse();
 });
 
+/** Vehicles whose last stop was not acknowledged. */
+export const unstopped = computed(() => {
+  const answers = new Map<string, boolean>();
+  for (const { kind, data } of view.value.events) {
+    if (kind === "stop" && typeof data.vehicle === "string")
+      answers.set(data.vehicle, data.acknowledged === true);
+  }
+  return new Set([...answers].flatMap(([vehicle, acknowledged]) => (acknowledged ? [] : [vehicle])));
+});
+
 export function takeAlarms(): void {
   const newest = openAlarms.value[0];
   if (newest) takenAlarms.value = { ...takenAlarms.value, [newest.mission_id]: newest.id };
