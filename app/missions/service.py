@@ -65,6 +65,7 @@ from app.missions.spec import MissionSpec, SoundSpeed, VehicleKind, VehicleSpec
 from app.missions.states import ENDED, MissionState
 from app.missions.target_pages import target_ranges_page
 from app.missions.target_views import TargetRangePage, TargetView
+from app.missions.telemetry import TelemetryView, telemetry_view
 from app.missions.trails import Trail
 from app.missions.views import (
     ActionView,
@@ -95,6 +96,7 @@ from app.missions.views import (
 from app.storage import events as event_queries
 from app.storage import missions as mission_queries
 from app.storage import soundings as sounding_queries
+from app.storage import telemetry as telemetry_queries
 from app.storage.database import Database
 from app.storage.models import MissionRow, MissionVehicleRow, SoundingRow
 
@@ -509,6 +511,14 @@ class MissionService:
     async def steps(self, mission_id: str, *, after: int = 0, limit: int = 1000) -> list[StepView]:
         """Return up to ``limit`` steps with a number above ``after``."""
         return await steps_after(await self._get(mission_id), self._database, after, limit)
+
+    async def telemetry(self, mission_id: str, points: int) -> TelemetryView:
+        """Return what the vehicles told of themselves, at about ``points`` moments at most."""
+        live = await self._get(mission_id)
+        await live.journal.flush()
+        async with self._database.reading() as session:
+            rows = await telemetry_queries.samples(session, mission_id, points)
+        return telemetry_view(rows)
 
     async def map_tiles(
         self, mission_id: str, run: str, since: str, further: Sequence[str] = (), step: int | None = None

@@ -31,6 +31,7 @@ CONTRACT = {
     "POST /missions/{mission_id}/start": "startMission",
     "GET /missions/{mission_id}/preflight": "checkMission",
     "GET /missions/{mission_id}/steps": "listSteps",
+    "GET /missions/{mission_id}/telemetry": "getTelemetry",
     "POST /missions/{mission_id}/notes": "writeNote",
     "POST /missions/{mission_id}/vehicles/{name}/abort": "abortVehicle",
     "GET /missions/{mission_id}/soundings": "listSoundings",

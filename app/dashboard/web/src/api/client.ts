@@ -17,6 +17,7 @@ import type {
   SoundingState,
   SoundingView,
   StepView,
+  TelemetryView,
   TimedTracks,
   VehicleView,
 } from "./types";
@@ -112,6 +113,7 @@ export const api = {
   preflight: (id: string) => request<PreflightView>(`${missionPath(id)}/preflight`),
   steps: (id: string, after: number) =>
     request<StepView[]>(`${missionPath(id)}/steps?after=${after}&limit=1000`),
+  telemetry: (id: string) => request<TelemetryView>(`${missionPath(id)}/telemetry`),
   tracks: (id: string) => request<TimedTracks>(`${missionPath(id)}/tracks.geojson`),
   note: (id: string, text: string) => post<EventView>(`${missionPath(id)}/notes`, { text }),
   abortVehicle: (id: string, name: string) =>

@@ -188,6 +188,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/missions/{mission_id}/telemetry": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * See the vehicles' figures over time
+         * @description Return depth, altitude, battery and link age of every vehicle while the mission ran, oldest first.
+         */
+        get: operations["getTelemetry"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/missions/{mission_id}/notes": {
         parameters: {
             query?: never;
@@ -2560,6 +2580,19 @@ export interface components {
             targets: components["schemas"]["TargetView"][];
         };
         /**
+         * TelemetryView
+         * @description What the vehicles told of themselves while the mission ran.
+         */
+        TelemetryView: {
+            /**
+             * Times S
+             * @description The moments, Unix seconds by the service's clock, ascending
+             */
+            times_s: number[];
+            /** Vehicles */
+            vehicles: components["schemas"]["VehicleTelemetry"][];
+        };
+        /**
          * Tide
          * @description Water level correction: depth below the datum = sounded depth - level + datum_offset_m.
          */
@@ -2782,6 +2815,25 @@ export interface components {
                 number,
                 number
             ] | null;
+        };
+        /**
+         * VehicleTelemetry
+         * @description One vehicle's figures, a value or null for each of the moments.
+         */
+        VehicleTelemetry: {
+            /** Vehicle */
+            vehicle: string;
+            /** Depth M */
+            depth_m: (number | null)[];
+            /** Altitude M */
+            altitude_m: (number | null)[];
+            /** Battery Pct */
+            battery_pct: (number | null)[];
+            /**
+             * Age S
+             * @description Seconds since it was heard
+             */
+            age_s: (number | null)[];
         };
         /**
          * VehicleView
@@ -3715,6 +3767,68 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["StepView"][];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such mission */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    getTelemetry: {
+        parameters: {
+            query?: {
+                /** @description Most moments in the answer, evenly spread */
+                points?: number;
+            };
+            header?: never;
+            path: {
+                /** @description The mission's id */
+                mission_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["TelemetryView"];
                 };
             };
             /** @description An access token is needed */

@@ -10,6 +10,7 @@ export interface TrackView {
 
 /** What a vehicle told at one moment, for the charts. */
 export interface Sample {
+  /** By the service's clock, milliseconds. */
   at: number;
   depth_m: number | null;
   altitude_m: number | null;
@@ -76,7 +77,7 @@ export function reduce(view: LiveView, message: LiveMessage, at: number): LiveVi
         tracks: extendTracks(view.tracks, message.vehicles),
         vehiclesAt: at,
         ...(at - view.sampledAt >= SAMPLE_PERIOD_MS
-          ? { samples: sampled(view.samples, message.vehicles, at), sampledAt: at }
+          ? { samples: sampled(view.samples, message.vehicles, Date.parse(message.time)), sampledAt: at }
           : {}),
       };
     case "targets":

@@ -17,6 +17,7 @@ import {
   serviceFault,
   socketStatus,
   steps,
+  telemetry,
   view,
 } from "./store";
 
@@ -195,6 +196,14 @@ export async function fetchSteps(): Promise<void> {
     steps.value = [...known, ...more];
     if (more.length < 1000) return;
   }
+}
+
+/** Asks what the vehicles told before this page heard of them. */
+export async function fetchTelemetry(): Promise<void> {
+  const id = selectedId.peek();
+  if (!id) return;
+  const found = await api.telemetry(id);
+  if (selectedId.peek() === id) telemetry.value = found;
 }
 
 /** Sends a command for the selected mission. Returns the service's answer, or null when it was refused. */

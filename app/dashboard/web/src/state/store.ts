@@ -9,6 +9,7 @@ import type {
   PolygonGeometry,
   SoundingView,
   StepView,
+  TelemetryView,
   VehicleView,
   WaypointView,
 } from "../api/types";
@@ -148,6 +149,8 @@ export const drawingReady = signal(false);
 
 /** Steps of the shown mission as far as they were asked for, and the one that is replayed; null: what is now. */
 export const steps = signal<readonly StepView[]>([]);
+/** What the vehicles of the shown mission told before this page heard of them; null until it was asked for. */
+export const telemetry = signal<TelemetryView | null>(null);
 export const replayStep = signal<number | null>(null);
 
 /** Soundings that are not simply used, while they are looked through. */
@@ -178,4 +181,5 @@ effect(() => {
   reviewed.value = null;
   chosenSounding.value = null;
   steps.value = [];
+  telemetry.value = null;
 });
