@@ -6,6 +6,7 @@ import uuid
 from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import asynccontextmanager
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Literal
@@ -36,6 +37,7 @@ from app.missions.fleet import (
     FleetLink,
     StopReceipt,
 )
+from app.missions.forecasts import Forecaster, ForecastView
 from app.missions.history import map_at_step, steps_after
 from app.missions.hub import FleetHub
 from app.missions.journal import event_view
@@ -151,6 +153,7 @@ class MissionService:
         self._executor = ThreadPoolExecutor(WORKERS, thread_name_prefix="planning")
         self._claims = Claims(self._hub, self._sim, lead, show_area)
         self._maps = MapKeeper()
+        self._forecaster = Forecaster()
         self._conductor = Conductor(database, self._hub, self._claims, self._executor, self._maps, settings.time_scale)
         self._runs = self._conductor.runs
         self._live: dict[str, LiveMission] = {}
@@ -191,6 +194,7 @@ class MissionService:
         for live in self._live.values():
             await live.close()
         self._executor.shutdown(wait=True, cancel_futures=True)
+        self._forecaster.close()
 
     async def ready(self) -> tuple[bool, dict[str, str]]:
         """Tell whether requests can be served, and how each component is."""
@@ -365,6 +369,26 @@ class MissionService:
     async def preflight(self, mission_id: str) -> PreflightView:
         """Return what stands before a mission's start."""
         return preflight(await self._get(mission_id), self._hub)
+
+    async def forecast(self, spec: MissionSpec, *, floor_depth_m: float | None = None) -> ForecastView:
+        """Return what is to be expected of a mission as it is described. Raises InvalidRequestError."""
+        check_spec(spec, self._hub.kinds)
+        return await self._forecaster.make(spec, floor_depth_m=floor_depth_m)
+
+    async def forecast_of(self, mission_id: str, *, floor_depth_m: float | None = None) -> ForecastView:
+        """Return what is to be expected of a stored mission from now on. Raises ConflictError, InvalidRequestError."""
+        live = await self._get(mission_id)
+        self._refuse_ended(live, "has nothing before it")
+        async with self._database.reading() as session:
+            prior = await sounding_queries.imported_arrays(session, mission_id)
+        team = [replace(member, report=member.report or self._hub.info(member.key).report) for member in live.team]
+        return await self._forecaster.make(
+            live.spec,
+            members=team,
+            prior=prior,
+            first_step=live.header.step + 1,
+            floor_depth_m=floor_depth_m,
+        )
 
     async def write_note(self, mission_id: str, text: str, *, actor: str) -> EventView:
         """Keep an operator's words in a mission's log."""

@@ -30,6 +30,8 @@ CONTRACT = {
     "GET /missions/{mission_id}": "getMission",
     "POST /missions/{mission_id}/start": "startMission",
     "GET /missions/{mission_id}/preflight": "checkMission",
+    "POST /missions/{mission_id}/forecast": "forecastMission",
+    "POST /forecast": "forecastDescription",
     "GET /missions/{mission_id}/steps": "listSteps",
     "GET /missions/{mission_id}/telemetry": "getTelemetry",
     "POST /missions/{mission_id}/notes": "writeNote",

@@ -1,6 +1,7 @@
 """Before a start: the page itself, its dialogs, and describing a mission, in Chromium against the real service."""
 
 import json
+import re
 
 import pytest
 from playwright.sync_api import Page, expect
@@ -95,6 +96,10 @@ def test_an_area_comes_from_a_kml_file(page: Page, service: Service) -> None:
     by_id(page, "area-file").set_input_files(file)
     expect(by_id(page, "area-note")).to_contain_text("basin.kml: area of 3 corners")
     expect(by_id(page, "estimate")).to_contain_text("At most")
+    by_id(page, "ask-forecast").click()
+    expect(by_id(page, "forecast-duration")).to_contain_text(re.compile(r"\d+ (s|min)"))
+    expect(by_id(page, "forecast-coverage")).to_contain_text("%")
+    expect(by_id(page, "forecast")).to_contain_text("which is a guess")
     by_id(page, "field-name").fill("From a file")
     by_id(page, "create-mission").click()
     expect(by_id(page, "mission-name")).to_have_text("From a file")

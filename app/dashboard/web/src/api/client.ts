@@ -4,6 +4,7 @@ import type {
   DoctorView,
   EventView,
   FieldProblem,
+  ForecastView,
   MissionAction,
   MissionSummary,
   MissionView,
@@ -111,6 +112,15 @@ export const api = {
   log: readLog,
   mission: (id: string) => request<MissionView>(missionPath(id)),
   preflight: (id: string) => request<PreflightView>(`${missionPath(id)}/preflight`),
+  forecast: (id: string, gone: AbortSignal) =>
+    request<ForecastView>(`${missionPath(id)}/forecast`, { method: "POST", signal: gone }),
+  forecastOf: (mission: NewMission, gone: AbortSignal) =>
+    request<ForecastView>("/forecast", {
+      method: "POST",
+      signal: gone,
+      body: JSON.stringify(mission),
+      headers: { "Content-Type": "application/json" },
+    }),
   steps: (id: string, after: number) =>
     request<StepView[]>(`${missionPath(id)}/steps?after=${after}&limit=1000`),
   telemetry: (id: string) => request<TelemetryView>(`${missionPath(id)}/telemetry`),

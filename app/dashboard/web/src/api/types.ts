@@ -28,6 +28,7 @@ export type MissionSummary = Complete<Schemas["MissionSummary"]>;
 export type MissionView = Complete<Schemas["MissionView"]>;
 export type EventView = Complete<Schemas["EventView"]>;
 export type StepView = Complete<Schemas["StepView"]>;
+export type ForecastView = Complete<Schemas["ForecastView"]>;
 export type TelemetryView = Complete<Schemas["TelemetryView"]>;
 export type PreflightView = Complete<Schemas["PreflightView"]>;
 export type CheckView = Complete<Schemas["CheckView"]>;
