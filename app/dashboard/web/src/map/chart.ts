@@ -130,6 +130,8 @@ export class Chart {
 
   setLook(look: Look): void {
     this.#look = look;
+    // What MapLibre has not painted yet, or a browser leaves out, is water, too.
+    this.#map.getContainer().style.backgroundColor = PAPER[look].sea;
     if (this.#styled) this.#map.setPaintProperty("sea", "background-color", PAPER[look].sea);
     this.#sheets.redraw();
   }
