@@ -150,6 +150,25 @@ def test_narrow_windows_scroll_nothing_sideways_and_keep_abort_in_reach(page: Pa
     expect(by_id(page, "card-sim-4")).to_be_in_viewport()
 
 
+def test_the_stop_is_whole_and_the_area_above_the_lower_bar_in_every_width(page: Page, service: Service) -> None:
+    mission = service.create(name="A rather long name for a mission in a window", vehicles=[])
+    show(page, mission)
+    for width, height in ((390, 844), (768, 1024), (820, 1180), (1024, 768), (1280, 800), (1600, 1000)):
+        page.set_viewport_size({"width": width, "height": height})
+        box = by_id(page, "abort").bounding_box()
+        assert box is not None
+        assert 0 <= box["x"] <= box["x"] + box["width"] <= width, width
+        name = by_id(page, "mission-name").bounding_box()
+        assert name is not None
+        assert name["width"] > 90, width
+        if width > 760:
+            covered = "parseFloat(getComputedStyle(document.querySelector('.app')).getPropertyValue('--over-bottom'))"
+            strip = page.locator(".bottom").bounding_box()
+            assert strip is not None
+            page.wait_for_timeout(50)  # the strip is measured after it is laid out
+            assert page.evaluate(covered) >= strip["height"] - 1, width
+
+
 def test_the_corners_of_a_drawn_area_are_dragged_and_added(page: Page) -> None:
     page.goto("/")
     expect(by_id(page, "map")).to_have_attribute("data-ready", "true")
