@@ -18,6 +18,7 @@ from app import __version__
 from app.api import (
     corrections,
     fleet,
+    forecasts,
     imports,
     logs,
     maps,
@@ -102,6 +103,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     )
     for router in (
         missions.router,
+        forecasts.router,
         measurements.router,
         corrections.router,
         imports.router,

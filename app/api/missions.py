@@ -10,6 +10,7 @@ from app.api.problems import problems
 from app.api.schemas import API, ActionRequest, MissionId, NoteRequest, VehicleName
 from app.api.state import Service
 from app.missions.spec import MissionSpec, VehicleSpec
+from app.missions.telemetry import TelemetryView
 from app.missions.views import ActionView, EventView, MissionSummary, MissionView, PreflightView, StepView
 
 router = APIRouter(prefix=f"{API}/missions", tags=["missions"], responses=problems("unauthenticated", "forbidden"))
@@ -160,6 +161,22 @@ async def list_steps(
 ) -> list[StepView]:
     """Return the steps with their figures and with what became of their waypoints, first to last."""
     return await service.steps(mission_id, after=after, limit=limit)
+
+
+@router.get(
+    "/{mission_id}/telemetry",
+    operation_id="getTelemetry",
+    summary="See the vehicles' figures over time",
+    responses=problems("mission-not-found", "invalid-request"),
+)
+async def get_telemetry(
+    mission_id: MissionId,
+    service: Service,
+    reader: Reader,
+    points: Annotated[int, Query(ge=2, le=5000, description="Most moments in the answer, evenly spread")] = 720,
+) -> TelemetryView:
+    """Return depth, altitude, battery and link age of every vehicle while the mission ran, oldest first."""
+    return await service.telemetry(mission_id, points)
 
 
 @router.post(

@@ -10,6 +10,7 @@ from enum import StrEnum
 from app.storage import tokens
 from app.storage.database import Database
 from app.storage.models import TokenRow
+from app.storage.sharing import Shared
 
 TOKEN_PREFIX = "bf_"  # noqa: S105 - makes leaked tokens easy to search for
 
@@ -46,6 +47,8 @@ class TokenStore:
 
     def __init__(self, database: Database) -> None:
         self._database = database
+        # Asked with every request: pages that ask for a new map at the same moment are answered by one query.
+        self._any = Shared(self._any_stored)
 
     async def create(
         self, name: str, role: Role, *, vehicle: str | None = None, expires_at: datetime | None = None
@@ -73,6 +76,9 @@ class TokenStore:
 
     async def any(self) -> bool:
         """Tell whether a token exists that was not revoked; then every request must carry one."""
+        return await self._any()
+
+    async def _any_stored(self) -> bool:
         async with self._database.reading() as session:
             return await tokens.any_token(session)
 

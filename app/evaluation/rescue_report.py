@@ -72,8 +72,8 @@ def rescue_report(runs: Sequence[Run], facts: Mapping[str, str]) -> str:
         "",
         f"150 x 150 m, cells of 1 m, scanner 8 m and 0.5 degrees; window {WINDOW:g} steps of 1 m. Goal area and map"
         " explored, in % of what can be seen from where a robot can go (the paper's fully explored map): means ± half"
-        " their 95 % interval over car parks of as many seeds. The paper shows its car parks in figures only and does not"
-        " state its window; ours are drawn by their"
+        " their 95 % interval over car parks of as many seeds. The paper shows its car parks in figures only and does"
+        " not state its window; ours are drawn by their"
         " descriptions. In the paper a step is a step however long the supervisor makes it; *ways count* charges each"
         " leg by its length.",
         "",

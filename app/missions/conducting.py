@@ -3,6 +3,7 @@
 import asyncio
 from collections.abc import Awaitable, Callable, Sequence
 from concurrent.futures import Executor
+from functools import partial
 
 import structlog
 
@@ -11,12 +12,17 @@ from app.missions.clock import now
 from app.missions.fleet import LinkState, StopReceipt
 from app.missions.hub import FleetHub
 from app.missions.live import LiveMission
+from app.missions.map_keeping import MapKeeper
+from app.missions.members import Member
 from app.missions.runner import Runner
 from app.missions.states import MissionState
 from app.missions.views import Level
 from app.storage import missions as mission_queries
 from app.storage.database import Database
 from app.storage.shielding import to_the_end
+
+PATIENCE_S = 0.5
+"""How long a stop waits for the database, so that a restart knows of it too; vehicles wait no longer for a disk."""
 
 log = structlog.get_logger(__name__)
 
@@ -33,19 +39,29 @@ class Conductor:
     """
 
     def __init__(
-        self, database: Database, hub: FleetHub, claims: Claims, executor: Executor, time_scale: float
+        self,
+        database: Database,
+        hub: FleetHub,
+        claims: Claims,
+        executor: Executor,
+        maps: MapKeeper,
+        time_scale: float,
     ) -> None:
         self._database = database
         self._hub = hub
         self._claims = claims
         self._executor = executor
+        self._maps = maps
         self._time_scale = time_scale
         self.runs: dict[str, asyncio.Task[None]] = {}
         self._acting: dict[str, asyncio.Lock] = {}
         self.warm: asyncio.Future[None] | None = None
 
     def acting(self, mission_id: str) -> asyncio.Lock:
-        """Return the lock under which a mission's state changes."""
+        """Return the lock under which a mission's state changes.
+
+        Whoever holds it keeps an abort waiting: nothing is computed under it.
+        """
         return self._acting.setdefault(mission_id, asyncio.Lock())
 
     def run(self, live: LiveMission) -> None:
@@ -82,16 +98,31 @@ class Conductor:
         """Bring a mission whose step loop ended to its end."""
         live.halt()
         stops = await self.stop_team(live)
-        try:
-            # What was measured until the vehicles stopped belongs to the result.
-            await live.journal.flush()
-            await live.build_map()
-        except Exception:
-            # The journal goes on trying by itself, and the map is made anew when it is asked for.
-            log.exception("the last soundings are not in the map yet", mission=live.id)
-        await self.set_state(live, target, reason, "service", level)
+        await self._write_down(live)
         await self.log_stops(live, stops)
+        # Who reads that the mission has ended finds its vehicles free.
         self._claims.release_team(live)
+        await self.set_state(live, target, reason, "service", level)
+        self._maps.map_last(live)
+
+    async def stand_down(self, live: LiveMission, state: MissionState, reason: str, actor: str) -> list[StopReceipt]:
+        """Commit a state in which vehicles do not follow, and stop them; returns what each answered.
+
+        The state comes first: killed in between, a restart must not go on with an aborted mission. But a disk that
+        hangs, or a long transaction, keeps no vehicle from being stopped.
+        """
+        live.halt()
+        written = asyncio.ensure_future(self.set_state(live, state, reason, actor))
+        await asyncio.wait([written], timeout=PATIENCE_S)
+        stops = await self.halt(live)
+        await written
+        await self.log_stops(live, stops)
+        return stops
+
+    def dismiss(self, live: LiveMission) -> None:
+        """Give up the vehicles of a mission that ended; its last map is made meanwhile."""
+        self._claims.release_team(live)
+        self._maps.map_last(live)
 
     async def halt(self, live: LiveMission) -> list[StopReceipt]:
         """End the step loop and stop the vehicles, at once and not only when the loop has ended."""
@@ -105,8 +136,21 @@ class Conductor:
             # A vehicle that was just being engaged when the loop was cancelled follows now.
             again = {stop.vehicle: stop for stop in await self.stop_team(live, only_engaged=True)}
             stops = [again.get(stop.vehicle, stop) for stop in stops]
-        await live.journal.flush()
+        await self._write_down(live)
         return stops
+
+    async def _write_down(self, live: LiveMission) -> None:
+        """Write what vehicles measured until now, unless that takes long: then the journal goes on by itself."""
+        flushing = asyncio.ensure_future(live.journal.flush())
+        flushing.add_done_callback(partial(_log_failure, live.id))
+        await asyncio.wait([flushing], timeout=PATIENCE_S)
+
+    async def stop_vehicle(self, live: LiveMission, member: Member) -> StopReceipt:
+        """Stop one vehicle and write down what it answered."""
+        member.engaged = False
+        stop = await self._hub.stop(member.key)
+        await self.log_stops(live, [stop])
+        return stop
 
     async def stop_team(self, live: LiveMission, *, only_engaged: bool = False) -> list[StopReceipt]:
         """Stop the mission's vehicles, or those of them that follow; returns what each answered."""
@@ -142,6 +186,13 @@ class Conductor:
         live.publish_summary()
         words = f"{state} by {actor}" + (f": {reason}" if reason else "")
         await live.journal.log(level, "state", words, state=state, actor=actor)
+
+
+def _log_failure(mission_id: str, done: asyncio.Task[None]) -> None:
+    error = None if done.cancelled() else done.exception()
+    if error is not None:
+        # What could not be written stays noted and is tried again.
+        log.error("the last soundings are not written yet", mission=mission_id, exc_info=error)
 
 
 def receipt(stop: StopReceipt) -> dict[str, str | bool]:

@@ -95,9 +95,12 @@ async def _recorrect(
     corrections = Corrections(live.frame, spec.tide, table=table, sound_speed=spec.sound_speed)
     loop = asyncio.get_running_loop()
     async with live.journal.writing:
-        async with database.writing() as session:
+        # Nothing else changes soundings meanwhile. Computing may have to wait for a thread, and the database's turn is
+        # for all missions, whose stops are written, too.
+        async with database.reading() as session:
             rows = await sounding_queries.all_soundings(session, live.id)
-            changes = await loop.run_in_executor(executor, recorrected, rows, corrections, live.gate)
+        changes = await loop.run_in_executor(executor, recorrected, rows, corrections, live.gate)
+        async with database.writing() as session:
             if changes:
                 await session.execute(update(SoundingRow), changes)
             mission = await session.get_one(MissionRow, live.id)

@@ -125,6 +125,11 @@ class Engaging:
         except Exception:
             log.exception("a vehicle could not be engaged, trying again", vehicle=member.name)
             return
+        if live.team.get(member.name) is not member:
+            # Taken out while it was asked: its stop may have come before it followed.
+            if self._hub.claimed_by(member.key) in (None, live.id):
+                await self._hub.stop(member.key)
+            return
         self._refused.pop(member.name, None)
         info = self._hub.info(member.key)
         member.engaged = member.followed = True

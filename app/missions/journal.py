@@ -7,7 +7,7 @@ accepted only when that transaction has committed.
 import asyncio
 import math
 from collections.abc import Awaitable, Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from itertools import pairwise
 from typing import Any
 
@@ -21,9 +21,11 @@ from app.missions.clock import now
 from app.missions.corrections import NO_LEVEL
 from app.missions.fleet import SoundingReport, VehicleReport, WaypointReport
 from app.missions.gate import Gate, GatedSounding
+from app.missions.telemetry import VehicleSample
 from app.missions.views import EventMessage, EventView, ItemVerdict, Level, Verdict
 from app.storage import missions as mission_queries
 from app.storage import soundings as sounding_queries
+from app.storage import telemetry as telemetry_queries
 from app.storage.database import Database
 from app.storage.models import EventRow
 from app.storage.shielding import to_the_end
@@ -72,6 +74,7 @@ class Journal:
         self._soundings: list[SoundingReport] = []
         self._positions: list[dict[str, Any]] = []
         self._statuses: list[WaypointReport] = []
+        self._telemetry: list[dict[str, Any]] = []
         self.told_of_missing_level = False
         """Whether the log has it that no water level is known for soundings; once is enough."""
         self._untold = ""
@@ -104,6 +107,11 @@ class Journal:
         self._statuses.append(report)
         self._start_pump()
 
+    def telemetry(self, samples: Sequence[VehicleSample]) -> None:
+        """Note what the vehicles told of themselves."""
+        self._telemetry += [{"mission_id": self._mission_id} | asdict(sample) for sample in samples]
+        self._start_pump()
+
     async def flush(self) -> None:
         """Write everything noted so far. What could not be written stays noted."""
         await to_the_end(self._flush())
@@ -118,12 +126,14 @@ class Journal:
             soundings, self._soundings = self._soundings, []
             positions, self._positions = self._positions, []
             statuses, self._statuses = self._statuses, []
-            if not (soundings or positions or statuses):
+            telemetry, self._telemetry = self._telemetry, []
+            if not (soundings or positions or statuses or telemetry):
                 return
             try:
                 async with self._database.writing() as session:
                     gated, new = await self._store(session, soundings)
                     await mission_queries.add_positions(session, positions)
+                    await telemetry_queries.add(session, telemetry)
                     for report in statuses:
                         await mission_queries.set_waypoint_status(
                             session, self._mission_id, report.step, report.vehicle, report.status, report.reason, now()
@@ -132,6 +142,7 @@ class Journal:
                 self._soundings[:0] = soundings
                 self._positions[:0] = positions
                 self._statuses[:0] = statuses
+                self._telemetry[:0] = telemetry
                 raise
             self._count(gated, new)
 
@@ -200,7 +211,7 @@ class Journal:
             self._pump = asyncio.create_task(self._flush_soon())
 
     async def _flush_soon(self) -> None:
-        while self._soundings or self._positions or self._statuses:
+        while self._soundings or self._positions or self._statuses or self._telemetry:
             await asyncio.sleep(FLUSH_PERIOD_S)
             try:
                 await self.flush()

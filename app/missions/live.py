@@ -60,6 +60,7 @@ from app.storage import missions as mission_queries
 from app.storage import soundings as sounding_queries
 from app.storage.database import Database
 from app.storage.models import MissionRow, PositionRow, TideTableRow, WaypointRow
+from app.storage.sharing import Shared
 
 LIVE_PERIOD_S = 0.2
 RISES = "rises"
@@ -119,6 +120,8 @@ class LiveMission:
         self.journal = Journal(database, row.id, self.gate, counts, self.broadcaster, self.builder.add)
         self.ranges = RangeJournal(database, row.id, Tracking(spec, self.frame), self.journal, time_scale)
         """Ranges to moving targets, and what they tell."""
+        self.correcting = asyncio.Lock()
+        """Held while corrections change, one after the other."""
         self.changed = asyncio.Event()
         """Set whenever a vehicle reported something that the step loop may be waiting for."""
         self.halted = False
@@ -131,6 +134,8 @@ class LiveMission:
         self._waypoints: dict[str, WaypointView] = {}
         self._ticker: asyncio.Task[None] | None = None
         self._imports_noticed = 0
+        self.notice_imports = Shared(self._notice_imports)
+        """Take up the soundings of logs that the command line imported while this process had the mission."""
 
     @classmethod
     async def load(
@@ -184,8 +189,7 @@ class LiveMission:
     def _gate_with(self, corrections: Corrections) -> Gate:
         return Gate(corrections, Polygon(self.area), margin_m=self.margin_m, noise=self.spec.sounding_noise)
 
-    async def notice_imports(self) -> None:
-        """Take up the soundings of logs that the command line imported while this process had the mission."""
+    async def _notice_imports(self) -> None:
         async with self._database.reading() as session:
             newest = await event_queries.last_event_id(session, self.id, kind="import")
         if newest <= self._imports_noticed:

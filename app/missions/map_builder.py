@@ -4,7 +4,7 @@ import copy
 import hashlib
 import threading
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import shapely
@@ -40,15 +40,20 @@ class _Everything:
 class _Learned:
     """The model with its hyperparameters, and of the soundings that it was learned on why outliers are left out.
 
-    ``reasons`` has one entry per sounding, empty where it is used.
+    ``soundings``, shape (n, 4), are those it was learned on; ``reasons`` has an entry for each, empty where it is used.
     """
 
     model: GaussianProcessMap
+    soundings: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 4)))
     reasons: tuple[str, ...] = ()
 
     @property
     def rejected(self) -> BoolArray:
         return np.array([bool(reason) for reason in self.reasons], dtype=bool)
+
+    @property
+    def doubted(self) -> list[tuple[NDArray[np.float64], str]]:
+        return [(row, reason) for row, reason in zip(self.soundings, self.reasons, strict=True) if reason]
 
 
 @dataclass(frozen=True)
@@ -214,23 +219,22 @@ class MapBuilder:
             used = np.array([not reason for reason in reasons])
             fitted = copy.copy(model).fit(soundings.take(used), learn=True)
             if generation == self._generation:
-                self._learned = _Learned(fitted, tuple(reasons))
+                self._learned = _Learned(fitted, known, tuple(reasons))
         finally:
             self._learning.release()
 
     def doubted(self) -> list[tuple[NDArray[np.float64], str]]:
-        """Return the soundings, rows of shape (4,), that the map leaves out as outliers, each with the reason."""
-        with self._building:
-            learned, soundings = self._learned, self._soundings
-            return [(soundings[i], reason) for i, reason in enumerate(learned.reasons) if reason]
+        """Return the soundings, rows of shape (4,), that the map leaves out as outliers, each with the reason.
+
+        Does not wait for a map that is being made.
+        """
+        return self._learned.doubted
 
     def as_of(self, soundings: NDArray[np.float64]) -> BathymetricMap:
         """Return the map that the first soundings (n, 4) alone make, under the model learned of all of them."""
         with self._building:
             learned, prior = self._learned, self._prior
-            doubted = {
-                row[:3].tobytes() for row, reason in zip(self._soundings, learned.reasons, strict=False) if reason
-            }
+        doubted = {row[:3].tobytes() for row, _ in learned.doubted}
         used = np.array([row[:3].tobytes() not in doubted for row in soundings], dtype=bool)
         if not used.any():
             if prior is None:

@@ -1,5 +1,6 @@
 """The map as it travels to browsers: whole once, then only the tiles that changed, each made once for all who ask."""
 
+import asyncio
 import json
 import struct
 import threading
@@ -57,6 +58,21 @@ class TileCache:
         self._lock = threading.Lock()
         self._pictures: OrderedDict[str, _Picture] = OrderedDict()
         self._answers: OrderedDict[tuple[str, str, tuple[str, ...]], bytes] = OrderedDict()
+        self._making: dict[tuple[str, str, tuple[str, ...]], asyncio.Task[bytes]] = {}
+
+    async def answer(self, snapshot: MapSnapshot, tag: str, since: str, further: tuple[str, ...] = ()) -> bytes:
+        """Return what ``changes`` does, which works in a thread; all who ask the same while it works wait for one."""
+        key = (tag, since, further)
+        known = self._answers.get(key)
+        if known is not None:
+            return known
+        making = self._making.get(key)
+        if making is None:
+            making = asyncio.create_task(asyncio.to_thread(self.changes, snapshot, tag, since, further))
+            self._making[key] = making
+            making.add_done_callback(lambda _: self._making.pop(key, None))
+        # Whoever stops waiting does not end it for the others.
+        return await asyncio.shield(making)
 
     def changes(self, snapshot: MapSnapshot, tag: str, since: str, further: tuple[str, ...] = ()) -> bytes:
         """Return what changed between the map that ``since`` names and this one, whole when that one is not known.
@@ -65,8 +81,8 @@ class TileCache:
         four bytes, and for every tile in ``tiles`` and every layer in ``layers`` its cells (int32, little endian, row
         by row from the south-west, cut off at the grid's edges).
         """
+        key = (tag, since, further)
         with self._lock:
-            key = (tag, since, further)
             known = self._answers.get(key)
             if known is None:
                 picture = self._picture(snapshot, tag, further)

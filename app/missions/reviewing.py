@@ -1,6 +1,5 @@
 """Soundings that are not in the map, and an operator's word on any of them: it counts, or it does not."""
 
-import asyncio
 from collections.abc import Sequence
 
 from sqlalchemy import ColumnElement, and_, func, or_, select
@@ -118,8 +117,7 @@ def _correct(live: LiveMission, row: SoundingRow) -> None:
 
 
 async def _doubts(live: LiveMission, session: AsyncSession) -> Doubts:
-    # The map's lock may be held while it is made: not on the event loop.
-    doubted = await asyncio.to_thread(live.builder.doubted)
+    doubted = live.builder.doubted()
     if not doubted:
         return {}
     found = await sounding_queries.ids_at(session, live.id, [row for row, _ in doubted])

@@ -31,6 +31,7 @@ from app.missions.fleet import (
 from app.missions.hub import FleetHub
 from app.missions.live import RISES, LiveMission
 from app.missions.members import SETTLED, Member
+from app.missions.sampling import keep_telemetry
 from app.missions.spec import Guidance
 from app.missions.views import Level
 from app.storage import missions as mission_queries
@@ -95,6 +96,7 @@ class Runner:
         keepers = [
             asyncio.create_task(Engaging(live, self._hub, self._time_scale, self._send_to).keep()),
             asyncio.create_task(self._keep_time()),
+            asyncio.create_task(keep_telemetry(live, self._time_scale)),
         ]
         try:
             planner = await self._recover()

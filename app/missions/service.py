@@ -6,6 +6,7 @@ import uuid
 from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import asynccontextmanager
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Literal
@@ -23,7 +24,7 @@ from app.missions.admission import check_spec, check_vehicle
 from app.missions.broadcast import Subscription
 from app.missions.claims import Claims, Lead, ShowArea
 from app.missions.clock import now
-from app.missions.conducting import Conductor, receipt
+from app.missions.conducting import PATIENCE_S, Conductor, receipt
 from app.missions.correcting import check_level_is_known, corrections_view, set_sound_speed, set_tide
 from app.missions.doctoring import DoctorView, Examine, doctor_view, switched_off
 from app.missions.errors import (
@@ -36,15 +37,18 @@ from app.missions.fleet import (
     FleetLink,
     StopReceipt,
 )
+from app.missions.forecasts import Forecaster, ForecastView
 from app.missions.history import map_at_step, steps_after
 from app.missions.hub import FleetHub
 from app.missions.journal import event_view
 from app.missions.links.rest import RestFleetLink
 from app.missions.links.sim import SimFleetLink
 from app.missions.live import LiveMission
+from app.missions.map_keeping import MapKeeper
 from app.missions.maps import MapSnapshot
 from app.missions.measurement import Measurement
 from app.missions.measuring import measure
+from app.missions.members import Member
 from app.missions.polling import waypoint
 from app.missions.preflight import preflight
 from app.missions.products import (
@@ -63,6 +67,7 @@ from app.missions.spec import MissionSpec, SoundSpeed, VehicleKind, VehicleSpec
 from app.missions.states import ENDED, MissionState
 from app.missions.target_pages import target_ranges_page
 from app.missions.target_views import TargetRangePage, TargetView
+from app.missions.telemetry import TelemetryView, telemetry_view
 from app.missions.trails import Trail
 from app.missions.views import (
     ActionView,
@@ -93,6 +98,7 @@ from app.missions.views import (
 from app.storage import events as event_queries
 from app.storage import missions as mission_queries
 from app.storage import soundings as sounding_queries
+from app.storage import telemetry as telemetry_queries
 from app.storage.database import Database
 from app.storage.models import MissionRow, MissionVehicleRow, SoundingRow
 
@@ -146,15 +152,14 @@ class MissionService:
         self._hub = FleetHub(links)
         self._executor = ThreadPoolExecutor(WORKERS, thread_name_prefix="planning")
         self._claims = Claims(self._hub, self._sim, lead, show_area)
-        self._conductor = Conductor(database, self._hub, self._claims, self._executor, settings.time_scale)
+        self._maps = MapKeeper()
+        self._forecaster = Forecaster()
+        self._conductor = Conductor(database, self._hub, self._claims, self._executor, self._maps, settings.time_scale)
         self._runs = self._conductor.runs
         self._live: dict[str, LiveMission] = {}
         # As they were when they left memory.
         self._left: dict[str, MissionSummary] = {}
         self._loading = asyncio.Lock()
-        # Maps of missions that were taken up; one at a time, so that planning has a thread.
-        self._mapping = asyncio.Lock()
-        self._mapped: dict[str, asyncio.Task[None]] = {}
         # One file after the other: reading takes memory and a core.
         self._importing = asyncio.Lock()
         self._started = False
@@ -182,14 +187,14 @@ class MissionService:
     async def shutdown(self) -> None:
         """Stop every vehicle and write everything down; running missions stay running and go on at the next start."""
         self._started = False
-        for task in list(self._mapped.values()):
-            task.cancel()
-        for mission_id in list(self._runs):
-            await self._conductor.halt(await self._get(mission_id))
+        running = [await self._get(mission_id) for mission_id in self._runs]
+        await asyncio.gather(*(self._conductor.halt(live) for live in running))
+        await self._maps.close()
         await self._hub.close()
         for live in self._live.values():
             await live.close()
         self._executor.shutdown(wait=True, cancel_futures=True)
+        self._forecaster.close()
 
     async def ready(self) -> tuple[bool, dict[str, str]]:
         """Tell whether requests can be served, and how each component is."""
@@ -260,13 +265,9 @@ class MissionService:
                 await self._conductor.set_state(live, target, note, actor)
                 self._conductor.run(live)
             else:
-                # The state first: killed in between, a restart must not go on with an aborted mission.
-                await self._conductor.set_state(live, target, note, actor)
-                stops = await self._conductor.halt(live)
-                await self._conductor.log_stops(live, stops)
+                stops = await self._conductor.stand_down(live, target, note, actor)
                 if target in ENDED:
-                    self._claims.release_team(live)
-                    await live.build_map()
+                    self._conductor.dismiss(live)
                 live.publish_summary()
         return _action_view(live, stops)
 
@@ -307,43 +308,87 @@ class MissionService:
             return len(rows)
 
     async def remove_vehicle(self, mission_id: str, name: str, *, actor: str = "operator") -> MissionView:
-        """Stop a vehicle and take it out of the mission. Raises VehicleNotFoundError."""
+        """Stop a vehicle and take it out of the mission. Raises VehicleNotFoundError, ConflictError."""
+        self._refuse_ended(await self._get(mission_id), "keeps its vehicles")
         await self.abort_vehicle(mission_id, name, actor=actor)
         return self._view(await self._get(mission_id))
 
     async def abort_vehicle(self, mission_id: str, name: str, *, actor: str = "operator") -> ActionView:
-        """Stop a vehicle and take it out of the mission; returns whether it acknowledged that."""
+        """Stop a vehicle and take it out of the mission; returns whether it acknowledged that.
+
+        When the mission has ended the vehicle stays in it and is told once more.
+        """
         live = await self._get(mission_id)
-        stops: list[StopReceipt] = []
         async with self._conductor.acting(mission_id):
-            self._refuse_ended(live, "keeps its vehicles")
             member = live.team.get(name)
             if member is None:
                 present = ", ".join(m.name for m in live.team) or "none"
                 raise VehicleNotFoundError(
                     f"vehicle {name!r} takes no part in this mission", f"those that do: {present}"
                 )
-            async with self._database.writing() as session:
-                for row in await mission_queries.vehicles_of(session, mission_id):
-                    if row.name == name:
-                        row.left_at = now()
-            claimed = self._hub.claimed_by(member.key) == mission_id
-            live.team.leave(name)
-            live.changed.set()
-            live.publish_summary()
-            if claimed:
-                stops = [await self._hub.stop(member.key)]
-                await self._conductor.log_stops(live, stops)
-                self._hub.release(member.key, mission_id)
-            if live.header.state is MissionState.READY and not list(live.team):
-                move = states.move(MissionState.READY, "reopen_draft")
-                await self._conductor.set_state(live, move, "no vehicle left", actor)
-            await live.journal.log(Level.INFO, "vehicle", f"{name} left", vehicle=name, actor=actor)
+            if live.header.state in ENDED:
+                stops = [await self._stop_again(live, member)]
+            else:
+                stops = await self._take_out(live, member, actor)
         return _action_view(live, stops)
+
+    async def _stop_again(self, live: LiveMission, member: Member) -> StopReceipt:
+        owner = self._hub.claimed_by(member.key)
+        if owner is not None:
+            raise ConflictError(
+                f"the mission is {live.header.state}, and vehicle {member.name!r} takes part in mission {owner} now",
+                f"stop it there: POST /api/v1/missions/{owner}/vehicles/{member.name}/abort",
+            )
+        return await self._conductor.stop_vehicle(live, member)
+
+    async def _take_out(self, live: LiveMission, member: Member, actor: str) -> list[StopReceipt]:
+        stops: list[StopReceipt] = []
+        # As with a mission: a vehicle does not wait for a slow disk.
+        written = asyncio.ensure_future(self._store_leaving(live.id, member.name))
+        await asyncio.wait([written], timeout=PATIENCE_S)
+        claimed = self._hub.claimed_by(member.key) == live.id
+        live.team.leave(member.name)
+        live.changed.set()
+        live.publish_summary()
+        if claimed:
+            stops = [await self._conductor.stop_vehicle(live, member)]
+            self._hub.release(member.key, live.id)
+        await written
+        if live.header.state is MissionState.READY and not list(live.team):
+            move = states.move(MissionState.READY, "reopen_draft")
+            await self._conductor.set_state(live, move, "no vehicle left", actor)
+        await live.journal.log(Level.INFO, "vehicle", f"{member.name} left", vehicle=member.name, actor=actor)
+        return stops
+
+    async def _store_leaving(self, mission_id: str, name: str) -> None:
+        async with self._database.writing() as session:
+            for row in await mission_queries.vehicles_of(session, mission_id):
+                if row.name == name:
+                    row.left_at = now()
 
     async def preflight(self, mission_id: str) -> PreflightView:
         """Return what stands before a mission's start."""
         return preflight(await self._get(mission_id), self._hub)
+
+    async def forecast(self, spec: MissionSpec, *, floor_depth_m: float | None = None) -> ForecastView:
+        """Return what is to be expected of a mission as it is described. Raises InvalidRequestError."""
+        check_spec(spec, self._hub.kinds)
+        return await self._forecaster.make(spec, floor_depth_m=floor_depth_m)
+
+    async def forecast_of(self, mission_id: str, *, floor_depth_m: float | None = None) -> ForecastView:
+        """Return what is to be expected of a stored mission from now on. Raises ConflictError, InvalidRequestError."""
+        live = await self._get(mission_id)
+        self._refuse_ended(live, "has nothing before it")
+        async with self._database.reading() as session:
+            prior = await sounding_queries.imported_arrays(session, mission_id)
+        team = [replace(member, report=member.report or self._hub.info(member.key).report) for member in live.team]
+        return await self._forecaster.make(
+            live.spec,
+            members=team,
+            prior=prior,
+            first_step=live.header.step + 1,
+            floor_depth_m=floor_depth_m,
+        )
 
     async def write_note(self, mission_id: str, text: str, *, actor: str) -> EventView:
         """Keep an operator's words in a mission's log."""
@@ -434,7 +479,7 @@ class MissionService:
     async def set_tide(self, mission_id: str, tide: TideCorrection, *, actor: str = "operator") -> CorrectionsView:
         """Change the tide and correct every sounding anew. Raises InvalidRequestError for a table that is wrong."""
         live = await self._get(mission_id)
-        async with self._conductor.acting(mission_id):
+        async with live.correcting:
             await set_tide(live, self._database, self._executor, tide, actor)
         return corrections_view(live)
 
@@ -443,7 +488,7 @@ class MissionService:
     ) -> CorrectionsView:
         """Change the sound speed profile, or take it away, and correct every sounding anew."""
         live = await self._get(mission_id)
-        async with self._conductor.acting(mission_id):
+        async with live.correcting:
             await set_sound_speed(live, self._database, self._executor, sound_speed, actor)
         return corrections_view(live)
 
@@ -491,6 +536,14 @@ class MissionService:
         """Return up to ``limit`` steps with a number above ``after``."""
         return await steps_after(await self._get(mission_id), self._database, after, limit)
 
+    async def telemetry(self, mission_id: str, points: int) -> TelemetryView:
+        """Return what the vehicles told of themselves, at about ``points`` moments at most."""
+        live = await self._get(mission_id)
+        await live.journal.flush()
+        async with self._database.reading() as session:
+            rows = await telemetry_queries.samples(session, mission_id, points)
+        return telemetry_view(rows)
+
     async def map_tiles(
         self, mission_id: str, run: str, since: str, further: Sequence[str] = (), step: int | None = None
     ) -> bytes:
@@ -505,11 +558,12 @@ class MissionService:
             snapshot = await map_at_step(live, self._database, step)
         at = "" if step is None else f"@{step}"
         tag = f"{run}.{snapshot.version}.{snapshot.revision}{at}"
-        return await asyncio.to_thread(live.tiles.changes, snapshot, tag, since, tuple(sorted(set(further))))
+        return await live.tiles.answer(snapshot, tag, since, tuple(sorted(set(further))))
 
     async def map(self, mission_id: str) -> MapSnapshot:
         """Return the newest map. Raises MapNotReadyError when there is no sounding yet."""
         live = await self._get(mission_id)
+        await self._maps.last(mission_id)
         await live.notice_imports()
         built = live.builder.newest
         if built is None or (live.builder.stale and mission_id not in self._runs):
@@ -628,32 +682,14 @@ class MissionService:
             live = await LiveMission.load(self._database, self._hub, self._executor, row, self._settings.time_scale)
             await self._make_room()
             self._live[mission_id] = live
-            self._map_soon(live)
+            self._maps.take_up(live)
             return live
-
-    def _map_soon(self, live: LiveMission) -> None:
-        """Make the map of what was stored; nobody waits for it, and one is made at a time."""
-        if not live.builder.stale:
-            return
-
-        async def make() -> None:
-            async with self._mapping:
-                await live.map_what_is_stored()
-
-        def done(task: asyncio.Task[None]) -> None:
-            self._mapped.pop(live.id, None)
-            error = None if task.cancelled() else task.exception()
-            if error is not None:
-                log.error("the map is not made yet; it is when it is asked for", mission=live.id, exc_info=error)
-
-        self._mapped[live.id] = task = asyncio.create_task(make(), name=f"map of {live.id}")
-        task.add_done_callback(done)
 
     async def _make_room(self) -> None:
         idle = [
             m
             for m in self._live.values()
-            if m.header.state in ENDED and not m.broadcaster.watched and m.id not in self._mapped
+            if m.header.state in ENDED and not m.broadcaster.watched and not self._maps.busy(m.id)
         ]
         for live in idle[: max(0, len(idle) - ENDED_MISSIONS_IN_MEMORY + 1)]:
             del self._live[live.id]

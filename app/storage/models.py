@@ -261,6 +261,25 @@ class PositionRow(Base):
     depth_m: Mapped[float]
 
 
+class TelemetryRow(Base):
+    """What a vehicle told of itself at a moment, thinned; all vehicles of a mission have the same moments.
+
+    ``at_s`` are Unix seconds by the service's clock, ``age_s`` the seconds since it was heard.
+    """
+
+    __tablename__ = "telemetry"
+    __table_args__ = (Index("ix_telemetry_mission", "mission_id", "at_s"),)
+
+    id: Mapped[int] = mapped_column(_BigId, primary_key=True, autoincrement=True)
+    mission_id: Mapped[str] = mapped_column(ForeignKey("missions.id", ondelete="CASCADE"))
+    vehicle: Mapped[str] = mapped_column(String(64))
+    at_s: Mapped[float]
+    depth_m: Mapped[float | None]
+    altitude_m: Mapped[float | None]
+    battery_pct: Mapped[float | None]
+    age_s: Mapped[float | None]
+
+
 class BatchRow(Base):
     """The answer once given to an idempotency key."""
 

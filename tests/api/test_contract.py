@@ -27,6 +27,8 @@ from tests.api.test_openapi import CONTRACT
 BEYOND_THE_SCHEMA = {
     "createMission",
     "addVehicle",
+    "forecastDescription",
+    "forecastMission",
     "getMap",
     "getMapOverlay",
     "getMapFile",

@@ -25,12 +25,13 @@ AREA = {
 class Service:
     """``bathyfleet serve`` with simulated vehicles, on one port and one database for all its lives."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, **settings: str) -> None:
         with socket.socket() as probe:
             probe.bind(("127.0.0.1", 0))
             self.port: int = probe.getsockname()[1]
         self.url = f"http://127.0.0.1:{self.port}"
         self._folder = folder
+        self._settings = {f"BATHYFLEET_{name.upper()}": value for name, value in settings.items()}
         self._log = folder / "service.log"
         self._process: subprocess.Popen[bytes] | None = None
 
@@ -42,6 +43,7 @@ class Service:
             "BATHYFLEET_DATABASE_URL": f"sqlite+aiosqlite:///{self._folder / 'service.db'}",
             "BATHYFLEET_IMC__ENABLED": "false",
             "BATHYFLEET_TIME_SCALE": "5",
+            **self._settings,
             "PYTHONPATH": os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")]),
         }
 

@@ -54,6 +54,8 @@ def test_charts_layers_space_and_comparison_of_a_finished_mission(
     by_id(page, "toggle-charts").click()
     expect(by_id(page, "charts").locator("canvas")).not_to_have_count(0)
     expect(by_id(page, "charts")).to_contain_text(re.compile(r"covered \d"))
+    # This page was opened after the end: what it shows of vehicles was kept.
+    expect(by_id(page, "charts")).to_contain_text(re.compile(r"Depth of vehicles.*sim-1 \d"))
     by_id(page, "toggle-charts").click()
     for name in ("uncertainty", "count", "slope", "tvu_fraction"):
         by_id(page, "layer").select_option(name)

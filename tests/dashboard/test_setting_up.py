@@ -1,6 +1,7 @@
 """Before a start: the page itself, its dialogs, and describing a mission, in Chromium against the real service."""
 
 import json
+import re
 
 import pytest
 from playwright.sync_api import Page, expect
@@ -95,6 +96,10 @@ def test_an_area_comes_from_a_kml_file(page: Page, service: Service) -> None:
     by_id(page, "area-file").set_input_files(file)
     expect(by_id(page, "area-note")).to_contain_text("basin.kml: area of 3 corners")
     expect(by_id(page, "estimate")).to_contain_text("At most")
+    by_id(page, "ask-forecast").click()
+    expect(by_id(page, "forecast-duration")).to_contain_text(re.compile(r"\d+ (s|min)"))
+    expect(by_id(page, "forecast-coverage")).to_contain_text("%")
+    expect(by_id(page, "forecast")).to_contain_text("which is a guess")
     by_id(page, "field-name").fill("From a file")
     by_id(page, "create-mission").click()
     expect(by_id(page, "mission-name")).to_have_text("From a file")
@@ -143,6 +148,25 @@ def test_narrow_windows_scroll_nothing_sideways_and_keep_abort_in_reach(page: Pa
     expect(by_id(page, "card-sim-4")).not_to_be_in_viewport()
     by_id(page, "card-sim-4").scroll_into_view_if_needed()
     expect(by_id(page, "card-sim-4")).to_be_in_viewport()
+
+
+def test_the_stop_is_whole_and_the_area_above_the_lower_bar_in_every_width(page: Page, service: Service) -> None:
+    mission = service.create(name="A rather long name for a mission in a window", vehicles=[])
+    show(page, mission)
+    for width, height in ((390, 844), (768, 1024), (820, 1180), (1024, 768), (1280, 800), (1600, 1000)):
+        page.set_viewport_size({"width": width, "height": height})
+        box = by_id(page, "abort").bounding_box()
+        assert box is not None
+        assert 0 <= box["x"] <= box["x"] + box["width"] <= width, width
+        name = by_id(page, "mission-name").bounding_box()
+        assert name is not None
+        assert name["width"] > 90, width
+        if width > 760:
+            covered = "parseFloat(getComputedStyle(document.querySelector('.app')).getPropertyValue('--over-bottom'))"
+            strip = page.locator(".bottom").bounding_box()
+            assert strip is not None
+            page.wait_for_timeout(50)  # the strip is measured after it is laid out
+            assert page.evaluate(covered) >= strip["height"] - 1, width
 
 
 def test_the_corners_of_a_drawn_area_are_dragged_and_added(page: Page) -> None:

@@ -131,15 +131,15 @@ async def test_a_mission_that_is_taken_up_has_its_map_without_being_asked_for_it
     await service.measure(mission, measured())
     await service.act(mission, "start", actor="Ana")
     await service.act(mission, "finish", actor="Ana")
-    shown = (await service.mission(mission)).progress
-    assert shown.coverage_pct > 0
-
-    service = await harbour.reopen()
-    await service.missions()
 
     async def mapped() -> bool:
         return bool((await service.mission(mission)).progress.coverage_pct)
 
+    await until(mapped, "the last map was made by itself")
+    shown = (await service.mission(mission)).progress
+
+    service = await harbour.reopen()
+    await service.missions()
     await until(mapped, "the map was made by itself")
     progress = (await service.mission(mission)).progress
     assert progress.coverage_pct == pytest.approx(shown.coverage_pct, abs=2)

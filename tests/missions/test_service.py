@@ -720,6 +720,21 @@ async def test_events_are_ordered_and_can_be_taken_up_after_any(harbour: Harbour
     assert await service.events(mission_id) == every
 
 
+async def test_what_vehicles_told_while_a_mission_ran_is_kept_for_charts(harbour: Harbour) -> None:
+    mission_id = await started(harbour.service, sim_spec(steps=3))
+    await until_state(harbour.service, mission_id, S.FINISHED)
+    service = await harbour.reopen()
+    found = await service.telemetry(mission_id, 100)
+    assert [vehicle.vehicle for vehicle in found.vehicles] == ["a", "b"]
+    assert found.times_s == sorted(found.times_s)
+    for vehicle in found.vehicles:
+        depths = [depth for depth in vehicle.depth_m if depth is not None]
+        assert len(vehicle.age_s) == len(found.times_s) >= 1
+        assert depths
+        assert all(0 <= depth < 20 for depth in depths)
+    assert (await service.telemetry((await service.create(make_spec())).id, 100)).times_s == []
+
+
 async def test_missions_are_listed_newest_first_and_survive_leaving_memory(service: MissionService) -> None:
     made = [await service.create(make_spec(name=f"M{i}")) for i in range(14)]
     for mission in made:

@@ -16,6 +16,7 @@ from app.storage.models import (
     SoundingRow,
     StepRow,
     TargetRangeRow,
+    TelemetryRow,
     TideTableRow,
     TokenRow,
     WaypointRow,
@@ -143,6 +144,9 @@ def one_of_each() -> list[list[Any]]:
             SoundingRow(**sounding()),
             PositionRow(**position()),
             TargetRangeRow(**target_range()),
+            TelemetryRow(
+                mission_id="m1", vehicle="a", at_s=5.0, depth_m=2.0, altitude_m=None, battery_pct=80.0, age_s=0.1
+            ),
             BatchRow(mission_id="m1", key="k", digest="d", answer={"accepted": 1}, created_at=TIME),
             EventRow(mission_id="m1", time=TIME, level="info", kind="state", message="made", data={"by": "me"}),
             TideTableRow(mission_id="m1", name="Leixoes", text="2026/01/01 00:00 1.0"),

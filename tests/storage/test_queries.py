@@ -7,6 +7,7 @@ import numpy as np
 from app.storage import events as event_queries
 from app.storage import missions as mission_queries
 from app.storage import soundings as sounding_queries
+from app.storage import telemetry as telemetry_queries
 from app.storage.database import Database
 from app.storage.models import EventRow, ImportRow, ReferenceRow
 from tests.storage.rows import TIME, mission, one_of_each, position, sounding, step, vehicle, waypoint
@@ -145,3 +146,28 @@ async def test_imports_and_the_reference_grid_come_back_as_they_were(database: D
         assert (await sounding_queries.imported_arrays(session, "m2")).shape == (0, 4)
         np.testing.assert_array_equal(await sounding_queries.reference_grid(session, "m1"), [[3.0, np.nan]])
         assert await sounding_queries.reference_grid(session, "m2") is None
+
+
+async def test_telemetry_is_thinned_evenly_for_all_vehicles_alike_and_keeps_the_newest(database: Database) -> None:
+    await _two_missions(database)
+    empty = {"depth_m": None, "altitude_m": None, "battery_pct": None, "age_s": None}
+    rows = [
+        {"mission_id": "m1", "vehicle": name, "at_s": 5.0 * i} | empty | {"depth_m": float(i)}
+        for i in range(101)
+        for name in ("b", "a")
+        if name == "a" or i >= 60  # joined later
+    ]
+    async with database.writing() as session:
+        await telemetry_queries.add(session, rows)
+        await telemetry_queries.add(session, [rows[0] | {"mission_id": "m2", "at_s": 1e6}])
+        await telemetry_queries.add(session, [])
+    async with database.reading() as session:
+        every = await telemetry_queries.samples(session, "m1", 200)
+        thin = await telemetry_queries.samples(session, "m1", 25)
+        assert await telemetry_queries.samples(session, "m3", 25) == []
+    assert [(row.at_s, row.vehicle, row.depth_m) for row in every] == sorted(
+        (row["at_s"], row["vehicle"], row["depth_m"]) for row in rows
+    )
+    of = {name: [row.at_s for row in thin if row.vehicle == name] for name in "ab"}
+    assert of["a"] == [5.0 * i for i in range(0, 101, 5)]
+    assert of["b"] == [at for at in of["a"] if at >= 300.0]

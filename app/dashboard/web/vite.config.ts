@@ -23,8 +23,33 @@ function compressed(): Plugin {
   };
 }
 
+/** Has browsers fetch the map's code together with the page's own, not after it. */
+function preloaded(): Plugin {
+  return {
+    name: "preloaded",
+    apply: "build",
+    transformIndexHtml(_, { bundle = {} }) {
+      const chunks = Object.values(bundle).filter((part) => part.type === "chunk");
+      const chart = chunks.find((chunk) => chunk.name === "chart");
+      if (!chart) throw new Error("the map's code is no part of its own any more");
+      const needed = [chart, ...chunks.filter((c) => chart.imports.includes(c.fileName) && !c.isEntry)];
+      const styles = needed.flatMap((chunk) => [...(chunk.viteMetadata?.importedCss ?? [])]);
+      const link = (attrs: Record<string, string>) => ({
+        tag: "link",
+        attrs: { crossorigin: "", ...attrs },
+        injectTo: "head" as const,
+      });
+      return [
+        // Only fetched: a module that is preloaded as one is compiled before the page's own code runs.
+        ...needed.map((chunk) => link({ rel: "preload", as: "script", href: `/${chunk.fileName}` })),
+        ...styles.map((name) => link({ rel: "preload", as: "style", href: `/${name}` })),
+      ];
+    },
+  };
+}
+
 export default defineConfig({
-  plugins: [compressed()],
+  plugins: [preloaded(), compressed()],
   build: {
     outDir,
     emptyOutDir: true,

@@ -96,7 +96,8 @@ class RestFleetLink(VisitedLink):
     async def stop(self, vehicle: str, *, timeout_s: float = 3.0) -> StopReceipt:
         """Withdraw the waypoint; acknowledged when the vehicle polled and was told."""
         poller = self._pollers.get(vehicle)
-        if poller is None or poller.state not in (LinkState.ENGAGED, LinkState.LOST):
+        follows = poller is not None and poller.state in (LinkState.ENGAGED, LinkState.LOST)
+        if poller is None or not (follows or poller.stopping):
             return StopReceipt(vehicle, acknowledged=True, detail="was not following")
         poller.order = None
         poller.status = None

@@ -4,6 +4,7 @@ import type {
   DoctorView,
   EventView,
   FieldProblem,
+  ForecastView,
   MissionAction,
   MissionSummary,
   MissionView,
@@ -17,6 +18,7 @@ import type {
   SoundingState,
   SoundingView,
   StepView,
+  TelemetryView,
   TimedTracks,
   VehicleView,
 } from "./types";
@@ -110,8 +112,18 @@ export const api = {
   log: readLog,
   mission: (id: string) => request<MissionView>(missionPath(id)),
   preflight: (id: string) => request<PreflightView>(`${missionPath(id)}/preflight`),
+  forecast: (id: string, gone: AbortSignal) =>
+    request<ForecastView>(`${missionPath(id)}/forecast`, { method: "POST", signal: gone }),
+  forecastOf: (mission: NewMission, gone: AbortSignal) =>
+    request<ForecastView>("/forecast", {
+      method: "POST",
+      signal: gone,
+      body: JSON.stringify(mission),
+      headers: { "Content-Type": "application/json" },
+    }),
   steps: (id: string, after: number) =>
     request<StepView[]>(`${missionPath(id)}/steps?after=${after}&limit=1000`),
+  telemetry: (id: string) => request<TelemetryView>(`${missionPath(id)}/telemetry`),
   tracks: (id: string) => request<TimedTracks>(`${missionPath(id)}/tracks.geojson`),
   note: (id: string, text: string) => post<EventView>(`${missionPath(id)}/notes`, { text }),
   abortVehicle: (id: string, name: string) =>

@@ -188,6 +188,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/missions/{mission_id}/telemetry": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * See the vehicles' figures over time
+         * @description Return depth, altitude, battery and link age of every vehicle while the mission ran, oldest first.
+         */
+        get: operations["getTelemetry"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/missions/{mission_id}/notes": {
         parameters: {
             query?: never;
@@ -263,6 +283,48 @@ export interface paths {
          * @description Stop the vehicle and go on without it; what it measured stays.
          */
         delete: operations["removeVehicle"];
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/missions/{mission_id}/forecast": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Foretell a mission
+         * @description Simulate what is left of a mission, over what was imported of the sea floor and a guess for the rest.
+         */
+        post: operations["forecastMission"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/forecast": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Foretell a mission that is being described
+         * @description Simulate a mission that nobody has created, over a sea floor that is guessed. Nothing is stored, nothing moves.
+         *
+         *     Takes some seconds at most; a client that does not wait any more ends it.
+         */
+        post: operations["forecastDescription"];
+        delete?: never;
         options?: never;
         head?: never;
         patch?: never;
@@ -1180,6 +1242,49 @@ export interface components {
              * @default
              */
             remedy: string;
+        };
+        /**
+         * ForecastView
+         * @description What is to be expected of a mission: a forecast from a simulation, not a promise.
+         */
+        ForecastView: {
+            /**
+             * Duration S
+             * @description Seconds of the vehicles' time until the last step is done
+             */
+            duration_s: number;
+            /** Vehicles */
+            vehicles: components["schemas"]["VehicleForecast"][];
+            /**
+             * Coverage Pct
+             * @description Share of the area's cells that will be known to `accuracy_m`
+             */
+            coverage_pct: number;
+            /**
+             * Remaining Pct
+             * @description Share of the landmarks that never were
+             */
+            remaining_pct: number;
+            /**
+             * Mean Sd M
+             * @description Mean deviation of the map; null: nothing was sounded
+             */
+            mean_sd_m: number | null;
+            /**
+             * Steps
+             * @description Steps that are still to be flown
+             */
+            steps: number;
+            /**
+             * Steps Simulated
+             * @description Of these were simulated in the time allowed; `coverage_pct` and what follows is after as many
+             */
+            steps_simulated: number;
+            /**
+             * Assumptions
+             * @description What was taken to be so, in words
+             */
+            assumptions: string[];
         };
         /**
          * FurtherLayer
@@ -2560,6 +2665,19 @@ export interface components {
             targets: components["schemas"]["TargetView"][];
         };
         /**
+         * TelemetryView
+         * @description What the vehicles told of themselves while the mission ran.
+         */
+        TelemetryView: {
+            /**
+             * Times S
+             * @description The moments, Unix seconds by the service's clock, ascending
+             */
+            times_s: number[];
+            /** Vehicles */
+            vehicles: components["schemas"]["VehicleTelemetry"][];
+        };
+        /**
          * Tide
          * @description Water level correction: depth below the datum = sounded depth - level + datum_offset_m.
          */
@@ -2736,6 +2854,16 @@ export interface components {
             history: components["schemas"]["LinkRecord"][];
         };
         /**
+         * VehicleForecast
+         * @description What one vehicle will have done.
+         */
+        VehicleForecast: {
+            /** Vehicle */
+            vehicle: string;
+            /** Distance M */
+            distance_m: number;
+        };
+        /**
          * VehicleKind
          * @description Which link reaches a vehicle.
          * @enum {string}
@@ -2782,6 +2910,25 @@ export interface components {
                 number,
                 number
             ] | null;
+        };
+        /**
+         * VehicleTelemetry
+         * @description One vehicle's figures, a value or null for each of the moments.
+         */
+        VehicleTelemetry: {
+            /** Vehicle */
+            vehicle: string;
+            /** Depth M */
+            depth_m: (number | null)[];
+            /** Altitude M */
+            altitude_m: (number | null)[];
+            /** Battery Pct */
+            battery_pct: (number | null)[];
+            /**
+             * Age S
+             * @description Seconds since it was heard
+             */
+            age_s: (number | null)[];
         };
         /**
          * VehicleView
@@ -3755,6 +3902,68 @@ export interface operations {
             };
         };
     };
+    getTelemetry: {
+        parameters: {
+            query?: {
+                /** @description Most moments in the answer, evenly spread */
+                points?: number;
+            };
+            header?: never;
+            path: {
+                /** @description The mission's id */
+                mission_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["TelemetryView"];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such mission */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
     writeNote: {
         parameters: {
             query?: never;
@@ -4066,6 +4275,185 @@ export interface operations {
             };
             /** @description It contradicts the present state */
             409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    forecastMission: {
+        parameters: {
+            query?: {
+                /** @description How deep it is where nothing is known; default: a guess */
+                floor_depth_m?: number;
+            };
+            header?: never;
+            path: {
+                /** @description The mission's id */
+                mission_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ForecastView"];
+                };
+            };
+            /** @description The body cannot be read */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such mission */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description It contradicts the present state */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body is too large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body's media type is not supported */
+            415: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    forecastDescription: {
+        parameters: {
+            query?: {
+                /** @description How deep it is where nothing is known; default: a guess */
+                floor_depth_m?: number;
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["MissionSpec"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ForecastView"];
+                };
+            };
+            /** @description The body cannot be read */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body is too large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body's media type is not supported */
+            415: {
                 headers: {
                     [name: string]: unknown;
                 };

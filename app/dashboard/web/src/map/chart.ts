@@ -80,12 +80,21 @@ export class Chart {
   #areaBounds: Bounds | null = null;
   #fitting: (() => Padding) | null = null;
   #tiles = "";
+  #styled = false;
 
-  private constructor(
-    map: MapLibreMap,
+  /** Makes the map inside an element. It is drawn on at once; what MapLibre itself shows follows when it is ready. */
+  constructor(
+    container: HTMLElement,
+    centre: LngLat,
     look: Look,
     readonly hooks: ChartHooks,
   ) {
+    const map = emptyMap(container, centre, look);
+    map.once("style.load", () => {
+      this.#styled = true;
+      this.setLook(this.#look);
+      this.#layTiles();
+    });
     this.#map = map;
     this.#look = look;
     this.#sheets = new Sheets(
@@ -110,35 +119,6 @@ export class Chart {
     this.#tellFrame();
   }
 
-  /** Makes the map inside an element; resolves when it can be drawn on. */
-  static create(container: HTMLElement, centre: LngLat, look: Look, hooks: ChartHooks): Promise<Chart> {
-    const map = new MapLibreMap({
-      container,
-      style: {
-        version: 8,
-        sources: {},
-        layers: [{ id: "sea", type: "background", paint: { "background-color": PAPER[look].sea } }],
-      },
-      center: centre,
-      zoom: 18,
-      minZoom: 2,
-      maxZoom: 23,
-      // North stays up, as on a chart: the grid's labels and the scale are read against the edges.
-      dragRotate: false,
-      pitchWithRotate: false,
-      touchPitch: false,
-      attributionControl: false,
-      fadeDuration: 0,
-      pixelRatio: EMPTY_RATIO,
-      canvasContextAttributes: { antialias: false },
-    });
-    map.touchZoomRotate.disableRotation();
-    map.keyboard.disableRotation();
-    map.addControl(new NavigationControl({ showCompass: false }), "bottom-right");
-    map.addControl(new ScaleControl({ maxWidth: 140, unit: "metric" }), "bottom-left");
-    return new Promise((resolve) => map.once("style.load", () => resolve(new Chart(map, look, hooks))));
-  }
-
   destroy(): void {
     this.#map.remove();
   }
@@ -150,17 +130,24 @@ export class Chart {
 
   setLook(look: Look): void {
     this.#look = look;
-    this.#map.setPaintProperty("sea", "background-color", PAPER[look].sea);
+    // What MapLibre has not painted yet, or a browser leaves out, is water, too.
+    this.#map.getContainer().style.backgroundColor = PAPER[look].sea;
+    if (this.#styled) this.#map.setPaintProperty("sea", "background-color", PAPER[look].sea);
     this.#sheets.redraw();
   }
 
   /** Charts under everything else, from a server of raster tiles; none without an address. */
   setTiles(address: string): void {
     if (address === this.#tiles) return;
-    if (this.#map.getLayer("tiles")) this.#map.removeLayer("tiles");
-    if (this.#map.getSource("tiles")) this.#map.removeSource("tiles");
     this.#tiles = address;
     this.#map.setPixelRatio(address ? devicePixelRatio : EMPTY_RATIO);
+    if (this.#styled) this.#layTiles();
+  }
+
+  #layTiles(): void {
+    const address = this.#tiles;
+    if (this.#map.getLayer("tiles")) this.#map.removeLayer("tiles");
+    if (this.#map.getSource("tiles")) this.#map.removeSource("tiles");
     if (!address) return;
     this.#map.addSource(
       "tiles",
@@ -315,4 +302,33 @@ export class Chart {
       yOf: (lat) => at.y(lat),
     });
   };
+}
+
+/** A map of nothing but water, which works without internet. */
+function emptyMap(container: HTMLElement, centre: LngLat, look: Look): MapLibreMap {
+  const map = new MapLibreMap({
+    container,
+    style: {
+      version: 8,
+      sources: {},
+      layers: [{ id: "sea", type: "background", paint: { "background-color": PAPER[look].sea } }],
+    },
+    center: centre,
+    zoom: 18,
+    minZoom: 2,
+    maxZoom: 23,
+    // North stays up, as on a chart: the grid's labels and the scale are read against the edges.
+    dragRotate: false,
+    pitchWithRotate: false,
+    touchPitch: false,
+    attributionControl: false,
+    fadeDuration: 0,
+    pixelRatio: EMPTY_RATIO,
+    canvasContextAttributes: { antialias: false },
+  });
+  map.touchZoomRotate.disableRotation();
+  map.keyboard.disableRotation();
+  map.addControl(new NavigationControl({ showCompass: false }), "bottom-right");
+  map.addControl(new ScaleControl({ maxWidth: 140, unit: "metric" }), "bottom-left");
+  return map;
 }

@@ -1,6 +1,6 @@
 import { describe, expect, it } from "vitest";
 import type { EventView, LiveMessage, MissionView, VehicleView, WaypointView } from "../api/types";
-import { ageSeconds, EMPTY_VIEW, reduce, withEvents } from "./live";
+import { ageSeconds, EMPTY_VIEW, reduce, withEvents, withMission } from "./live";
 
 const vehicle = (
   name: string,
@@ -166,4 +166,16 @@ describe("age", () => {
     expect(ageSeconds(vehicle("a", 1, 1, 0.5), 10_000, 9000)).toBe(0.5);
     expect(ageSeconds(vehicle("a", 1, 1, null), 0, 9000)).toBeNull();
   });
+});
+
+it("shows a mission that was asked for, and what the live view tells in its place", () => {
+  const asked = withMission(EMPTY_VIEW, mission("m"), 5000);
+  expect(asked.mission?.vehicles).toHaveLength(1);
+  expect(ageSeconds(vehicle("a", 1, 1, 2), asked.vehiclesAt, 6000)).toBe(3);
+  const told = reduce(
+    asked,
+    { type: "vehicles", time: "2026-11-21T12:00:00Z", vehicles: [vehicle("a", 1, 2)] },
+    7000,
+  );
+  expect(told.tracks.a?.tail).toHaveLength(1);
 });

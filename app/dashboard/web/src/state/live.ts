@@ -10,6 +10,7 @@ export interface TrackView {
 
 /** What a vehicle told at one moment, for the charts. */
 export interface Sample {
+  /** By the service's clock, milliseconds. */
   at: number;
   depth_m: number | null;
   altitude_m: number | null;
@@ -76,7 +77,7 @@ export function reduce(view: LiveView, message: LiveMessage, at: number): LiveVi
         tracks: extendTracks(view.tracks, message.vehicles),
         vehiclesAt: at,
         ...(at - view.sampledAt >= SAMPLE_PERIOD_MS
-          ? { samples: sampled(view.samples, message.vehicles, at), sampledAt: at }
+          ? { samples: sampled(view.samples, message.vehicles, Date.parse(message.time)), sampledAt: at }
           : {}),
       };
     case "targets":
@@ -95,6 +96,11 @@ export function reduce(view: LiveView, message: LiveMessage, at: number): LiveVi
     case "event":
       return withEvents(view, [message.event]);
   }
+}
+
+/** The mission as it was asked for once, until the live view tells more. */
+export function withMission(view: LiveView, mission: MissionView, at: number): LiveView {
+  return { ...view, mission, vehiclesAt: at, progressAt: at };
 }
 
 /** Adds lines to the log: each once, in the order of their numbers, at most the newest 2000. */

@@ -5,7 +5,7 @@ import { api, liveUrl, ServiceError, token } from "../api/client";
 import { LiveSocket } from "../api/socket";
 import type { ActionView, MissionAction, NewMission } from "../api/types";
 import { withTiles } from "../map/seafloor";
-import { EMPTY_VIEW, reduce, withEvents } from "./live";
+import { EMPTY_VIEW, reduce, withEvents, withMission } from "./live";
 import {
   fleet,
   furtherLayers,
@@ -17,6 +17,7 @@ import {
   serviceFault,
   socketStatus,
   steps,
+  telemetry,
   view,
 } from "./store";
 
@@ -105,6 +106,15 @@ function followMission(id: string): () => void {
     const events = await api.log(id, known, last);
     if (!closed) view.value = withEvents(view.peek(), events);
   };
+  // What is there and where is shown before the live view has gathered the whole ways there.
+  api
+    .mission(id)
+    .then((mission) => {
+      if (!closed && !view.peek().mission) view.value = withMission(EMPTY_VIEW, mission, Date.now());
+    })
+    .catch(() => {
+      // The live socket tells what is wrong, and tries again.
+    });
   const connections = signal(0);
   const socket = new LiveSocket(liveUrl(id), {
     onStatus: (status) => {
@@ -186,6 +196,14 @@ export async function fetchSteps(): Promise<void> {
     steps.value = [...known, ...more];
     if (more.length < 1000) return;
   }
+}
+
+/** Asks what the vehicles told before this page heard of them. */
+export async function fetchTelemetry(): Promise<void> {
+  const id = selectedId.peek();
+  if (!id) return;
+  const found = await api.telemetry(id);
+  if (selectedId.peek() === id) telemetry.value = found;
 }
 
 /** Sends a command for the selected mission. Returns the service's answer, or null when it was refused. */

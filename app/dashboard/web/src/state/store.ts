@@ -9,6 +9,7 @@ import type {
   PolygonGeometry,
   SoundingView,
   StepView,
+  TelemetryView,
   VehicleView,
   WaypointView,
 } from "../api/types";
@@ -79,6 +80,16 @@ export const openAlarms = computed(() => {
   return view.value.events.filter((e) => e.level === "alarm" && e.id > taken).reverse();
 });
 
+/** Vehicles whose last stop was not acknowledged. */
+export const unstopped = computed(() => {
+  const answers = new Map<string, boolean>();
+  for (const { kind, data } of view.value.events) {
+    if (kind === "stop" && typeof data.vehicle === "string")
+      answers.set(data.vehicle, data.acknowledged === true);
+  }
+  return new Set([...answers].flatMap(([vehicle, acknowledged]) => (acknowledged ? [] : [vehicle])));
+});
+
 export function takeAlarms(): void {
   const newest = openAlarms.value[0];
   if (newest) takenAlarms.value = { ...takenAlarms.value, [newest.mission_id]: newest.id };
@@ -138,6 +149,8 @@ export const drawingReady = signal(false);
 
 /** Steps of the shown mission as far as they were asked for, and the one that is replayed; null: what is now. */
 export const steps = signal<readonly StepView[]>([]);
+/** What the vehicles of the shown mission told before this page heard of them; null until it was asked for. */
+export const telemetry = signal<TelemetryView | null>(null);
 export const replayStep = signal<number | null>(null);
 
 /** Soundings that are not simply used, while they are looked through. */
@@ -168,4 +181,5 @@ effect(() => {
   reviewed.value = null;
   chosenSounding.value = null;
   steps.value = [];
+  telemetry.value = null;
 });

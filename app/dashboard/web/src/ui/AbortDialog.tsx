@@ -3,6 +3,7 @@ import { useEffect, useRef } from "preact/hooks";
 import type { StopView } from "../api/types";
 import { abortVehicle, act, refusal } from "../state/session";
 import { abortDialogOpen, abortOne, mission, vehicles } from "../state/store";
+import { hasEnded } from "../state/words";
 
 /** Asks once, then stays until it has shown what every vehicle answered. Of the whole team, or of one vehicle. */
 export function AbortDialog() {
@@ -36,6 +37,7 @@ export function AbortDialog() {
   };
   const what = only ? `abort of ${only}` : "abort";
   const refused = refusal.value?.what === what ? refusal.value.error : null;
+  const again = only !== null && mission.value !== null && hasEnded(mission.value.state);
   const name = only ?? mission.value?.name ?? "the mission";
 
   return (
@@ -47,15 +49,9 @@ export function AbortDialog() {
       data-testid="abort-dialog"
     >
       <h2 id="abort-title">
-        {receipts.value ? (only ? `${only} was taken out` : "Mission aborted") : `Abort ${name}?`}
+        {receipts.value ? doneTitle(only, again) : `${again ? "Stop" : "Abort"} ${name}?`}
       </h2>
-      {receipts.value ? null : (
-        <p>
-          {only
-            ? "This vehicle is told to stop and leaves the mission; the others go on. It can be added again."
-            : "Every vehicle is told to stop following its waypoints. An aborted mission cannot be resumed; its map stays."}
-        </p>
-      )}
+      {receipts.value ? null : <p>{consequence(only, again)}</p>}
       <ul class="receipts" aria-live="polite">
         {rows(receipts.value, sending.value, only).map((row) => (
           <li key={row.vehicle} class={row.tone} data-testid={`receipt-${row.vehicle}`}>
@@ -87,12 +83,25 @@ export function AbortDialog() {
             onClick={() => void abort()}
             data-testid="abort-confirm"
           >
-            {sending.value ? "Aborting…" : only ? `Abort ${only}` : "Abort mission"}
+            {sending.value ? "Aborting…" : only ? `${again ? "Stop" : "Abort"} ${only}` : "Abort mission"}
           </button>
         )}
       </div>
     </dialog>
   );
+}
+
+/** `again`: the mission has ended, and a vehicle is told once more. */
+function doneTitle(only: string | null, again: boolean): string {
+  if (only === null) return "Mission aborted";
+  return again ? `${only} was told again` : `${only} was taken out`;
+}
+
+function consequence(only: string | null, again: boolean): string {
+  if (again) return "It did not acknowledge its last stop. It is told once more.";
+  return only
+    ? "This vehicle is told to stop and leaves the mission; the others go on. It can be added again."
+    : "Every vehicle is told to stop following its waypoints. An aborted mission cannot be resumed; its map stays.";
 }
 
 function rows(receipts: readonly StopView[] | null, sending: boolean, only: string | null) {

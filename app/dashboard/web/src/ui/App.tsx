@@ -14,10 +14,13 @@ import { SpaceView } from "./SpaceView";
 import { TopBar } from "./TopBar";
 import { VehicleCards } from "./VehicleCards";
 
+/** Before the strip's height was measured. */
+const LEAST_STRIP_PX = 106;
+
 export function App() {
   const classes = ["app", panelOpen.value ? "with-missions" : "", mission.value ? "with-mission" : ""];
   return (
-    <div class={classes.join(" ")} style={{ "--strip": `${stripHeight.value}px` }}>
+    <div class={classes.join(" ")} style={{ "--strip": `${Math.max(LEAST_STRIP_PX, stripHeight.value)}px` }}>
       <TopBar />
       <main class="stage">
         <ChartPane />

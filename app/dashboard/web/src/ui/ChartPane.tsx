@@ -1,10 +1,13 @@
 import { useSignal } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
-import { Chart, type GridFrame } from "../map/chart";
+import type { Chart, GridFrame } from "../map/chart";
 import { latitude, longitude } from "../state/format";
 import { chosenSounding, cursor, in3d, isDark, mapCentre, measured, theme } from "../state/store";
 import { follow, overlaid } from "./follow";
 import { MapTools } from "./MapTools";
+
+// Most of the page's code: it is read while the service is asked, not before.
+const charting = import("../map/chart");
 
 /** The map, following the page's state. */
 export function ChartPane() {
@@ -14,35 +17,39 @@ export function ChartPane() {
   const fault = useSignal("");
 
   useEffect(() => {
-    if (!container.current) return;
+    const element = container.current;
+    if (!element) return;
+    let ended = false;
     let stop = () => {};
     const look = theme.peek() === "contrast" ? "contrast" : isDark.peek() ? "dark" : "light";
-    Chart.create(container.current, mapCentre.peek(), look, {
-      onCursor: (place) => {
-        cursor.value = place;
-      },
-      onClick: (place) => {
-        if (measured.value) measured.value = [...measured.value, place];
-      },
-      onSpot: (id) => {
-        chosenSounding.value = id;
-      },
-      onCentre: (place) => {
-        mapCentre.value = place;
-      },
-      onFrame: (next) => {
-        frame.value = next;
-      },
-    }).then(
-      (made) => {
+    charting
+      .then(({ Chart }) => {
+        if (ended) return;
+        const made = new Chart(element, mapCentre.peek(), look, {
+          onCursor: (place) => {
+            cursor.value = place;
+          },
+          onClick: (place) => {
+            if (measured.value) measured.value = [...measured.value, place];
+          },
+          onSpot: (id) => {
+            chosenSounding.value = id;
+          },
+          onCentre: (place) => {
+            mapCentre.value = place;
+          },
+          onFrame: (next) => {
+            frame.value = next;
+          },
+        });
         chart.value = made;
         stop = follow(made);
-      },
-      (error: unknown) => {
+      })
+      .catch((error: unknown) => {
         fault.value = String(error);
-      },
-    );
+      });
     return () => {
+      ended = true;
       stop();
       chart.peek()?.destroy();
     };

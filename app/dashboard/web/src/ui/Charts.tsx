@@ -1,39 +1,46 @@
 import { useComputed, useSignal, useSignalEffect } from "@preact/signals";
 import { figuresOf } from "../state/history";
-import type { Sample } from "../state/live";
-import { fetchSteps, noteFault } from "../state/session";
-import { colourOf, isDark, mission, steps, view } from "../state/store";
-import { type Line, Plot } from "./Plot";
+import { fetchSteps, fetchTelemetry, noteFault } from "../state/session";
+import { colourOf, isDark, mission, selectedId, steps, telemetry, view } from "../state/store";
+import { figuresOver, type Metric } from "../state/telemetry";
+import { hasEnded } from "../state/words";
+import { Plot } from "./Plot";
 
 const METRICS = {
   depth_m: { title: "Depth of vehicles", unit: "m", down: true },
   altitude_m: { title: "Altitude", unit: "m", down: false },
   battery_pct: { title: "Battery", unit: "%", down: false },
   age_s: { title: "Seconds since heard", unit: "s", down: false },
-} as const;
-
-type Metric = keyof typeof METRICS;
+} as const satisfies Record<Metric, unknown>;
 
 const INKS = ["#1d5c94", "#b8442b", "#2e7d6e", "#8c50b8", "#8a6d00", "#5f6f7a", "#b03a80", "#3b7fd0"];
 const DARK_INKS = ["#7ec3f5", "#ff9b7d", "#79d7c0", "#cfa6f0", "#e8cf6a", "#b6c6d2", "#f39ac8", "#9cc0ff"];
 
-/** The mission's figures over its steps, and the vehicles' over the last hour. */
+/** The mission's figures over its steps, and the vehicles' over its whole time. */
 export function Charts() {
   const metric = useSignal<Metric>("depth_m");
   // The view changes several times a second; steps and samples seldom.
   const step = useComputed(() => mission.value?.progress.step);
   const samples = useComputed(() => view.value.samples);
+  const ended = useComputed(() => mission.value !== null && hasEnded(mission.value.state));
   useSignalEffect(() => {
     step.value;
     fetchSteps().catch(noteFault);
+  });
+  useSignalEffect(() => {
+    selectedId.value;
+    ended.value;
+    // Until now; from here on the page hears by itself.
+    fetchTelemetry().catch(noteFault);
   });
   const figures = useComputed(() => figuresOf(steps.value));
   const f = figures.value;
   const ink = isDark.value ? DARK_INKS : INKS;
   const colour = (i: number) => ink[i % ink.length] as string;
   const { title, unit, down } = METRICS[metric.value];
-  const told = Object.entries(samples.value);
-  const xs = (told[0]?.[1] ?? []).map((s) => s.at / 1000);
+  // What is heard of vehicles after the end is no part of the mission.
+  const heard = ended.value ? {} : samples.value;
+  const over = figuresOver(metric.value, telemetry.value, heard);
   return (
     <div class="log charts" data-testid="charts">
       {f.numbers.length === 0 ? (
@@ -91,25 +98,17 @@ export function Charts() {
         </label>
         <Plot
           title={title}
-          xs={xs}
+          xs={over.times_s}
           unit={unit}
           time
           down={down}
-          lines={linesOf(told, metric.value, xs.length)}
+          lines={over.vehicles.map(({ name, values }) => ({
+            label: name,
+            colour: colourOf.value.get(name) ?? "#888888",
+            values,
+          }))}
         />
       </div>
     </div>
   );
-}
-
-/** Vehicles that joined later have fewer samples: theirs are the newest. */
-function linesOf(samples: readonly [string, readonly Sample[]][], metric: Metric, length: number): Line[] {
-  return samples.map(([name, values]) => ({
-    label: name,
-    colour: colourOf.value.get(name) ?? "#888888",
-    values: [
-      ...Array<null>(Math.max(0, length - values.length)).fill(null),
-      ...values.slice(-length).map((s) => s[metric]),
-    ],
-  }));
 }

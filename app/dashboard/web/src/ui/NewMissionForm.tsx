@@ -20,6 +20,7 @@ import { createMission, said } from "../state/session";
 import { describing, draftShapes, drawing, fleet, mapCentre } from "../state/store";
 import { AreaFields } from "./AreaFields";
 import { Fault, Form, Text, useForm } from "./Fields";
+import { Forecast } from "./Forecast";
 
 export function NewMissionForm() {
   const draft = useSignal(emptyDraft(mapCentre.peek()));
@@ -180,11 +181,20 @@ function Expected() {
   const corners = cornersOf(draft);
   const found = corners.length > 2 ? estimate(draft, sizeOf(corners).area_m2) : null;
   if (!found) return null;
+  const whole = Object.keys(faultsOf({ ...draft, name: draft.name || "forecast" })).length === 0;
   return (
-    <p class="hint" data-testid="estimate">
-      At most {duration(found.seconds)} and {distance(found.metres)} of tracks, as much as lines{" "}
-      {found.spacing_m.toFixed(1)} m apart.
-    </p>
+    <>
+      <p class="hint" data-testid="estimate">
+        At most {duration(found.seconds)} and {distance(found.metres)} of tracks, as much as lines{" "}
+        {found.spacing_m.toFixed(1)} m apart.
+      </p>
+      {whole ? (
+        <Forecast
+          of={JSON.stringify(toMission({ ...draft, name: "forecast" }))}
+          ask={(gone) => api.forecastOf(toMission({ ...draft, name: draft.name || "forecast" }), gone)}
+        />
+      ) : null}
+    </>
   );
 }
 

@@ -4,6 +4,7 @@ import { api } from "../api/client";
 import type { CheckStatus, PreflightView } from "../api/types";
 import { act, busyWith, refusal, said } from "../state/session";
 import { mission, preflightOpen, selectedId } from "../state/store";
+import { Forecast } from "./Forecast";
 
 const SIGNS: Record<CheckStatus, string> = { ok: "✓", note: "•", warning: "▲", problem: "✕" };
 const TONES: Record<CheckStatus, string> = { ok: "good", note: "calm", warning: "warning", problem: "alarm" };
@@ -84,6 +85,9 @@ export function PreflightDialog() {
           </li>
         ))}
       </ul>
+      {open && selectedId.value ? (
+        <Forecast of={selectedId.value} ask={(gone) => api.forecast(selectedId.peek() ?? "", gone)} />
+      ) : null}
       <div class="dialog-actions">
         <button type="button" class="command" onClick={close} data-testid="preflight-close">
           Not yet

@@ -1,6 +1,14 @@
 import { age, metres, percent } from "../state/format";
 import { localizationWords } from "../state/localization";
-import { abortDialogOpen, abortOne, mission, socketStatus, type Vehicle, vehicles } from "../state/store";
+import {
+  abortDialogOpen,
+  abortOne,
+  mission,
+  socketStatus,
+  unstopped,
+  type Vehicle,
+  vehicles,
+} from "../state/store";
 import { hasEnded, vehicleState, WAYPOINT_WORDS } from "../state/words";
 import { WaypointShape } from "./marks";
 import { TargetCards } from "./TargetCards";
@@ -29,6 +37,7 @@ function Card({ vehicle }: { vehicle: Vehicle }) {
   const v = vehicle.view;
   const state = vehicleState(v, vehicle.waypoint);
   const away = v.kind === "sim" && v.link === "unknown";
+  const ended = mission.value !== null && hasEnded(mission.value.state);
   const low = v.battery_pct !== null && v.battery_pct < LOW_BATTERY_PCT;
   return (
     <article
@@ -87,7 +96,7 @@ function Card({ vehicle }: { vehicle: Vehicle }) {
           {WAYPOINT_WORDS[vehicle.waypoint.status]}
         </p>
       ) : null}
-      {v.active && mission.value && !hasEnded(mission.value.state) ? (
+      {v.active && mission.value && (!ended || unstopped.value.has(v.name)) ? (
         <button
           type="button"
           class="abort-one"
@@ -97,7 +106,7 @@ function Card({ vehicle }: { vehicle: Vehicle }) {
             abortDialogOpen.value = true;
           }}
         >
-          Abort {v.name}
+          {ended ? `Stop ${v.name} again` : `Abort ${v.name}`}
         </button>
       ) : null}
       {v.reason ? <p class={`reason ${state.tone}`}>{v.reason}</p> : null}

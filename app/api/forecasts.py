@@ -1,0 +1,80 @@
+"""What is to be expected of a mission before it is started."""
+
+import asyncio
+from collections.abc import Coroutine
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Body, Query, Request, Response
+
+from app.api.auth import Operator
+from app.api.missions import EXAMPLE_SPEC
+from app.api.problems import problems
+from app.api.schemas import API, MissionId
+from app.api.state import Service
+from app.missions.forecasts import ForecastView
+from app.missions.spec import MissionSpec
+
+router = APIRouter(prefix=API, tags=["missions"], responses=problems("unauthenticated", "forbidden"))
+
+LOOK_S = 0.2
+"""How often it is looked whether a client still waits."""
+
+CLIENT_LEFT = 499
+"""Only the log sees it."""
+
+_FloorDepth = Annotated[
+    float | None,
+    Query(gt=0, le=11_000, allow_inf_nan=False, description="How deep it is where nothing is known; default: a guess"),
+]
+
+
+@router.post(
+    "/missions/{mission_id}/forecast",
+    operation_id="forecastMission",
+    summary="Foretell a mission",
+    response_model=ForecastView,
+    responses=problems(
+        "malformed-body", "mission-not-found", "conflict", "body-too-large", "unsupported-media-type", "invalid-request"
+    ),
+)
+async def forecast_mission(
+    mission_id: MissionId, service: Service, operator: Operator, request: Request, floor_depth_m: _FloorDepth = None
+) -> Any:
+    """Simulate what is left of a mission, over what was imported of the sea floor and a guess for the rest."""
+    return await _while_connected(request, service.forecast_of(mission_id, floor_depth_m=floor_depth_m))
+
+
+@router.post(
+    "/forecast",
+    operation_id="forecastDescription",
+    summary="Foretell a mission that is being described",
+    response_model=ForecastView,
+    responses=problems("malformed-body", "body-too-large", "unsupported-media-type", "invalid-request"),
+)
+async def forecast_description(
+    spec: Annotated[
+        MissionSpec, Body(openapi_examples={"quay": {"summary": "Two IMC vehicles at a quay", "value": EXAMPLE_SPEC}})
+    ],
+    service: Service,
+    operator: Operator,
+    request: Request,
+    floor_depth_m: _FloorDepth = None,
+) -> Any:
+    """Simulate a mission that nobody has created, over a sea floor that is guessed. Nothing is stored, nothing moves.
+
+    Takes some seconds at most; a client that does not wait any more ends it.
+    """
+    return await _while_connected(request, service.forecast(spec, floor_depth_m=floor_depth_m))
+
+
+async def _while_connected(request: Request, work: Coroutine[Any, Any, ForecastView]) -> ForecastView | Response:
+    """Return what ``work`` does, and end it when the client leaves: nobody would read the answer."""
+    task = asyncio.ensure_future(work)
+    try:
+        while not task.done():
+            if await request.is_disconnected():
+                return Response(status_code=CLIENT_LEFT)
+            await asyncio.wait([task], timeout=LOOK_S)
+        return task.result()
+    finally:
+        task.cancel()

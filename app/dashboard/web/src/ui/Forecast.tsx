@@ -1,0 +1,104 @@
+import { useSignal } from "@preact/signals";
+import { useEffect, useRef } from "preact/hooks";
+import type { ForecastView } from "../api/types";
+import { distance, duration, metres, percent } from "../state/format";
+import { said } from "../state/session";
+
+/**
+ * What a quick simulation says of a mission. It is asked for by a button; `of` names what it was made of, so that it is
+ * taken away when that changes.
+ */
+export function Forecast({ of, ask }: { of: string; ask: (gone: AbortSignal) => Promise<ForecastView> }) {
+  const found = useSignal<ForecastView | null>(null);
+  const fault = useSignal("");
+  const waiting = useSignal(false);
+  const request = useRef<AbortController | null>(null);
+
+  // Nobody waits for the answer any more: the service ends what it does.
+  useEffect(
+    () => () => {
+      request.current?.abort();
+      found.value = null;
+      fault.value = "";
+      waiting.value = false;
+    },
+    [of],
+  );
+  const start = async () => {
+    const mine = new AbortController();
+    request.current = mine;
+    waiting.value = true;
+    fault.value = "";
+    try {
+      const answer = await ask(mine.signal);
+      if (!mine.signal.aborted) found.value = answer;
+    } catch (error) {
+      if (!mine.signal.aborted) fault.value = said(error);
+    } finally {
+      if (!mine.signal.aborted) waiting.value = false;
+    }
+  };
+  const view = found.value;
+  return (
+    <section class="forecast" aria-live="polite" data-testid="forecast">
+      {view ? <Found view={view} /> : null}
+      {fault.value ? (
+        <p class="reason alarm" role="alert">
+          {fault.value}
+        </p>
+      ) : null}
+      {waiting.value ? (
+        <p class="hint">
+          Simulating the mission, some seconds…{" "}
+          <button
+            type="button"
+            class="command"
+            onClick={() => {
+              request.current?.abort();
+              waiting.value = false;
+            }}
+          >
+            Stop
+          </button>
+        </p>
+      ) : view ? null : (
+        <button type="button" class="command" data-testid="ask-forecast" onClick={() => void start()}>
+          Forecast by a quick simulation
+        </button>
+      )}
+    </section>
+  );
+}
+
+function Found({ view }: { view: ForecastView }) {
+  const simulated = view.steps_simulated < view.steps ? ` after ${view.steps_simulated} steps` : "";
+  return (
+    <>
+      <h3>Forecast, not measured</h3>
+      <dl class="figures">
+        <div class="figure">
+          <dt>Duration</dt>
+          <dd data-testid="forecast-duration">{duration(view.duration_s)}</dd>
+        </div>
+        <div class="figure">
+          <dt>Well known{simulated}</dt>
+          <dd data-testid="forecast-coverage">{percent(view.coverage_pct)}</dd>
+        </div>
+        <div class="figure">
+          <dt>Landmarks left{simulated}</dt>
+          <dd>{percent(view.remaining_pct)}</dd>
+        </div>
+        <div class="figure">
+          <dt>Mean deviation{simulated}</dt>
+          <dd>{metres(view.mean_sd_m, 2)}</dd>
+        </div>
+      </dl>
+      <p class="hint">{view.vehicles.map((v) => `${v.vehicle} ${distance(v.distance_m)}`).join(" · ")}</p>
+      <ul class="hint assumptions">
+        {view.assumptions.map((words) => (
+          <li key={words}>{words}</li>
+        ))}
+      </ul>
+    </>
+  );
+}

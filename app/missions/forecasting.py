@@ -1,0 +1,149 @@
+"""What is to be expected of a mission: its own planner, decisions and map, flown ahead over a floor that is guessed.
+
+No vehicle, no network and no clock of the vehicles takes part: legs are straight, and a map is made twelve times.
+"""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from app.exploration.planners import create_planner
+from app.mapping.types import FloatArray
+from app.missions.decision import Place, decide, make_constraints
+from app.missions.forecast_floor import Floor, floor_of, forecast_cell_m
+from app.missions.map_builder import MapBuilder
+from app.missions.members import Member
+from app.missions.spec import MissionSpec, Sensor
+from simulator.terrain import Terrain
+
+MAPS = 12
+LEARN_AT = (1, 4, 12)
+"""Maps before which the model is learned anew; in between it is kept."""
+
+LEAST_SD_M = 0.01
+TURN_S = 2.0
+"""What a vehicle takes for a waypoint beyond its way: it turns, and the next decision is made."""
+
+BEAMS_RAD = {
+    Sensor.SINGLE_BEAM: (0.0,),
+    Sensor.DVL: (-np.pi / 8, 0.0, np.pi / 8),
+    Sensor.MULTIBEAM: tuple(np.linspace(-np.pi / 3, np.pi / 3, 7)),
+}
+"""Across the way, from straight down."""
+
+
+@dataclass(frozen=True)
+class Forecast:
+    """What came of it. ``steps_flown`` is less than asked for when the time was up; then the rest is drawn out.
+
+    ``distances_m`` has every vehicle's way, ``remaining_pct`` the landmarks that stay inaccurate.
+    """
+
+    duration_s: float
+    distances_m: dict[str, float]
+    coverage_pct: float
+    remaining_pct: float
+    mean_sd_m: float | None
+    steps_flown: int
+    floor: Floor
+
+
+def forecast(
+    spec: MissionSpec,
+    members: list[Member],
+    starts_m: FloatArray,
+    prior: FloatArray,
+    *,
+    floor_depth_m: float | None = None,
+    first_step: int = 1,
+    budget_s: float,
+    stop: Callable[[], bool] = lambda: False,
+) -> Forecast:
+    """Fly a mission ahead.
+
+    Parameters
+    ----------
+    members, starts_m
+        The vehicles and where they begin, (vehicles, 2): east, north.
+    prior
+        Imported soundings, shape (n, 4): east, north, depth, deviation.
+    floor_depth_m
+        How deep the floor is where nothing was imported; None: a guess.
+    first_step
+        The first step that is still to be flown.
+    budget_s
+        How long it may work, wall clock; what is left of the mission then is drawn out.
+    stop
+        Asked at every step whether anyone still wants to know.
+    """
+    until = time.monotonic() + budget_s
+    cruise = [member.cruise_depth_m(spec.limits) for member in members]
+    floor = floor_of(spec, prior, max(cruise), floor_depth_m)
+    builder = MapBuilder(spec.local_area(), forecast_cell_m(spec), spec.accuracy_m)
+    builder.replace(np.zeros((0, 4)), prior)
+    builder.build()
+    constraints, planner = make_constraints(spec), create_planner(spec.planner.name, spec.planner.options)
+    rng = np.random.default_rng([spec.seed, 1])
+    here = np.column_stack([starts_m, np.zeros(len(members))])
+    heading = np.full(len(members), np.nan)
+    distance, seconds, flown = np.zeros(len(members)), 0.0, 0
+    steps = max(spec.steps - first_step + 1, 0)
+    every = max(1, steps // MAPS)
+    for step in range(first_step, spec.steps + 1):
+        if stop() or (flown and time.monotonic() > until):
+            break
+        places = [Place(member.name, here[i, :2], float(heading[i]), cruise[i]) for i, member in enumerate(members)]
+        decision = decide(step, spec, constraints, planner, places, builder.belief(), builder.sounded_at_m()[0])
+        target = {leg.vehicle: leg.target_m for leg in decision.legs}
+        longest = 0.0
+        for i, member in enumerate(members):
+            end = target.get(member.name, here[i])
+            leg_m = float(np.linalg.norm(end - here[i]))
+            builder.add(_sounded(member.spec.sensor, here[i], end, floor.terrain, spec.sounding_noise, rng))
+            if leg_m > 0.0:
+                heading[i] = float(np.arctan2(end[0] - here[i, 0], end[1] - here[i, 1]))
+            distance[i] += leg_m
+            longest = max(longest, leg_m)
+            here[i] = end
+        seconds += min(longest / spec.speed_mps + TURN_S, spec.step_deadline_s)
+        flown += 1
+        if flown % every == 0:
+            builder.build()
+            if flown // every in LEARN_AT:
+                builder.learn(always=True)
+    builder.build()
+    whole = steps / flown if flown else 1.0
+    newest = builder.newest
+    return Forecast(
+        duration_s=seconds * whole,
+        distances_m={member.name: float(distance[i]) * whole for i, member in enumerate(members)},
+        coverage_pct=builder.coverage_pct(),
+        remaining_pct=builder.remaining_pct(),
+        mean_sd_m=float(np.nanmean(newest.map.sd_m)) if newest is not None else None,
+        steps_flown=flown,
+        floor=floor,
+    )
+
+
+def _sounded(
+    sensor: Sensor, start: FloatArray, end: FloatArray, floor: Terrain, noise: float, rng: np.random.Generator
+) -> FloatArray:
+    """Return what is sounded on a leg, shape (n, 4): east, north, depth, deviation."""
+    way = end[:2] - start[:2]
+    length = float(np.linalg.norm(way))
+    count = max(1, int(np.ceil(length / floor.cell_m)))
+    along = start + np.linspace(1 / count, 1, count)[:, None] * (end - start)
+    across = np.array([way[1], -way[0]]) / length if length > 0 else np.zeros(2)
+    found = []
+    for angle in BEAMS_RAD[sensor]:
+        under = floor.depth_at(along[:, 0], along[:, 1])
+        reach = np.tan(angle) * np.maximum(under - along[:, 2], 0.0)
+        place = along[:, :2] + reach[:, None] * across
+        depth = floor.depth_at(place[:, 0], place[:, 1])
+        sd = np.maximum(noise * (depth - along[:, 2]) / np.cos(angle), LEAST_SD_M)
+        found.append(np.column_stack([place, depth + rng.normal(size=count) * np.nan_to_num(sd), sd]))
+    rows = np.concatenate(found)
+    used: FloatArray = rows[np.isfinite(rows).all(axis=1) & (rows[:, 2] > 0)]
+    return used
