@@ -111,9 +111,7 @@ def estimate_floor(
     shifts = np.stack(np.meshgrid(*[np.linspace(-cell, cell, looks)] * 2), axis=-1).reshape(-1, 1, 1, 2)
     around = bottom.at(np.stack([east, north], axis=-1) + shifts)
     limit = np.minimum(limit, np.where(np.isnan(around), np.inf, around).min(axis=0) - clearance_m)
-    for x, y, z in felt_m:
-        away = np.hypot(east - x, north - y)
-        limit = np.minimum(limit, z - clearance_m - margin_m(visibility_m, clearance_m) + ENVELOPE_SLOPE * away)
+    _keep_above(limit, east, north, felt_m, clearance_m + margin_m(visibility_m, clearance_m))
     return Floor(
         float(low[0]), float(low[1]), float(cell), depth, smooth, np.minimum(_envelope(limit, cell), depth - held_m)
     )
@@ -130,6 +128,17 @@ def _from_neighbours(
     local = (weight * depth_m[index]).sum(axis=1) / weight.sum(axis=1)
     trust = np.exp(-np.maximum(0.0, distance[:, 0] / visibility_m - 0.25) / FADE)
     return np.asarray(trust * local + (1.0 - trust) * depth_m.mean())
+
+
+@njit(cache=True, nogil=True)
+def _keep_above(limit: FloatArray, east: FloatArray, north: FloatArray, felt_m: FloatArray, above_m: float) -> None:
+    """Lower ``limit`` (rows, cols) in place so that vehicles clear the felt points (k, 3) and can climb to them."""
+    rows, cols = limit.shape
+    for k in range(len(felt_m)):
+        for r in range(rows):
+            for c in range(cols):
+                away = np.hypot(east[r, c] - felt_m[k, 0], north[r, c] - felt_m[k, 1])
+                limit[r, c] = min(limit[r, c], felt_m[k, 2] - above_m + ENVELOPE_SLOPE * away)
 
 
 @njit(cache=True, nogil=True, inline="always")

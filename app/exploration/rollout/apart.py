@@ -1,0 +1,173 @@
+"""Vehicles that need no links fly each its own route; what they see together is one matter.
+
+A team in a row (:mod:`app.exploration.rollout.flight`) goes only as fast as its slowest member, and is one place from
+which moving targets are ranged. Routes are flown one by one, each as the plan of a team of one, and judged together.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from app.exploration.rollout.flight import PER_WAYPOINT, WORTH_OF_EARLY, Plan, Rules, Work, fly_step
+from app.exploration.rollout.floor import Floor
+from app.exploration.rollout.free_space import Free, clear_ways, settle_waypoint
+from app.exploration.rollout.points import Points, lacks, look_whole
+from app.exploration.rollout.search import change
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+ALL_LEFT = 10_000.0
+"""Steps charged for leaving every landmark over: one of a thousand is worth a way of ten steps."""
+
+
+class Routes(NamedTuple):
+    """A route for each vehicle, with room for more waypoints than it has.
+
+    Attributes
+    ----------
+    at_m : (n_vehicles, room, 1, 2)
+        Waypoints, east and north.
+    height_m : (n_vehicles, room)
+        Height above the floor on the way to each.
+    count : (n_vehicles,)
+        How many there are.
+    """
+
+    at_m: FloatArray
+    height_m: FloatArray
+    count: IntArray
+
+
+def no_routes(vehicles: int, room: int, height_m: float) -> Routes:
+    """Return empty routes to be flown ``height_m`` above the floor."""
+    return Routes(
+        np.zeros((vehicles, room, 1, 2)), np.full((vehicles, room), height_m), np.zeros(vehicles, dtype=np.int64)
+    )
+
+
+@njit(cache=True, nogil=True)
+def route_of(routes: Routes, i: int) -> Plan:
+    """Return a view of one vehicle's route as the plan of a team of one."""
+    return Plan(routes.at_m[i], routes.height_m[i], np.zeros(1, dtype=np.int64))
+
+
+@njit(cache=True, nogil=True)
+def fly_apart(
+    start: FloatArray,
+    routes: Routes,
+    points: Points,
+    floor: Floor,
+    rules: Rules,
+    horizon: float,
+    bound: float,
+    left: FloatArray,
+) -> float:
+    """Return the score of routes in steps; less is better, inf as soon as it cannot be better than ``bound``.
+
+    Parameters
+    ----------
+    start : (n_vehicles, 3)
+        Where the vehicles are.
+    horizon : float
+        Steps left of the mission.
+    left : (m,)
+        Overwritten: what each landmark lacks in the end, 0 to 1.
+    """
+    n, size = len(start), points.information.shape[1]
+    information = points.information.copy()
+    done = np.zeros(size, dtype=np.bool_)
+    at = np.empty((n, 1, 3))
+    at[:, 0] = start
+    after = np.empty((1, 3))
+    passed = np.zeros(n, dtype=np.int64)
+    open_ = float(size)
+    cost = 0.0
+    for i in range(n):
+        cost += PER_WAYPOINT * routes.count[i]
+    t = 0.0
+    flying = True
+    while flying and open_ > 0.0 and t < horizon:
+        flying = False
+        for i in range(n):
+            count = routes.count[i]
+            if passed[i] >= count:
+                continue
+            flying = True
+            passed[i] = fly_step(at[i], route_of(routes, i), passed[i], count, floor, rules, after)
+            at[i] = after
+            open_ -= look_whole(
+                at[i, 0, 0],
+                at[i, 0, 1],
+                at[i, 0, 2],
+                points,
+                rules.visibility_m,
+                rules.relative_noise,
+                information,
+                done,
+            )
+        if flying:
+            t += 1.0
+            cost += WORTH_OF_EARLY * open_ / points.work.total
+            if t + cost >= bound:
+                return np.inf
+    missing = 0.0
+    for m in range(size):
+        left[m] = 0.0 if done[m] else lacks(information, m, points.variance_m2)
+        missing += left[m]
+    return float(t + cost + ALL_LEFT * 0.5 * (open_ + missing) / points.work.total)
+
+
+@njit(cache=True, nogil=True)
+def improve_apart(
+    start: FloatArray,
+    routes: Routes,
+    trial: Routes,
+    score: float,
+    left: FloatArray,
+    draws: FloatArray,
+    points: Points,
+    floor: Floor,
+    rules: Rules,
+    horizon: float,
+    free: Free,
+) -> float:
+    """Try a change to one vehicle's route per row of ``draws`` and keep those that better the score.
+
+    ``routes`` and ``left`` (m,) are kept up to date, ``trial`` is scratch; the first number of a row chooses the
+    vehicle. Returns the score.
+    """
+    n = len(start)
+    trial_left = np.empty(len(left))
+    for i in range(n):
+        _copy(routes, trial, i)
+    for d in range(len(draws)):
+        i = int(draws[d, 0] * n)
+        count = routes.count[i]
+        plan = route_of(trial, i)
+        here = start[i : i + 1, :2].copy()
+        changed, first, last = change(plan, count, here, points.work, rules, left, draws[d, 1:])
+        if first >= 0:
+            ok = True
+            for k in range(first, min(last, changed - 1) + 1):
+                ok = ok and settle_waypoint(free, plan.at_m[k], plan.chain, np.inf)
+            changed = clear_ways(free, plan, changed, here, first, last + 1, np.inf) if ok else -1
+            if changed >= 0:
+                trial.count[i] = changed
+                value = fly_apart(start, trial, points, floor, rules, horizon, score, trial_left)
+                if value < score:
+                    score = value
+                    left[:] = trial_left
+                    _copy(trial, routes, i)
+                    continue
+        _copy(routes, trial, i)
+    return score
+
+
+@njit(cache=True, nogil=True)
+def _copy(source: Routes, target: Routes, i: int) -> None:
+    target.at_m[i] = source.at_m[i]
+    target.height_m[i] = source.height_m[i]
+    target.count[i] = source.count[i]
