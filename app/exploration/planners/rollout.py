@@ -21,6 +21,7 @@ from app.exploration.options import PlannerOptions
 from app.exploration.planners.base import PlannerBase, settle
 from app.exploration.problem import Belief, Proposal, Situation
 from app.exploration.rollout.apart_mission import apart_mission
+import app.exploration.rollout.apart_mission as AM
 from app.exploration.rollout.backbones import Backbone, backbones, with_team
 from app.exploration.rollout.flight import Course, Plan, Rules, Work, begin, fly_plan, fly_step, make_work, new_course
 from app.exploration.rollout.floor import Floor, estimate_floor, fill_depths, margin_m
@@ -179,7 +180,8 @@ class RolloutPlanner(PlannerBase):
             whole, bottom, self._felt.points_m, self._free[1], self._range, self.options, np.random.default_rng(seed)
         )
         if set(whole.vehicles) == set(self._routes):
-            best = mission.refine(mission.plan([self._routes[name] for name in whole.vehicles]), self.options.rollouts)
+            kept = mission.plan([self._routes[name] for name in whole.vehicles])
+            best = mission.refine(kept, self.options.rollouts, AM.WORTH)
         else:
             best = mission.first()
         positions = team.positions.copy()

@@ -10,8 +10,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from app.exploration.rollout.flight import PER_WAYPOINT, WORTH_OF_EARLY, Plan, Rules, Work, fly_step
-from app.exploration.rollout.floor import Floor
+from app.exploration.rollout.flight import PER_WAYPOINT, SINKING, WORTH_OF_EARLY, Plan, Rules, advance
+from app.exploration.rollout.floor import Floor, sample
 from app.exploration.rollout.free_space import Free, clear_ways, settle_waypoint
 from app.exploration.rollout.points import Points, lacks, look_whole
 from app.exploration.rollout.search import change
@@ -21,6 +21,10 @@ IntArray = NDArray[np.int64]
 
 ALL_LEFT = 10_000.0
 """Steps charged for leaving every landmark over: one of a thousand is worth a way of ten steps."""
+
+
+HALVINGS = 6
+"""Times that the reach of a step is narrowed down between what is too far for its climb and what is not."""
 
 
 class Routes(NamedTuple):
@@ -52,6 +56,39 @@ def no_routes(vehicles: int, room: int, height_m: float) -> Routes:
 def route_of(routes: Routes, i: int) -> Plan:
     """Return a view of one vehicle's route as the plan of a team of one."""
     return Plan(routes.at_m[i], routes.height_m[i], np.zeros(1, dtype=np.int64))
+
+
+@njit(cache=True, nogil=True)
+def fly_alone(at: FloatArray, plan: Plan, k: int, count: int, floor: Floor, rules: Rules, out: FloatArray) -> int:
+    """Fly one vehicle's step from ``at`` (1, 3) into ``out``; return the index of the next waypoint to be reached.
+
+    It goes as far along its route as its climb or descent leaves of the step.
+    """
+    step = rules.step_m * (1.0 - 1e-9)
+    there = np.empty((1, 2))
+    enough, too_far, reach = 0.0, step, step
+    here = at[:, :2]
+    after = k
+    for halving in range(HALVINGS + 2):
+        after = advance(here, plan, k, count, reach, rules.cut_corners, there)
+        x, y = there[0, 0], there[0, 1]
+        wish = sample(floor.smooth_m, floor.west_m, floor.south_m, floor.cell_m, x, y)
+        wish -= plan.height_m[min(k, count - 1)]
+        limit = sample(floor.deepest_m, floor.west_m, floor.south_m, floor.cell_m, x, y)
+        # Sinking may wait a little; most of what is in sight would be missed from much higher up.
+        lowest = at[0, 2] + SINKING * step
+        z = min(max(rules.min_depth_m, min(rules.max_depth_m, wish, limit)), lowest)
+        out[0, 0], out[0, 1], out[0, 2] = x, y, z
+        fits = (x - at[0, 0]) ** 2 + (y - at[0, 1]) ** 2 + (z - at[0, 2]) ** 2 <= step * step
+        if fits:
+            enough = reach
+            if halving == 0 or halving > HALVINGS:
+                break
+        else:
+            too_far = reach
+        reach = enough if halving == HALVINGS else 0.5 * (enough + too_far)
+    out[0, 2] = min(max(out[0, 2], at[0, 2] - step), at[0, 2] + step)
+    return after
 
 
 @njit(cache=True, nogil=True)
@@ -96,7 +133,7 @@ def fly_apart(
             if passed[i] >= count:
                 continue
             flying = True
-            passed[i] = fly_step(at[i], route_of(routes, i), passed[i], count, floor, rules, after)
+            passed[i] = fly_alone(at[i], route_of(routes, i), passed[i], count, floor, rules, after)
             at[i] = after
             open_ -= look_whole(
                 at[i, 0, 0],
@@ -133,6 +170,7 @@ def improve_apart(
     rules: Rules,
     horizon: float,
     free: Free,
+    worth: float,
 ) -> float:
     """Try a change to one vehicle's route per row of ``draws`` and keep those that better the score.
 
@@ -156,8 +194,8 @@ def improve_apart(
             changed = clear_ways(free, plan, changed, here, first, last + 1, np.inf) if ok else -1
             if changed >= 0:
                 trial.count[i] = changed
-                value = fly_apart(start, trial, points, floor, rules, horizon, score, trial_left)
-                if value < score:
+                value = fly_apart(start, trial, points, floor, rules, horizon, score - worth, trial_left)
+                if value < score - worth:
                     score = value
                     left[:] = trial_left
                     _copy(trial, routes, i)

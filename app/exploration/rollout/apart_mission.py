@@ -9,9 +9,9 @@ from app.estimation import RangeSensor
 from app.exploration.bottom import Bottom
 from app.exploration.options import PlannerOptions
 from app.exploration.problem import Situation
-from app.exploration.rollout.apart import Routes, fly_apart, improve_apart, no_routes, route_of
-from app.exploration.rollout.flight import Rules, fly_step
-from app.exploration.rollout.floor import Floor, estimate_floor, fill_depths, margin_m
+from app.exploration.rollout.apart import Routes, fly_alone, fly_apart, improve_apart, no_routes, route_of
+from app.exploration.rollout.flight import Rules
+from app.exploration.rollout.floor import HELD_NEAR, Floor, estimate_floor, fill_depths, let_stay, margin_m
 from app.exploration.rollout.free_space import Free, clear_ways, settle_waypoint
 from app.exploration.rollout.points import Points, make_points
 from app.exploration.rollout.sectors import sectors
@@ -28,6 +28,9 @@ BUCKETS = 3
 
 HEIGHT = 0.45
 """Height above the floor to fly at, in visibilities, where vehicles may come that low."""
+
+WORTH = 2.0
+"""Steps that a change must save: what is found on one guess of all that is unknown does not hold on the next."""
 
 FRESH_STARTS, FRESH_SEARCH = 4, 100
 FIRST_SEARCH = 1000
@@ -102,13 +105,13 @@ class ApartMission:
         chosen = [self.refine(self.plan(routes), FRESH_SEARCH) for _, _, routes in sorted(flown)[:FRESH_STARTS]]
         return self.refine(min(chosen, key=lambda best: best.score), FIRST_SEARCH)
 
-    def refine(self, best: Best, changes: int) -> Best:
+    def refine(self, best: Best, changes: int, worth: float = 0.0) -> Best:
         """Try so many changes; the routes are improved in place."""
         trial = no_routes(len(self._start), ROOM, self._height)
         best.score = float(
             improve_apart(
                 self._start, best.routes, trial, best.score, best.left, self._rng.random((changes, DRAWS + 1)),
-                self._points, self._floor, self._rules, self._horizon, self._free,
+                self._points, self._floor, self._rules, self._horizon, self._free, worth,
             )
         )  # fmt: skip
         return best
@@ -125,7 +128,7 @@ class ApartMission:
             wish = here.copy()
             if count:
                 part_of_step = self._rules._replace(step_m=part * step)
-                passed.append(int(fly_step(here, route, 0, count, self._floor, part_of_step, wish)))
+                passed.append(int(fly_alone(here, route, 0, count, self._floor, part_of_step, wish)))
             else:
                 passed.append(0)
             spare = np.sqrt(max(0.0, (part * step) ** 2 - ((wish - here)[0, :2] ** 2).sum()))
@@ -150,15 +153,17 @@ def apart_mission(
     constraints, sight = team.constraints, sensor.visibility_m
     clearance = constraints.min_altitude_m
     height = max(HEIGHT * sight, clearance + margin_m(sight, clearance), constraints.lowest_m)
+    lower = min(LOWER * sight, max(0.0, constraints.lowest_m - clearance))
     unknown = min(constraints.max_depth_m, float(team.positions[:, 2].max()) + height)
     floor = estimate_floor(
         team.belief, bottom, felt_m, constraints.area, sight, clearance, unknown, constraints.lowest_m
     )
+    if lower > 0.0:
+        let_stay(floor, team.positions, height, HELD_NEAR * sight)
     rules = Rules(
         constraints.max_step_m, np.inf, constraints.min_depth_m, min(constraints.max_depth_m, 1e9), sight,
         sensor.relative_noise, free.everywhere, directed=True,
     )  # fmt: skip
-    lower = min(LOWER * sight, max(0.0, constraints.lowest_m - clearance))
     return ApartMission(team, floor, free, rules, height, lower, options.accuracy_sd_m, rng)
 
 

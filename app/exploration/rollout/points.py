@@ -20,7 +20,7 @@ BoolArray = NDArray[np.bool_]
 DEPTH_PRESUMED = 0.5
 """Deviation, in visibilities, of the depth that a landmark is presumed to have before anybody has seen it."""
 
-SURELY = 0.9
+SURELY = 0.8
 """Part of the accuracy threshold that flights must come below: estimates come out a little worse than the bound."""
 
 
