@@ -36,13 +36,13 @@ class Routes(NamedTuple):
         Waypoints, east and north.
     height_m : (n_vehicles, room)
         Height above the floor on the way to each.
-    count : (n_vehicles,)
+    counts : (n_vehicles,)
         How many there are.
     """
 
     at_m: FloatArray
     height_m: FloatArray
-    count: IntArray
+    counts: IntArray
 
 
 def no_routes(vehicles: int, room: int, height_m: float) -> Routes:
@@ -123,13 +123,13 @@ def fly_apart(
     open_ = float(size)
     cost = 0.0
     for i in range(n):
-        cost += PER_WAYPOINT * routes.count[i]
+        cost += PER_WAYPOINT * routes.counts[i]
     t = 0.0
     flying = True
     while flying and open_ > 0.0 and t < horizon:
         flying = False
         for i in range(n):
-            count = routes.count[i]
+            count = routes.counts[i]
             if passed[i] >= count:
                 continue
             flying = True
@@ -183,7 +183,7 @@ def improve_apart(
         _copy(routes, trial, i)
     for d in range(len(draws)):
         i = int(draws[d, 0] * n)
-        count = routes.count[i]
+        count = routes.counts[i]
         plan = route_of(trial, i)
         here = start[i : i + 1, :2].copy()
         changed, first, last = change(plan, count, here, points.work, rules, left, draws[d, 1:])
@@ -193,7 +193,7 @@ def improve_apart(
                 ok = ok and settle_waypoint(free, plan.at_m[k], plan.chain, np.inf)
             changed = clear_ways(free, plan, changed, here, first, last + 1, np.inf) if ok else -1
             if changed >= 0:
-                trial.count[i] = changed
+                trial.counts[i] = changed
                 value = fly_apart(start, trial, points, floor, rules, horizon, score - worth, trial_left)
                 if value < score - worth:
                     score = value
@@ -208,4 +208,4 @@ def improve_apart(
 def _copy(source: Routes, target: Routes, i: int) -> None:
     target.at_m[i] = source.at_m[i]
     target.height_m[i] = source.height_m[i]
-    target.count[i] = source.count[i]
+    target.counts[i] = source.counts[i]

@@ -14,8 +14,8 @@ from app.exploration.rollout.flight import Rules
 from app.exploration.rollout.floor import HELD_NEAR, Floor, estimate_floor, fill_depths, let_stay, margin_m
 from app.exploration.rollout.free_space import Free, clear_ways, settle_waypoint
 from app.exploration.rollout.points import Points, make_points
-from app.exploration.rollout.sectors import sectors
 from app.exploration.rollout.search import DRAWS
+from app.exploration.rollout.sectors import sectors
 
 FloatArray = NDArray[np.float64]
 
@@ -84,16 +84,12 @@ class ApartMission:
                 if settle_waypoint(self._free, route.at_m[count], route.chain, np.inf):
                     changed = int(clear_ways(self._free, route, count + 1, here, count, count, np.inf))
                     count = max(count, changed)
-            routes.count[i] = count
+            routes.counts[i] = count
         left = np.empty(len(self._points.work.need))
         return Best(routes, self._fly(routes, np.inf, left), left)
 
     def _fly(self, routes: Routes, bound: float, left: FloatArray) -> float:
-        return float(
-            fly_apart(
-                self._start, routes, self._points, self._floor, self._rules, self._horizon, bound, left
-            )
-        )
+        return float(fly_apart(self._start, routes, self._points, self._floor, self._rules, self._horizon, bound, left))
 
     def first(self) -> Best:
         """Return the best of the sweeps over what is left, improved."""
@@ -123,7 +119,7 @@ class ApartMission:
         to has steps that the plan's estimate smooths.
         """
         wishes, passed, here = [], [], self._start[i : i + 1]
-        route, count, step = route_of(best.routes, i), int(best.routes.count[i]), self._rules.step_m
+        route, count, step = route_of(best.routes, i), int(best.routes.counts[i]), self._rules.step_m
         for part in PARTS:
             wish = here.copy()
             if count:
