@@ -14,7 +14,7 @@ from app.exploration.dynamic import Targets
 from app.exploration.options import PlannerOptions
 from app.exploration.planners import create_planner
 from app.exploration.problem import Belief, Situation
-from app.exploration.rollout.apart import fly_alone, fly_apart, improve_apart, no_routes, route_of
+from app.exploration.rollout.apart import fly_alone, improve_apart, judge, no_paths, no_routes, route_of, trace
 from app.exploration.rollout.flight import Rules
 from app.exploration.rollout.floor import estimate_floor, let_stay, sample
 from app.exploration.rollout.free_space import free_space
@@ -25,6 +25,7 @@ from app.exploration.rollout.sectors import sectors
 CUBE = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 RULES = Rules(0.05, np.inf, -1.0, 1.0, 0.4, 0.1, cut_corners=True, directed=True)
 NAMES = ("a", "b", "c")
+FREE = np.ones(3)
 HELD, ACCURACY = 0.3, 0.1
 START = np.array([[-0.8, -0.8, 0.2], [-0.7, -0.8, 0.2], [-0.8, -0.7, 0.2]])
 LIMITS = Constraints(CUBE, max_step_m=0.05, min_depth_m=-1.0, max_depth_m=1.0, min_altitude_m=0.2, held_altitude_m=HELD)
@@ -55,6 +56,14 @@ def make_case(seed, stops=4):
     routes.at_m[:, :stops, 0] = rng.uniform(-0.9, 0.9, (3, stops, 2))
     routes.counts[:] = stops
     return belief, points, floor, routes
+
+
+def flown(routes, points, floor):
+    """Fly routes to their ends; return score, paths and what is left."""
+    paths, left = no_paths(3, 300), np.empty(points.information.shape[1])
+    for i in range(3):
+        trace(START, i, routes, floor, RULES, paths)
+    return judge(paths, FREE, int(routes.counts.sum()), points, RULES, np.inf, left), paths, left
 
 
 def open_landmarks(information):
@@ -119,17 +128,26 @@ def test_the_search_never_worsens_routes_and_reports_their_true_score(seed, zone
     _, points, floor, routes = make_case(seed)
     zone = np.array([[-0.2, -0.2], [0.2, -0.2], [0.2, 0.2], [-0.2, 0.2]])
     free = free_space(Constraints(CUBE, (zone,) if zones else ()))
-    left = np.empty(points.information.shape[1])
-    before = fly_apart(START, routes, points, floor, RULES, 300.0, np.inf, left)
+    before, paths, left = flown(routes, points, floor)
     draws = np.random.default_rng(seed).random((60, DRAWS + 1))
     score = improve_apart(
-        START, routes, no_routes(3, 12, HELD), before, left, draws, points, floor, RULES, 300.0, free, 1.0
-    )
+        START, FREE, routes, paths, no_routes(3, 12, HELD), no_paths(3, 300), before, left, draws, points, floor, RULES,
+        free, 1.0,
+    )  # fmt: skip
     assert score <= before
-    again = np.empty_like(left)
-    assert fly_apart(START, routes, points, floor, RULES, 300.0, np.inf, again) == pytest.approx(score)
-    np.testing.assert_allclose(left, again)
-    assert fly_apart(START, routes, points, floor, RULES, 300.0, score * 0.99, again) >= score * 0.99
+    again, _, left_again = flown(routes, points, floor)
+    assert again == pytest.approx(score)
+    np.testing.assert_allclose(left, left_again)
+    assert judge(paths, FREE, int(routes.counts.sum()), points, RULES, score * 0.99, left) >= score * 0.99
+
+
+@given(seed=st.integers(0, 1000))
+@settings(max_examples=10, deadline=None)
+def test_a_vehicle_that_is_away_half_of_the_time_is_not_relied_upon(seed):
+    _, points, floor, routes = make_case(seed)
+    whole, paths, _ = flown(routes, points, floor)
+    half = judge(paths, np.array([0.5, 1.0, 1.0]), 12, points, RULES, np.inf, np.empty(points.information.shape[1]))
+    assert half >= whole
 
 
 def test_first_routes_give_each_vehicle_a_strip_of_its_own():

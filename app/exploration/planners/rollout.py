@@ -71,8 +71,10 @@ LAST_SHARE = 4
 FRESH_STARTS = 4
 FRESH_SEARCH = 60
 
-APART_SHARE = 4
-"""Part of the search that is enough for routes apart: 10, 30 and 100 changes per step came out the same."""
+AWAY_STEPS = 40.0
+"""Steps over which it is averaged what part of its time a vehicle is on errands."""
+
+LEAST_FREE = 0.1
 
 
 @dataclass
@@ -106,6 +108,7 @@ class RolloutPlanner(PlannerBase):
         self._free: tuple[Constraints, Free] | None = None
         self._felt = FeltBottom()
         self._routes: dict[str, FloatArray] = {}
+        self._away: dict[str, float] = {}
 
     def _remember(self) -> dict[str, Any]:
         kept = self._kept
@@ -117,6 +120,7 @@ class RolloutPlanner(PlannerBase):
             "heights": self._heights,
             "felt": self._felt.remember(),
             "routes": self._routes,
+            "away": self._away,
         }
 
     def _recall(self, state: dict[str, Any]) -> None:
@@ -124,6 +128,7 @@ class RolloutPlanner(PlannerBase):
         self._heights = np.array(state["heights"], dtype=np.float64)
         self._felt.recall(state["felt"])
         self._routes = {name: np.array(at, dtype=np.float64).reshape(-1, 2) for name, at in state["routes"].items()}
+        self._away = {str(name): float(part) for name, part in state["away"].items()}
         self._kept = None
         if state["at_m"] is not None:
             at = np.array(state["at_m"], dtype=np.float64).reshape(-1, len(self._names), 2)
@@ -178,12 +183,23 @@ class RolloutPlanner(PlannerBase):
         constraints = team.constraints
         if self._free is None or not _same(self._free[0], constraints):
             self._free = (constraints, free_space(constraints))
+        self._away = {name: self._away.get(name, 0.0) for name in whole.vehicles}
+        for name in whole.vehicles:
+            self._away[name] += (float(name not in team.vehicles) - self._away[name]) / AWAY_STEPS
+        free_part = np.array([max(LEAST_FREE, 1.0 - self._away[name]) for name in whole.vehicles])
         mission = apart_mission(
-            whole, bottom, self._felt.points_m, self._free[1], self._range, self.options, np.random.default_rng(seed)
+            whole,
+            free_part,
+            bottom,
+            self._felt.points_m,
+            self._free[1],
+            self._range,
+            self.options,
+            np.random.default_rng(seed),
         )
         if set(whole.vehicles) == set(self._routes):
             kept = mission.plan([self._routes[name] for name in whole.vehicles])
-            best = mission.refine(kept, self.options.rollouts // APART_SHARE, WORTH)
+            best = mission.refine(kept, self.options.rollouts, WORTH)
         else:
             best = mission.first()
         positions = team.positions.copy()

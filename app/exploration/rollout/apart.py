@@ -91,60 +91,74 @@ def fly_alone(at: FloatArray, plan: Plan, k: int, count: int, floor: Floor, rule
     return after
 
 
+class Paths(NamedTuple):
+    """Where vehicles come to be step by step on their routes.
+
+    Attributes
+    ----------
+    at_m : (n_vehicles, horizon, 3)
+        After each step; meaningless beyond its end.
+    length : (n_vehicles,)
+        How many steps each takes to the end of its route, at most ``horizon``.
+    """
+
+    at_m: FloatArray
+    length: IntArray
+
+
+def no_paths(vehicles: int, horizon: int) -> Paths:
+    """Return paths that lead nowhere, with room for ``horizon`` steps."""
+    return Paths(np.zeros((vehicles, horizon, 3)), np.zeros(vehicles, dtype=np.int64))
+
+
 @njit(cache=True, nogil=True)
-def fly_apart(
-    start: FloatArray,
-    routes: Routes,
-    points: Points,
-    floor: Floor,
-    rules: Rules,
-    horizon: float,
-    bound: float,
-    left: FloatArray,
+def trace(start: FloatArray, i: int, routes: Routes, floor: Floor, rules: Rules, paths: Paths) -> None:
+    """Fly the route of vehicle ``i`` from its place in ``start`` (n_vehicles, 3), into its row of ``paths``."""
+    at, after = start[i : i + 1].copy(), np.empty((1, 3))
+    plan, count, k, t = route_of(routes, i), routes.counts[i], 0, 0
+    while k < count and t < paths.at_m.shape[1]:
+        k = fly_alone(at, plan, k, count, floor, rules, after)
+        at[:] = after
+        paths.at_m[i, t] = after[0]
+        t += 1
+    paths.length[i] = t
+
+
+@njit(cache=True, nogil=True)
+def judge(
+    paths: Paths, free_part: FloatArray, waypoints: int, points: Points, rules: Rules, bound: float, left: FloatArray
 ) -> float:
-    """Return the score of routes in steps; less is better, inf as soon as it cannot be better than ``bound``.
+    """Return the score of a team's paths in steps; less is better, inf as soon as it cannot be better than ``bound``.
 
     Parameters
     ----------
-    start : (n_vehicles, 3)
-        Where the vehicles are.
-    horizon : float
-        Steps left of the mission.
+    free_part : (n_vehicles,)
+        Of its time, what each is expected to have for its route; errands take the rest.
+    waypoints : int
+        How many the routes have together.
     left : (m,)
         Overwritten: what each landmark lacks in the end, 0 to 1.
     """
-    n, size = len(start), points.information.shape[1]
+    n, size = len(free_part), points.information.shape[1]
     information = points.information.copy()
     done = np.zeros(size, dtype=np.bool_)
-    at = np.empty((n, 1, 3))
-    at[:, 0] = start
-    after = np.empty((1, 3))
-    passed = np.zeros(n, dtype=np.int64)
-    open_ = float(size)
-    cost = 0.0
-    for i in range(n):
-        cost += PER_WAYPOINT * routes.counts[i]
-    t = 0.0
+    flown = np.zeros(n, dtype=np.int64)
+    credit = np.zeros(n)
+    open_, t, cost = float(size), 0.0, PER_WAYPOINT * waypoints
     flying = True
-    while flying and open_ > 0.0 and t < horizon:
+    while flying and open_ > 0.0 and t < paths.at_m.shape[1]:
         flying = False
         for i in range(n):
-            count = routes.counts[i]
-            if passed[i] >= count:
+            if flown[i] >= paths.length[i]:
                 continue
             flying = True
-            passed[i] = fly_alone(at[i], route_of(routes, i), passed[i], count, floor, rules, after)
-            at[i] = after
-            open_ -= look_whole(
-                at[i, 0, 0],
-                at[i, 0, 1],
-                at[i, 0, 2],
-                points,
-                rules.visibility_m,
-                rules.relative_noise,
-                information,
-                done,
-            )
+            credit[i] += free_part[i]
+            if credit[i] < 1.0:
+                continue
+            credit[i] -= 1.0
+            x, y, z = paths.at_m[i, flown[i]]
+            flown[i] += 1
+            open_ -= look_whole(x, y, z, points, rules.visibility_m, rules.relative_noise, information, done)
         if flying:
             t += 1.0
             cost += WORTH_OF_EARLY * open_ / points.work.total
@@ -160,33 +174,35 @@ def fly_apart(
 @njit(cache=True, nogil=True)
 def improve_apart(
     start: FloatArray,
+    free_part: FloatArray,
     routes: Routes,
+    paths: Paths,
     trial: Routes,
+    trial_paths: Paths,
     score: float,
     left: FloatArray,
     draws: FloatArray,
     points: Points,
     floor: Floor,
     rules: Rules,
-    horizon: float,
     free: Free,
     worth: float,
 ) -> float:
-    """Try a change to one vehicle's route per row of ``draws`` and keep those that better the score.
+    """Try a change to one vehicle's route per row of ``draws`` and keep those that better the score by ``worth``.
 
-    ``routes`` and ``left`` (m,) are kept up to date, ``trial`` is scratch; the first number of a row chooses the
-    vehicle. Returns the score.
+    ``routes``, ``paths`` and ``left`` (m,) are kept up to date, the ``trial`` ones are scratch; the first number of a
+    row chooses the vehicle. Returns the score.
     """
     n = len(start)
     trial_left = np.empty(len(left))
     for i in range(n):
         _copy(routes, trial, i)
+        _copy_path(paths, trial_paths, i)
     for d in range(len(draws)):
         i = int(draws[d, 0] * n)
-        count = routes.counts[i]
         plan = route_of(trial, i)
         here = start[i : i + 1, :2].copy()
-        changed, first, last = change(plan, count, here, points.work, rules, left, draws[d, 1:])
+        changed, first, last = change(plan, routes.counts[i], here, points.work, rules, left, draws[d, 1:])
         if first >= 0:
             ok = True
             for k in range(first, min(last, changed - 1) + 1):
@@ -194,12 +210,15 @@ def improve_apart(
             changed = clear_ways(free, plan, changed, here, first, last + 1, np.inf) if ok else -1
             if changed >= 0:
                 trial.counts[i] = changed
-                value = fly_apart(start, trial, points, floor, rules, horizon, score - worth, trial_left)
+                trace(start, i, trial, floor, rules, trial_paths)
+                value = judge(trial_paths, free_part, trial.counts.sum(), points, rules, score - worth, trial_left)
                 if value < score - worth:
                     score = value
                     left[:] = trial_left
                     _copy(trial, routes, i)
+                    _copy_path(trial_paths, paths, i)
                     continue
+                _copy_path(paths, trial_paths, i)
         _copy(routes, trial, i)
     return score
 
@@ -209,3 +228,10 @@ def _copy(source: Routes, target: Routes, i: int) -> None:
     target.at_m[i] = source.at_m[i]
     target.height_m[i] = source.height_m[i]
     target.counts[i] = source.counts[i]
+
+
+@njit(cache=True, nogil=True)
+def _copy_path(source: Paths, target: Paths, i: int) -> None:
+    length = source.length[i]
+    target.at_m[i, :length] = source.at_m[i, :length]
+    target.length[i] = length

@@ -9,7 +9,17 @@ from app.estimation import RangeSensor
 from app.exploration.bottom import Bottom
 from app.exploration.options import PlannerOptions
 from app.exploration.problem import Situation
-from app.exploration.rollout.apart import Routes, fly_alone, fly_apart, improve_apart, no_routes, route_of
+from app.exploration.rollout.apart import (
+    Paths,
+    Routes,
+    fly_alone,
+    improve_apart,
+    judge,
+    no_paths,
+    no_routes,
+    route_of,
+    trace,
+)
 from app.exploration.rollout.flight import Rules
 from app.exploration.rollout.floor import HELD_NEAR, Floor, estimate_floor, fill_depths, let_stay, margin_m
 from app.exploration.rollout.free_space import Free, clear_ways, settle_waypoint
@@ -45,9 +55,10 @@ PARTS = (1.0, 0.8, 0.5, 0.2)
 
 @dataclass
 class Best:
-    """Routes with their score and what they leave, (m,)."""
+    """Routes with their paths, their score and what they leave, (m,)."""
 
     routes: Routes
+    paths: Paths
     score: float
     left: FloatArray
 
@@ -56,13 +67,14 @@ class ApartMission:
     """Everything about a step that routes are judged by."""
 
     def __init__(
-        self, team: Situation, floor: Floor, free: Free, rules: Rules, height_m: float, lower_m: float,
-        accuracy_sd_m: float, rng: np.random.Generator,
+        self, team: Situation, free_part: FloatArray, floor: Floor, free: Free, rules: Rules, height_m: float,
+        lower_m: float, accuracy_sd_m: float, rng: np.random.Generator,
     ) -> None:  # fmt: skip
         belief = team.belief
         self._start = np.ascontiguousarray(team.positions)
+        self._free_part = free_part
         self._area, self._floor, self._free, self._rules = team.constraints.area, floor, free, rules
-        self._horizon = float(max(1, team.steps_total - team.step + 1))
+        self._horizon = max(1, team.steps_total - team.step + 1)
         self._height, self._lower, self._rng = height_m, lower_m, rng
         open_ = np.flatnonzero(~belief.accurate)
         row = open_[_sample(belief.xy_m[open_])]
@@ -85,11 +97,13 @@ class ApartMission:
                     changed = int(clear_ways(self._free, route, count + 1, here, count, count, np.inf))
                     count = max(count, changed)
             routes.counts[i] = count
+        paths = no_paths(len(self._start), self._horizon)
+        for i in range(len(self._start)):
+            trace(self._start, i, routes, self._floor, self._rules, paths)
         left = np.empty(len(self._points.work.need))
-        return Best(routes, self._fly(routes, np.inf, left), left)
-
-    def _fly(self, routes: Routes, bound: float, left: FloatArray) -> float:
-        return float(fly_apart(self._start, routes, self._points, self._floor, self._rules, self._horizon, bound, left))
+        count_all = int(routes.counts.sum())
+        score = float(judge(paths, self._free_part, count_all, self._points, self._rules, np.inf, left))
+        return Best(routes, paths, score, left)
 
     def first(self) -> Best:
         """Return the best of the sweeps over what is left, improved."""
@@ -103,11 +117,11 @@ class ApartMission:
 
     def refine(self, best: Best, changes: int, worth: float = 0.0) -> Best:
         """Try so many changes; the routes are improved in place."""
-        trial = no_routes(len(self._start), ROOM, self._height)
+        trial, scratch = no_routes(len(self._start), ROOM, self._height), no_paths(len(self._start), self._horizon)
         best.score = float(
             improve_apart(
-                self._start, best.routes, trial, best.score, best.left, self._rng.random((changes, DRAWS + 1)),
-                self._points, self._floor, self._rules, self._horizon, self._free, worth,
+                self._start, self._free_part, best.routes, best.paths, trial, scratch, best.score, best.left,
+                self._rng.random((changes, DRAWS + 1)), self._points, self._floor, self._rules, self._free, worth,
             )
         )  # fmt: skip
         return best
@@ -138,6 +152,7 @@ class ApartMission:
 
 def apart_mission(
     team: Situation,
+    free_part: FloatArray,
     bottom: Bottom,
     felt_m: FloatArray,
     free: Free,
@@ -145,7 +160,10 @@ def apart_mission(
     options: PlannerOptions,
     rng: np.random.Generator,
 ) -> ApartMission:
-    """Return what the routes of a team are judged by; ``felt_m`` (k, 3) is where altimeters felt the bottom."""
+    """Return what the routes of a team are judged by.
+
+    ``free_part`` (n_vehicles,) is what each has of its time; ``felt_m`` (k, 3) is where altimeters felt the bottom.
+    """
     constraints, sight = team.constraints, sensor.visibility_m
     clearance = constraints.min_altitude_m
     height = max(HEIGHT * sight, clearance + margin_m(sight, clearance), constraints.lowest_m)
@@ -160,7 +178,7 @@ def apart_mission(
         constraints.max_step_m, np.inf, constraints.min_depth_m, min(constraints.max_depth_m, 1e9), sight,
         sensor.relative_noise, free.everywhere, directed=True,
     )  # fmt: skip
-    return ApartMission(team, floor, free, rules, height, lower, options.accuracy_sd_m, rng)
+    return ApartMission(team, free_part, floor, free, rules, height, lower, options.accuracy_sd_m, rng)
 
 
 def _sample(xy: FloatArray) -> NDArray[np.int64]:
