@@ -26,11 +26,14 @@ class PlainEkf:
         A landmark belongs to ``A`` once all three standard deviations are below this.
     box_m : (2, 3)
         The landmarks are presumed evenly in it: its middle and variance are the prior.
+    fixed_m : float or None
+        Standard deviation that the filter takes every range to have, whatever its length; None: it knows the noise.
     """
 
     noise: float
     accuracy_sd_m: float
     box_m: FloatArray
+    fixed_m: float | None = None
 
     def update(
         self,
@@ -50,7 +53,8 @@ class PlainEkf:
         r = np.maximum(np.linalg.norm(u, axis=1), 1e-9)
         u /= r[:, None]
         Pu = np.einsum("mij,mj->mi", covariance[index], u)
-        variance = (u * Pu).sum(axis=1) + (self.noise * r) ** 2 + position_sd_m**2
+        sd = self.noise * r if self.fixed_m is None else np.full(len(r), self.fixed_m)
+        variance = (u * Pu).sum(axis=1) + sd**2 + position_sd_m**2
         mean[index] += Pu * ((ranges - r) / variance)[:, None]
         covariance[index] -= Pu[:, :, None] * Pu[:, None, :] / variance[:, None, None]
         looks[index] += 1

@@ -36,7 +36,9 @@ class TraceGreedy:
         points, covariances, sight = self._features(situation)
         moves = neighbouring_moves(constraints.max_step_m * (1.0 - 1e-9))
         n, m = len(origin), len(moves)
-        noise = self._world.scenario.sensor.relative_noise
+        scenario = self._world.scenario
+        noise, fixed = scenario.sensor.relative_noise, scenario.fixed_noise
+        noise, fixed_m = (noise, 0.0) if fixed is None else (0.0, fixed)
 
         def best_of(configurations: FloatArray) -> FloatArray:
             allowed = configurations[constraints.feasible(origin, configurations, bottom)]
@@ -44,7 +46,7 @@ class TraceGreedy:
                 return origin
             # Equal ones are left to chance: far from everything no move is better than another.
             allowed = allowed[rng.permutation(len(allowed))]
-            trace = foretold_trace(allowed, points, covariances, sight, noise)
+            trace = foretold_trace(allowed, points, covariances, sight, noise, fixed_m)
             return np.asarray(allowed[np.argmin(trace)])
 
         if m**n * len(points) <= MOST_PAIRS:
@@ -79,9 +81,17 @@ class TraceGreedy:
 
 @njit(cache=True, nogil=True)
 def foretold_trace(
-    configurations: FloatArray, points: FloatArray, covariances: FloatArray, sight: FloatArray, noise: float
+    configurations: FloatArray,
+    points: FloatArray,
+    covariances: FloatArray,
+    sight: FloatArray,
+    noise: float,
+    fixed_m: float = 0.0,
 ) -> FloatArray:
-    """Return the sum of all variances after each of the configurations (c, n_vehicles, 3) has measured, (c,)."""
+    """Return the sum of all variances after each of the configurations (c, n_vehicles, 3) has measured, (c,).
+
+    The deviation of a range is ``noise`` times its length and ``fixed_m`` besides.
+    """
     result = np.zeros(len(configurations))
     P = np.empty((3, 3))
     u = np.empty(3)
@@ -102,7 +112,7 @@ def foretold_trace(
                     Pu[k] = (P[k, 0] * u[0] + P[k, 1] * u[1] + P[k, 2] * u[2]) / np.sqrt(r2)
                 for k in range(3):
                     along += u[k] * Pu[k] / np.sqrt(r2)
-                variance = along + noise * noise * (r2 + along)
+                variance = along + noise * noise * (r2 + along) + fixed_m * fixed_m
                 for a in range(3):
                     for b in range(3):
                         P[a, b] -= Pu[a] * Pu[b] / variance

@@ -95,6 +95,8 @@ class TrackScenario:
         Whether vehicles range to each other.
     plain_ekf : bool
         Whether landmarks are estimated by one first-order filter each, as in MED13's figure 1.
+    fixed_noise : float or None
+        Standard deviation that this filter, and who plans by it, takes every range to have; None: it knows the noise.
     """
 
     terrain: Terrain | None = None
@@ -113,6 +115,7 @@ class TrackScenario:
     shared_fix: bool = True
     cooperative: bool = True
     plain_ekf: bool = False
+    fixed_noise: float | None = None
 
     @property
     def sensor(self) -> RangeSensor:
@@ -152,7 +155,9 @@ class TrackWorld:
         self.known = Landmarks3D.unknown(len(self.truth))
         self.estimator: Landmark3DEstimator | PlainEkf = Landmark3DEstimator(scenario.sensor, scenario.accuracy, NEVER)
         if scenario.plain_ekf:
-            self.estimator = PlainEkf(scenario.sensor.relative_noise, scenario.accuracy, self._presumed_area())
+            self.estimator = PlainEkf(
+                scenario.sensor.relative_noise, scenario.accuracy, self._presumed_area(), scenario.fixed_noise
+            )
         self.presumed = Presumed(self._presumed_area(), scenario.visibility, flat=self._cube is not None)
         self._low = np.array([*-self.half, CEILING])
         self._high = np.array([*self.half, SHALLOWEST if self._cube is not None else DEEPEST])

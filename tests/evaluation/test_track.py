@@ -8,13 +8,15 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from app.estimation import Fading
+from app.estimation import Fading, Landmarks3D
+from app.evaluation.plain_ekf import PlainEkf
 from app.evaluation.presumed import Presumed
 from app.evaluation.trace_greedy import foretold_trace
 from app.evaluation.track import run_track
 from app.evaluation.track_cli import evaluate_app
 from app.evaluation.track_world import TrackScenario, TrackWorld
 from app.evaluation.tracking import consistency
+from app.evaluation.tracking.setups import TrackJob
 from app.exploration.options import PlannerOptions
 from simulator.seafloors import generate
 
@@ -78,7 +80,8 @@ def test_ranges_and_own_fixes_serve_where_fixes_are_not_shared():
     assert run.resurfacings >= 2
 
 
-def test_the_foretold_trace_is_that_of_a_slow_reference():
+@pytest.mark.parametrize(("noise", "fixed"), [(0.1, 0.0), (0.0, 0.1)])
+def test_the_foretold_trace_is_that_of_a_slow_reference(noise, fixed):
     rng = np.random.default_rng(0)
     points, team = rng.uniform(-1, 1, (4, 3)), rng.uniform(-1, 1, (1, 3, 3))
     covariances = np.array([a @ a.T + 0.1 * np.eye(3) for a in rng.standard_normal((4, 3, 3))])
@@ -88,10 +91,22 @@ def test_the_foretold_trace_is_that_of_a_slow_reference():
             u = point - place
             r = np.linalg.norm(u)
             H = u[None] / r
-            S = H @ P @ H.T + 0.01 * (r**2 + H @ P @ H.T)
+            S = H @ P @ H.T + noise**2 * (r**2 + H @ P @ H.T) + fixed**2
             P = P - P @ H.T @ H @ P / S
         expected += np.trace(P)
-    assert foretold_trace(team, points, covariances, np.full(4, np.inf), 0.1)[0] == pytest.approx(expected)
+    assert foretold_trace(team, points, covariances, np.full(4, np.inf), noise, fixed)[0] == pytest.approx(expected)
+
+
+def test_a_filter_that_takes_its_noise_to_be_fixed_believes_ranges_from_afar_too_much():
+    box = np.array([[-1.0, -1.0, 0.0], [1.0, 1.0, 1.0]])
+    far = (0, np.array([-1.0, 0.0, -1.0]), np.array([0]), np.array([1.8]))
+    knows, believes = (PlainEkf(0.1, 0.05, box, fixed).update(Landmarks3D.unknown(1), *far) for fixed in (None, 0.05))
+    assert np.trace(believes.covariance_m2[0]) < np.trace(knows.covariance_m2[0])
+
+
+def test_runs_that_were_kept_before_a_scenario_learned_more_are_found_again():
+    assert "fixed_noise" not in TrackJob("figure1", "cao", SMALL, OPTIONS).key
+    assert "fixed_noise" in TrackJob("figure1", "cao", replace(SMALL, fixed_noise=0.1), OPTIONS).key
 
 
 def call(*arguments):

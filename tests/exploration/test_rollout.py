@@ -55,7 +55,7 @@ def make_case(seed, vehicles=3, waypoints=5):
         turned = row @ np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
         plan.at_m[k] = np.clip(rng.uniform(-0.7, 0.7, 2) + turned, -1.0, 1.0)
         plan.height_m[k] = rng.uniform(0.12, 0.25)
-    work = make_work(np.column_stack([belief.xy_m, depth]), np.full(len(depth), 2500.0), CUBE, 0.15, 2.0, 250, 30.0)
+    work, _ = make_work(np.column_stack([belief.xy_m, depth]), np.full(len(depth), 2500.0), CUBE, 0.15, 2.0, 250, 30.0)
     return start, plan, waypoints, work, floor
 
 

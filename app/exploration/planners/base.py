@@ -36,6 +36,7 @@ class PlannerBase(ABC):
         self.sensor = sensor
         self._cruise: dict[str, float] = {}
         self._errands = Errands()
+        self._whole: Situation | None = None
 
     def propose(self, situation: Situation, rng: np.random.Generator) -> Proposal:
         """Return a configuration that obeys ``situation.constraints``; hold when none is found."""
@@ -60,6 +61,7 @@ class PlannerBase(ABC):
 
     def _with_errands(self, team: Situation, bottom: Bottom, seed: int) -> Proposal:
         """Decide for the vehicles that are on no errand, then send the others on theirs."""
+        self._whole = team
         # Bathymeter missions rise along their legs instead; see app.missions.decision.
         localization = None if self._surveys else team.localization
         if not self.runs_errands or (team.targets is None and localization is None):

@@ -20,6 +20,7 @@ from app.exploration.lacking import Lacking, lacking
 from app.exploration.options import PlannerOptions
 from app.exploration.planners.base import PlannerBase, settle
 from app.exploration.problem import Belief, Proposal, Situation
+from app.exploration.rollout.apart_mission import WORTH, apart_mission
 from app.exploration.rollout.backbones import Backbone, backbones, with_team
 from app.exploration.rollout.flight import Course, Plan, Rules, Work, begin, fly_plan, fly_step, make_work, new_course
 from app.exploration.rollout.floor import Floor, estimate_floor, fill_depths, margin_m
@@ -70,6 +71,11 @@ LAST_SHARE = 4
 FRESH_STARTS = 4
 FRESH_SEARCH = 60
 
+AWAY_STEPS = 40.0
+"""Steps over which it is averaged what part of its time a vehicle is on errands."""
+
+LEAST_FREE = 0.1
+
 
 @dataclass
 class _Best:
@@ -101,6 +107,8 @@ class RolloutPlanner(PlannerBase):
         self._planned = 0
         self._free: tuple[Constraints, Free] | None = None
         self._felt = FeltBottom()
+        self._routes: dict[str, FloatArray] = {}
+        self._away: dict[str, float] = {}
 
     def _remember(self) -> dict[str, Any]:
         kept = self._kept
@@ -111,12 +119,16 @@ class RolloutPlanner(PlannerBase):
             "chain": None if kept is None else kept.chain,
             "heights": self._heights,
             "felt": self._felt.remember(),
+            "routes": self._routes,
+            "away": self._away,
         }
 
     def _recall(self, state: dict[str, Any]) -> None:
         self._names, self._planned = tuple(state["names"]), int(state["planned"])
         self._heights = np.array(state["heights"], dtype=np.float64)
         self._felt.recall(state["felt"])
+        self._routes = {name: np.array(at, dtype=np.float64).reshape(-1, 2) for name, at in state["routes"].items()}
+        self._away = {str(name): float(part) for name, part in state["away"].items()}
         self._kept = None
         if state["at_m"] is not None:
             at = np.array(state["at_m"], dtype=np.float64).reshape(-1, len(self._names), 2)
@@ -125,6 +137,8 @@ class RolloutPlanner(PlannerBase):
     def _decide(self, team: Situation, bottom: Bottom, seed: int) -> Proposal:
         if team.belief.accurate.all():
             return Proposal(self._rest(team, bottom), 0.0)
+        if team.belief.covariance_m2 is not None and team.belief.on_floor and np.isinf(team.constraints.com_range_m):
+            return self._decide_apart(team, bottom, seed)
         if self._names != team.vehicles:
             if self._kept is not None:
                 self._kept = with_team(self._kept, self._names, team.vehicles)
@@ -161,6 +175,47 @@ class RolloutPlanner(PlannerBase):
         self._felt.ask(team.vehicles, positions)
         terms = {"finish": team.step - 1 + float(best.course.state[best.count, 0]), "waypoints": float(best.count)}
         return Proposal(positions, -best.score, terms)
+
+    def _decide_apart(self, team: Situation, bottom: Bottom, seed: int) -> Proposal:
+        """Decide where no links are needed: a route for each vehicle, those on errands included."""
+        whole = team if self._whole is None else self._whole
+        self._felt.feel(team)
+        constraints = team.constraints
+        if self._free is None or not _same(self._free[0], constraints):
+            self._free = (constraints, free_space(constraints))
+        self._away = {name: self._away.get(name, 0.0) for name in whole.vehicles}
+        for name in whole.vehicles:
+            self._away[name] += (float(name not in team.vehicles) - self._away[name]) / AWAY_STEPS
+        free_part = np.array([max(LEAST_FREE, 1.0 - self._away[name]) for name in whole.vehicles])
+        mission = apart_mission(
+            whole,
+            free_part,
+            bottom,
+            self._felt.points_m,
+            self._free[1],
+            self._range,
+            self.options,
+            np.random.default_rng(seed),
+        )
+        if set(whole.vehicles) == set(self._routes):
+            kept = mission.plan([self._routes[name] for name in whole.vehicles])
+            best = mission.refine(kept, self.options.rollouts, WORTH)
+        else:
+            best = mission.first()
+        positions = team.positions.copy()
+        rows = {name: whole.vehicles.index(name) for name in whole.vehicles}
+        self._routes = {name: best.routes.at_m[i, : best.routes.counts[i], 0].copy() for name, i in rows.items()}
+        for j, name in enumerate(team.vehicles):
+            wishes, passed = mission.steps(best, rows[name])
+            tries = np.repeat(positions[None], len(wishes), axis=0)
+            tries[:, j] = wishes
+            feasible = np.flatnonzero(constraints.feasible(team.positions, tries, bottom))
+            if len(feasible):
+                positions = tries[feasible[0]]
+                self._routes[name] = self._routes[name][passed[feasible[0]] :]
+        positions, _ = settle(team, bottom, positions[None])
+        self._felt.ask(team.vehicles, positions)
+        return Proposal(positions, -best.score, {"waypoints": float(best.routes.counts.sum())})
 
     def _rest(self, team: Situation, bottom: Bottom) -> FloatArray:
         """Return where the vehicles wait, (n_vehicles, 3): here, or closer together when that breaks a limit."""
@@ -258,7 +313,7 @@ class _Mission:
         return make_work(
             xyz, left.need[shown], self._area, self._sight / BUCKETS, allowed, round(tasks * part), max(1.0, most),
             left.direction[shown],
-        )  # fmt: skip
+        )[0]  # fmt: skip
 
     @property
     def far_from_done(self) -> bool:

@@ -114,11 +114,11 @@ def make_work(
     area: FloatArray,
     bucket_m: float,
     allowed: float,
-    total: int,
+    total: float,
     most_per_step: float,
     direction: FloatArray | None = None,
-) -> Work:
-    """Sort landmarks (m, 3) into buckets over the bounding box of ``area`` (n, 2)."""
+) -> tuple[Work, IntArray]:
+    """Sort landmarks (m, 3) into buckets over the bounding box of ``area`` (n, 2); return the order too, (m,)."""
     along = np.zeros_like(xyz) if direction is None else direction
     low, high = area.min(axis=0), area.max(axis=0)
     cols, rows = (max(1, int(k)) for k in np.ceil((high - low) / bucket_m))
@@ -128,7 +128,7 @@ def make_work(
     order = np.argsort(bucket, kind="stable")
     first = np.zeros(rows * cols + 1, dtype=np.int64)
     first[1:] = np.cumsum(np.bincount(bucket, minlength=rows * cols))
-    return Work(
+    work = Work(
         np.ascontiguousarray(xyz[order].T, dtype=np.float64),
         np.ascontiguousarray(along[order].T, dtype=np.float64),
         np.ascontiguousarray(need[order], dtype=np.float64),
@@ -142,6 +142,7 @@ def make_work(
         float(max(1, total)),
         float(most_per_step),
     )
+    return work, order
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -30,6 +30,13 @@ MARGIN_OF_ROOM = 0.25
 """The same as a part of what visibility leaves above the required clearance, where that is less."""
 
 
+ROUGHLY = 0.1
+"""Deviation, in visibilities, up to which the depth of a landmark counts as estimated."""
+
+HELD_NEAR = 0.3
+"""How far the height that a vehicle holds by its altimeter says something of the floor, in visibilities."""
+
+
 class Floor(NamedTuple):
     """Rasters over the area; the first row is the southernmost, the first column the westernmost.
 
@@ -92,8 +99,10 @@ def estimate_floor(
     cols, rows = (max(2, int(k)) for k in np.ceil((high - low) / cell) + 1)
     east, north = np.meshgrid(low[0] + cell * np.arange(cols), low[1] + cell * np.arange(rows))
     known = np.isfinite(belief.depth_m)
-    # Where whole positions are estimated their deviation is not that of the depth.
-    trust = belief.sd_m if belief.covariance_m2 is None else np.zeros(len(belief.sd_m))
+    trust = belief.sd_m
+    if belief.covariance_m2 is not None:
+        # Where the estimate says less than that, others have filled the depth in.
+        trust = np.minimum(np.sqrt(belief.covariance_m2[:, 2, 2]), ROUGHLY * visibility_m)
     if known.any():
         depth = _from_neighbours(
             np.vstack([belief.xy_m[known], felt_m[:, :2]]),
@@ -111,9 +120,7 @@ def estimate_floor(
     shifts = np.stack(np.meshgrid(*[np.linspace(-cell, cell, looks)] * 2), axis=-1).reshape(-1, 1, 1, 2)
     around = bottom.at(np.stack([east, north], axis=-1) + shifts)
     limit = np.minimum(limit, np.where(np.isnan(around), np.inf, around).min(axis=0) - clearance_m)
-    for x, y, z in felt_m:
-        away = np.hypot(east - x, north - y)
-        limit = np.minimum(limit, z - clearance_m - margin_m(visibility_m, clearance_m) + ENVELOPE_SLOPE * away)
+    _keep_above(limit, east, north, felt_m, clearance_m + margin_m(visibility_m, clearance_m))
     return Floor(
         float(low[0]), float(low[1]), float(cell), depth, smooth, np.minimum(_envelope(limit, cell), depth - held_m)
     )
@@ -130,6 +137,36 @@ def _from_neighbours(
     local = (weight * depth_m[index]).sum(axis=1) / weight.sum(axis=1)
     trust = np.exp(-np.maximum(0.0, distance[:, 0] / visibility_m - 0.25) / FADE)
     return np.asarray(trust * local + (1.0 - trust) * depth_m.mean())
+
+
+@njit(cache=True, nogil=True)
+def let_stay(floor: Floor, positions: FloatArray, height_m: float, reach_m: float) -> None:
+    """Lower the estimate in place where vehicles at ``positions`` (n, 3) are closer to it than their altimeters allow.
+
+    Whoever holds its height above the sea floor need not climb because an estimate says that it is too low.
+    """
+    rows, cols = floor.depth_m.shape
+    for k in range(len(positions)):
+        x, y, z = positions[k, 0], positions[k, 1], positions[k, 2]
+        smooth = z - sample(floor.smooth_m, floor.west_m, floor.south_m, floor.cell_m, x, y) + height_m
+        deepest = z - sample(floor.deepest_m, floor.west_m, floor.south_m, floor.cell_m, x, y)
+        for r in range(rows):
+            for c in range(cols):
+                away = np.hypot(floor.west_m + c * floor.cell_m - x, floor.south_m + r * floor.cell_m - y) / reach_m
+                fading = np.exp(-away * away)
+                floor.smooth_m[r, c] += max(0.0, smooth) * fading
+                floor.deepest_m[r, c] += max(0.0, deepest) * fading
+
+
+@njit(cache=True, nogil=True)
+def _keep_above(limit: FloatArray, east: FloatArray, north: FloatArray, felt_m: FloatArray, above_m: float) -> None:
+    """Lower ``limit`` (rows, cols) in place so that vehicles clear the felt points (k, 3) and can climb to them."""
+    rows, cols = limit.shape
+    for k in range(len(felt_m)):
+        for r in range(rows):
+            for c in range(cols):
+                away = np.hypot(east[r, c] - felt_m[k, 0], north[r, c] - felt_m[k, 1])
+                limit[r, c] = min(limit[r, c], felt_m[k, 2] - above_m + ENVELOPE_SLOPE * away)
 
 
 @njit(cache=True, nogil=True, inline="always")

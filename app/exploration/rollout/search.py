@@ -94,7 +94,7 @@ def _visit(plan: Plan, count: int, start: FloatArray, x: float, y: float, u: Flo
 
 
 @njit(cache=True, nogil=True)
-def _change(
+def change(
     plan: Plan, count: int, start: FloatArray, work: Work, rules: Rules, left_need: FloatArray, u: FloatArray
 ) -> tuple[int, int, int]:
     """Change the plan at random; return its number of waypoints and the first and last one changed (-1: nothing)."""
@@ -242,7 +242,7 @@ def improve(
     start = course.at_m[0][:, :2].copy()
     for d in range(len(draws)):
         _copy(plan, trial, count)
-        changed, first, last = _change(trial, count, start, work, rules, left_need, draws[d])
+        changed, first, last = change(trial, count, start, work, rules, left_need, draws[d])
         if first < 0:
             continue
         ok = True

@@ -1,0 +1,191 @@
+"""Plans for vehicles that need no links, where landmarks' whole positions are estimated: made, improved, flown."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.estimation import RangeSensor
+from app.exploration.bottom import Bottom
+from app.exploration.options import PlannerOptions
+from app.exploration.problem import Situation
+from app.exploration.rollout.apart import (
+    Paths,
+    Routes,
+    fly_alone,
+    improve_apart,
+    judge,
+    no_paths,
+    no_routes,
+    route_of,
+    trace,
+)
+from app.exploration.rollout.flight import Rules
+from app.exploration.rollout.floor import HELD_NEAR, Floor, estimate_floor, fill_depths, let_stay, margin_m
+from app.exploration.rollout.free_space import Free, clear_ways, settle_waypoint
+from app.exploration.rollout.points import Points, make_points
+from app.exploration.rollout.search import DRAWS
+from app.exploration.rollout.sectors import sectors
+
+FloatArray = NDArray[np.float64]
+
+ROOM = 48
+SAMPLE, SAMPLE_GRID = 400, 20
+"""Landmarks that plans are judged by, and cells per side of the area that they are taken from."""
+
+BUCKETS = 3
+"""Buckets of landmarks per visibility."""
+
+HEIGHT = 0.45
+"""Height above the floor to fly at, in visibilities, where vehicles may come that low."""
+
+WORTH = 2.0
+"""Steps that a change must save: what is found on one guess of all that is unknown does not hold on the next."""
+
+FRESH_STARTS, FRESH_SEARCH = 4, 100
+FIRST_SEARCH = 1000
+
+LOWER = 0.1
+"""How far below what the estimate of the floor allows vehicles are sent where their altimeters hold the clearance
+anyway, in visibilities."""
+
+PARTS = (1.0, 0.8, 0.5, 0.2)
+"""Parts of a step to try when the whole one is not feasible."""
+
+
+@dataclass
+class Best:
+    """Routes with their paths, their score and what they leave, (m,)."""
+
+    routes: Routes
+    paths: Paths
+    score: float
+    left: FloatArray
+
+
+class ApartMission:
+    """Everything about a step that routes are judged by."""
+
+    def __init__(
+        self, team: Situation, free_part: FloatArray, floor: Floor, free: Free, rules: Rules, height_m: float,
+        lower_m: float, accuracy_sd_m: float, rng: np.random.Generator,
+    ) -> None:  # fmt: skip
+        belief = team.belief
+        self._start = np.ascontiguousarray(team.positions)
+        self._free_part = free_part
+        self._area, self._floor, self._free, self._rules = team.constraints.area, floor, free, rules
+        self._horizon = max(1, team.steps_total - team.step + 1)
+        self._height, self._lower, self._rng = height_m, lower_m, rng
+        open_ = np.flatnonzero(~belief.accurate)
+        row = open_[_sample(belief.xy_m[open_])]
+        xyz = np.column_stack([belief.xy_m, belief.depth_m])[row]
+        fill_depths(xyz, floor)
+        total = len(belief.accurate) * len(row) / len(open_)
+        self._points: Points = make_points(
+            xyz, belief, row, accuracy_sd_m, self._area, rules.visibility_m, BUCKETS, total
+        )
+
+    def plan(self, waypoints: list[FloatArray]) -> Best:
+        """Make routes of waypoints (k, 2) per vehicle and fly them; what cannot be reached is left out."""
+        routes = no_routes(len(self._start), ROOM, self._height)
+        for i, stops in enumerate(waypoints):
+            route, count = route_of(routes, i), 0
+            here = np.ascontiguousarray(self._start[i : i + 1, :2])
+            for stop in stops[: ROOM - 4]:
+                route.at_m[count, 0] = stop
+                if settle_waypoint(self._free, route.at_m[count], route.chain, np.inf):
+                    changed = int(clear_ways(self._free, route, count + 1, here, count, count, np.inf))
+                    count = max(count, changed)
+            routes.counts[i] = count
+        paths = no_paths(len(self._start), self._horizon)
+        for i in range(len(self._start)):
+            trace(self._start, i, routes, self._floor, self._rules, paths)
+        left = np.empty(len(self._points.work.need))
+        count_all = int(routes.counts.sum())
+        score = float(judge(paths, self._free_part, count_all, self._points, self._rules, np.inf, left))
+        return Best(routes, paths, score, left)
+
+    def first(self) -> Best:
+        """Return the best of the sweeps over what is left, improved."""
+        here = self._start[:, :2]
+        flown = [
+            (self.plan(routes).score, k, routes)
+            for k, routes in enumerate(sectors(self._points.work.xyz[:2].T, here, self._area, self._rules.visibility_m))
+        ]
+        chosen = [self.refine(self.plan(routes), FRESH_SEARCH) for _, _, routes in sorted(flown)[:FRESH_STARTS]]
+        return self.refine(min(chosen, key=lambda best: best.score), FIRST_SEARCH)
+
+    def refine(self, best: Best, changes: int, worth: float = 0.0) -> Best:
+        """Try so many changes; the routes are improved in place."""
+        trial, scratch = no_routes(len(self._start), ROOM, self._height), no_paths(len(self._start), self._horizon)
+        best.score = float(
+            improve_apart(
+                self._start, self._free_part, best.routes, best.paths, trial, scratch, best.score, best.left,
+                self._rng.random((changes, DRAWS + 1)), self._points, self._floor, self._rules, self._free, worth,
+            )
+        )  # fmt: skip
+        return best
+
+    def steps(self, best: Best, i: int) -> tuple[FloatArray, list[int]]:
+        """Return where vehicle ``i`` may go now, (k, 3), best first, and how many waypoints each of these passes.
+
+        The first is the route's; the others go less far and higher, for when the sea floor that the constraints hold
+        to has steps that the plan's estimate smooths.
+        """
+        wishes, passed, here = [], [], self._start[i : i + 1]
+        route, count, step = route_of(best.routes, i), int(best.routes.counts[i]), self._rules.step_m
+        for part in PARTS:
+            wish = here.copy()
+            if count:
+                part_of_step = self._rules._replace(step_m=part * step)
+                passed.append(int(fly_alone(here, route, 0, count, self._floor, part_of_step, wish)))
+            else:
+                passed.append(0)
+            spare = np.sqrt(max(0.0, (part * step) ** 2 - ((wish - here)[0, :2] ** 2).sum()))
+            deeper = min(wish[0, 2] + self._lower, max(wish[0, 2], here[0, 2] + (1.0 - 1e-9) * spare))
+            wishes.append(np.array([*wish[0, :2], min(deeper, self._rules.max_depth_m)]))
+            if part < 1.0:
+                wishes.append(wish[0] - [0.0, 0.0, 0.99 * np.sqrt(1.0 - part**2) * step])
+                passed.append(passed[-1])
+        return np.array(wishes), passed
+
+
+def apart_mission(
+    team: Situation,
+    free_part: FloatArray,
+    bottom: Bottom,
+    felt_m: FloatArray,
+    free: Free,
+    sensor: RangeSensor,
+    options: PlannerOptions,
+    rng: np.random.Generator,
+) -> ApartMission:
+    """Return what the routes of a team are judged by.
+
+    ``free_part`` (n_vehicles,) is what each has of its time; ``felt_m`` (k, 3) is where altimeters felt the bottom.
+    """
+    constraints, sight = team.constraints, sensor.visibility_m
+    clearance = constraints.min_altitude_m
+    height = max(HEIGHT * sight, clearance + margin_m(sight, clearance), constraints.lowest_m)
+    lower = min(LOWER * sight, max(0.0, constraints.lowest_m - clearance))
+    unknown = min(constraints.max_depth_m, float(team.positions[:, 2].max()) + height)
+    floor = estimate_floor(
+        team.belief, bottom, felt_m, constraints.area, sight, clearance, unknown, constraints.lowest_m
+    )
+    if lower > 0.0:
+        let_stay(floor, team.positions, height, HELD_NEAR * sight)
+    rules = Rules(
+        constraints.max_step_m, np.inf, constraints.min_depth_m, min(constraints.max_depth_m, 1e9), sight,
+        sensor.relative_noise, free.everywhere, directed=True,
+    )  # fmt: skip
+    return ApartMission(team, free_part, floor, free, rules, height, lower, options.accuracy_sd_m, rng)
+
+
+def _sample(xy: FloatArray) -> NDArray[np.int64]:
+    """Return evenly many of the landmarks at ``xy`` (m, 2): flights over all of them would tell no more."""
+    n = len(xy)
+    if n <= SAMPLE:
+        return np.arange(n)
+    east, north = np.floor((xy - xy.min(axis=0)) / (np.ptp(xy) / SAMPLE_GRID + 1e-12)).T
+    order = np.lexsort((np.where(north % 2 == 0, east, -east), north))
+    return np.asarray(np.sort(order[:: -(-n // SAMPLE)]), dtype=np.int64)

@@ -1,0 +1,117 @@
+"""Landmarks whose whole position is unknown, as flights look at them: each with the information held about it.
+
+A range tells something along its own direction only, so that what a flight teaches of a landmark is a matrix. A
+straight line, however long, leaves the direction across it and across the line of sight unknown; a second line at the
+side, or across, settles it. Flights that foretell the matrices know that; single figures do not.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from app.exploration.problem import Belief
+from app.exploration.rollout.flight import NEAREST, Work, make_work
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+DEPTH_PRESUMED = 0.5
+"""Deviation, in visibilities, of the depth that a landmark is presumed to have before anybody has seen it."""
+
+SURELY = 0.8
+"""Part of the accuracy threshold that flights must come below: estimates come out a little worse than the bound."""
+
+
+class Points(NamedTuple):
+    """Landmarks still to be done.
+
+    Attributes
+    ----------
+    work : Work
+        Where they are, in buckets; ``need`` is 1 each.
+    information : (6, m)
+        Inverse covariances: xx, xy, xz, yy, yz, zz.
+    variance_m2 : float
+        Along every axis a landmark is accurate below this.
+    """
+
+    work: Work
+    information: FloatArray
+    variance_m2: float
+
+
+def make_points(
+    xyz: FloatArray, belief: Belief, row: NDArray[np.int64], accuracy_sd_m: float, area: FloatArray, sight_m: float,
+    buckets: int, total: float,
+) -> Points:  # fmt: skip
+    """Return the landmarks ``row`` (m,) of a belief, presumed at ``xyz`` (m, 3), as flights look at them.
+
+    ``total`` is how many there are in all, done ones included, of which these are a fair sample.
+    """
+    assert belief.covariance_m2 is not None  # noqa: S101 - only where whole positions are estimated
+    information = np.zeros((len(row), 3, 3))
+    information[:, 2, 2] = 1.0 / (DEPTH_PRESUMED * sight_m) ** 2
+    seen = np.isfinite(belief.sd_m[row])
+    information[seen] = np.linalg.inv(belief.covariance_m2[row[seen]] + 1e-12 * np.eye(3))
+    work, order = make_work(xyz, np.ones(len(row)), area, sight_m / buckets, 0.0, total, 1.0)
+    six = information[order][:, (0, 0, 0, 1, 1, 2), (0, 1, 2, 1, 2, 2)]
+    return Points(work, np.ascontiguousarray(six.T), (SURELY * accuracy_sd_m) ** 2)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def lacks(information: FloatArray, m: int, variance: float) -> float:
+    """Return what part of the variance of landmark ``m`` must still go, 0 to 1; 0 when it is accurate."""
+    a, b, c = information[0, m], information[1, m], information[2, m]
+    d, e, f = information[3, m], information[4, m], information[5, m]
+    xx = d * f - e * e
+    yy = a * f - c * c
+    zz = a * d - b * b
+    det = a * xx - b * (b * f - c * e) + c * (b * e - c * d)
+    worst = max(xx, max(yy, zz))
+    if worst < variance * det:
+        return 0.0
+    return float(1.0 - max(0.0, variance * det) / max(worst, 1e-300))
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def look_whole(
+    x: float, y: float, z: float, points: Points, reach: float, noise: float, information: FloatArray, done: BoolArray
+) -> int:
+    """Add what a vehicle sees at (x, y, z) to ``information`` (6, m); return how many landmarks that completes."""
+    work = points.work
+    v2 = reach * reach
+    gain = 1.0 / (noise * noise)
+    b = work.bucket_m
+    low = max(0, int(np.floor((y - reach - work.south_m) / b)))
+    high = min(work.rows - 1, int(np.floor((y + reach - work.south_m) / b)))
+    completed = 0
+    for row in range(low, high + 1):
+        south = work.south_m + row * b
+        gap = max(0.0, max(south - y, y - south - b))
+        half = np.sqrt(max(0.0, v2 - gap * gap))
+        left = max(0, int(np.floor((x - half - work.west_m) / b)))
+        right = min(work.cols - 1, int(np.floor((x + half - work.west_m) / b)))
+        if right < left:
+            continue
+        for m in range(work.first[row * work.cols + left], work.first[row * work.cols + right + 1]):
+            if done[m]:
+                continue
+            dx = work.xyz[0, m] - x
+            dy = work.xyz[1, m] - y
+            dz = work.xyz[2, m] - z
+            r2 = max(dx * dx + dy * dy + dz * dz, NEAREST * v2)
+            if r2 >= v2:
+                continue
+            g = gain / (r2 * r2)
+            information[0, m] += g * dx * dx
+            information[1, m] += g * dx * dy
+            information[2, m] += g * dx * dz
+            information[3, m] += g * dy * dy
+            information[4, m] += g * dy * dz
+            information[5, m] += g * dz * dz
+            if lacks(information, m, points.variance_m2) == 0.0:
+                done[m] = True
+                completed += 1
+    return completed
