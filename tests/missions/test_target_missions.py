@@ -156,19 +156,22 @@ async def test_vehicles_over_udp_find_what_swims_about_and_every_waypoint_was_ch
             tracking={"accuracy_m": 4.0},
             surface_policy={"max_position_sd_m": 2.0},
             planner={"name": "cao"},
-            steps=4,
+            steps=40,
         )
         mission = await service.create(spec)
+
+        async def known() -> bool:
+            (target,) = await service.targets(mission.id)
+            return target.state in ("uncertain", "accurate") and target.ranges > 30 and target.rejected > 0
+
         await until(lambda: _ready(service), "the vehicles are ready")
         await service.act(mission.id, "start", actor="Ana")
+        # How well and how soon it is known is a matter of the filters' own tests: a busy machine is late by minutes.
+        await until(known, "the target is known")
+        await service.act(mission.id, "finish", actor="Ana")
         assert await until_state(service, mission.id, MissionState.FINISHED)
         (seen,) = await service.targets(mission.id)
-        assert seen.ranges > 30
-        assert seen.rejected > 0
         assert "were expected" in seen.last_refusal
-        # How well it is known is a matter of the filters' own tests: at this pace a busy machine is late by minutes.
-        assert seen.state in ("uncertain", "accurate")
-        assert seen.ellipse is not None
         view = await service.mission(mission.id)
         assert {v.localization for v in view.vehicles} <= {"good", "fading", "poor"}
         strangers = [e for e in await service.events(mission.id) if "'buoy'" in e.message]
