@@ -60,6 +60,11 @@ class Broadcaster:
         """Whether anyone listens."""
         return bool(self._subscriptions)
 
+    @property
+    def viewers(self) -> int:
+        """How many listen."""
+        return len(self._subscriptions)
+
     def publish(self, message: LiveMessage) -> None:
         """Hand out a message."""
         for subscription in self._subscriptions:

@@ -63,6 +63,8 @@ from app.storage.models import MissionRow, PositionRow, TideTableRow, WaypointRo
 from app.storage.sharing import Shared
 
 LIVE_PERIOD_S = 0.2
+CROWD, MOST_PERIODS = 20, 5
+"""For so many viewers more the period grows by itself once, so many times at most."""
 RISES = "rises"
 """Marks events that tell of a vehicle sent up for a fix."""
 
@@ -454,7 +456,7 @@ class LiveMission:
             self.broadcaster.publish(VehiclesMessage(time=now(), vehicles=self.vehicle_views()))
             if self.spec.targets:
                 self.broadcaster.publish(TargetsMessage(time=now(), targets=self.target_views()))
-            await asyncio.sleep(LIVE_PERIOD_S)
+            await asyncio.sleep(live_period_s(self.broadcaster.viewers))
 
     async def close(self) -> None:
         """Write what is left."""
@@ -463,6 +465,11 @@ class LiveMission:
             await asyncio.gather(self._ticker, return_exceptions=True)
         await self.ranges.close()
         await self.journal.close()
+
+
+def live_period_s(viewers: int) -> float:
+    """Return how often positions are sent: a crowd of viewers sees them less often, so that it costs hardly more."""
+    return LIVE_PERIOD_S * min(MOST_PERIODS, 1.0 + viewers // CROWD)
 
 
 def rounded(value: float | None, digits: int) -> float | None:

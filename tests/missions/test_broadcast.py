@@ -7,6 +7,7 @@ import pytest
 
 from app.missions import broadcast
 from app.missions.broadcast import Broadcaster, Subscription, WatcherTooSlowError
+from app.missions.live import live_period_s
 from app.missions.views import EventMessage, EventView, Level, LiveMessage, VehiclesMessage, WaypointsMessage
 
 TIME = datetime(2026, 6, 1, tzinfo=UTC)
@@ -84,5 +85,14 @@ def test_nobody_watches_after_the_last_one_left() -> None:
     assert not broadcaster.watched
     with broadcaster.subscribe():
         assert broadcaster.watched
+        assert broadcaster.viewers == 1
     assert not broadcaster.watched
     broadcaster.publish(event(1))
+
+
+def test_positions_are_sent_five_times_a_second_to_some_and_no_less_than_once_to_any_crowd() -> None:
+    periods = [live_period_s(viewers) for viewers in (1, 10, 50, 200, 5000)]
+    assert periods[:2] == [0.2, 0.2]
+    assert periods == sorted(periods)
+    assert periods[2] == pytest.approx(0.6)
+    assert periods[-1] == pytest.approx(1.0)
