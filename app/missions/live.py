@@ -2,6 +2,7 @@
 
 import asyncio
 import math
+import time
 from collections.abc import Callable
 from concurrent.futures import Executor
 from dataclasses import dataclass
@@ -65,6 +66,8 @@ from app.storage.sharing import Shared
 LIVE_PERIOD_S = 0.2
 CROWD, MOST_PERIODS = 20, 5
 """For so many viewers more the period grows by itself once, so many times at most."""
+CROWD_MAP_S = 4.0
+"""Least time between two maps that a crowd is told of."""
 RISES = "rises"
 """Marks events that tell of a vehicle sent up for a fix."""
 
@@ -135,6 +138,8 @@ class LiveMission:
         self._executor = executor
         self._waypoints: dict[str, WaypointView] = {}
         self._ticker: asyncio.Task[None] | None = None
+        self._map_news: MapMessage | None = None
+        self._map_told_s = -math.inf
         self._imports_noticed = 0
         self.notice_imports = Shared(self._notice_imports)
         """Take up the soundings of logs that the command line imported while this process had the mission."""
@@ -333,14 +338,20 @@ class LiveMission:
     def publish_map(self, built: BuiltMap) -> None:
         """Tell everyone who watches that there is a new map."""
         depth = built.map.depth_m[np.isfinite(built.map.depth_m)]
-        self.broadcaster.publish(
-            MapMessage(
-                version=built.version,
-                step=self.header.step,
-                min_depth_m=float(depth.min()) if depth.size else None,
-                max_depth_m=float(depth.max()) if depth.size else None,
-            )
+        self._map_news = MapMessage(
+            version=built.version,
+            step=self.header.step,
+            min_depth_m=float(depth.min()) if depth.size else None,
+            max_depth_m=float(depth.max()) if depth.size else None,
         )
+        self._tell_of_map()
+
+    def _tell_of_map(self) -> None:
+        """Publish what is new of the map; to a crowd, who would all fetch it, not before it is time again."""
+        wait_s = 0.0 if self.broadcaster.viewers < CROWD else CROWD_MAP_S
+        if self._map_news is not None and time.monotonic() - self._map_told_s >= wait_s:
+            self.broadcaster.publish(self._map_news)
+            self._map_news, self._map_told_s = None, time.monotonic()
 
     def figures(self) -> dict[str, float]:
         """Return how far the mission has come, as each step keeps it."""
@@ -456,6 +467,7 @@ class LiveMission:
             self.broadcaster.publish(VehiclesMessage(time=now(), vehicles=self.vehicle_views()))
             if self.spec.targets:
                 self.broadcaster.publish(TargetsMessage(time=now(), targets=self.target_views()))
+            self._tell_of_map()
             await asyncio.sleep(live_period_s(self.broadcaster.viewers))
 
     async def close(self) -> None:

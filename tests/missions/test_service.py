@@ -5,6 +5,7 @@ import io
 import json
 import math
 from collections.abc import Callable
+from contextlib import AsyncExitStack
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -19,6 +20,7 @@ from app.exploration.bottom import Bottom
 from app.exploration.planners import PLANNERS
 from app.exploration.planners.random_walk import RandomPlanner
 from app.exploration.problem import Proposal, Situation
+from app.missions import live
 from app.missions.errors import (
     ConflictError,
     InvalidRequestError,
@@ -33,7 +35,7 @@ from app.missions.service import MissionService
 from app.missions.settings import ServiceSettings
 from app.missions.spec import MissionSpec, VehicleKind, VehicleSpec
 from app.missions.states import MissionState, MoveRefusedError
-from app.missions.views import EventMessage, Level, SnapshotMessage, StateMessage, Verdict
+from app.missions.views import EventMessage, Level, MapMessage, SnapshotMessage, StateMessage, Verdict
 from app.storage.database import Database
 from app.storage.models import MissionRow, MissionVehicleRow, SoundingRow, StepRow, WaypointRow
 from tests.missions.builders import lon_lat, make_spec, rectangle
@@ -700,6 +702,30 @@ async def test_a_watcher_gets_a_snapshot_first_and_then_every_event_in_order(ser
     stored_events = await service.events(mission.id, after=first.last_event_id)
     assert seen == [line.id for line in stored_events][: len(seen)]
     assert seen == sorted(set(seen))
+
+
+async def test_a_crowd_is_told_of_a_new_map_less_often_but_always_of_the_last(
+    service: MissionService, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(live, "CROWD_MAP_S", math.inf)
+    mission = await service.create(sim_spec(steps=3))
+    async with AsyncExitStack() as crowd, asyncio.timeout(90):
+        for _ in range(live.CROWD - 1):
+            await crowd.enter_async_context(service.subscribe(mission.id))
+        messages = await crowd.enter_async_context(service.subscribe(mission.id))
+        await service.act(mission.id, "start", actor="Ana")
+        told: list[int] = []
+        while_running = None
+        async for message in messages:
+            if isinstance(message, EventMessage) and message.event.data.get("state") == "finished":
+                while_running = len(told)
+                monkeypatch.setattr(live, "CROWD_MAP_S", 0.0)
+            if isinstance(message, MapMessage):
+                told.append(message.version)
+                if while_running is not None:
+                    break
+        assert while_running == 1
+        assert told == sorted(set(told))
 
 
 async def test_events_are_ordered_and_can_be_taken_up_after_any(harbour: Harbour) -> None:
