@@ -17,11 +17,13 @@ BoolArray = NDArray[np.bool_]
 
 CORNER_TOLERANCE = 0.15
 """A corner may be cut when the leg passes it within this fraction of a step."""
+SAME_CORNER = 0.03
+"""Vertices that are no farther apart than this fraction of a step are one corner."""
 
 
 @njit(cache=True, nogil=True)
 def next_waypoint(
-    x: float, y: float, route: FloatArray, first: int, count: int, step: float
+    x: float, y: float, route: FloatArray, first: int, count: int, step: float, cut: float = CORNER_TOLERANCE
 ) -> tuple[float, float, int]:
     """Return the end of the next leg along a route and the index of the first vertex still to be reached.
 
@@ -33,6 +35,8 @@ def next_waypoint(
         Vertices; those from ``first`` to ``count`` (exclusive) are still to be reached.
     step : float
         Largest length of the leg.
+    cut : float
+        A vertex may be left aside by this fraction of a step, and with it others that belong to the same corner.
     """
     i = first
     while i < count and np.hypot(route[i, 0] - x, route[i, 1] - y) < 1e-9:
@@ -46,27 +50,34 @@ def next_waypoint(
         f = step / d
         reached = 1 if d - step < 1e-9 else 0
         return x + f * dx, y + f * dy, i + reached
-    if i + 1 >= count:
-        return route[i, 0], route[i, 1], count
     # The vertex lies within the step: cut the corner when the leg still passes close to it.
-    ex = route[i + 1, 0] - route[i, 0]
-    ey = route[i + 1, 1] - route[i, 1]
-    b = dx * ex + dy * ey
-    a = ex * ex + ey * ey
-    c = d * d - step * step
-    t = 1.0
-    if a > 0.0:
-        t = (-b + np.sqrt(max(0.0, b * b - a * c))) / a
-    t = min(1.0, t)
-    tx = dx + t * ex
-    ty = dy + t * ey
-    length = np.hypot(tx, ty)
-    if length > 1e-9:
-        along = (dx * tx + dy * ty) / length
-        aside = abs(dx * ty - dy * tx) / length
-        if along <= length and aside <= CORNER_TOLERANCE * step:
-            return x + tx, y + ty, i + 2 if t >= 1.0 else i + 1
-    return route[i, 0], route[i, 1], i + 1
+    to_x, to_y, ahead = route[i, 0], route[i, 1], i + 1
+    for j in range(i, count - 1):
+        if np.hypot(route[j, 0] - route[i, 0], route[j, 1] - route[i, 1]) > min(cut, SAME_CORNER) * step:
+            break
+        px, py = route[j, 0] - x, route[j, 1] - y
+        ex, ey = route[j + 1, 0] - route[j, 0], route[j + 1, 1] - route[j, 1]
+        a, b, c = ex * ex + ey * ey, px * ex + py * ey, px * px + py * py - step * step
+        t = 1.0
+        if a > 0.0:
+            t = min(1.0, (-b + np.sqrt(max(0.0, b * b - a * c))) / a)
+        tx, ty = px + t * ex, py + t * ey
+        length = np.hypot(tx, ty)
+        if length <= 1e-9:
+            break
+        close = True
+        for k in range(i, j + 1):
+            kx, ky = route[k, 0] - x, route[k, 1] - y
+            along = (kx * tx + ky * ty) / length
+            if along > length + 1e-12 or abs(kx * ty - ky * tx) / length > cut * step + 1e-12:
+                close = False
+                break
+        if not close:
+            break
+        to_x, to_y, ahead = x + tx, y + ty, j + 2 if t >= 1.0 else j + 1
+        if t < 1.0:
+            break
+    return to_x, to_y, ahead
 
 
 @njit(cache=True, nogil=True)
@@ -115,11 +126,14 @@ class FreeSpace:
 
     def __init__(self, constraints: Constraints, margin_m: float) -> None:
         """Keep ``margin_m`` away from borders and zones, where that leaves anything."""
-        area: BaseGeometry = Polygon(constraints.area)
-        for zone in constraints.keep_out:
-            area = area.difference(Polygon(zone).buffer(margin_m, join_style="mitre"))
-        inner = area.buffer(-margin_m) if margin_m > 0 else area
-        self.region: BaseGeometry = area if inner.is_empty else inner
+        whole = Polygon(constraints.area)
+        inner = whole.buffer(-margin_m, join_style="mitre") if margin_m > 0 else whole
+        # Sharp corners throughout: a rounded one is a dozen vertices a few centimetres apart.
+        zones = [Polygon(zone).buffer(2.0 * margin_m, join_style="mitre") for zone in constraints.keep_out]
+        area: BaseGeometry = whole if inner.is_empty else inner
+        for zone in zones:
+            area = area.difference(zone)
+        self.region: BaseGeometry = area
         self._loose: BaseGeometry = self.region.buffer(1e-6)
         shapely.prepare(self._loose)
         self._open = not constraints.keep_out and bool(np.isclose(area.area, area.convex_hull.area))

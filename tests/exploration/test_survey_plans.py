@@ -1,4 +1,4 @@
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -8,12 +8,15 @@ from scipy.spatial import cKDTree
 from situations import make_situation
 
 from app.estimation import SingleBeam
+from app.evaluation.survey_world import SurveyScenario, fly_planner
+from app.exploration.constraints import Constraints
 from app.exploration.options import PlannerOptions
 from app.exploration.planners import create_planner
 from app.exploration.routes import fly, next_waypoint
 from app.exploration.survey_error import MOST_DOUBTS, SECOND_LOOK, with_second_looks
 from app.exploration.survey_search import DRAWS, improve
 from app.exploration.survey_value import Objective, lower_to_segment, make_nodes, plan_value
+from simulator.seafloors import generate
 
 SQUARE = np.array([[0.0, 0.0], [100.0, 0.0], [100.0, 100.0], [0.0, 100.0]])
 coordinate = st.floats(0.0, 100.0)
@@ -42,6 +45,17 @@ def test_nodes_within_reach_of_a_leg_get_their_distance_to_it(ax, ay, bx, by, re
     assert (np.sqrt(d2[~near]) >= reach - 1e-6).all()
 
 
+@dataclass(frozen=True)
+class WithZone(SurveyScenario):
+    """A survey round keep-out zones."""
+
+    zones: tuple[np.ndarray, ...] = ()
+
+    @property
+    def constraints(self) -> Constraints:
+        return replace(super().constraints, keep_out=self.zones)
+
+
 @settings(max_examples=50, deadline=None)
 @given(st.integers(0, 10**6), st.integers(1, 6), st.integers(1, 80))
 def test_a_route_is_flown_leg_by_leg_however_many_are_taken_at_once(seed, corners, steps):
@@ -58,6 +72,28 @@ def test_a_route_is_flown_leg_by_leg_however_many_are_taken_at_once(seed, corner
         x, y, legs = nx, ny, legs + 1
     assert used == legs
     np.testing.assert_allclose(vertices[n - 1], [x, y], atol=1e-6)
+
+
+def test_vertices_close_together_are_flown_in_one_leg():
+    arc = np.array([[0.0, 8.0], [0.02, 8.05], [0.06, 8.1], [0.12, 8.14], [0.2, 8.16], [30.0, 8.16]])
+    x, y, first = next_waypoint(0.0, 0.0, arc, 0, len(arc), 10.0)
+    assert (x, y, first) == pytest.approx((0.2, 8.16, 5))
+    x, y, first = next_waypoint(0.0, 0.0, arc, 0, len(arc), 10.0, 0.0)
+    assert (x, y, first) == (0.0, 8.0, 1)
+
+
+@pytest.mark.parametrize("planner", ["cao", "lawnmower"])
+def test_vehicles_do_not_linger_at_the_corners_of_a_keep_out_zone(planner):
+    zone = np.array([[40.0, 30.0], [70.0, 30.0], [70.0, 60.0], [40.0, 60.0]])
+    terrain = generate("flat", 1)
+    scenario = WithZone(terrain, 2, 100, 10.0, "step", zones=(zone,))
+    track = fly_planner(scenario, planner, PlannerOptions(search=200))
+    legs = np.linalg.norm(np.diff(track.positions_m, axis=0), axis=2)
+    inside = (track.positions_m[..., 0] > 40) & (track.positions_m[..., 0] < 70)
+    inside &= (track.positions_m[..., 1] > 30) & (track.positions_m[..., 1] < 60)
+    assert not inside.any()
+    assert (legs < 0.5).sum() <= 4  # a team gives way now and then; a rounded corner took a step every 5 cm
+    assert np.median(legs) > 9.0
 
 
 def test_searching_never_worsens_a_plan_and_says_truly_what_it_is_worth():

@@ -12,7 +12,7 @@ from app.exploration.lattice import Sweep, boustrophedon, longer_axis_rad, route
 from app.exploration.planners.base import PlannerBase, settle
 from app.exploration.planners.handover import hand_over
 from app.exploration.problem import Proposal, Situation
-from app.exploration.routes import FreeSpace, next_waypoint
+from app.exploration.routes import CORNER_TOLERANCE, FreeSpace, next_waypoint
 
 FloatArray = NDArray[np.float64]
 
@@ -64,20 +64,22 @@ class LawnmowerPlanner(PlannerBase):
 
     def _decide(self, team: Situation, bottom: Bottom, seed: int) -> Proposal:
         self._adopt(team)
-        targets = np.empty((len(team.vehicles), 2))
-        following: list[int] = []
+        step = team.constraints.max_step_m * (1 - 1e-9)
+        # The corner that a leg cuts may be that of a zone: then it is flown out.
+        cuts = (CORNER_TOLERANCE, 0.0) if team.constraints.keep_out else (CORNER_TOLERANCE,)
+        targets = np.empty((len(cuts), len(team.vehicles), 2))
+        following = np.empty((len(cuts), len(team.vehicles)), dtype=np.int64)
+        for k, cut in enumerate(cuts):
+            for i, name in enumerate(team.vehicles):
+                route = self._routes[name]
+                x, y = team.positions[i, :2]
+                targets[k, i, 0], targets[k, i, 1], following[k, i] = next_waypoint(
+                    x, y, route, 0, len(route), step, cut
+                )
+        positions, which = settle(team, bottom, self._at_cruise(team, bottom, targets))
         for i, name in enumerate(team.vehicles):
-            route = self._routes[name]
-            x, y = team.positions[i, :2]
-            targets[i, 0], targets[i, 1], first = next_waypoint(
-                x, y, route, 0, len(route), team.constraints.max_step_m * (1 - 1e-9)
-            )
-            following.append(first)
-        wish = self._at_cruise(team, bottom, targets)
-        positions, _ = settle(team, bottom, wish[None])
-        for i, name in enumerate(team.vehicles):
-            if np.hypot(*(positions[i, :2] - targets[i])) < 1e-6:
-                self._routes[name] = self._routes[name][following[i] :]
+            if np.hypot(*(positions[i, :2] - targets[which, i])) < 1e-6:
+                self._routes[name] = self._routes[name][following[which, i] :]
         return Proposal(positions, 0.0, {"left_m": float(sum(self._left(team, i) for i in range(len(positions))))})
 
     def _left(self, team: Situation, i: int) -> float:

@@ -26,7 +26,7 @@ from app.exploration.options import PlannerOptions
 from app.exploration.planners.base import vehicle_rng
 from app.exploration.planners.handover import hand_over
 from app.exploration.problem import Belief, Situation
-from app.exploration.routes import next_waypoint
+from app.exploration.routes import CORNER_TOLERANCE, next_waypoint
 from app.exploration.survey_backbone import MARGIN_M, backbone
 from app.exploration.survey_error import expected_roughness, with_second_looks
 from app.exploration.survey_search import DRAWS, improve
@@ -135,6 +135,9 @@ class SurveyRegressors:
         team, n = self._team, len(self._en)
         along = self._first_legs(self._followed)
         targets = [along]
+        if team.constraints.keep_out:
+            # The corner that a leg cuts may be that of a zone: then it is flown out.
+            targets.append(self._first_legs(self._followed, cut=0.0))
         if not self._replans:
             return self._at_cruise(team, self._bottom, np.array(targets))
         legs = [self._legs_of(i, alpha) for i in range(n)]
@@ -169,11 +172,13 @@ class SurveyRegressors:
             x, y = self._en[i]
             for routes in (self._plan, self._backbone):
                 route = routes[name]
-                tx, ty, first = next_waypoint(x, y, route, 0, len(route), self._step_m)
-                if np.hypot(tx - positions[i, 0], ty - positions[i, 1]) < 1e-3:
-                    routes[name] = route[first:]
-                    if routes is self._plan:
-                        self._coarse[name] = max(0, self._coarse[name] - first)
+                for cut in (CORNER_TOLERANCE, 0.0):
+                    tx, ty, first = next_waypoint(x, y, route, 0, len(route), self._step_m, cut)
+                    if np.hypot(tx - positions[i, 0], ty - positions[i, 1]) < 1e-3:
+                        routes[name] = route[first:]
+                        if routes is self._plan:
+                            self._coarse[name] = max(0, self._coarse[name] - first)
+                        break
 
     def remember(self) -> dict[str, Any]:
         """Return the memory."""
@@ -269,18 +274,21 @@ class SurveyRegressors:
             vias[i, : counts[i]] = routes[v]
         return vias, counts
 
-    def _first_legs(self, plan: tuple[FloatArray, IntArray]) -> FloatArray:
+    def _first_legs(self, plan: tuple[FloatArray, IntArray], cut: float = CORNER_TOLERANCE) -> FloatArray:
         vias, counts = plan
         legs = [
-            next_waypoint(self._en[i, 0], self._en[i, 1], vias[i], 0, int(counts[i]), self._step_m)[:2]
+            next_waypoint(self._en[i, 0], self._en[i, 1], vias[i], 0, int(counts[i]), self._step_m, cut)[:2]
             for i in range(len(self._en))
         ]
         return np.array(legs)
 
     def _on_plan(self, candidates: FloatArray) -> BoolArray:
         """Return which vehicles' legs are those of the plan that is followed, (c, n_vehicles)."""
-        away = candidates[..., :2] - self._first_legs(self._followed)
-        return np.asarray(np.hypot(away[..., 0], away[..., 1]) < 1e-3)
+        on_plan = np.zeros(candidates.shape[:2], dtype=np.bool_)
+        for cut in (CORNER_TOLERANCE, 0.0):
+            away = candidates[..., :2] - self._first_legs(self._followed, cut)
+            on_plan |= np.hypot(away[..., 0], away[..., 1]) < 1e-3
+        return on_plan
 
     def _legs_of(self, i: int, alpha: float) -> FloatArray:
         """Return the free candidates (k, 2) of one vehicle."""
