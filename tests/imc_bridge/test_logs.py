@@ -119,8 +119,8 @@ def test_damaged_bytes_never_end_the_reading(tmp_path: Path) -> None:
     [
         (b"", "holds no IMC packet"),
         (b"not a log at all, but long enough to be looked at", "holds no IMC packet"),
-        (gzip.compress(b"nor this one, which is compressed"), "holds no IMC packet"),
-        (gzip.compress(b"cut")[:8], "holds no IMC packet"),
+        (gzip.compress(b"nor this one, which is compressed", mtime=0), "holds no IMC packet"),
+        (gzip.compress(b"cut", mtime=0)[:8], "holds no IMC packet"),
         (writer.announce(1e9), "holds no EstimatedState"),
         (writer.state(1e9, 0.0), "does not tell its vehicle's name"),
     ],
