@@ -14,8 +14,8 @@ HIT, MISS = 1.2, -0.4
 """Logarithmic odds that one scan adds to a cell where a beam ended, or that beams only passed."""
 CLAMP = (-3.0, 4.0)
 """Bounds of the evidence, so that a boat that left can be unlearned."""
-INTO = 1e-6
-"""How far into its cell an echo lies, as a part of a cell."""
+INTO = 1e-9
+"""How far into its cell an echo lies, as a part of a cell: a beam may touch no more than a corner of it."""
 
 
 class Cell(IntEnum):

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from app.estimation import Cell, OccupancyGrid, Scanner
@@ -38,7 +38,7 @@ def first_hit(world: ObstacleWorld, start: np.ndarray, bearing: float, reach: fl
 
 
 @given(st.integers(0, 10_000))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=8, deadline=None)
 def test_a_scan_hears_the_first_obstacle(seed):
     site = world(seed)
     place = free_place(site, seed)
@@ -51,7 +51,8 @@ def test_a_scan_hears_the_first_obstacle(seed):
 
 
 @given(st.integers(0, 10_000))
-@settings(max_examples=40, deadline=None)
+@example(1147)  # a beam that touches an obstacle by a hundred-thousandth of a cell
+@settings(max_examples=20, deadline=None)
 def test_what_was_seen_is_true(seed):
     site, scanner = world(seed), Scanner(6.0, 1.0)
     grid = OccupancyGrid.from_blueprint(site.known, 1.0)

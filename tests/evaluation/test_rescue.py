@@ -16,7 +16,7 @@ def rescue(*arguments: str) -> dict:
 
 
 def test_the_default_planner_sees_the_goal_area_and_is_back_in_time():
-    run = rescue("--scenario", "harbour", "--rc", "15", "--window", "500")
+    run = rescue("--scenario", "harbour", "--rc", "12", "--window", "400")
     assert run["goal_area_pct"] > 90.0
     assert 15.0 < run["map_pct"] < 60.0
     assert run["returned_in_time"] is True
@@ -24,14 +24,14 @@ def test_the_default_planner_sees_the_goal_area_and_is_back_in_time():
 
 
 def test_three_robots_see_more_than_one():
-    one, three = (rescue("--scenario", "1", "--window", "150", "--robots", n) for n in ("1", "3"))
+    one, three = (rescue("--scenario", "1", "--window", "90", "--robots", n) for n in ("1", "3"))
     assert three["map_pct"] > 1.5 * one["map_pct"]
     assert three["returned_in_time"]
     assert three["collisions"] == 0
 
 
 def test_planners_are_compared_under_either_clock():
-    compared = rescue("--planner", "cao,random", "--seeds", "0:2", "--window", "120", "--clock", "steps")
+    compared = rescue("--planner", "cao,random", "--seeds", "0:2", "--window", "90", "--clock", "steps")
     assert len(compared["runs"]) == 4
     mean = {name: metrics["map_pct"]["mean"] for name, metrics in compared["summary"].items()}
     assert mean["cao"] > mean["random"]

@@ -67,7 +67,7 @@ def explored(seed: int, looks: int = 6) -> tuple[ObstacleWorld, SearchTask]:
 
 
 @given(st.integers(0, 5000))
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=5, deadline=None)
 def test_distances_are_those_of_dijkstra(seed):
     _, task = explored(seed)
     ground = Ground.of(task)
@@ -90,7 +90,7 @@ def test_distances_are_those_of_dijkstra(seed):
 
 
 @given(st.integers(0, 5000))
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=10, deadline=None)
 def test_clear_legs_and_ways_home_keep_the_safety_distance(seed):
     world, task = explored(seed)
     ground, rng = Ground.of(task), np.random.default_rng([seed, 2])
@@ -115,7 +115,7 @@ def test_clear_legs_and_ways_home_keep_the_safety_distance(seed):
 
 
 @given(st.integers(0, 5000))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=10, deadline=None)
 def test_a_view_shows_what_was_foretold_where_all_obstacles_are_known(seed):
     world, task = explored(seed)
     blueprint_only = replace(task, grid=OccupancyGrid.from_blueprint(world.solid, 1.0))
@@ -159,7 +159,7 @@ def test_a_standstill_is_noticed_only_once_the_window_is_full_and_growth_ends_it
 
 @pytest.mark.parametrize("name", sorted(SEARCHERS))
 @given(seed=st.integers(0, 5000), robots=st.integers(1, 3))
-@settings(max_examples=4, deadline=None)
+@settings(max_examples=2, deadline=None)
 def test_no_planner_hits_anything_and_all_are_back_in_time(name, seed, robots):
     world = site(seed)
     positions = np.column_stack(
