@@ -20,13 +20,13 @@ NONE = np.zeros((0, 4))
 
 
 def lines(**changes: object) -> MissionSpec:
-    return sim_spec(steps=15, planner={"name": "lawnmower"}, **changes)
+    return sim_spec(steps=8, planner={"name": "lawnmower"}, **changes)
 
 
 async def test_a_forecast_is_near_what_comes_and_says_what_it_assumes(service: MissionService) -> None:
     spec = lines()
     before = await service.forecast(spec)
-    assert before.steps == before.steps_simulated == 15
+    assert before.steps == before.steps_simulated == 8
     mission = (await service.create(spec)).id
     assert (await service.forecast_of(mission)).duration_s == pytest.approx(before.duration_s, rel=0.05)
     await service.act(mission, "start", actor="Ana")
@@ -82,9 +82,9 @@ def test_time_that_is_up_leaves_a_forecast_that_says_so() -> None:
     found = forecast(spec, members, starts, NONE, budget_s=0.0)
     assert found.steps_flown == 1
     # Drawn out: as if every step were as long as the first.
-    assert found.duration_s == pytest.approx(15 * min(8.0 / spec.speed_mps + 2.0, 60.0), rel=0.2)
-    view = forecasts._view(spec, found, "", 15)
-    assert any("1 of 15 steps" in words for words in view.assumptions)
+    assert found.duration_s == pytest.approx(8 * min(8.0 / spec.speed_mps + 2.0, 60.0), rel=0.2)
+    view = forecasts._view(spec, found, "", 8)
+    assert any("1 of 8 steps" in words for words in view.assumptions)
 
 
 def test_the_floor_is_what_was_imported_and_a_guess_beside_it() -> None:
