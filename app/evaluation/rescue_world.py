@@ -25,8 +25,6 @@ LONGEST_STEPS = 60.0
 """How far the supervisor may raise alpha: a leg across the longest free line of sight in sight of anything."""
 CHECK_M = 0.05
 """Distance between the places on a leg at which that is looked at."""
-STANDSTILL_M = 100.0
-"""How far a team may travel without seeing a new cell before it counts as trapped, while there is something to see."""
 
 
 @dataclass(frozen=True)
@@ -102,7 +100,7 @@ class RescueTrack:
     collisions, too_close : int
         Legs on which a robot touched an obstacle, or came closer than the safety distance.
     longest_standstill_m : float
-        Longest way without a new cell while a reachable view would have shown one.
+        Longest way without a new cell; ways home and waiting there are left out.
     plan_s : (steps,)
         Time that decisions took.
     """
@@ -160,20 +158,16 @@ def run_search(
         left -= gone if gone > 0.0 and scenario.clock == "way" else scenario.step_m
         before = task.explored_part
         task = _task(scenario, grid, left)
-        standstill = (
-            0.0
-            if task.explored_part > before or proposal.terms.get("homebound")
-            else standstill + max(gone, scenario.step_m)
-        )
+        home = proposal.terms["at_home"] == scenario.robots
+        idle = bool(proposal.terms["homebound"]) or home
+        standstill = 0.0 if task.explored_part > before or idle else standstill + max(gone, scenario.step_m)
         longest = max(longest, standstill)
         history.append(positions)
         explored.append(task.explored_part)
         goal.append(task.explored_goal_part)
         lefts.append(left)
         progress(step)
-        if left <= 0.0 or (
-            gone == 0.0 and proposal.terms["at_home"] == scenario.robots and proposal.terms["homebound"]
-        ):
+        if left <= 0.0 or (gone == 0.0 and home and proposal.terms["homebound"]):
             break
     return RescueTrack(
         np.array(history), np.array(explored), np.array(goal), np.array(lefts), grid, collisions, too_close, longest,

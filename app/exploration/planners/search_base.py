@@ -48,8 +48,7 @@ class Scene:
             raise ValueError("search: the situation holds no search task; this planner is for missions of that kind")
         ground = Ground.of(task)
         home = ground.distances(ground.places(task.entry_m[None]))
-        spare = SPARE_CELLS * len(team.vehicles) * task.grid.cell_m
-        return cls(team, task, ground, home, ground.metres(home) * (1.0 + SPARE_PART) + spare)
+        return cls(team, task, ground, home, _with_spare(team, task, ground.metres(home)))
 
     @property
     def step_m(self) -> float:
@@ -63,9 +62,12 @@ class Scene:
 
     def in_time(self, end_m: FloatArray, gone_m: float) -> bool:
         """Return whether from a place (2,) the entry is within the time that is left after a step of ``gone_m``."""
-        spare = SPARE_CELLS * len(self.team.vehicles) * self.task.grid.cell_m
-        way = self.ground.way_m(end_m, self.home) * (1.0 + SPARE_PART) + spare
-        return gone_m + way <= self.task.left_m
+        way = _with_spare(self.team, self.task, np.array(self.ground.way_m(end_m, self.home)))
+        return gone_m + float(way) <= self.task.left_m
+
+
+def _with_spare(team: Situation, task: SearchTask, way_m: FloatArray) -> FloatArray:
+    return np.asarray(way_m * (1.0 + SPARE_PART) + SPARE_CELLS * len(team.vehicles) * task.grid.cell_m)
 
 
 class SearchPlanner(PlannerBase):
