@@ -20,6 +20,10 @@ LEFT_BEHIND = 1.4
 """From this share of the radius on it can be turned to again, whatever the turn needs to build up."""
 
 
+HOVER_M, AHEAD = 0.2, 0.95
+"""Within this distance a hovering vehicle stays where it is; it goes once the cosine to its target is above that."""
+
+
 class Guidance(StrEnum):
     """What the vehicle does about its target."""
 
@@ -49,6 +53,8 @@ class VehicleLimits:
         Ascent with the motor off.
     loiter_radius_m
         Circle flown around a reached target.
+    hovers
+        Whether it has thrusters for it: turns on the spot, slows down before its target and stays there.
     """
 
     min_speed_mps: float = 0.7
@@ -59,6 +65,13 @@ class VehicleLimits:
     pitch_rate_radps: float = 0.15
     buoyancy_mps: float = 0.15
     loiter_radius_m: float = 7.5
+    hovers: bool = False
+
+
+BOAT = VehicleLimits(
+    min_speed_mps=0.1, max_speed_mps=1.5, acceleration_mps2=0.5, turn_rate_radps=1.0, buoyancy_mps=0.0, hovers=True
+)
+"""A small boat with two thrusters, or a hovering underwater vehicle."""
 
 
 @dataclass(slots=True)
@@ -161,10 +174,12 @@ class Vehicle:
             wanted_speed = min(max(target.speed_mps, lim.min_speed_mps), lim.max_speed_mps)
             wanted_turn = self._turn_rate(target, m.east_m + error_m[0], m.north_m + error_m[1])
             wanted_pitch = self._pitch(target, bottom_m)
+            if lim.hovers:
+                wanted_speed = self._hovering_speed(target, wanted_speed, error_m)
 
         m.surge_mps += _clip(wanted_speed - m.surge_mps, lim.acceleration_mps2 * STEP_S)
         # Fins need flow: no turning on the spot.
-        authority = min(1.0, m.surge_mps / lim.min_speed_mps)
+        authority = 1.0 if lim.hovers else min(1.0, m.surge_mps / lim.min_speed_mps)
         m.turn_rate_radps = _clip(wanted_turn, lim.turn_rate_radps * authority)
         m.heading_rad = wrap(m.heading_rad + m.turn_rate_radps * STEP_S)
         m.pitch_rad += _clip(wanted_pitch * authority - m.pitch_rad, lim.pitch_rate_radps * STEP_S)
@@ -188,9 +203,22 @@ class Vehicle:
         self.distance_m += math.hypot(m.ve_mps, m.vn_mps, m.vd_mps) * STEP_S
         return hit
 
+    def _hovering_speed(self, target: Target, cruise_mps: float, error_m: tuple[float, float]) -> float:
+        """Return the speed of a vehicle that turns before it goes, brakes in time and stays where it arrived."""
+        m = self.motion
+        de, dn = target.east_m - m.east_m - error_m[0], target.north_m - m.north_m - error_m[1]
+        left_m = math.hypot(de, dn)
+        if left_m < HOVER_M:
+            return 0.0
+        ahead = math.cos(wrap(math.atan2(de, dn) - m.heading_rad))
+        return min(cruise_mps, math.sqrt(self.limits.acceleration_mps2 * left_m)) * (ahead if ahead > AHEAD else 0.0)
+
     def _turn_rate(self, target: Target, east_m: float, north_m: float) -> float:
         de, dn = target.east_m - east_m, target.north_m - north_m
         course = math.atan2(de, dn)
+        if self.limits.hovers:
+            near = math.hypot(de, dn) < HOVER_M
+            return 0.0 if near else 1.2 * wrap(self._heading_for(course) - self.motion.heading_rad)
         if self.guidance is Guidance.LOITER:
             side = 1.0 if self.clockwise else -1.0
             # Vector field around a circle: tangential on it, steeper inwards or outwards the farther away.

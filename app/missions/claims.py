@@ -3,11 +3,14 @@
 import math
 from collections.abc import Callable, Sequence
 
+import numpy as np
+
 from app.missions.errors import ConflictError
 from app.missions.fleet import LinkState
 from app.missions.hub import FleetHub
-from app.missions.links.sim import Launch, SimFleetLink
+from app.missions.links.sim import Launch, Lookout, SimFleetLink
 from app.missions.live import LiveMission
+from app.missions.search.site import simulated_world
 from app.missions.spec import VehicleKind, VehicleSpec
 from simulator.targets import RangingNoise
 
@@ -78,7 +81,8 @@ class Claims:
 
     def _launch(self, live: LiveMission, vehicle: VehicleSpec) -> None:
         size = live.area.max(axis=0)
-        start = (vehicle.start[1], vehicle.start[0]) if vehicle.start is not None else None
+        start = (vehicle.start[1], vehicle.start[0]) if vehicle.start is not None else self._berth(live, vehicle)
+        search = live.spec.search
         launch = Launch(
             vehicle=vehicle.name,
             sensor=vehicle.sensor,
@@ -93,11 +97,26 @@ class Claims:
                 sd_m=live.spec.tracking.range_sd_m,
                 hearing_m=live.spec.tracking.hearing_m or math.inf,
             ),
+            lookout=None
+            if search is None
+            else Lookout(simulated_world(live.spec, search), search.scanner.reach_m, search.scanner.resolution_deg),
         )
         try:
             self._sim.launch(launch)
         except ValueError as error:
             raise ConflictError(f"vehicle {vehicle.name!r} cannot be launched: {error}", "change its start") from error
+
+    def _berth(self, live: LiveMission, vehicle: VehicleSpec) -> tuple[float, float] | None:
+        """Return latitude and longitude of a free place by a search's entry for each vehicle; None: anywhere."""
+        member = live.team.get(vehicle.name)
+        if live.search is None:
+            return None
+        slot = member.slot if member is not None else len(list(live.team))
+        limits = live.spec.limits
+        apart_m = max(limits.min_separation_m, 1.0) * 1.1
+        east, north = live.search.site.berths(slot + 1, apart_m, live.search.spec.safety_m)[slot]
+        lat, lon = live.frame.to_geographic(np.array(east), np.array(north))
+        return float(lat), float(lon)
 
     def release_team(self, live: LiveMission) -> None:
         """Give every vehicle of a mission up."""

@@ -7,6 +7,7 @@ from functools import partial
 
 import structlog
 
+from app.exploration.planners import warm_up
 from app.missions.claims import Claims
 from app.missions.clock import now
 from app.missions.fleet import LinkState, StopReceipt
@@ -74,20 +75,22 @@ class Conductor:
         runner = Runner(live, self._database, self._hub, self._executor, self._time_scale)
         self.runs[live.id] = asyncio.create_task(self._supervise(live, runner.run), name=f"mission {live.id}")
 
-    async def _supervise(self, live: LiveMission, run: Callable[[], Awaitable[None]]) -> None:
+    async def _supervise(self, live: LiveMission, run: Callable[[], Awaitable[str]]) -> None:
         """Run a mission to its end; whatever happens, its vehicles are stopped."""
         try:
             if self.warm is not None:
                 # Compiling what planning needs takes seconds on a new machine; vehicles must not wait for it.
                 await asyncio.wait([self.warm])
-            await run()
+            if live.search is not None:
+                await live.in_thread(warm_up, live.search.site.scanner)
+            reason = await run()
         except asyncio.CancelledError:
             raise
         except Exception as error:
             log.exception("the step loop failed", mission=live.id)
             target, level, reason = MissionState.FAILED, Level.ALARM, f"the step loop failed: {error}"
         else:
-            target, level, reason = MissionState.FINISHED, Level.INFO, "every step is done"
+            target, level = MissionState.FINISHED, Level.INFO
         async with self.acting(live.id):
             try:
                 await to_the_end(self._conclude(live, target, reason, level))

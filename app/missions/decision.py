@@ -12,7 +12,9 @@ from app.exploration.constraints import Constraints
 from app.exploration.dynamic import Localization, Targets
 from app.exploration.errands import due_to_rise
 from app.exploration.problem import Belief, Planner, Situation
+from app.exploration.search import SearchTask
 from app.missions import safety
+from app.missions.search.course import hold_before_hazards
 from app.missions.spec import MissionSpec, SurfacePolicy
 
 FloatArray = NDArray[np.float64]
@@ -81,6 +83,8 @@ class Decision:
     bottom: Bottom = field(default_factory=Bottom.unknown)
     pursuits: dict[str, str] = field(default_factory=dict)
     """Vehicles that leave the mapping for a target, with its name."""
+    origin_m: dict[str, FloatArray] = field(default_factory=dict)
+    """Where every vehicle was, (2,)."""
 
 
 def make_constraints(spec: MissionSpec) -> Constraints:
@@ -114,21 +118,29 @@ def decide(
     water_level_m: float = 0.0,
     doubtful_en_m: FloatArray | None = None,
     targets: Targets | None = None,
+    search: SearchTask | None = None,
 ) -> Decision:
     """Decide one step for the vehicles at ``places``; vehicles far outside the area are sent to its border.
 
     ``water_level_m`` is how high the water stands above the datum of the belief's depths. Vehicles count their depth
     from the water level: below the datum it leaves them less room; above it the room to spare is not used.
     ``doubtful_en_m`` (k, 2) is where the map left soundings out as outliers.
-    ``targets`` are the mission's, in the order of its description.
+    ``targets`` are the mission's, in the order of its description. ``search`` is what a search knows of its site.
     """
     polygon = Polygon(constraints.area)
+    where = {place.vehicle: place.en_m for place in places}
     notes: list[str] = []
     team: list[Place] = []
     legs: list[Leg] = []
     for place in places:
         outside_m = safety.distance_outside_m(polygon, place.en_m)
-        if outside_m > NEARBY_OUTSIDE_M:
+        if outside_m > NEARBY_OUTSIDE_M and search is not None:
+            refusal = (
+                f"it is {outside_m:.0f} m outside the site, and what lies between is not known: bring it to the entry"
+            )
+            notes.append(f"{place.vehicle}: {refusal}")
+            legs.append(Leg(place.vehicle, np.append(place.en_m, 0.0), refusal))
+        elif outside_m > NEARBY_OUTSIDE_M:
             others = [p.en_m for p in places if p is not place] + [other.target_m[:2] for other in legs]
             leg = _come_in(place, constraints, others)
             what = leg.refusal or "it is sent to the border"
@@ -140,7 +152,7 @@ def decide(
         else:
             team.append(place)
     if not team:
-        return Decision(legs, None, {}, planner.snapshot(), notes)
+        return Decision(legs, None, {}, planner.snapshot(), notes, origin_m=where)
 
     names = tuple(place.vehicle for place in team)
     below_level_m = belief.depth_m + min(water_level_m, 0.0)
@@ -170,6 +182,7 @@ def decide(
         constraints=constraints,
         doubtful_en_m=np.zeros((0, 2)) if doubtful_en_m is None else doubtful_en_m,
         targets=targets,
+        search=search,
     )
     proposal = planner.propose(situation, np.random.default_rng([spec.seed, step]))
     proposed = np.array(proposal.positions, dtype=float)
@@ -183,6 +196,9 @@ def decide(
             # It goes on along its leg while it rises; the checks below are the same for it as for everyone.
             proposed[i, 2] = min(proposed[i, 2], max(origin[i, 2] - RISE_OF_STEP * constraints.max_step_m, 0.0))
         proposed[i] = _within_step(origin[i], proposed[i], constraints.max_step_m)
+    if search is not None:
+        proposed, held = hold_before_hazards(search, names, origin, proposed)
+        notes += held
     checked = safety.check_step(names, origin, proposed, constraints, bottom)
     notes += [f"{name}: {reason}" for name, reason in (checked.corrections | checked.refusals).items()]
     for i, place in enumerate(team):
@@ -190,7 +206,7 @@ def decide(
         legs.append(Leg(place.vehicle, checked.positions[i], refusal, bool(up[i])))
     pursuits = {name: spec.targets[number].name for name, number in proposal.errands.items() if number >= 0}
     return Decision(
-        legs, proposal.objective, dict(proposal.terms), planner.snapshot(), notes, fixes, cautious, pursuits
+        legs, proposal.objective, dict(proposal.terms), planner.snapshot(), notes, fixes, cautious, pursuits, where
     )
 
 

@@ -126,6 +126,24 @@ class RangeReport:
 
 
 @dataclass(frozen=True, slots=True)
+class ScanReport:
+    """A look round: ranges along bearings, clockwise from true north, the first one and so much more for each.
+
+    A range is infinite where nothing was met within ``reach_m``, NaN where a beam is left out. ``position`` is
+    where the vehicle was.
+    """
+
+    vehicle: str
+    time_s: float
+    position: Position
+    first_bearing_deg: float
+    bearing_step_deg: float
+    reach_m: float
+    ranges_m: tuple[float, ...]
+    source: str
+
+
+@dataclass(frozen=True, slots=True)
 class WaypointOrder:
     """One waypoint for one vehicle, checked by the safety gate before it reaches a link.
 
@@ -167,7 +185,7 @@ class LinkReport:
     reason: str = ""
 
 
-FleetEvent = VehicleReport | SoundingReport | RangeReport | WaypointReport | LinkReport
+FleetEvent = VehicleReport | SoundingReport | RangeReport | ScanReport | WaypointReport | LinkReport
 EventSink = Callable[[FleetEvent], None]
 
 

@@ -19,7 +19,7 @@ from app.missions import metrics
 from app.missions.broadcast import Broadcaster
 from app.missions.clock import now
 from app.missions.corrections import NO_LEVEL
-from app.missions.fleet import SoundingReport, VehicleReport, WaypointReport
+from app.missions.fleet import ScanReport, SoundingReport, VehicleReport, WaypointReport
 from app.missions.gate import Gate, GatedSounding
 from app.missions.telemetry import VehicleSample
 from app.missions.views import EventMessage, EventView, ItemVerdict, Level, Verdict
@@ -33,6 +33,9 @@ from app.storage.shielding import to_the_end
 FLUSH_PERIOD_S = 0.1
 TRACK_SPACING_M = 1.0
 METRES_PER_DEGREE = 111_320.0
+
+TakeScans = Callable[[Sequence[ScanReport], int, AsyncSession], Awaitable[tuple[list[ItemVerdict], Callable[[], None]]]]
+"""Stores scans of a step in a transaction; returns the verdicts and what to call once it has committed."""
 
 log = structlog.get_logger(__name__)
 
@@ -52,6 +55,8 @@ class Journal:
     ----------
     on_accepted
         Called with every committed batch of accepted soundings, shape (n, 4): east, north, depth, sd.
+    take_scans
+        Stores scans; None in missions that have no use for any.
     """
 
     def __init__(
@@ -62,16 +67,19 @@ class Journal:
         counts: Counts,
         broadcaster: Broadcaster,
         on_accepted: Callable[[np.ndarray[Any, np.dtype[np.float64]]], None],
+        take_scans: TakeScans | None = None,
     ) -> None:
         self._database = database
         self._mission_id = mission_id
         self._gate = gate
         self._broadcaster = broadcaster
         self._on_accepted = on_accepted
+        self._take_scans = take_scans
         self.counts = counts
         self.travelled_m = 0.0
         self.step = 0
         self._soundings: list[SoundingReport] = []
+        self._scans: list[ScanReport] = []
         self._positions: list[dict[str, Any]] = []
         self._statuses: list[WaypointReport] = []
         self._telemetry: list[dict[str, Any]] = []
@@ -87,6 +95,12 @@ class Journal:
         """Note a sounding; it is written within a moment."""
         self._soundings.append(report)
         self._start_pump()
+
+    def scan(self, report: ScanReport) -> None:
+        """Note a look round; it is written within a moment, in a mission that has use for it."""
+        if self._take_scans is not None:
+            self._scans.append(report)
+            self._start_pump()
 
     def position(self, report: VehicleReport) -> None:
         """Note a point of a track, unless it is close to the last one."""
@@ -124,14 +138,16 @@ class Journal:
     async def _flush(self) -> None:
         async with self.writing:
             soundings, self._soundings = self._soundings, []
+            scans, self._scans = self._scans, []
             positions, self._positions = self._positions, []
             statuses, self._statuses = self._statuses, []
             telemetry, self._telemetry = self._telemetry, []
-            if not (soundings or positions or statuses or telemetry):
+            if not (soundings or scans or positions or statuses or telemetry):
                 return
             try:
                 async with self._database.writing() as session:
                     gated, new = await self._store(session, soundings)
+                    _, seen = await self.take_scans(scans, session)
                     await mission_queries.add_positions(session, positions)
                     await telemetry_queries.add(session, telemetry)
                     for report in statuses:
@@ -140,11 +156,26 @@ class Journal:
                         )
             except BaseException:
                 self._soundings[:0] = soundings
+                self._scans[:0] = scans
                 self._positions[:0] = positions
                 self._statuses[:0] = statuses
                 self._telemetry[:0] = telemetry
                 raise
             self._count(gated, new)
+            seen()
+
+    async def take_scans(
+        self, reports: Sequence[ScanReport], session: AsyncSession
+    ) -> tuple[list[ItemVerdict], Callable[[], None]]:
+        """Store scans in the caller's transaction; the caller holds ``writing``.
+
+        Returns
+        -------
+        The verdicts in the order of the reports, and what to call once the transaction has committed.
+        """
+        if self._take_scans is None or not reports:
+            return [], lambda: None
+        return await self._take_scans(reports, self.step, session)
 
     async def take(
         self, reports: Sequence[SoundingReport], session: AsyncSession, *, gate: Gate | None = None
@@ -211,7 +242,7 @@ class Journal:
             self._pump = asyncio.create_task(self._flush_soon())
 
     async def _flush_soon(self) -> None:
-        while self._soundings or self._positions or self._statuses or self._telemetry:
+        while self._soundings or self._scans or self._positions or self._statuses or self._telemetry:
             await asyncio.sleep(FLUSH_PERIOD_S)
             try:
                 await self.flush()

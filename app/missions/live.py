@@ -25,6 +25,7 @@ from app.missions.fleet import (
     LinkState,
     Position,
     RangeReport,
+    ScanReport,
     SoundingReport,
     VehicleReport,
     WaypointReport,
@@ -38,6 +39,9 @@ from app.missions.maps import MapSnapshot, MissionFacts
 from app.missions.members import Member, Team
 from app.missions.position_quality import position_quality
 from app.missions.range_journal import RangeJournal
+from app.missions.search.scans import report_of, take
+from app.missions.search.state import Search
+from app.missions.search.views import SearchMessage, progress_of
 from app.missions.spec import MissionSpec, VehicleSpec
 from app.missions.states import MissionState
 from app.missions.target_showing import target_views
@@ -58,6 +62,7 @@ from app.missions.views import (
 )
 from app.storage import events as event_queries
 from app.storage import missions as mission_queries
+from app.storage import scans as scan_queries
 from app.storage import soundings as sounding_queries
 from app.storage.database import Database
 from app.storage.models import MissionRow, PositionRow, TideTableRow, WaypointRow
@@ -122,13 +127,16 @@ class LiveMission:
         """Counts changes of what the map is shown with."""
         self.tiles = TileCache()
         self.trails = Trails(database, row.id)
-        self.journal = Journal(database, row.id, self.gate, counts, self.broadcaster, self.builder.add)
+        self.changed = asyncio.Event()
+        """Set whenever a vehicle reported something that the step loop may be waiting for."""
+        self.search = None if spec.search is None else Search(spec, spec.search, self.frame, time_scale)
+        """What a mission of kind search knows of its site."""
+        take_scans = None if self.search is None else partial(take, self.search, row.id, self.changed.set)
+        self.journal = Journal(database, row.id, self.gate, counts, self.broadcaster, self.builder.add, take_scans)
         self.ranges = RangeJournal(database, row.id, Tracking(spec, self.frame), self.journal, time_scale)
         """Ranges to moving targets, and what they tell."""
         self.correcting = asyncio.Lock()
         """Held while corrections change, one after the other."""
-        self.changed = asyncio.Event()
-        """Set whenever a vehicle reported something that the step loop may be waiting for."""
         self.halted = False
         """Set while vehicles are being stopped: the step loop must not send them off again as it ends."""
         self.seconds_per_step: float | None = None
@@ -140,6 +148,7 @@ class LiveMission:
         self._ticker: asyncio.Task[None] | None = None
         self._map_news: MapMessage | None = None
         self._map_told_s = -math.inf
+        self._search_told = 0
         self._imports_noticed = 0
         self.notice_imports = Shared(self._notice_imports)
         """Take up the soundings of logs that the command line imported while this process had the mission."""
@@ -176,6 +185,7 @@ class LiveMission:
                 await live.ranges.load(session, step)
         if len(accepted.table) + len(prior):
             live.builder.replace(accepted.table, prior, accepted.trusted)
+        await live._take_up_search()
         live.reference_m = reference
         live._imports_noticed = imported
         live.journal.travelled_m = sum(track_length_m(track) for track in tracks.values())
@@ -188,6 +198,15 @@ class LiveMission:
                 member.risings = risings.get(member.name, 0)
         live.show_waypoints([live.waypoint_view(waypoint) for waypoint in waypoints])
         return live
+
+    async def _take_up_search(self) -> None:
+        """Make the site's grid of every scan that was accepted."""
+        if self.search is None:
+            return
+        async with self._database.reading() as session:
+            scans = await scan_queries.accepted_scans(session, self.id)
+            self.search.began_at = await mission_queries.first_step_at(session, self.id)
+        await self.in_thread(self.search.see, [report_of(row) for row in scans])
 
     def make_gate(self) -> Gate:
         """Return a gate with the mission's corrections, which has seen no sounding yet."""
@@ -245,6 +264,9 @@ class LiveMission:
                     self.ranges.times.heard(event.vehicle, event.time_s)
             case SoundingReport():
                 self.journal.sounding(event)
+                return
+            case ScanReport():
+                self.journal.scan(event)
                 return
             case RangeReport():
                 self.ranges.note(event, member.report.time_s if member.report else None)
@@ -353,6 +375,13 @@ class LiveMission:
             self.broadcaster.publish(self._map_news)
             self._map_news, self._map_told_s = None, time.monotonic()
 
+    def _tell_of_search(self) -> None:
+        """Publish how a search stands when a scan changed that."""
+        found = progress_of(self.search, self.team, self.frame)
+        if found is not None and found.version != self._search_told:
+            self._search_told = found.version
+            self.broadcaster.publish(SearchMessage(search=found))
+
     def figures(self) -> dict[str, float]:
         """Return how far the mission has come, as each step keeps it."""
         built = self.builder.newest
@@ -383,6 +412,7 @@ class LiveMission:
             terms=header.terms or {},
             elapsed_s=header.elapsed_s + running_s,
             eta_s=left * self.seconds_per_step if self.seconds_per_step is not None else None,
+            search=progress_of(self.search, self.team, self.frame),
         )
 
     def summary(self) -> MissionSummary:
@@ -467,6 +497,7 @@ class LiveMission:
             self.broadcaster.publish(VehiclesMessage(time=now(), vehicles=self.vehicle_views()))
             if self.spec.targets:
                 self.broadcaster.publish(TargetsMessage(time=now(), targets=self.target_views()))
+            self._tell_of_search()
             self._tell_of_map()
             await asyncio.sleep(live_period_s(self.broadcaster.viewers))
 

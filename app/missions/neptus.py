@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 from app.missions.errors import MissionError
 from app.missions.links.neptus import NeptusFleetLink
 from app.missions.settings import NeptusSettings
-from app.missions.spec import Limits, MissionSpec, PlannerSpec, PolygonGeometry, Tide, VehicleKind, VehicleSpec
+from app.missions.spec import Limits, MissionSpec, PlannerSpec, Tide, VehicleKind, VehicleSpec
+from app.missions.spec_base import PolygonGeometry
 from app.missions.states import ENDED, MissionState
 from app.missions.views import Level
 from app.storage import events as event_queries

@@ -5,17 +5,17 @@ The REST schema, the command line's help and the dashboard's forms are all made 
 
 from enum import StrEnum
 from itertools import pairwise
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Self
 
 import numpy as np
 from pydantic import Field, field_validator, model_validator
-from shapely.geometry import Polygon
-from shapely.validation import explain_validity
+from shapely.geometry import Point, Polygon
 
 from app.exploration.options import PlannerOptions
 from app.mapping.georeference import LocalFrame
 from app.mapping.vertical import LOWEST_ASTRONOMICAL_TIDE, check_depth_datum
-from app.missions.spec_base import Latitude, Longitude, Model, Name
+from app.missions.search_spec import SearchSpec, filled_in
+from app.missions.spec_base import Latitude, Longitude, Model, Name, PolygonGeometry
 from app.missions.target_spec import MOST_TARGETS, TargetSpec, Tracking
 
 ProfileDepth = Annotated[float, Field(ge=0, le=12_000)]
@@ -26,44 +26,21 @@ MAX_GRID_CELLS = 4_000_000
 NO_TIDE = "none applied"
 
 
-class PolygonGeometry(Model):
-    """A GeoJSON polygon: one closed outer ring of [longitude, latitude] positions, no holes."""
-
-    type: Literal["Polygon"] = "Polygon"
-    coordinates: list[list[tuple[Longitude, Latitude]]] = Field(
-        min_length=1,
-        max_length=1,
-        description="One ring of [longitude, latitude]; the last position repeats the first",
-        examples=[[[[-8.705, 41.185], [-8.7038, 41.185], [-8.7038, 41.1859], [-8.705, 41.1859], [-8.705, 41.185]]]],
-    )
-
-    @field_validator("coordinates")
-    @classmethod
-    def _is_a_simple_ring(cls, rings: list[list[tuple[float, float]]]) -> list[list[tuple[float, float]]]:
-        ring = rings[0]
-        if len(ring) < 4 or ring[0] != ring[-1]:
-            raise ValueError(
-                "the ring needs at least 4 positions and must end where it began: repeat the first position as the last"
-            )
-        if len(ring) > 1000:
-            raise ValueError(f"the ring has {len(ring)} positions, at most 1000 are taken: simplify it")
-        polygon = Polygon(ring)
-        if not polygon.is_valid:
-            raise ValueError(f"the ring crosses or touches itself ({explain_validity(polygon)}): draw a simple polygon")
-        return rings
-
-    @property
-    def ring(self) -> list[tuple[float, float]]:
-        """The outer ring without its closing position, as (longitude, latitude)."""
-        return self.coordinates[0][:-1]
-
-
 class Sensor(StrEnum):
     """How a vehicle sounds the bottom."""
 
     SINGLE_BEAM = "single_beam"
     DVL = "dvl"
     MULTIBEAM = "multibeam"
+
+
+class MissionKind(StrEnum):
+    """What a mission is for."""
+
+    SURVEY = "survey"
+    """To map the sea floor of an area."""
+    SEARCH = "search"
+    """To look for something in a partly known site, and to be back in time."""
 
 
 class VehicleKind(StrEnum):
@@ -286,7 +263,11 @@ class MissionSpec(Model):
         description="Shown to people; need not be unique",
         examples=["Leixoes quay"],
     )
-    area: PolygonGeometry = Field(description="The area to map")
+    kind: MissionKind = Field(
+        default=MissionKind.SURVEY,
+        description="survey: map the sea floor; search: look for something in a partly known site, see `search`",
+    )
+    area: PolygonGeometry = Field(description="The area to map, or the site to search")
     keep_out: list[PolygonGeometry] = Field(
         default_factory=list, max_length=100, description="Zones no vehicle may enter"
     )
@@ -302,6 +283,11 @@ class MissionSpec(Model):
         default_factory=list, max_length=MOST_TARGETS, description="Moving targets to keep track of"
     )
     tracking: Tracking = Field(default_factory=Tracking)
+    search: SearchSpec | None = Field(
+        default=None,
+        description="With kind search, and only there: what is sought. Then planner.name is rollout unless given, and "
+        "steps as many as the time window has room for",
+    )
     speed_mps: float = Field(default=1.3, gt=0, le=5, description="Speed asked of the vehicles")
     arrival_radius_m: float = Field(
         default=3.0, gt=0, le=100, description="Horizontal distance at which a waypoint counts as reached"
@@ -330,6 +316,11 @@ class MissionSpec(Model):
     )
     seed: int = Field(default=0, ge=0, lt=2**63, description="Seed of every random decision")
 
+    @model_validator(mode="before")
+    @classmethod
+    def _a_search_has_its_own_defaults(cls, data: Any) -> Any:
+        return filled_in(data)
+
     @field_validator("vehicles")
     @classmethod
     def _names_are_unique(cls, vehicles: list[VehicleSpec]) -> list[VehicleSpec]:
@@ -349,6 +340,33 @@ class MissionSpec(Model):
                         f"target {target.name!r}: {name!r} is the name of {taken[name]} already: give it another one"
                     )
             taken |= dict.fromkeys((target.name, target.called), f"target {target.name!r}")
+        return self
+
+    @model_validator(mode="after")
+    def _a_search_says_what_is_sought(self) -> Self:
+        if (self.kind is MissionKind.SEARCH) != (self.search is not None):
+            told = "missing" if self.search is None else "given"
+            raise ValueError(
+                f"kind is {self.kind} and search is {told}: a mission of kind search needs it, and no other has it"
+            )
+        if self.search is None:
+            return self
+        site = Polygon(self.local_area())
+        for name in ("goal", "entry"):
+            lon, lat = getattr(self.search, name)
+            east, north = self.frame().to_local(np.array(lat), np.array(lon))
+            outside_m = float(site.distance(Point(float(east), float(north))))
+            if outside_m > 0:
+                raise ValueError(
+                    f"search.{name} lies {outside_m:.1f} m outside the area: it must be a place [longitude, latitude] "
+                    "in it"
+                )
+        if self.search.safety_m < self.arrival_radius_m:
+            raise ValueError(
+                f"search.safety_m is {self.search.safety_m} m but arrival_radius_m is {self.arrival_radius_m} m: a "
+                "vehicle that arrives beside its waypoint must not be nearer to an obstacle than that; make "
+                "arrival_radius_m smaller or safety_m larger"
+            )
         return self
 
     @model_validator(mode="after")

@@ -8,6 +8,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from app.mapping.s44 import Order
 from app.missions.fleet import LinkState, WaypointStatus
+from app.missions.search.views import SearchMessage, SearchProgress
 from app.missions.spec import MissionSpec, Sensor, SoundSpeed, Tide, VehicleKind
 from app.missions.spec_base import Latitude, Longitude
 from app.missions.states import MissionState
@@ -94,6 +95,7 @@ class Progress(View):
     terms: dict[str, float] = Field(default_factory=dict)
     elapsed_s: float = Field(default=0.0, description="Wall-clock seconds in state running")
     eta_s: float | None = Field(default=None, description="Estimated wall-clock seconds until the last step")
+    search: SearchProgress | None = Field(default=None, description="In missions of kind search: how it stands")
 
 
 class MissionSummary(View):
@@ -500,7 +502,14 @@ class EventMessage(View):
 
 
 LiveMessage = (
-    SnapshotMessage | VehiclesMessage | TargetsMessage | WaypointsMessage | StateMessage | MapMessage | EventMessage
+    SnapshotMessage
+    | VehiclesMessage
+    | TargetsMessage
+    | SearchMessage
+    | WaypointsMessage
+    | StateMessage
+    | MapMessage
+    | EventMessage
 )
 
 

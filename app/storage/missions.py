@@ -56,6 +56,12 @@ async def last_step(session: AsyncSession, mission_id: str) -> StepRow | None:
     return (await session.scalars(query)).first()
 
 
+async def first_step_at(session: AsyncSession, mission_id: str) -> datetime | None:
+    """Return when the first step was committed."""
+    query = select(StepRow.committed_at).where(StepRow.mission_id == mission_id).order_by(StepRow.number).limit(1)
+    return (await session.scalars(query)).first()
+
+
 async def waypoints_of_step(session: AsyncSession, mission_id: str, step: int) -> Sequence[WaypointRow]:
     """Return the waypoints of one step."""
     query = select(WaypointRow).where(WaypointRow.mission_id == mission_id, WaypointRow.step == step)

@@ -203,6 +203,37 @@ class TargetRangeRow(Base):
     reason: Mapped[str] = mapped_column(Text, default="")
 
 
+class ScanRow(Base):
+    """A look round by a vehicle of a search, in the order in which scans were judged.
+
+    ``ranges`` holds little-endian float32 metres, compressed by zlib: infinite without an echo, NaN for a beam that is
+    left out.
+    """
+
+    __tablename__ = "scans"
+    __table_args__ = (
+        UniqueConstraint("mission_id", "vehicle", "time_s", name="uq_scans_identity"),
+        Index("ix_scans_mission", "mission_id", "id"),
+    )
+
+    id: Mapped[int] = mapped_column(_BigId, primary_key=True, autoincrement=True)
+    mission_id: Mapped[str] = mapped_column(ForeignKey("missions.id", ondelete="CASCADE"))
+    vehicle: Mapped[str] = mapped_column(String(64))
+    time_s: Mapped[float]
+    received_at: Mapped[datetime]
+    step: Mapped[int]
+    source: Mapped[str] = mapped_column(String(64))
+    lat_deg: Mapped[float]
+    lon_deg: Mapped[float]
+    depth_m: Mapped[float]
+    first_bearing_deg: Mapped[float]
+    bearing_step_deg: Mapped[float]
+    reach_m: Mapped[float]
+    ranges: Mapped[bytes] = mapped_column(LargeBinary)
+    verdict: Mapped[str] = mapped_column(String(16))
+    reason: Mapped[str] = mapped_column(Text, default="")
+
+
 class TideTableRow(Base):
     """A mission's table of high and low waters, as it was sent."""
 

@@ -16,6 +16,7 @@ from app.missions.fleet import (
     LinkState,
     Position,
     RangeReport,
+    ScanReport,
     SoundingReport,
     StopReceipt,
     VehicleInfo,
@@ -28,12 +29,15 @@ from app.missions.fleet import (
 from app.missions.settings import SimulationSettings
 from app.missions.spec import Sensor
 from app.missions.target_spec import TargetSpec
+from simulator.obstacles import ObstacleWorld
+from simulator.scanning import Scan, Scanning
 from simulator.seafloors import generate
 from simulator.sensors import SensorKind, SonarNoise
 from simulator.targets import Ranging, RangingNoise, Target
 from simulator.targets import TargetSpec as SimulatedTarget
 from simulator.terrain import Terrain
 from simulator.terrain_files import load_terrain
+from simulator.vehicle import BOAT, STEP_S
 from simulator.world import Measurement, Place, SimulatedVehicle
 
 TICK_S = 0.05
@@ -41,11 +45,24 @@ REPORT_PERIOD_S = 0.5
 """Time between position reports on the vehicle's clock, as often as DUNE sends EstimatedState."""
 
 LAUNCH_MARGIN_M = 2.0
+AGROUND = "ran into an obstacle and lies there"
 SENSORS = {
     Sensor.SINGLE_BEAM: SensorKind.SINGLE,
     Sensor.DVL: SensorKind.DVL,
     Sensor.MULTIBEAM: SensorKind.MULTIBEAM,
 }
+
+
+@dataclass(frozen=True)
+class Lookout:
+    """What a vehicle that searches meets, in the frame of the area's south-western corner, and how it looks round."""
+
+    world: ObstacleWorld
+    reach_m: float
+    resolution_deg: float
+
+
+SCAN_NOISE_M = 0.02
 
 
 @dataclass(frozen=True)
@@ -66,6 +83,8 @@ class Launch:
         Standard deviation of a range as a fraction of it.
     targets, ranging
         What moves about there, and how well it ranges to that.
+    lookout
+        For a search: then it is a boat that can stop and turn on the spot.
     """
 
     vehicle: str
@@ -77,12 +96,17 @@ class Launch:
     noise: float
     targets: tuple[TargetSpec, ...] = ()
     ranging: RangingNoise = RangingNoise()  # noqa: RUF009 - frozen
+    lookout: Lookout | None = None
 
 
 class _Swimmer:
-    def __init__(self, body: SimulatedVehicle, terrain: Terrain, ranging: Ranging) -> None:
+    def __init__(
+        self, body: SimulatedVehicle, terrain: Terrain, ranging: Ranging, scanning: Scanning | None = None
+    ) -> None:
         self.body = body
         self.ranging = ranging
+        self.scanning = scanning
+        self.aground = False
         self.terrain = terrain
         self.state = LinkState.READY
         self.order: WaypointOrder | None = None
@@ -152,9 +176,12 @@ class SimFleetLink:
         Raises
         ------
         ValueError
-            When the start lies outside of the sea floor.
+            When the start lies outside of the sea floor, or a vehicle of that name is there and cannot do this.
         """
-        if launch.vehicle in self._swimmers:
+        there = self._swimmers.get(launch.vehicle)
+        if there is not None:
+            if (there.scanning is None) != (launch.lookout is None):
+                raise ValueError("a vehicle of that name is in the water for another kind of mission")
             return
         terrain = self._terrain(launch)
         seed = [self._settings.seed, *launch.vehicle.encode()]
@@ -170,9 +197,15 @@ class SimFleetLink:
             noise=SonarNoise(relative_sd=launch.noise),
             start_time_s=started_s,
             drift_m2ps=self._settings.drift_m2ps,
+            limits=None if launch.lookout is None else BOAT,
         )
         ranging = Ranging(targets, launch.ranging, np.random.default_rng([*seed, 1]), started_s)
-        swimmer = _Swimmer(body, terrain, ranging)
+        scanning = None
+        if launch.lookout is not None:
+            out = launch.lookout
+            noise = np.random.default_rng([*seed, 2])
+            scanning = Scanning(out.world, out.reach_m, out.resolution_deg, SCAN_NOISE_M, noise, started_s)
+        swimmer = _Swimmer(body, terrain, ranging, scanning)
         swimmer.make_report()
         self._swimmers[launch.vehicle] = swimmer
 
@@ -200,7 +233,7 @@ class SimFleetLink:
     def vehicles(self) -> Sequence[VehicleInfo]:
         """Every vehicle that was launched."""
         return [
-            VehicleInfo(name=name, kind=self.kind, state=s.state, age_s=0.0, report=s.report)
+            VehicleInfo(name, self.kind, s.state, AGROUND if s.aground else "", age_s=0.0, report=s.report)
             for name, s in self._swimmers.items()
         ]
 
@@ -209,6 +242,8 @@ class SimFleetLink:
         swimmer = self._swimmers.get(vehicle)
         if swimmer is None:
             raise VehicleRefusedError(vehicle, "is not in the water", "add it to a mission as a vehicle of kind sim")
+        if swimmer.aground:
+            raise VehicleRefusedError(vehicle, AGROUND, "take it out of the mission")
         if swimmer.state is not LinkState.ENGAGED:
             swimmer.state = LinkState.ENGAGED
             self._sink(LinkReport(vehicle, LinkState.ENGAGED))
@@ -250,7 +285,14 @@ class SimFleetLink:
 
     def _advance(self, swimmer: _Swimmer, passed_s: float) -> list[FleetEvent]:
         events: list[FleetEvent] = []
-        measurements = swimmer.body.advance(passed_s)
+        measurements, scans = _lived(swimmer, passed_s)
+        events += scans
+        if swimmer.scanning is not None and swimmer.scanning.collided and not swimmer.aground:
+            swimmer.aground = True
+            swimmer.body.stop()
+            swimmer.order = None
+            swimmer.state = LinkState.HEARD
+            events.append(LinkReport(swimmer.body.name, LinkState.HEARD, AGROUND))
         order = swimmer.order
         if order is not None:
             events += [_sounding(swimmer, m) for m in measurements if m.valid]
@@ -280,6 +322,35 @@ def _simulated(target: TargetSpec, terrain: Terrain) -> SimulatedTarget:
     lon, lat = asked.start
     place = (*terrain.frame.to_local(lat, lon), asked.depth_m)
     return SimulatedTarget(target.called, place, math.radians(asked.course_deg), asked.speed_mps)
+
+
+def _lived(swimmer: _Swimmer, passed_s: float) -> tuple[list[Measurement], list[FleetEvent]]:
+    """Let time pass; one that looks round does so on its way, and not only where it is in the end."""
+    scanning, body = swimmer.scanning, swimmer.body
+    if scanning is None:
+        return body.advance(passed_s), []
+    measurements: list[Measurement] = []
+    scans: list[FleetEvent] = []
+    while passed_s > 0.0 and not scanning.collided:
+        measurements += body.advance(min(passed_s, STEP_S))
+        passed_s -= STEP_S
+        scan = scanning.step(body.time_s, body.true_position)
+        if scan is not None:
+            scans.append(_scan(swimmer, scan, scanning))
+    return measurements, scans
+
+
+def _scan(swimmer: _Swimmer, scan: Scan, scanning: Scanning) -> ScanReport:
+    return ScanReport(
+        vehicle=swimmer.body.name,
+        time_s=scan.time_s,
+        position=swimmer.position(swimmer.body.position),
+        first_bearing_deg=0.0,
+        bearing_step_deg=scanning.resolution_deg,
+        reach_m=scanning.reach_m,
+        ranges_m=tuple(scan.ranges_m.tolist()),
+        source="sim",
+    )
 
 
 def _ranges(swimmer: _Swimmer) -> list[FleetEvent]:

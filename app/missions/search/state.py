@@ -1,0 +1,164 @@
+"""What a running search knows: the occupancy of the site from every accepted scan."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import datetime
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.estimation.occupancy import Cell, OccupancyGrid
+from app.exploration.planners.search_base import HOME_STEPS
+from app.exploration.search import SearchTask
+from app.exploration.search.criteria import in_contact
+from app.exploration.search.ground import Ground
+from app.mapping.georeference import LocalFrame
+from app.missions.clock import now
+from app.missions.fleet import ScanReport
+from app.missions.search.site import Site, site_of
+from app.missions.search_spec import SearchSpec
+from app.missions.spec import MissionSpec
+
+FloatArray = NDArray[np.float64]
+
+NEAR_M = 1e-3
+"""A position this little outside of the site comes from rounding."""
+
+
+@dataclass(frozen=True)
+class Figures:
+    """How far a search has come; parts of the cells that the known obstacles leave open."""
+
+    explored_part: float
+    explored_goal_part: float
+    found_cells: int
+
+
+class Search:
+    """A search as the mission keeps it in memory: one grid that every scan is added to.
+
+    Parameters
+    ----------
+    time_scale
+        How much faster than the wall clock the vehicles live.
+    """
+
+    def __init__(self, spec: MissionSpec, search: SearchSpec, frame: LocalFrame, time_scale: float) -> None:
+        self.spec = search
+        self.site: Site = site_of(spec, search)
+        self.version = 0
+        """Scans that the grid was made of."""
+        self.began_at: datetime | None = None
+        """When its first step was committed."""
+        self._frame = frame
+        self._step_m = spec.limits.max_step_m
+        self._time_scale = time_scale
+        self._grid = self.site.grid
+        self._figures: Figures | None = None
+        self._ground: Ground | None = None
+
+    @property
+    def grid(self) -> OccupancyGrid:
+        """The grid as known now."""
+        return self._grid
+
+    def see(self, scans: Sequence[ScanReport]) -> None:
+        """Add scans to the grid."""
+        for scan in scans:
+            place = self.place_m(scan)
+            if place is None:
+                continue
+            bearings = np.radians(scan.first_bearing_deg + scan.bearing_step_deg * np.arange(len(scan.ranges_m)))
+            # As they are stored: a restart makes the same grid of them.
+            ranges = np.array(scan.ranges_m, dtype=np.float32).astype(np.float64)
+            self._grid = self._grid.seen_from(place, bearings, ranges, scan.reach_m)
+            self.version += 1
+        if scans:
+            self._figures = self._ground = None
+
+    def refusal(self, scan: ScanReport) -> str:
+        """Return why a scan cannot be used; empty when it can."""
+        numbers = (scan.time_s, scan.first_bearing_deg, scan.bearing_step_deg, scan.reach_m)
+        if not all(math.isfinite(n) for n in numbers):
+            return f"time, bearings and reach are {numbers}: they must be numbers"
+        if any(r < 0 for r in scan.ranges_m):
+            return f"a range of {min(scan.ranges_m):g} m: ranges are 0 or more"
+        if len(scan.ranges_m) * abs(scan.bearing_step_deg) > 360.0 + 1e-6:
+            return (
+                f"{len(scan.ranges_m)} beams of {scan.bearing_step_deg:g} degrees are more than once round: "
+                "send every turn as a scan of its own"
+            )
+        place = self.place_m(scan)
+        if place is None:
+            return f"{scan.position.lat_deg}, {scan.position.lon_deg} is not near the site"
+        row, col = self._grid.cell_of(place)
+        rows, cols = self._grid.blueprint.shape
+        if not (0 <= row < rows and 0 <= col < cols):
+            return f"{place[0]:.1f} m east, {place[1]:.1f} m north is outside of the site"
+        return ""
+
+    def place_m(self, scan: ScanReport) -> FloatArray | None:
+        """Return where a scan was taken, (2,); None when that is not near the site."""
+        try:
+            east, north = self._frame.to_local(scan.position.lat_deg, scan.position.lon_deg)
+        except ValueError:
+            return None
+        place = np.array([float(east), float(north)])
+        return np.where(np.abs(place) < NEAR_M, np.abs(place), place) if np.isfinite(place).all() else None
+
+    def knows(self, en_m: FloatArray) -> bool:
+        """Return whether the cell at a place (2,) was looked at."""
+        row, col = (int(x) for x in self._grid.cell_of(en_m))
+        rows, cols = self._grid.evidence.shape
+        return 0 <= row < rows and 0 <= col < cols and bool(np.isfinite(self._grid.evidence[row, col]))
+
+    def task(self, left_m: float) -> SearchTask:
+        """Return the task as planners see it; ``left_m``: how far each vehicle can still travel."""
+        spec = self.spec
+        return SearchTask(
+            grid=self._grid,
+            scanner=self.site.scanner,
+            goal_m=self.site.goal_m,
+            goal_radius_m=spec.goal_radius_m,
+            entry_m=self.site.entry_m,
+            transmitter_m=self.site.transmitter_m,
+            com_range_m=spec.transmitter_range_m,
+            safety_m=spec.safety_m,
+            step_m=self._step_m,
+            left_m=left_m,
+            window_m=max(left_m, 1e-9),
+        )
+
+    def clear(self, origin_m: FloatArray, end_m: FloatArray) -> bool:
+        """Return whether a straight leg between places (2,) keeps the safety distance from every hazard known now."""
+        if self._ground is None:
+            self._ground = Ground.of(self.task(0.0))
+        return bool(self._ground.clear(origin_m, end_m[None])[0])
+
+    @property
+    def figures(self) -> Figures:
+        """How much of the site, and of its goal area, was explored."""
+        if self._figures is None:
+            task = self.task(0.0)
+            found = int(np.count_nonzero(task.states == Cell.FOUND))
+            self._figures = Figures(task.explored_part, task.explored_goal_part, found)
+        return self._figures
+
+    def contact(self, en_m: FloatArray) -> bool:
+        """Return whether a place (2,) is within the transmitter's range."""
+        return bool(in_contact(en_m, self.task(0.0)) >= 0.5)
+
+    def left_s(self) -> float:
+        """Return how much of the time window is left, seconds of vehicle time; all of it before the first step."""
+        if self.began_at is None:
+            return self.spec.window_s
+        return self.spec.window_s - (now() - self.began_at).total_seconds() * self._time_scale
+
+    def way_to_entry_m(self, en_m: FloatArray) -> float:
+        """Return the straight distance from a place (2,) to the entry."""
+        return float(np.hypot(*(en_m - self.site.entry_m)))
+
+    def home_radius_m(self, vehicles: int) -> float:
+        """Return within which distance of the entry each vehicle of a team counts as being back."""
+        return HOME_STEPS * self._step_m * max(vehicles, 1)

@@ -1,0 +1,52 @@
+"""Queries on the scans of search missions."""
+
+import zlib
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from sqlalchemy import insert, select, tuple_
+from sqlalchemy.ext.asyncio import AsyncSession
+
+from app.storage.models import ScanRow
+
+Identity = tuple[str, float]
+"""What makes a scan the same scan within a mission: vehicle, vehicle's time."""
+
+CHUNK = 300
+
+
+async def known_scans(session: AsyncSession, mission_id: str, wanted: Sequence[Identity]) -> set[Identity]:
+    """Return those of the scans that are stored already."""
+    columns = (ScanRow.vehicle, ScanRow.time_s)
+    found: set[Identity] = set()
+    for first in range(0, len(wanted), CHUNK):
+        query = select(*columns).where(
+            ScanRow.mission_id == mission_id, tuple_(*columns).in_(wanted[first : first + CHUNK])
+        )
+        found |= {(vehicle, time_s) for vehicle, time_s in await session.execute(query)}
+    return found
+
+
+async def add_scans(session: AsyncSession, rows: Sequence[dict[str, Any]]) -> None:
+    """Store scans in their order."""
+    if rows:
+        await session.execute(insert(ScanRow), list(rows))
+
+
+async def accepted_scans(session: AsyncSession, mission_id: str, until_step: int | None = None) -> Sequence[ScanRow]:
+    """Return the accepted scans in the order they were judged, those until the end of a step where one is given."""
+    query = select(ScanRow).where(ScanRow.mission_id == mission_id, ScanRow.verdict == "accepted")
+    if until_step is not None:
+        query = query.where(ScanRow.step <= until_step)
+    return (await session.scalars(query.order_by(ScanRow.id))).all()
+
+
+def pack_ranges(ranges_m: Sequence[float]) -> bytes:
+    """Return ranges as they are stored."""
+    return zlib.compress(np.array(ranges_m, dtype="<f4").tobytes(), level=1)
+
+
+def unpack_ranges(stored: bytes) -> tuple[float, ...]:
+    """Return stored ranges."""
+    return tuple(np.frombuffer(zlib.decompress(stored), dtype="<f4").astype(np.float64).tolist())
