@@ -7,6 +7,8 @@ from pydantic import BaseModel, ConfigDict, Field, PlainValidator, ValidationErr
 
 from app.api.problems import field_problem
 from app.missions.measurement import Measurement
+from app.missions.search.posted import Scan
+from app.missions.search.scanning import MAX_SCANS
 from app.missions.spec_base import Name
 
 API = "/api/v1"
@@ -81,6 +83,33 @@ class MeasurementBatch(BaseModel):
     )
 
     items: list[BatchItem] = Field(min_length=1, max_length=MAX_BATCH)
+
+
+class ScanBatch(BaseModel):
+    """Scans in the order in which they were made."""
+
+    model_config = ConfigDict(
+        extra="forbid",
+        json_schema_extra={
+            "examples": [
+                {
+                    "items": [
+                        {
+                            "vehicle": "boat-1",
+                            "time_s": 1795225140.5,
+                            "lat_deg": 41.1852,
+                            "lon_deg": -8.7046,
+                            "bearing_step_deg": 90.0,
+                            "reach_m": 12.0,
+                            "ranges_m": [7.2, None, 3.1, None],
+                        }
+                    ]
+                }
+            ]
+        },
+    )
+
+    items: list[Scan] = Field(min_length=1, max_length=MAX_SCANS)
 
 
 class ComponentHealth(BaseModel):

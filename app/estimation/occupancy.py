@@ -14,6 +14,8 @@ HIT, MISS = 1.2, -0.4
 """Logarithmic odds that one scan adds to a cell where a beam ended, or that beams only passed."""
 CLAMP = (-3.0, 4.0)
 """Bounds of the evidence, so that a boat that left can be unlearned."""
+CLOSE = 0.1
+"""Distance between the places beyond an echo that are looked at, in cells."""
 INTO = 1e-9
 """How far into its cell an echo lies, as a part of a cell: a beam may touch no more than a corner of it."""
 
@@ -91,7 +93,13 @@ class OccupancyGrid:
         return states
 
     def seen_from(
-        self, position_m: FloatArray, bearings_rad: FloatArray, ranges_m: FloatArray, reach_m: float
+        self,
+        position_m: FloatArray,
+        bearings_rad: FloatArray,
+        ranges_m: FloatArray,
+        reach_m: float,
+        *,
+        doubt_m: float = 0.0,
     ) -> "OccupancyGrid":
         """Return the grid after a scan.
 
@@ -105,6 +113,9 @@ class OccupancyGrid:
             Clockwise from north.
         ranges_m : (n,)
             To the echo; inf where there was none within ``reach_m``; NaN: the beam is left out.
+        doubt_m : float
+            How far an echo may lie in front of an obstacle of the blueprint and still come from it: neither ranges nor
+            positions are exact.
         """
         evidence = self.evidence.copy()
         start = (np.asarray(position_m, dtype=np.float64)[:2] - [self.west_m, self.south_m]) / self.cell_m
@@ -114,6 +125,8 @@ class OccupancyGrid:
             np.asarray(bearings_rad, dtype=np.float64),
             np.asarray(ranges_m, dtype=np.float64) / self.cell_m,
             reach_m / self.cell_m,
+            self.blueprint,
+            doubt_m / self.cell_m,
         )
         return replace(self, evidence=evidence)
 
@@ -132,7 +145,28 @@ class OccupancyGrid:
 
 
 @njit(cache=True, nogil=True)
-def _mark(evidence: FloatArray, start: FloatArray, bearings: FloatArray, ranges: FloatArray, reach: float) -> None:
+def _is_before(blueprint: BoolArray, start: FloatArray, east: float, north: float, length: float, doubt: float) -> bool:
+    """Tell whether a beam would meet an obstacle of the blueprint within ``doubt`` beyond its echo."""
+    rows, cols = blueprint.shape
+    pieces = int(np.ceil(doubt / CLOSE))
+    for k in range(1, pieces + 1):
+        beyond = length + doubt * k / pieces
+        row, col = int(np.floor(start[1] + beyond * north)), int(np.floor(start[0] + beyond * east))
+        if 0 <= row < rows and 0 <= col < cols and blueprint[row, col]:
+            return True
+    return False
+
+
+@njit(cache=True, nogil=True)
+def _mark(
+    evidence: FloatArray,
+    start: FloatArray,
+    bearings: FloatArray,
+    ranges: FloatArray,
+    reach: float,
+    blueprint: BoolArray,
+    doubt: float,
+) -> None:
     rows, cols = evidence.shape
     passed = np.zeros((rows, cols), dtype=np.uint8)
     for k in range(len(bearings)):
@@ -151,7 +185,7 @@ def _mark(evidence: FloatArray, start: FloatArray, bearings: FloatArray, ranges:
             leaves = min(next_c, next_r)
             if leaves >= length:
                 # A beam without an echo says nothing of a cell that it only touches.
-                if echo:
+                if echo and not _is_before(blueprint, start, east, north, length, doubt):
                     passed[row, col] = 2
                 break
             if passed[row, col] == 0:

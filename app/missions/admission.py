@@ -2,9 +2,9 @@
 
 from collections.abc import Sequence
 
-from app.exploration.planners import ONLY_IN_SIMULATION, PLANNERS, REFUSAL
+from app.exploration.planners import ONLY_IN_SIMULATION, PLANNERS, REFUSAL, SEARCHERS
 from app.missions.errors import InvalidRequestError
-from app.missions.spec import MissionSpec, VehicleKind, VehicleSpec
+from app.missions.spec import MissionKind, MissionSpec, VehicleKind, VehicleSpec
 
 
 def check_spec(spec: MissionSpec, kinds: Sequence[VehicleKind]) -> None:
@@ -12,11 +12,16 @@ def check_spec(spec: MissionSpec, kinds: Sequence[VehicleKind]) -> None:
 
     ``kinds`` are the kinds of vehicles that can be reached.
     """
-    name, use = spec.planner.name, f"use one of {', '.join(PLANNERS)}"
+    name = spec.planner.name
+    there = PLANNERS if spec.kind is MissionKind.SURVEY else SEARCHERS
+    use = f"use one of {', '.join(there)}"
     if name in ONLY_IN_SIMULATION:
         raise InvalidRequestError("planner.name", REFUSAL.format(name=name), use)
-    if name not in PLANNERS:
-        raise InvalidRequestError("planner.name", f"there is no planner {name!r}", use)
+    if name not in there:
+        what = (
+            f"{name!r} plans no missions of kind {spec.kind}" if name in PLANNERS else f"there is no planner {name!r}"
+        )
+        raise InvalidRequestError("planner.name", what, use)
     for index, vehicle in enumerate(spec.vehicles):
         check_vehicle(vehicle, spec, kinds, f"vehicles.{index}.")
 

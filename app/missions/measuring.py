@@ -17,6 +17,7 @@ from app.missions.measurement import Measurement
 from app.missions.spec import VehicleKind
 from app.missions.states import MissionState
 from app.missions.tracking import Arrived
+from app.missions.verdicts import batch_verdict
 from app.missions.views import BatchVerdict, ItemVerdict, Verdict
 from app.storage import soundings as sounding_queries
 from app.storage.database import Database
@@ -209,10 +210,4 @@ def _batch_verdict(count: int, taken: Mapping[int, ItemVerdict], strangers: Mapp
             items.append(ItemVerdict(index=index, verdict=Verdict.REJECTED, reason=strangers[index]))
         else:
             items.append(ItemVerdict(index=index, verdict=Verdict.ACCEPTED, reason="position report"))
-    tally = {verdict: sum(item.verdict is verdict for item in items) for verdict in Verdict}
-    return BatchVerdict(
-        accepted=tally[Verdict.ACCEPTED],
-        rejected=tally[Verdict.REJECTED],
-        duplicate=tally[Verdict.DUPLICATE],
-        items=items,
-    )
+    return batch_verdict(items)

@@ -11,6 +11,7 @@ from app.missions.fleet import LinkState
 from app.missions.hub import FleetHub
 from app.missions.live import LiveMission
 from app.missions.members import Member
+from app.missions.search.checks import search_checks
 from app.missions.spec import VehicleKind
 from app.missions.views import CheckStatus, CheckView, PreflightView
 
@@ -31,7 +32,8 @@ def preflight(live: LiveMission, hub: FleetHub) -> PreflightView:
         *_room(live),
         *_water_level(live),
         *_known_bottom(live),
-        _duration(live),
+        *search_checks(live, hub),
+        *([_duration(live)] if live.search is None else []),
     ]
     return PreflightView(ready=all(check.status is not PROBLEM for check in checks), checks=checks)
 

@@ -29,6 +29,7 @@ from app.missions.correcting import check_level_is_known, corrections_view, set_
 from app.missions.doctoring import DoctorView, Examine, doctor_view, switched_off
 from app.missions.errors import (
     ConflictError,
+    InvalidRequestError,
     MapNotReadyError,
     MissionNotFoundError,
     VehicleNotFoundError,
@@ -62,8 +63,12 @@ from app.missions.products import (
     product_kind,
 )
 from app.missions.reviewing import rule, soundings_page
+from app.missions.search.obstacles import obstacles_geojson
+from app.missions.search.posted import Scan
+from app.missions.search.scanning import scan, search_of
+from app.missions.search.views import SearchGridView, grid_view
 from app.missions.settings import ServiceSettings
-from app.missions.spec import MissionSpec, SoundSpeed, VehicleKind, VehicleSpec
+from app.missions.spec import MissionKind, MissionSpec, SoundSpeed, VehicleKind, VehicleSpec
 from app.missions.states import ENDED, MissionState
 from app.missions.target_pages import target_ranges_page
 from app.missions.target_views import TargetRangePage, TargetView
@@ -105,6 +110,7 @@ from app.storage.models import MissionRow, MissionVehicleRow, SoundingRow
 Action = Literal["start", "pause", "resume", "abort", "finish"]
 
 ENDED_MISSIONS_IN_MEMORY = 8
+NO_FORECAST = "what a search will find cannot be forecast: it depends on what stands there"
 WORKERS = 2
 
 log = structlog.get_logger(__name__)
@@ -373,12 +379,16 @@ class MissionService:
     async def forecast(self, spec: MissionSpec, *, floor_depth_m: float | None = None) -> ForecastView:
         """Return what is to be expected of a mission as it is described. Raises InvalidRequestError."""
         check_spec(spec, self._hub.kinds)
+        if spec.kind is MissionKind.SEARCH:
+            raise InvalidRequestError("kind", NO_FORECAST, "forecast missions of kind survey")
         return await self._forecaster.make(spec, floor_depth_m=floor_depth_m)
 
     async def forecast_of(self, mission_id: str, *, floor_depth_m: float | None = None) -> ForecastView:
         """Return what is to be expected of a stored mission from now on. Raises ConflictError, InvalidRequestError."""
         live = await self._get(mission_id)
         self._refuse_ended(live, "has nothing before it")
+        if live.search is not None:
+            raise ConflictError(NO_FORECAST, "see its time window, search.window_s")
         async with self._database.reading() as session:
             prior = await sounding_queries.imported_arrays(session, mission_id)
         team = [replace(member, report=member.report or self._hub.info(member.key).report) for member in live.team]
@@ -469,6 +479,23 @@ class MissionService:
     ) -> TargetRangePage:
         """Return ranges to targets, a page of them."""
         return await target_ranges_page(await self._get(mission_id), self._database, target, after, limit)
+
+    # Searches
+
+    async def scan(self, mission_id: str, items: Sequence[Scan]) -> BatchVerdict:
+        """Take in scans; see ``scanning.scan``."""
+        return await scan(await self._get(mission_id), self._database, items)
+
+    async def search_grid(self, mission_id: str, *, after: int | None = None) -> SearchGridView | None:
+        """Return a search's site as known now; None when nothing is newer than ``after``. Raises ConflictError."""
+        live = await self._get(mission_id)
+        search = search_of(live)
+        return None if after is not None and search.version <= after else grid_view(search, live.id, live.frame)
+
+    async def search_obstacles(self, mission_id: str) -> bytes:
+        """Return the obstacles of a search's site as GeoJSON. Raises ConflictError."""
+        live = await self._get(mission_id)
+        return await live.in_thread(obstacles_geojson, search_of(live), live.frame)
 
     # Corrections
 

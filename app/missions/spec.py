@@ -4,6 +4,7 @@ The REST schema, the command line's help and the dashboard's forms are all made 
 """
 
 from enum import StrEnum
+from functools import lru_cache
 from itertools import pairwise
 from typing import Annotated, Any, Self
 
@@ -394,7 +395,7 @@ class MissionSpec(Model):
     def frame(self) -> LocalFrame:
         """The mission's local frame; its origin is the south-western corner of the area's bounding box."""
         lons, lats = zip(*self.area.ring, strict=True)
-        return LocalFrame(min(lats), min(lons))
+        return _frame(min(lats), min(lons))
 
     def local_area(self) -> np.ndarray[Any, np.dtype[np.float64]]:
         """The area's vertices in the local frame, shape (n, 2): east, north in metres."""
@@ -407,3 +408,9 @@ class MissionSpec(Model):
         vertices = np.column_stack([east, north])
         ring_area = Polygon(vertices).exterior.is_ccw
         return vertices if ring_area else vertices[::-1]
+
+
+@lru_cache(maxsize=256)
+def _frame(lat_deg: float, lon_deg: float) -> LocalFrame:
+    """Return the frame about an origin; making one takes milliseconds, and a description is checked often."""
+    return LocalFrame(lat_deg, lon_deg)

@@ -4,7 +4,7 @@ from datetime import datetime
 from enum import StrEnum
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, SkipValidation
 
 from app.mapping.s44 import Order
 from app.missions.fleet import LinkState, WaypointStatus
@@ -113,7 +113,8 @@ class MissionSummary(View):
 class MissionView(MissionSummary):
     """A mission with everything an operator sees of it."""
 
-    spec: MissionSpec
+    # Checked when it was stored; checking its geometry for every answer would take milliseconds.
+    spec: SkipValidation[MissionSpec]
     origin: tuple[Longitude, Latitude] = Field(description="Origin of the local frame, [longitude, latitude]")
     vehicles: list[VehicleView]
     waypoints: list[WaypointView] = Field(description="The newest waypoint of each vehicle")

@@ -91,3 +91,15 @@ def test_an_obstacle_that_left_is_unlearned_and_a_beam_without_a_value_says_noth
     assert grid.states[2, 3] == Cell.EXPLORED
     silent = nothing.seen_from(np.array([0.5, 2.5]), east, np.array([np.nan]), 5.0)
     assert (silent.states == Cell.UNEXPLORED).all()
+
+
+def test_an_echo_just_in_front_of_a_known_obstacle_is_that_obstacle():
+    blueprint = np.zeros((SIDE, SIDE), dtype=np.bool_)
+    blueprint[12] = True
+    grid = OccupancyGrid.from_blueprint(blueprint, 1.0)
+    north = np.zeros(1)
+    for short, found in ((0.6, False), (1.6, True)):
+        seen = grid.seen_from(np.array([5.5, 5.5]), north, np.array([12.0 - 5.5 - short]), 10.0, doubt_m=1.0)
+        assert (seen.states == Cell.FOUND).any() == found
+        assert (seen.states[5:10, 5] == Cell.EXPLORED).all()
+        np.testing.assert_array_equal(seen.states == Cell.KNOWN, blueprint)

@@ -44,7 +44,7 @@ class Ground:
     def of(cls, task: SearchTask) -> "Ground":
         """Make it from what is known now."""
         hazard = task.states != Cell.EXPLORED
-        return cls(task, hazard, ~hazard & ~binary_dilation(hazard, _within(task.safety_m / task.grid.cell_m)))
+        return cls(task, hazard, ~hazard & ~binary_dilation(hazard, _within(_margin(task))))
 
     def places(self, en_m: FloatArray) -> IntArray:
         """Return the cells (n, 2) of positions (n, 2), at the border those within."""
@@ -63,7 +63,8 @@ class Ground:
     def clear(self, origin_m: FloatArray, ends_m: FloatArray) -> BoolArray:
         """Return which straight legs from (2,) to (n, 2) keep the safety distance from every hazard, all along.
 
-        Where a vehicle stands closer already it may only get away.
+        They keep what is spared beside it, too, or where a vehicle stands without that as much as it has. Where it
+        stands closer than the safety distance it may only get away.
         """
         grid = self.task.grid
         corner = np.array([grid.west_m, grid.south_m])
@@ -72,6 +73,7 @@ class Ground:
             (np.asarray(origin_m, dtype=np.float64) - corner) / grid.cell_m,
             np.ascontiguousarray((np.asarray(ends_m, dtype=np.float64) - corner) / grid.cell_m),
             self.task.safety_m / grid.cell_m,
+            self.task.spare_m / grid.cell_m,
         )
 
     def beside(self, origin_m: FloatArray) -> IntArray:
@@ -95,7 +97,7 @@ class Ground:
         In fifths of a cell, as in :meth:`distances`.
         """
         solid = self.task.states >= Cell.KNOWN
-        open_ = ~binary_dilation(solid, _within(self.task.safety_m / self.task.grid.cell_m))
+        open_ = ~binary_dilation(solid, _within(_margin(self.task)))
         return _distances(open_, np.argwhere(places))
 
     def way_m(self, origin_m: FloatArray, distance: NDArray[np.int32]) -> float:
@@ -133,6 +135,11 @@ class Ground:
         return np.asarray(origin_m + leg[last] * min(1.0, step_m / max(float(length[last]), 1e-12)))
 
 
+def _margin(task: SearchTask) -> float:
+    """Return how far places to go to are from hazards, in cells."""
+    return (task.safety_m + task.spare_m) / task.grid.cell_m
+
+
 def _within(radius: float) -> BoolArray:
     """Return the offsets at which a hazard's edge is closer than ``radius`` cells to a cell's centre."""
     k = int(np.ceil(radius + 0.5))
@@ -155,10 +162,11 @@ def _edge_distance(hazard: BoolArray, east: float, north: float, radius: float) 
 
 
 @njit(cache=True, nogil=True)
-def _clear(hazard: BoolArray, origin: FloatArray, ends: FloatArray, safety: float) -> BoolArray:
+def _clear(hazard: BoolArray, origin: FloatArray, ends: FloatArray, safety: float, spare: float) -> BoolArray:
     rows, cols = hazard.shape
     clear = np.ones(len(ends), dtype=np.bool_)
-    here = _edge_distance(hazard, origin[0], origin[1], safety + SLACK)
+    least = safety + SLACK
+    here = _edge_distance(hazard, origin[0], origin[1], least + spare)
     for k in range(len(ends)):
         if not (0.0 <= ends[k, 0] <= cols and 0.0 <= ends[k, 1] <= rows):
             clear[k] = False
@@ -168,8 +176,8 @@ def _clear(hazard: BoolArray, origin: FloatArray, ends: FloatArray, safety: floa
         before = here
         for i in range(1, points + 1):
             point = origin + leg * (i / points)
-            away = _edge_distance(hazard, point[0], point[1], safety + SLACK)
-            if away < safety + SLACK and away <= before:
+            away = _edge_distance(hazard, point[0], point[1], least + spare)
+            if away < here - 1e-9 or (away < least and away <= before):
                 clear[k] = False
                 break
             before = away

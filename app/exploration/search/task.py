@@ -36,6 +36,8 @@ class SearchTask:
         How far each vehicle can still travel before the time is up.
     window_m : float
         The same when the mission began.
+    spare_m : float
+        How much more than ``safety_m`` legs keep where they can: real vehicles do not arrive at the very place.
     """
 
     grid: OccupancyGrid
@@ -49,6 +51,7 @@ class SearchTask:
     step_m: float
     left_m: float
     window_m: float
+    spare_m: float = 0.0
 
     @cached_property
     def states(self) -> NDArray[np.uint8]:

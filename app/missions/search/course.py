@@ -1,7 +1,7 @@
 """How the step loop serves a search: scans before decisions, the time that is left, obstacles on the way, the end."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,9 +23,13 @@ RESERVE = 0.1
 """Part of the time that is left which nobody plans with."""
 SPARE_STEPS = 0.5
 """Part of a full step that each step that is left counts as on the way home."""
+SPARE_PART = 0.5
+"""Part of the arrival radius that legs keep beside the safety distance: so far from its waypoint a vehicle may be."""
 REST_S = 2.0
 """Vehicle time that a decision in which nobody moves waits for a new scan."""
 STILL_M = 0.1
+LITTLE = 0.05
+"""Part of the time window that is not worth going out again for once everybody is back."""
 IDLE_STEPS = 3
 """Decisions in a row that send nobody anywhere while all are at the entry: nothing is left to do."""
 
@@ -63,7 +67,7 @@ class Course:
         """Return what planners are to see when ``step`` is decided: the way that is left by time and by steps."""
         by_time_m = self.search.left_s() * (1.0 - RESERVE) * self.pace_mps
         by_steps_m = (self.spec.steps - step + 1) * self.spec.limits.max_step_m * SPARE_STEPS
-        return self.search.task(min(by_time_m, by_steps_m))
+        return self.search.task(min(by_time_m, by_steps_m), spare_m=SPARE_PART * self.spec.arrival_radius_m)
 
     def unseen(self, team: Sequence[Member]) -> list[str]:
         """Return the vehicles whose own place nobody has looked at yet: where to go from there is not known."""
@@ -96,7 +100,8 @@ class Course:
         """Return whether everybody is back and has nothing more to do, or no time for it."""
         if not team or self.away(team):
             return False
-        return homebound >= len(team) or self.idle >= IDLE_STEPS or self.search.left_s() <= 0
+        little = LITTLE * self.search.spec.window_s
+        return homebound >= len(team) or self.idle >= IDLE_STEPS or self.search.left_s() <= little
 
 
 def hold_before_hazards(
@@ -106,7 +111,7 @@ def hold_before_hazards(
 
     Planners keep off by themselves; this is the check that does not trust them.
     """
-    ground, checked, notes = Ground.of(task), proposed.copy(), []
+    ground, checked, notes = Ground.of(replace(task, spare_m=0.0)), proposed.copy(), []
     for i, name in enumerate(names):
         still = np.hypot(*(proposed[i, :2] - origin[i, :2])) <= 0.0
         if not still and np.isfinite(proposed[i]).all() and not ground.clear(origin[i, :2], proposed[i : i + 1, :2])[0]:

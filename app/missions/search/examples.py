@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from shapely.geometry import Polygon, box
 
 from app.mapping.georeference import LocalFrame
 from app.mapping.outlines import outlines
@@ -52,8 +53,21 @@ def example(site: str = "harbour", *, seed: int = 0, vehicles: int = 1, window_s
 
 
 def _obstacles(frame: LocalFrame, world: ObstacleWorld, cells: NDArray[np.bool_]) -> list[dict[str, Any]]:
-    shapes = outlines(cells, 0.0, 0.0, world.cell_m)
+    shapes = [part for outline in outlines(cells, 0.0, 0.0, world.cell_m) for part in _without_holes(outline)]
     return [_polygon(frame, np.asarray(polygon.exterior.simplify(0.0).coords)) for polygon in shapes]
+
+
+def _without_holes(outline: Polygon) -> list[Polygon]:
+    """Cut a polygon until no part has a hole: a mission's polygons have none."""
+    if not outline.interiors:
+        return [outline]
+    west, south, east, north = outline.bounds
+    middle = round(outline.interiors[0].centroid.x)
+    halves = [
+        outline.intersection(box(*sides)) for sides in ((west, south, middle, north), (middle, south, east, north))
+    ]
+    parts = [part for half in halves for part in getattr(half, "geoms", [half]) if isinstance(part, Polygon)]
+    return [piece for part in parts for piece in _without_holes(part)]
 
 
 def _polygon(frame: LocalFrame, ring_m: NDArray[np.float64]) -> dict[str, Any]:

@@ -22,6 +22,8 @@ from app.missions.spec import MissionSpec
 
 FloatArray = NDArray[np.float64]
 
+DOUBT_CELLS = 1.0
+"""An echo so close in front of a known obstacle comes from that."""
 NEAR_M = 1e-3
 """A position this little outside of the site comes from rounding."""
 
@@ -53,6 +55,7 @@ class Search:
         """When its first step was committed."""
         self._frame = frame
         self._step_m = spec.limits.max_step_m
+        self._speed_mps = spec.speed_mps
         self._time_scale = time_scale
         self._grid = self.site.grid
         self._figures: Figures | None = None
@@ -72,7 +75,8 @@ class Search:
             bearings = np.radians(scan.first_bearing_deg + scan.bearing_step_deg * np.arange(len(scan.ranges_m)))
             # As they are stored: a restart makes the same grid of them.
             ranges = np.array(scan.ranges_m, dtype=np.float32).astype(np.float64)
-            self._grid = self._grid.seen_from(place, bearings, ranges, scan.reach_m)
+            doubt_m = DOUBT_CELLS * self._grid.cell_m
+            self._grid = self._grid.seen_from(place, bearings, ranges, scan.reach_m, doubt_m=doubt_m)
             self.version += 1
         if scans:
             self._figures = self._ground = None
@@ -113,8 +117,16 @@ class Search:
         rows, cols = self._grid.evidence.shape
         return 0 <= row < rows and 0 <= col < cols and bool(np.isfinite(self._grid.evidence[row, col]))
 
-    def task(self, left_m: float) -> SearchTask:
-        """Return the task as planners see it; ``left_m``: how far each vehicle can still travel."""
+    def task(self, left_m: float, *, spare_m: float = 0.0) -> SearchTask:
+        """Return the task as planners see it.
+
+        Parameters
+        ----------
+        left_m
+            How far each vehicle can still travel.
+        spare_m
+            What legs are to keep beside the safety distance.
+        """
         spec = self.spec
         return SearchTask(
             grid=self._grid,
@@ -127,7 +139,8 @@ class Search:
             safety_m=spec.safety_m,
             step_m=self._step_m,
             left_m=left_m,
-            window_m=max(left_m, 1e-9),
+            window_m=spec.window_s * self._speed_mps,
+            spare_m=spare_m,
         )
 
     def clear(self, origin_m: FloatArray, end_m: FloatArray) -> bool:

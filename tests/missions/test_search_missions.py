@@ -1,0 +1,261 @@
+"""Missions that search: real services, simulated boats among obstacles, scans through the service's door."""
+
+import json
+from typing import Any
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+from shapely.geometry import Point, shape
+
+from app.missions.errors import ConflictError, InvalidRequestError
+from app.missions.links.sim import SimFleetLink
+from app.missions.search.course import hold_before_hazards
+from app.missions.search.examples import example
+from app.missions.search.posted import Scan
+from app.missions.search.scanning import report_of_posted
+from app.missions.search.site import simulated_world
+from app.missions.search.state import Search
+from app.missions.service import MissionService
+from app.missions.spec import MissionKind, MissionSpec
+from app.missions.states import MissionState
+from app.missions.views import CheckStatus, Verdict
+from simulator.car_parks import car_park, harbour_basin
+from tests.missions.builders import lon_lat, rectangle
+from tests.missions.fleet import Harbour, Rover, until, until_state
+
+SIDE_M = 30.0
+
+
+def search_json(**changes: Any) -> dict[str, Any]:
+    """A basin of 30 x 30 m: a quay in the east is known, a pontoon across half of the middle is not."""
+    search = {
+        "goal": lon_lat(8, 25),
+        "goal_radius_m": 5.0,
+        "entry": lon_lat(14, 5),
+        "window_s": 4000.0,
+        "safety_m": 1.5,
+        "scanner": {"reach_m": 10.0, "resolution_deg": 2.0},
+        "obstacles": [rectangle(27, 0, 30, 30)],
+        "simulated_obstacles": [rectangle(0, 14, 15, 16)],
+    }
+    values: dict[str, Any] = {
+        "name": "Basin",
+        "kind": "search",
+        "area": rectangle(0, 0, SIDE_M, SIDE_M),
+        "vehicles": [{"name": "boat", "kind": "sim", "depth_m": 0}],
+        "limits": {"max_step_m": 4.0, "min_depth_m": 0.0, "min_altitude_m": 0.1},
+        "search": search | changes.pop("search", {}),
+    }
+    return values | changes
+
+
+def search_spec(**changes: Any) -> MissionSpec:
+    return MissionSpec.model_validate(search_json(**changes))
+
+
+def all_round(east: float, north: float, time_s: float, **changes: Any) -> Scan:
+    """A look round that meets nothing."""
+    lon, lat = lon_lat(east, north)
+    values: dict[str, Any] = {"vehicle": "boat", "time_s": time_s, "lat_deg": lat, "lon_deg": lon}
+    nothing = [None] * 180
+    return Scan.model_validate(values | {"bearing_step_deg": 2.0, "reach_m": 10.0, "ranges_m": nothing} | changes)
+
+
+async def test_a_boat_goes_round_what_nobody_knew_of_sees_the_goal_and_is_back_in_time(
+    harbour: Harbour, service: MissionService
+) -> None:
+    spec = search_spec()
+    mission = await service.create(spec)
+    checks = await service.preflight(mission.id)
+    assert checks.ready
+    await service.act(mission.id, "start", actor="Ana")
+    done = await until_state(service, mission.id, MissionState.FINISHED)
+    found = done.progress.search
+    assert found is not None
+    assert done.reason == "everybody is back at the entry"
+    assert found.goal_pct > 90
+    assert found.explored_pct > 75
+    assert (found.back, found.left_s > 0) == (["boat"], True)
+    assert found.found_cells >= 15
+    # The truth is that of the description: nobody touched anything, no leg came too near.
+    link = service._sim
+    assert isinstance(link, SimFleetLink)
+    assert "obstacle" not in link.vehicles()[0].reason
+    pontoon = shape(rectangle(0, 14, 15, 16))
+    for step in await service.steps(mission.id):
+        for waypoint in step.waypoints:
+            assert pontoon.distance(Point(waypoint.lon_deg, waypoint.lat_deg)) > 0
+            assert 0 <= waypoint.east_m <= 27 - 1.5
+    geo = json.loads(await service.search_obstacles(mission.id))
+    seen = [f for f in geo["features"] if f["properties"]["found"]]
+    assert all(shape(f["geometry"]).intersects(pontoon.buffer(2e-5)) for f in seen)
+    assert sum(f["properties"]["area_m2"] for f in seen) == found.found_cells
+
+    # A restart makes the same grid of what was stored.
+    before = await service.search_grid(mission.id)
+    service = await harbour.reopen()
+    assert await service.search_grid(mission.id) == before
+    assert before is not None
+    assert await service.search_grid(mission.id, after=before.version) is None
+
+
+async def test_a_killed_search_goes_on_and_its_time_has_not_stood_still(
+    harbour: Harbour, service: MissionService
+) -> None:
+    mission = await service.create(search_spec())
+    await service.act(mission.id, "start", actor="Ana")
+
+    async def under_way() -> bool:
+        return (await service.mission(mission.id)).progress.step >= 3
+
+    await until(under_way, "it is under way")
+    before = (await service.mission(mission.id)).progress.search
+    service = await harbour.reopen()
+    after = (await service.mission(mission.id)).progress.search
+    assert before is not None
+    assert after is not None
+    assert after.began_at == before.began_at
+    assert after.left_s < before.left_s
+    assert after.version >= before.version
+
+    async def further() -> bool:
+        return (await service.mission(mission.id)).progress.step >= 6
+
+    await until(further, "it goes on")
+    await service.act(mission.id, "abort", actor="Ana")
+
+
+async def test_scans_are_judged_one_by_one_and_stored_once(service: MissionService) -> None:
+    mission = await service.create(search_spec(vehicles=[{"name": "boat", "kind": "rest", "depth_m": 0}]))
+    scans = [
+        all_round(14, 5, 1.0),
+        all_round(14, 5, 2.0, vehicle="stranger"),
+        all_round(-9, 5, 3.0),
+        all_round(14, 5, 4.0, ranges_m=[1.0, -1.0]),
+        all_round(14, 5, 5.0, ranges_m=[1.0] * 181),
+        all_round(14, 5, 1.0),
+    ]
+    answer = await service.scan(mission.id, scans)
+    assert [item.verdict for item in answer.items] == [
+        Verdict.ACCEPTED, Verdict.REJECTED, Verdict.REJECTED, Verdict.REJECTED, Verdict.REJECTED, Verdict.DUPLICATE,
+    ]  # fmt: skip
+    wrong = ("stranger", "outside of the site", "-1", "once round")
+    for item, word in zip(answer.items[1:5], wrong, strict=True):
+        assert word in item.reason
+    again = await service.scan(mission.id, scans[:1])
+    assert (again.accepted, again.duplicate) == (0, 1)
+    view = await service.search_grid(mission.id)
+    assert view is not None
+    assert view.version == 1
+
+
+async def test_a_vehicle_waits_for_scans_and_turns_back_where_something_comes_up(service: MissionService) -> None:
+    mission = await service.create(
+        search_spec(vehicles=[{"name": "boat", "kind": "rest", "depth_m": 0}], search={"simulated_obstacles": []})
+    )
+    rover = Rover(service, mission.id, "boat", 14, 5)
+    await rover.post()
+    await service.act(mission.id, "start", actor="Ana")
+
+    async def said(kind: str) -> bool:
+        return any(event.kind == kind for event in await service.events(mission.id))
+
+    await until(lambda: said("waiting"), "the search says that it waits for a scan")
+    assert not await rover.poll(0.0)
+    await service.scan(mission.id, [all_round(14, 5, 10.0)])
+    # A ring of walls 6 m away comes up while the boat is on its way: that leg ends, another one comes.
+    first = await service.waypoint(mission.id, "boat", after_step=0, timeout_s=30.0)
+    assert first is not None
+    leg = np.array([first.east_m - 14.0, first.north_m - 5.0])
+    assert 1.0 < np.hypot(*leg) < 4.001
+    bearing = np.degrees(np.arctan2(leg[0], leg[1])) % 360
+    for k in range(6):
+        wall = all_round(
+            14,
+            5,
+            11.0 + k,
+            first_bearing_deg=bearing - 20,
+            bearing_step_deg=1.0,
+            ranges_m=[float(np.hypot(*leg)) - 0.5] * 40,
+        )
+        assert (await service.scan(mission.id, [wall])).accepted == 1
+    await until(lambda: said("obstacle"), "the way is barred")
+    second = await service.waypoint(mission.id, "boat", after_step=first.step, timeout_s=30.0)
+    assert second is not None
+    steps = await service.steps(mission.id)
+    missed = next(step for step in steps if step.number == first.step)
+    assert "something stands on its way" in missed.waypoints[0].reason
+    await service.act(mission.id, "abort", actor="Ana")
+
+
+def test_no_leg_leads_closer_to_a_hazard_than_asked_whatever_a_planner_says() -> None:
+    spec = search_spec()
+    assert spec.search is not None
+    search = Search(spec, spec.search, spec.frame(), 1.0)
+    search.see([report_of_posted(all_round(14, 5, 1.0))])
+    origin = np.array([[14.0, 5.0, 0.0], [14.0, 8.0, 0.0], [12.0, 5.0, 0.0]])
+    wishes = np.array([[14.0, 9.0, 0.0], [14.0, 16.0, 0.0], [np.nan, 5.0, 0.0]])
+    held, notes = hold_before_hazards(search.task(100.0), ("free", "unseen", "lost"), origin, wishes)
+    np.testing.assert_array_equal(held[:2], [wishes[0], origin[1]])
+    assert [note.partition(":")[0] for note in notes] == ["unseen"]
+
+
+async def test_what_a_search_lacks_is_told_field_by_field(service: MissionService) -> None:
+    wrong: list[tuple[dict[str, Any], str]] = [
+        ({"kind": "survey"}, "kind is survey and search is given"),
+        ({"search": None}, "kind is search and search is missing"),
+        ({"search": {"goal": lon_lat(50, 5)}}, "search.goal lies 20.0 m outside the area"),
+        ({"search": {"safety_m": 0.5}}, "search.safety_m is 0.5 m but arrival_radius_m is 1.0 m"),
+    ]
+    for change, words in wrong:
+        raw = search_json(**(change if change.get("search", {}) is not None else {}))
+        if change.get("search", {}) is None:
+            del raw["search"]
+        with pytest.raises(ValidationError, match=words):
+            MissionSpec.model_validate(raw)
+    with pytest.raises(InvalidRequestError, match="plans no missions of kind search") as refused:
+        await service.create(search_spec(planner={"name": "lawnmower"}))
+    assert "rollout" in str(refused.value.remedy)
+    survey = await service.create(MissionSpec.model_validate(search_json() | {"kind": "survey", "search": None}))
+    with pytest.raises(ConflictError, match="kind survey"):
+        await service.scan(survey.id, [all_round(14, 5, 1.0)])
+    mission = await service.create(search_spec())
+    with pytest.raises(ConflictError, match="cannot be forecast"):
+        await service.forecast_of(mission.id)
+
+
+def test_a_search_has_defaults_of_its_own() -> None:
+    spec = search_spec()
+    assert (spec.kind, spec.planner.name, spec.arrival_radius_m) == (MissionKind.SEARCH, "rollout", 1.0)
+    assert spec.steps == 3000
+    assert search_spec(steps=7, planner={"name": "cao"}).steps == 7
+    assert MissionSpec.model_validate(spec.model_dump(mode="json")) == spec
+
+
+async def test_the_checklist_says_when_nobody_could_leave_or_get_there(service: MissionService) -> None:
+    cases = [
+        ({}, CheckStatus.OK, "to the goal area"),
+        ({"obstacles": [rectangle(0, 14, 30, 16)]}, CheckStatus.WARNING, "bar every way"),
+        (
+            {"obstacles": [rectangle(10, 6.5, 30, 9), rectangle(10, 0, 30, 4)]},
+            CheckStatus.PROBLEM,
+            "closer to the entry",
+        ),
+        ({"window_s": 60.0}, CheckStatus.WARNING, "there and back"),
+    ]
+    for change, status, words in cases:
+        mission = await service.create(search_spec(search=change))
+        (line,) = [c for c in (await service.preflight(mission.id)).checks if c.id == "search.ways"]
+        assert (line.status, words in line.message) == (status, True), line
+
+
+def test_the_examples_are_missions() -> None:
+    for site in ("harbour", "car-park-1", "car-park-2", "car-park-3"):
+        spec = MissionSpec.model_validate(example(site, vehicles=2))
+        assert spec.search is not None
+        cells = Search(spec, spec.search, spec.frame(), 1.0).grid.blueprint
+        world = simulated_world(spec, spec.search)
+        truth = harbour_basin(0) if site == "harbour" else car_park(int(site[-1]), 0)
+        np.testing.assert_array_equal(cells, truth.known)
+        np.testing.assert_array_equal(world.solid, truth.solid)
