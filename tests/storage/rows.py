@@ -13,6 +13,7 @@ from app.storage.models import (
     MissionVehicleRow,
     PositionRow,
     ReferenceRow,
+    ScanRow,
     SoundingRow,
     StepRow,
     TargetRangeRow,
@@ -21,6 +22,7 @@ from app.storage.models import (
     TokenRow,
     WaypointRow,
 )
+from app.storage.scans import pack_ranges
 from app.storage.soundings import pack
 
 TIME = datetime(2026, 6, 1, 12, 30, 15, 250_000, tzinfo=UTC)
@@ -134,6 +136,26 @@ def target_range(mission_id: str = "m1", target: str = "tag-1", time_s: float = 
     }
 
 
+def scan(mission_id: str = "m1", time_s: float = 1.0) -> dict[str, Any]:
+    return {
+        "mission_id": mission_id,
+        "vehicle": "a",
+        "time_s": time_s,
+        "received_at": TIME,
+        "step": 0,
+        "source": "rest",
+        "lat_deg": 41.18,
+        "lon_deg": -8.7,
+        "depth_m": 0.0,
+        "first_bearing_deg": 0.0,
+        "bearing_step_deg": 90.0,
+        "reach_m": 12.0,
+        "ranges": pack_ranges([1.5, float("inf"), 3.0, 4.0]),
+        "verdict": "accepted",
+        "reason": "",
+    }
+
+
 def one_of_each() -> list[list[Any]]:
     """Rows in the order in which foreign keys allow them."""
     return [
@@ -144,6 +166,7 @@ def one_of_each() -> list[list[Any]]:
             SoundingRow(**sounding()),
             PositionRow(**position()),
             TargetRangeRow(**target_range()),
+            ScanRow(**scan()),
             TelemetryRow(
                 mission_id="m1", vehicle="a", at_s=5.0, depth_m=2.0, altitude_m=None, battery_pct=80.0, age_s=0.1
             ),

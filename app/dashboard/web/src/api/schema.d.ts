@@ -778,6 +778,69 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/missions/{mission_id}/scans": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Post scans
+         * @description Store scans of a mission of kind search, and add them to what is known of its site.
+         *
+         *     Each scan has its own verdict; one that came before, by its vehicle and time, is a duplicate. Vehicles of any kind
+         *     but sim may have a computer that posts: those that are commanded over IMC, too.
+         */
+        post: operations["postScans"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/missions/{mission_id}/search": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * See the site of a search as known now
+         * @description Return what is known of every cell: explored, not explored, an obstacle known beforehand, or one found.
+         */
+        get: operations["getSearch"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/missions/{mission_id}/search/obstacles.geojson": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Download the obstacles of a search as GeoJSON
+         * @description Return the outlines of all cells that obstacles fill: known beforehand, and found.
+         */
+        get: operations["getSearchObstacles"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/missions/{mission_id}/events": {
         parameters: {
             query?: never;
@@ -1454,7 +1517,7 @@ export interface components {
          * @enum {string}
          */
         LinkState: "unknown" | "lost" | "expected_offline" | "heard" | "ready" | "engaged";
-        LiveMessage: components["schemas"]["SnapshotMessage"] | components["schemas"]["VehiclesMessage"] | components["schemas"]["TargetsMessage"] | components["schemas"]["WaypointsMessage"] | components["schemas"]["StateMessage"] | components["schemas"]["MapMessage"] | components["schemas"]["EventMessage"];
+        LiveMessage: components["schemas"]["SnapshotMessage"] | components["schemas"]["VehiclesMessage"] | components["schemas"]["TargetsMessage"] | components["schemas"]["SearchMessage"] | components["schemas"]["WaypointsMessage"] | components["schemas"]["StateMessage"] | components["schemas"]["MapMessage"] | components["schemas"]["EventMessage"];
         /**
          * Liveness
          * @description The process answers.
@@ -1649,6 +1712,12 @@ export interface components {
             items: components["schemas"]["Measurement"][];
         };
         /**
+         * MissionKind
+         * @description What a mission is for.
+         * @enum {string}
+         */
+        MissionKind: "survey" | "search";
+        /**
          * MissionSpec
          * @description A mission as an operator describes it.
          */
@@ -1659,7 +1728,12 @@ export interface components {
              * @example Leixoes quay
              */
             name: string;
-            /** @description The area to map */
+            /**
+             * @description survey: map the sea floor; search: look for something in a partly known site, see `search`
+             * @default survey
+             */
+            kind: components["schemas"]["MissionKind"];
+            /** @description The area to map, or the site to search */
             area: components["schemas"]["PolygonGeometry"];
             /**
              * Keep Out
@@ -1690,6 +1764,8 @@ export interface components {
              */
             targets?: components["schemas"]["TargetSpec"][];
             tracking?: components["schemas"]["Tracking"];
+            /** @description With kind search, and only there: what is sought. Then planner.name is rollout unless given, and steps as many as the time window has room for */
+            search?: components["schemas"]["SearchSpec"] | null;
             /**
              * Speed Mps
              * @description Speed asked of the vehicles
@@ -1791,7 +1867,95 @@ export interface components {
              */
             updated_at: string;
             progress: components["schemas"]["Progress"];
-            spec: components["schemas"]["MissionSpec"];
+            /**
+             * MissionSpec
+             * @description A mission as an operator describes it.
+             */
+            spec: {
+                /**
+                 * Name
+                 * @description Shown to people; need not be unique
+                 * @example Leixoes quay
+                 */
+                name: string;
+                /**
+                 * @description survey: map the sea floor; search: look for something in a partly known site, see `search`
+                 * @default survey
+                 */
+                kind: components["schemas"]["MissionKind"];
+                /** @description The area to map, or the site to search */
+                area: components["schemas"]["PolygonGeometry"];
+                /**
+                 * Keep Out
+                 * @description Zones no vehicle may enter
+                 */
+                keep_out?: components["schemas"]["PolygonGeometry"][];
+                /** Vehicles */
+                vehicles?: components["schemas"]["VehicleSpec"][];
+                /**
+                 * Steps
+                 * @description Steps after which the mission is finished
+                 * @default 100
+                 */
+                steps: number;
+                /**
+                 * Cell M
+                 * @description Cell of the map's grid
+                 * @default 1
+                 */
+                cell_m: number;
+                limits?: components["schemas"]["Limits"];
+                planner?: components["schemas"]["PlannerSpec"];
+                /** @description When vehicles come up for a GPS fix; null: never because of their position */
+                surface_policy?: components["schemas"]["SurfacePolicy"] | null;
+                /**
+                 * Targets
+                 * @description Moving targets to keep track of
+                 */
+                targets?: components["schemas"]["TargetSpec"][];
+                tracking?: components["schemas"]["Tracking"];
+                /** @description With kind search, and only there: what is sought. Then planner.name is rollout unless given, and steps as many as the time window has room for */
+                search?: components["schemas"]["SearchSpec"] | null;
+                /**
+                 * Speed Mps
+                 * @description Speed asked of the vehicles
+                 * @default 1.3
+                 */
+                speed_mps: number;
+                /**
+                 * Arrival Radius M
+                 * @description Horizontal distance at which a waypoint counts as reached
+                 * @default 3
+                 */
+                arrival_radius_m: number;
+                /**
+                 * Step Deadline S
+                 * @description After this many seconds of vehicle time a step goes on without stragglers
+                 * @default 60
+                 */
+                step_deadline_s: number;
+                /**
+                 * Accuracy M
+                 * @description Standard deviation below which a cell counts as accurately known
+                 * @default 0.25
+                 */
+                accuracy_m: number;
+                /**
+                 * Sounding Noise
+                 * @description Standard deviation of a range as a fraction of it, where the vehicle states none
+                 * @default 0.01
+                 */
+                sounding_noise: number;
+                tide?: components["schemas"]["Tide"];
+                /** @description Sound speed correction; null: the sonars' own ranges are taken */
+                sound_speed?: components["schemas"]["SoundSpeed"] | null;
+                /**
+                 * Seed
+                 * @description Seed of every random decision
+                 * @default 0
+                 */
+                seed: number;
+            };
             /**
              * Origin
              * @description Origin of the local frame, [longitude, latitude]
@@ -2167,6 +2331,8 @@ export interface components {
              * @description Estimated wall-clock seconds until the last step
              */
             eta_s: number | null;
+            /** @description In missions of kind search: how it stands */
+            search: components["schemas"]["SearchProgress"] | null;
         };
         /**
          * QualityView
@@ -2211,6 +2377,276 @@ export interface components {
             cells: number;
             /** Notes */
             notes: string[];
+        };
+        /**
+         * Scan
+         * @description One look round from a vehicle: a laser scanner's turn, or a sweep of an imaging sonar.
+         */
+        Scan: {
+            /** Vehicle */
+            vehicle: string;
+            /**
+             * Time S
+             * @description The vehicle's clock, Unix seconds
+             * @example 1795225140.5
+             */
+            time_s: number;
+            /**
+             * Lat Deg
+             * @description Latitude, WGS84 degrees
+             */
+            lat_deg: number;
+            /**
+             * Lon Deg
+             * @description Longitude, WGS84 degrees
+             */
+            lon_deg: number;
+            /**
+             * Depth M
+             * @description Depth of the vehicle below the surface
+             * @default 0
+             */
+            depth_m: number;
+            /**
+             * First Bearing Deg
+             * @description Bearing of the first beam, clockwise from true north
+             * @default 0
+             */
+            first_bearing_deg: number;
+            /**
+             * Bearing Step Deg
+             * @description By how much further clockwise each next beam looks
+             * @example 1
+             */
+            bearing_step_deg: number;
+            /**
+             * Reach M
+             * @description Within this range it tells of everything
+             * @example 12
+             */
+            reach_m: number;
+            /**
+             * Ranges M
+             * @description Range of each beam's first echo; null, or more than reach_m: there was none within reach
+             * @example [
+             *       7.2,
+             *       7.1,
+             *       null
+             *     ]
+             */
+            ranges_m: (number | null)[];
+        };
+        /**
+         * ScanBatch
+         * @description Scans in the order in which they were made.
+         * @example {
+         *       "items": [
+         *         {
+         *           "bearing_step_deg": 90,
+         *           "lat_deg": 41.1852,
+         *           "lon_deg": -8.7046,
+         *           "ranges_m": [
+         *             7.2,
+         *             null,
+         *             3.1,
+         *             null
+         *           ],
+         *           "reach_m": 12,
+         *           "time_s": 1795225140.5,
+         *           "vehicle": "boat-1"
+         *         }
+         *       ]
+         *     }
+         */
+        ScanBatch: {
+            /** Items */
+            items: components["schemas"]["Scan"][];
+        };
+        /**
+         * ScannerSpec
+         * @description A laser scanner or an imaging sonar that looks round, on every vehicle.
+         */
+        ScannerSpec: {
+            /**
+             * Reach M
+             * @description Range within which it tells of everything
+             * @default 8
+             */
+            reach_m: number;
+            /**
+             * Resolution Deg
+             * @description Angle between neighbouring beams
+             * @default 0.5
+             */
+            resolution_deg: number;
+        };
+        /**
+         * SearchGridView
+         * @description A search's site: what is known of each cell.
+         */
+        SearchGridView: {
+            /** Mission Id */
+            mission_id: string;
+            /**
+             * Version
+             * @description Scans that it was made of
+             */
+            version: number;
+            /** West M */
+            west_m: number;
+            /** South M */
+            south_m: number;
+            /** Cell M */
+            cell_m: number;
+            /** Rows */
+            rows: number;
+            /** Cols */
+            cols: number;
+            /**
+             * Corners
+             * @description [longitude, latitude] of the grid's corners: north-west, north-east, south-east, south-west
+             */
+            corners: [
+                number,
+                number
+            ][];
+            /**
+             * Cells
+             * @description One byte per cell, rows from south to north, each from west to east, in base64. 1: explored and free, 2: not explored, 3: obstacle known beforehand, 4: obstacle found
+             */
+            cells: string;
+        };
+        /**
+         * SearchMessage
+         * @description How a search stands: its grid can be fetched anew.
+         */
+        SearchMessage: {
+            /**
+             * Type
+             * @default search
+             * @constant
+             */
+            type: "search";
+            search: components["schemas"]["SearchProgress"];
+        };
+        /**
+         * SearchProgress
+         * @description How a search stands.
+         */
+        SearchProgress: {
+            /**
+             * Version
+             * @description Scans that the site's grid was made of
+             */
+            version: number;
+            /**
+             * Explored Pct
+             * @description Share of the site's open cells that were looked at and are free
+             */
+            explored_pct: number;
+            /**
+             * Goal Pct
+             * @description The same within the goal area
+             */
+            goal_pct: number;
+            /**
+             * Found Cells
+             * @description Cells with an obstacle that is on no plan
+             */
+            found_cells: number;
+            /**
+             * Left S
+             * @description Vehicle time until everybody has to be back; negative: too late
+             */
+            left_s: number;
+            /**
+             * Began At
+             * @description When the time began to run: at the first step
+             */
+            began_at: string | null;
+            /**
+             * Back
+             * @description Vehicles at the entry
+             */
+            back: string[];
+            /**
+             * Out Of Contact
+             * @description Vehicles farther from the transmitter than it reaches
+             */
+            out_of_contact: string[];
+        };
+        /**
+         * SearchSpec
+         * @description A search: something near the goal is sought, the rest of the site is looked at, and all are back in time.
+         */
+        SearchSpec: {
+            /**
+             * Goal
+             * @description Where it is expected, [longitude, latitude]
+             * @example [
+             *       -8.7033,
+             *       41.1863
+             *     ]
+             */
+            goal: [
+                number,
+                number
+            ];
+            /**
+             * Goal Radius M
+             * @description Radius of the goal area about it
+             * @default 50
+             */
+            goal_radius_m: number;
+            /**
+             * Entry
+             * @description Where vehicles enter, and where they are when the time is up, [longitude, latitude]
+             * @example [
+             *       -8.7046,
+             *       41.1852
+             *     ]
+             */
+            entry: [
+                number,
+                number
+            ];
+            /**
+             * Window S
+             * @description Time from the first step in which every vehicle is back, seconds of vehicle time; pauses count
+             * @example 1800
+             */
+            window_s: number;
+            /**
+             * Transmitter
+             * @description Where the team's radio stands; null: at the entry
+             */
+            transmitter?: [
+                number,
+                number
+            ] | null;
+            /**
+             * Transmitter Range M
+             * @description Farther away a vehicle is out of contact
+             * @default 200
+             */
+            transmitter_range_m: number;
+            /**
+             * Safety M
+             * @description Legs keep this far from obstacles and from what nobody has looked at; not below arrival_radius_m
+             * @default 2
+             */
+            safety_m: number;
+            scanner?: components["schemas"]["ScannerSpec"];
+            /**
+             * Obstacles
+             * @description What is known to stand there: quays on a chart, walls on a plan
+             */
+            obstacles?: components["schemas"]["PolygonGeometry"][];
+            /**
+             * Simulated Obstacles
+             * @description What simulated vehicles meet beyond `obstacles`; planners do not know of it
+             */
+            simulated_obstacles?: components["schemas"]["PolygonGeometry"][];
         };
         /**
          * Sensor
@@ -6340,6 +6776,251 @@ export interface operations {
             };
             /** @description There is no such mission; the mission has no such target */
             404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    postScans: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description The mission's id */
+                mission_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["ScanBatch"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["BatchVerdict"];
+                };
+            };
+            /** @description The body cannot be read */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such mission */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description It contradicts the present state */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body is too large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body's media type is not supported */
+            415: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    getSearch: {
+        parameters: {
+            query?: {
+                /** @description Only what is newer than this version */
+                after?: number;
+            };
+            header?: never;
+            path: {
+                /** @description The mission's id */
+                mission_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["SearchGridView"];
+                };
+            };
+            /** @description Nothing newer than `after` */
+            204: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such mission */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description It contradicts the present state */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    getSearchObstacles: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description The mission's id */
+                mission_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description A FeatureCollection of polygons */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/geo+json": unknown;
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such mission */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description It contradicts the present state */
+            409: {
                 headers: {
                     [name: string]: unknown;
                 };

@@ -23,6 +23,8 @@ export type VehicleView = Complete<Schemas["VehicleView"]>;
 export type PositionQuality = Schemas["PositionQuality"];
 export type TargetState = Schemas["TargetState"];
 export type TargetView = Complete<Schemas["TargetView"]>;
+export type SearchProgress = Complete<Schemas["SearchProgress"]>;
+export type SearchGridView = Complete<Schemas["SearchGridView"]>;
 export type WaypointView = Complete<Schemas["WaypointView"]>;
 export type MissionSummary = Complete<Schemas["MissionSummary"]>;
 export type MissionView = Complete<Schemas["MissionView"]>;
@@ -49,16 +51,22 @@ export type Problem = Complete<Schemas["Problem"]>;
 export type FieldProblem = Complete<Schemas["FieldProblem"]>;
 
 /** What a request says of a vehicle; whatever is left out takes the service's default. */
-export type VehicleSpec = Pick<Schemas["VehicleSpec"], "name" | "kind" | "sensor">;
+export type VehicleSpec = Pick<Schemas["VehicleSpec"], "name" | "kind" | "sensor"> & { depth_m?: number };
 export type PlannerOptions = Partial<Schemas["PlannerOptions"]>;
 
 /** What the form sends. */
-export type NewMission = Pick<Schemas["MissionSpec"], "name" | "area" | "keep_out" | "steps" | "cell_m"> & {
+export type NewMission = Pick<Schemas["MissionSpec"], "name" | "area" | "keep_out" | "cell_m"> & {
+  kind?: Schemas["MissionKind"];
   vehicles: VehicleSpec[];
-  speed_mps: number;
-  accuracy_m: number;
+  steps?: number;
+  speed_mps?: number;
+  accuracy_m?: number;
   limits: Partial<Schemas["Limits"]>;
-  planner: { name: string; options: PlannerOptions };
+  planner?: { name: string; options: PlannerOptions };
+  search?: Pick<
+    Schemas["SearchSpec"],
+    "goal" | "goal_radius_m" | "entry" | "window_s" | "safety_m" | "scanner" | "obstacles"
+  >;
   tide?: { level_m: number; source: string };
 };
 

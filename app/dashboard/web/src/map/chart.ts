@@ -12,6 +12,7 @@ import { type LivelyContent, NOTHING, paintLively, type Sketch } from "./lively"
 import { type Look, PAPER } from "./paper";
 import type { PictureResult } from "./picture.worker";
 import { Sheets } from "./sheets";
+import { type SearchMark, type Site, sitePicture } from "./site";
 import { imageOf, paintStill, type StillContent } from "./still";
 import type { TargetMark } from "./targets";
 
@@ -75,7 +76,7 @@ export class Chart {
   readonly #sheets: Sheets;
   readonly #pins = new Map<string, Marker>();
   #look: Look;
-  #still: StillContent = { floor: null, area: null, keepOut: [], tracks: [] };
+  #still: StillContent = { floor: null, area: null, keepOut: [], tracks: [], site: null };
   #lively: LivelyContent = NOTHING;
   #areaBounds: Bounds | null = null;
   #fitting: (() => Padding) | null = null;
@@ -204,6 +205,19 @@ export class Chart {
       interval,
     };
     this.#lay({ floor });
+  }
+
+  /** What a search knows of its site; null: there is none, or it is not shown. */
+  setSite(site: Site | null): void {
+    if (!site && !this.#still.site) return;
+    this.#lay({
+      site: site && { corners: site.corners, image: imageOf(sitePicture(site), this.#still.site?.image) },
+    });
+  }
+
+  /** The places of a search. */
+  setSearch(marks: readonly SearchMark[]): void {
+    this.#show({ marks });
   }
 
   /** The long part of the vehicles' ways; changes seldom. */

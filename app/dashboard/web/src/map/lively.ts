@@ -6,6 +6,7 @@ import { circle } from "./geo";
 import type { Paper } from "./paper";
 import { dot, line, stroke, trace, way } from "./pen";
 import type { Projection } from "./projection";
+import type { SearchMark } from "./site";
 import type { TargetMark } from "./targets";
 
 const SKETCH = "#1d5c94";
@@ -22,6 +23,7 @@ export interface LivelyContent {
   tails: readonly Track[];
   routes: readonly Route[];
   targets: readonly TargetMark[];
+  marks: readonly SearchMark[];
   spots: readonly Spot[];
   measure: readonly LngLat[];
   sketch: Sketch | null;
@@ -33,6 +35,7 @@ export const NOTHING: LivelyContent = {
   tails: [],
   routes: [],
   targets: [],
+  marks: [],
   spots: [],
   measure: [],
   sketch: null,
@@ -46,7 +49,7 @@ export function paintLively(
   content: LivelyContent,
   paper: Paper,
 ): void {
-  const { draft, ranges, tails, routes, targets, spots, measure, sketch } = content;
+  const { draft, ranges, tails, routes, targets, marks, spots, measure, sketch } = content;
   context.lineJoin = context.lineCap = "round";
   for (const ring of draft.area?.coordinates ?? []) {
     line(context, at, ring as LngLat[], { colour: paper.area, width: 2.5, dash: [5, 5] });
@@ -59,6 +62,7 @@ export function paintLively(
   for (const { at: place, radius_m, colour } of ranges) {
     line(context, at, circle(place, radius_m, 72), { colour, width: 1, dash: [4, 3] });
   }
+  for (const mark of marks) paintMark(context, at, mark, paper);
   for (const tail of tails) way(context, at, tail, paper.casing);
   for (const { points, colour, acknowledged, arrivalRadius_m } of routes) {
     const to = points.at(-1);
@@ -88,13 +92,67 @@ function paintTarget(
 ): void {
   line(context, at, ring, { colour: paper.ink, width: accurate ? 2 : 1.5, dash: [6, 4] });
   dot(context, at, place, 6, accurate ? paper.ink : paper.casing, { colour: paper.ink, width: 2 });
+  label(context, at, place, name, paper);
+}
+
+function label(
+  context: CanvasRenderingContext2D,
+  at: Projection,
+  place: LngLat,
+  words: string,
+  paper: Paper,
+): void {
   context.font = "12px sans-serif";
+  context.textAlign = "start";
   context.textBaseline = "middle";
   context.lineWidth = 3.2;
+  context.setLineDash([]);
   context.strokeStyle = paper.casing;
-  context.strokeText(name, at.x(place[0]) + 11, at.y(place[1]));
+  context.strokeText(words, at.x(place[0]) + 11, at.y(place[1]));
   context.fillStyle = paper.ink;
-  context.fillText(name, at.x(place[0]) + 11, at.y(place[1]));
+  context.fillText(words, at.x(place[0]) + 11, at.y(place[1]));
+}
+
+/** Outlines of a search's signs about their place, pixels: a star, a door and a mast. */
+const SIGNS: Record<SearchMark["sign"], readonly (readonly [number, number])[]> = {
+  goal: [...Array(10).keys()].map((i) => {
+    const away = i % 2 === 0 ? 9 : 4;
+    return [away * Math.sin((i * Math.PI) / 5), -away * Math.cos((i * Math.PI) / 5)] as const;
+  }),
+  entry: [
+    [-6, 7],
+    [-6, -7],
+    [6, -7],
+    [6, 7],
+  ],
+  transmitter: [
+    [0, -20],
+    [5, -10],
+    [-5, -10],
+  ],
+};
+
+function paintMark(
+  context: CanvasRenderingContext2D,
+  at: Projection,
+  { at: place, sign, words, radius_m }: SearchMark,
+  paper: Paper,
+): void {
+  if (radius_m > 0) {
+    const dash = sign === "goal" ? [9, 5] : [2, 6];
+    line(context, at, circle(place, radius_m, 96), { colour: paper.casing, width: 4, opacity: 0.6 });
+    line(context, at, circle(place, radius_m, 96), { colour: paper.ink, width: 2, dash });
+  }
+  context.beginPath();
+  SIGNS[sign].forEach(([x, y], i) => {
+    if (i === 0) context.moveTo(at.x(place[0]) + x, at.y(place[1]) + y);
+    else context.lineTo(at.x(place[0]) + x, at.y(place[1]) + y);
+  });
+  context.closePath();
+  context.fillStyle = sign === "goal" ? "#ffd24d" : paper.casing;
+  context.fill();
+  stroke(context, { colour: paper.ink, width: 2 });
+  if (words) label(context, at, place, words, paper);
 }
 
 function paintSketch(context: CanvasRenderingContext2D, at: Projection, { lines, handles }: Sketch): void {

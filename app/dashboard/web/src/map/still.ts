@@ -35,10 +35,15 @@ export interface StillContent {
   area: PolygonGeometry | null;
   keepOut: readonly PolygonGeometry[];
   tracks: readonly Track[];
+  /** What a search knows of its site. */
+  site: { corners: readonly LngLat[]; image: HTMLCanvasElement } | null;
 }
 
 /** A picture as something that can be drawn again and again. */
-export function imageOf(picture: PictureResult, before: HTMLCanvasElement | undefined): HTMLCanvasElement {
+export function imageOf(
+  picture: Pick<PictureResult, "pixels" | "width" | "height">,
+  before: HTMLCanvasElement | undefined,
+): HTMLCanvasElement {
   const canvas = before ?? document.createElement("canvas");
   if (canvas.width !== picture.width || canvas.height !== picture.height) {
     canvas.width = picture.width;
@@ -52,11 +57,12 @@ export function paintStill(
   context: CanvasRenderingContext2D,
   at: Projection,
   window: Projection,
-  { floor, area, keepOut, tracks }: StillContent,
+  { floor, area, keepOut, tracks, site }: StillContent,
   paper: Paper,
 ): void {
   context.lineCap = context.lineJoin = "round";
   if (floor) paintFloor(context, at, floor);
+  if (site) paintGridded(context, at, site.corners, site.image);
   paintGrid(context, at, window, paper);
   for (const zone of keepOut) {
     const pattern = context.createPattern(striped(paper.keepOut), "repeat");
@@ -72,12 +78,15 @@ export function paintStill(
   for (const track of tracks) way(context, at, track, paper.casing);
 }
 
-function paintFloor(context: CanvasRenderingContext2D, at: Projection, floor: FloorPicture): void {
-  const [northWest, northEast, , southWest] = floor.corners.map(
-    ([lng, lat]): Pixel => [at.x(lng), at.y(lat)],
-  );
-  if (!northWest || !northEast || !southWest) return;
-  const { image, rows, cols } = floor;
+/** Draws a picture over the grid with these corners; returns where three of them are on the sheet. */
+function paintGridded(
+  context: CanvasRenderingContext2D,
+  at: Projection,
+  corners: readonly LngLat[],
+  image: HTMLCanvasElement,
+): { northWest: Pixel; east: Pixel; south: Pixel } | null {
+  const [northWest, northEast, , southWest] = corners.map(([lng, lat]): Pixel => [at.x(lng), at.y(lat)]);
+  if (!northWest || !northEast || !southWest) return null;
   // The grid is a parallelogram: its picture's pixels, and its columns and rows, become those of the sheet.
   const east: Pixel = [northEast[0] - northWest[0], northEast[1] - northWest[1]];
   const south: Pixel = [southWest[0] - northWest[0], southWest[1] - northWest[1]];
@@ -94,6 +103,14 @@ function paintFloor(context: CanvasRenderingContext2D, at: Projection, floor: Fl
   context.imageSmoothingEnabled = Math.hypot(...east) < image.width;
   context.drawImage(image, 0, 0);
   context.restore();
+  return { northWest, east, south };
+}
+
+function paintFloor(context: CanvasRenderingContext2D, at: Projection, floor: FloorPicture): void {
+  const { rows, cols } = floor;
+  const placed = paintGridded(context, at, floor.corners, floor.image);
+  if (!placed) return;
+  const { northWest, east, south } = placed;
   const pixel = ([col, row]: [number, number]): Pixel => {
     const [u, v] = [col / cols, 1 - row / rows];
     return [northWest[0] + u * east[0] + v * south[0], northWest[1] + u * east[1] + v * south[1]];

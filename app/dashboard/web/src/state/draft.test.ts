@@ -25,6 +25,34 @@ describe("a wrong value is named with what would be right", () => {
   });
 });
 
+describe("a search", () => {
+  const search = { ...draft, kind: "search" as const, goal: "41.1853, -8.7045", entry: "41.1851 -8.7049" };
+
+  it("needs two places, and no steps", () => {
+    expect(Object.keys(faultsOf({ ...search, goal: "", entry: "north", steps: "" }))).toEqual([
+      "goal",
+      "entry",
+    ]);
+    expect(faultsOf({ ...search, steps: "" })).toEqual({});
+  });
+
+  it("is sent with places as [longitude, latitude] and seconds, and leaves its defaults to the service", () => {
+    const mission = toMission({ ...search, window_min: "20" });
+    expect(mission.search).toMatchObject({
+      goal: [-8.7045, 41.1853],
+      entry: [-8.7049, 41.1851],
+      window_s: 1200,
+    });
+    expect(mission).not.toHaveProperty("steps");
+    expect(mission).not.toHaveProperty("planner");
+  });
+
+  it("is told of beside its own fields", () => {
+    expect(fieldOf("search.goal.0")).toBe("goal");
+    expect(fieldOf("search.goal_radius_m")).toBe("goal_radius_m");
+  });
+});
+
 describe("what is sent", () => {
   it("has the numbers as numbers and a closed area", () => {
     const mission = toMission({ ...draft, steps: " 40 ", east_m: "120" });

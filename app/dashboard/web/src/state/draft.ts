@@ -10,6 +10,15 @@ export type AreaSource = "typed" | "drawn";
 /** As typed. */
 export interface Draft {
   name: string;
+  kind: "survey" | "search";
+  /** As "latitude, longitude". */
+  goal: string;
+  entry: string;
+  goal_radius_m: string;
+  window_min: string;
+  safety_m: string;
+  reach_m: string;
+  obstacles: readonly (readonly LngLat[])[];
   source: AreaSource;
   ring: readonly LngLat[];
   keepOut: readonly (readonly LngLat[])[];
@@ -56,6 +65,14 @@ export const PLANNER_PRESETS: Readonly<Record<string, { title: string; words: st
 export function emptyDraft(middle: LngLat): Draft {
   const draft: Draft = {
     name: "",
+    kind: "survey",
+    goal: "",
+    entry: "",
+    goal_radius_m: "30",
+    window_min: "30",
+    safety_m: "2",
+    reach_m: "12",
+    obstacles: [],
     source: "typed",
     ring: [],
     keepOut: [],
@@ -104,6 +121,8 @@ interface NumberField {
   /** May stay empty. */
   optional?: boolean;
   typedArea?: boolean;
+  /** Only of this kind of mission. */
+  kind?: Draft["kind"];
 }
 
 const NUMBERS: NumberField[] = [
@@ -111,7 +130,11 @@ const NUMBERS: NumberField[] = [
   { field: "longitude", label: "Longitude", low: -180, high: 180, typedArea: true },
   { field: "east_m", label: "Size to the east", low: 2, high: 20_000, typedArea: true },
   { field: "north_m", label: "Size to the north", low: 2, high: 20_000, typedArea: true },
-  { field: "steps", label: "Steps", low: 1, high: 100_000, whole: true },
+  { field: "goal_radius_m", label: "Radius of the goal area", low: 1, high: 10_000, kind: "search" },
+  { field: "window_min", label: "Time window", low: 0.5, high: 10_000, kind: "search" },
+  { field: "safety_m", label: "Distance to obstacles", low: 1, high: 100, kind: "search" },
+  { field: "reach_m", label: "Reach of the scanner", low: 0.5, high: 200, kind: "search" },
+  { field: "steps", label: "Steps", low: 1, high: 100_000, whole: true, kind: "survey" },
   { field: "cell_m", label: "Cell", low: 0.1, high: 1000 },
   { field: "accuracy_m", label: "Accuracy", low: 0.001, high: 100 },
   { field: "speed_mps", label: "Speed", low: 0.1, high: 5 },
@@ -129,8 +152,8 @@ const NUMBERS: NumberField[] = [
 export function faultsOf(draft: Draft): Faults {
   const faults: Faults = {};
   if (!draft.name.trim()) faults.name = "Give the mission a name";
-  for (const { field, label, low, high, whole, optional, typedArea } of NUMBERS) {
-    if (typedArea && draft.source !== "typed") continue;
+  for (const { field, label, low, high, whole, optional, typedArea, kind } of NUMBERS) {
+    if ((typedArea && draft.source !== "typed") || (kind && draft.kind !== kind)) continue;
     const text = String(draft[field]).trim();
     const value = Number(text);
     if (text === "" && optional) continue;
@@ -146,6 +169,18 @@ export function faultsOf(draft: Draft): Faults {
     const fault = areaFault(zone, 0);
     if (fault) faults.keepOut = `Keep-out zone ${i + 1}: ${fault.toLowerCase()}`;
   });
+  if (draft.kind === "search") {
+    for (const [field, words] of [
+      ["goal", "the goal"],
+      ["entry", "the entry"],
+    ] as const) {
+      if (!placeOf(draft[field])) faults[field] = `Pick ${words} on the map, or type "41.1852, -8.7046"`;
+    }
+    draft.obstacles.forEach((ring, i) => {
+      const fault = areaFault(ring, 0);
+      if (fault) faults.obstacles = `Obstacle ${i + 1}: ${fault.toLowerCase()}`;
+    });
+  }
   if (!faults.max_depth_m && !faults.min_depth_m && Number(draft.max_depth_m) < Number(draft.min_depth_m)) {
     faults.max_depth_m = "Deepest travel must not be above the shallowest";
   }
@@ -153,6 +188,18 @@ export function faultsOf(draft: Draft): Faults {
     faults.simulated = "Choose at least one vehicle, or simulate some";
   }
   return faults;
+}
+
+/** A place typed as "latitude, longitude" in decimal degrees; null when it is none. */
+export function placeOf(text: string): LngLat | null {
+  const [lat, lng, ...rest] = text.trim() === "" ? [] : text.split(/[,;\s]+/).map(Number);
+  if (lat === undefined || lng === undefined || rest.some((n) => n !== 0)) return null;
+  return Math.abs(lat) <= 90 && Math.abs(lng) <= 180 ? [lng, lat] : null;
+}
+
+/** A place as it is typed. */
+export function typedPlace([lng, lat]: LngLat): string {
+  return `${lat.toFixed(6)}, ${lng.toFixed(6)}`;
 }
 
 /** The area that a draft describes; null while it describes none. */
@@ -185,6 +232,7 @@ export function toMission(draft: Draft): NewMission {
   }
   const range = draft.com_range_m.trim();
   const tide = draft.tide_m.trim();
+  if (draft.kind === "search") return toSearch(draft, area, [...draft.chosen, ...simulated]);
   return {
     name: draft.name.trim(),
     area,
@@ -206,6 +254,35 @@ export function toMission(draft: Draft): NewMission {
     ...(tide
       ? { tide: { level_m: Number(tide), source: draft.tide_source.trim() || "stated by the operator" } }
       : {}),
+  };
+}
+
+/** What to send for a search: it takes its own defaults for steps, planner and arrival. */
+function toSearch(draft: Draft, area: NewMission["area"], vehicles: VehicleSpec[]): NewMission {
+  const [goal, entry] = [placeOf(draft.goal), placeOf(draft.entry)];
+  if (!goal || !entry) throw new Error("the draft has faults");
+  return {
+    name: draft.name.trim(),
+    kind: "search",
+    area,
+    keep_out: draft.keepOut.map(polygonOf),
+    vehicles: vehicles.map((vehicle) => (vehicle.kind === "sim" ? { ...vehicle, depth_m: 0 } : vehicle)),
+    cell_m: Number(draft.cell_m),
+    limits: {
+      min_depth_m: 0,
+      max_depth_m: Number(draft.max_depth_m),
+      min_altitude_m: Math.min(Number(draft.min_altitude_m), 0.5),
+      min_separation_m: Number(draft.min_separation_m),
+    },
+    search: {
+      goal,
+      goal_radius_m: Number(draft.goal_radius_m),
+      entry,
+      window_s: 60 * Number(draft.window_min),
+      safety_m: Number(draft.safety_m),
+      scanner: { reach_m: Number(draft.reach_m), resolution_deg: 1 },
+      obstacles: draft.obstacles.map(polygonOf),
+    },
   };
 }
 
@@ -232,6 +309,13 @@ const FROM_SERVICE: [prefix: string, field: keyof Draft][] = [
   ["limits.min_altitude_m", "min_altitude_m"],
   ["limits.min_separation_m", "min_separation_m"],
   ["limits.com_range_m", "com_range_m"],
+  ["search.goal", "goal"],
+  ["search.goal_radius_m", "goal_radius_m"],
+  ["search.entry", "entry"],
+  ["search.window_s", "window_min"],
+  ["search.safety_m", "safety_m"],
+  ["search.scanner", "reach_m"],
+  ["search.obstacles", "obstacles"],
   ["planner", "planner"],
   ["tide", "tide_m"],
   ["vehicles", "simulated"],

@@ -82,6 +82,13 @@ export function reduce(view: LiveView, message: LiveMessage, at: number): LiveVi
       };
     case "targets":
       return view.mission ? { ...view, mission: { ...view.mission, targets: message.targets } } : view;
+    case "search":
+      if (!view.mission) return view;
+      return {
+        ...view,
+        mission: { ...view.mission, progress: { ...view.mission.progress, search: message.search } },
+        progressAt: at,
+      };
     case "waypoints":
       if (!view.mission) return view;
       return {

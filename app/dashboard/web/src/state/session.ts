@@ -5,6 +5,7 @@ import { api, liveUrl, ServiceError, token } from "../api/client";
 import { LiveSocket } from "../api/socket";
 import type { ActionView, MissionAction, NewMission } from "../api/types";
 import { withTiles } from "../map/seafloor";
+import { siteOf } from "../map/site";
 import { EMPTY_VIEW, reduce, withEvents, withMission } from "./live";
 import {
   fleet,
@@ -15,6 +16,7 @@ import {
   seaFloor,
   selectedId,
   serviceFault,
+  site,
   socketStatus,
   steps,
   telemetry,
@@ -95,6 +97,7 @@ export function signIn(text: string): void {
 function clear(): void {
   view.value = EMPTY_VIEW;
   seaFloor.value = null;
+  site.value = null;
   socketStatus.value = null;
 }
 
@@ -129,10 +132,12 @@ function followMission(id: string): () => void {
     },
   });
   const stopMap = followMap(id, () => connections.value);
+  const stopSite = followSite(id);
   return () => {
     closed = true;
     socket.close();
     stopMap();
+    stopSite();
   };
 }
 
@@ -178,6 +183,34 @@ function followMap(id: string, connections: () => number): () => void {
     if (stopped) return;
     const map = withTiles(known, answer) ?? withTiles(null, await api.mapTiles(id, "", further, step));
     if (!stopped) seaFloor.value = map;
+  }
+  return () => {
+    stopped = true;
+    stop();
+  };
+}
+
+/** Fetches a search's site whenever scans changed it, one request at a time. */
+function followSite(id: string): () => void {
+  let stopped = false;
+  let fetching = false;
+  const wanted = () => view.value.mission?.progress.search?.version ?? null;
+  const stop = effect(() => {
+    const version = wanted();
+    if (version !== null && version !== site.peek()?.version && !fetching) void fetchSite();
+  });
+  async function fetchSite(): Promise<void> {
+    fetching = true;
+    while (!stopped && untracked(wanted) !== (site.peek()?.version ?? null)) {
+      try {
+        const answer = siteOf(await api.site(id));
+        if (!stopped) site.value = answer;
+      } catch {
+        // The service is gone, which the live socket tells of.
+      }
+      await new Promise((resolve) => setTimeout(resolve, LEAST_MAP_PERIOD_MS));
+    }
+    fetching = false;
   }
   return () => {
     stopped = true;

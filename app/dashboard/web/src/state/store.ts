@@ -17,6 +17,7 @@ import { kept } from "../kept";
 import { fittingRange, KINDS, type Range, type Shown } from "../map/layers";
 import { type DepthPalette, vehicleColour } from "../map/palette";
 import type { SeaFloor } from "../map/seafloor";
+import type { SearchMark, Site } from "../map/site";
 import type { CoordinateFormat } from "./format";
 import { ageSeconds, EMPTY_VIEW, type LiveView } from "./live";
 
@@ -29,6 +30,8 @@ export const serviceFault = signal<ServiceError | null>(null);
 export const selectedId = signal<string | null>(null);
 export const view = signal<LiveView>(EMPTY_VIEW);
 export const seaFloor = signal<SeaFloor | null>(null);
+/** What a search knows of its site. */
+export const site = signal<Site | null>(null);
 export const socketStatus = signal<SocketStatus | null>(null);
 /** Page clock, milliseconds, ticking. */
 export const now = signal(Date.now());
@@ -110,6 +113,7 @@ export const showHatching = kept("hatching", true);
 export const showContours = kept("contours", true);
 export const showTracks = kept("tracks", true);
 export const showRanges = kept("com-range", false);
+export const showSite = kept("site", true);
 export const showTargets = kept("targets", true);
 /** Ranges that the operator fixed, for each layer; a layer without one takes a fitting range. */
 export const fixedRanges = kept<Partial<Record<Shown, Range>>>("ranges", {});
@@ -135,7 +139,11 @@ export const measured = signal<readonly LngLat[] | null>(null);
 export interface DraftShapes {
   area: PolygonGeometry | null;
   keepOut: readonly PolygonGeometry[];
+  /** Places of a search. */
+  marks: readonly SearchMark[];
 }
+/** A place that is to be clicked on the map next. */
+export const picking = signal<{ what: string; onPicked: (at: LngLat) => void } | null>(null);
 export const draftShapes = signal<DraftShapes | null>(null);
 export type Drawing = { shape: "polygon" | "rectangle"; onDrawn: (ring: LngLat[]) => void };
 export const drawing = signal<Drawing | null>(null);

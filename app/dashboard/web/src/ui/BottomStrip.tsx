@@ -35,12 +35,21 @@ export function BottomStrip() {
       <TimeSlider />
       <div class="strip">
         <dl class="figures">
-          <Figure
-            label={`Known to ${present.spec.accuracy_m} m`}
-            value={percent(p.coverage_pct, 1)}
-            id="coverage"
-          />
-          <Figure label="Mean deviation" value={metres(p.mean_sd_m, 2)} id="mean-sd" />
+          {p.search ? (
+            <>
+              <Figure label="Goal area seen" value={percent(p.search.goal_pct, 1)} id="strip-goal" />
+              <Figure label="Site seen" value={percent(p.search.explored_pct, 1)} id="strip-site" />
+            </>
+          ) : (
+            <>
+              <Figure
+                label={`Known to ${present.spec.accuracy_m} m`}
+                value={percent(p.coverage_pct, 1)}
+                id="coverage"
+              />
+              <Figure label="Mean deviation" value={metres(p.mean_sd_m, 2)} id="mean-sd" />
+            </>
+          )}
           <Figure label="Soundings" value={count(p.soundings)} id="soundings" />
           <Figure label="Travelled" value={distance(p.distance_m)} id="distance" />
         </dl>

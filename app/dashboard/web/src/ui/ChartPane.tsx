@@ -2,7 +2,7 @@ import { useSignal } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
 import type { Chart, GridFrame } from "../map/chart";
 import { latitude, longitude } from "../state/format";
-import { chosenSounding, cursor, in3d, isDark, mapCentre, measured, theme } from "../state/store";
+import { chosenSounding, cursor, in3d, isDark, mapCentre, measured, picking, theme } from "../state/store";
 import { follow, overlaid } from "./follow";
 import { MapTools } from "./MapTools";
 
@@ -30,7 +30,10 @@ export function ChartPane() {
             cursor.value = place;
           },
           onClick: (place) => {
-            if (measured.value) measured.value = [...measured.value, place];
+            const wanted = picking.value;
+            picking.value = null;
+            if (wanted) wanted.onPicked(place);
+            else if (measured.value) measured.value = [...measured.value, place];
           },
           onSpot: (id) => {
             chosenSounding.value = id;

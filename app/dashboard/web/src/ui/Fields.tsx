@@ -18,7 +18,10 @@ export function useForm(): FormState {
   return form;
 }
 
-type TextField = Exclude<keyof Draft, "chosen" | "ring" | "keepOut" | "options" | "source">;
+type TextField = Exclude<
+  keyof Draft,
+  "chosen" | "ring" | "keepOut" | "obstacles" | "options" | "source" | "kind"
+>;
 
 interface TextProps {
   field: TextField;

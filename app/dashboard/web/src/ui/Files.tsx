@@ -1,7 +1,7 @@
 import { useComputed, useSignal, useSignalEffect } from "@preact/signals";
 import { api, ServiceError } from "../api/client";
 import type { ProductView, QualityView } from "../api/types";
-import { selectedId, view } from "../state/store";
+import { mission, selectedId, view } from "../state/store";
 
 /** What can be downloaded of the mission, and what may be said of its map's uncertainty. */
 export function Files() {
@@ -37,6 +37,11 @@ export function Files() {
     );
   });
 
+  const offered = useComputed(() => {
+    const id = selectedId.value;
+    return id && mission.value?.spec.search ? [...products.value, obstaclesOf(id)] : products.value;
+  });
+
   const download = async (product: ProductView) => {
     busy.value = product.name;
     fault.value = "";
@@ -64,7 +69,7 @@ export function Files() {
       ) : null}
       <Quality found={quality.value} />
       <ul>
-        {products.value.map((product) => (
+        {offered.value.map((product) => (
           <li key={product.name}>
             <button
               type="button"
@@ -82,6 +87,17 @@ export function Files() {
       {hasMap.value ? null : <p class="empty">Files of the map follow with the first accepted sounding.</p>}
     </div>
   );
+}
+
+/** What a search alone has to offer. */
+function obstaclesOf(id: string): ProductView {
+  return {
+    name: "obstacles.geojson",
+    title: "Obstacles of the search, known and found",
+    media_type: "application/geo+json",
+    href: `/api/v1/missions/${encodeURIComponent(id)}/search/obstacles.geojson`,
+    needs_map: false,
+  };
 }
 
 function Quality({ found }: { found: QualityView | null }) {

@@ -11,6 +11,7 @@ import {
   shareOutside,
 } from "../map/layers";
 import { DEPTH_PALETTES, type DepthPalette } from "../map/palette";
+import { SITE_COLOURS, SITE_WORDS } from "../map/site";
 import {
   depthPalette,
   fixedRanges,
@@ -20,6 +21,8 @@ import {
   showContours,
   showHatching,
   shownRange,
+  showSite,
+  site,
 } from "../state/store";
 
 /** Layer switch, colour scale and its range, which stays what the operator set until changed. */
@@ -56,6 +59,7 @@ export function Legend() {
         <p class="empty">{map ? missing(layer.value) : "The sea floor appears with the first soundings"}</p>
       )}
       {map ? <Options /> : null}
+      {site.value && showSite.value ? <SiteStates /> : null}
     </section>
   );
 }
@@ -126,6 +130,21 @@ function Landmarks() {
           {shares ? ` ${((shares[i] ?? 0) * 100).toFixed(0)} %` : ""}
         </li>
       ))}
+    </ul>
+  );
+}
+
+function SiteStates() {
+  return (
+    <ul class="landmarks" data-testid="site-legend">
+      {Object.entries(SITE_WORDS).map(([name, words]) => {
+        const [r, g, b, a] = SITE_COLOURS[name as keyof typeof SITE_COLOURS];
+        return (
+          <li key={name}>
+            <span class="swatch" style={{ background: `rgb(${r} ${g} ${b} / ${a / 255})` }} /> {words}
+          </li>
+        );
+      })}
     </ul>
   );
 }

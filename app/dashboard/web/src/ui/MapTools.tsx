@@ -8,6 +8,7 @@ import {
   mission,
   seaFloor,
   showRanges,
+  showSite,
   showTargets,
   showTracks,
 } from "../state/store";
@@ -40,6 +41,18 @@ export function MapTools({ onFit }: { onFit: () => void }) {
         >
           <path d="M3,17 C3,9 10,13 10,8 S17,9 17,3" />
         </Tool>
+        {mission.value?.spec.search ? (
+          <Tool
+            label={`What was looked at: ${showSite.value ? "shown" : "hidden"}`}
+            pressed={showSite.value}
+            id="show-site"
+            onClick={() => {
+              showSite.value = !showSite.value;
+            }}
+          >
+            <path d="M2,10 C5,4 15,4 18,10 C15,16 5,16 2,10 M10,7.5 a2.5,2.5 0 1 1 -0.01,0" />
+          </Tool>
+        ) : null}
         {mission.value?.targets.length ? (
           <Tool
             label={`Targets: ${showTargets.value ? "shown" : "hidden"}`}

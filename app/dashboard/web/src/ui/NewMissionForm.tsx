@@ -3,6 +3,7 @@ import { useEffect } from "preact/hooks";
 import { api, ServiceError } from "../api/client";
 import type { PlannerView, VehicleSpec, VehicleView } from "../api/types";
 import { polygonOf, sizeOf } from "../map/area";
+import type { SearchMark } from "../map/site";
 import {
   areaOf,
   cornersOf,
@@ -13,6 +14,7 @@ import {
   faultsOf,
   fieldOf,
   PLANNER_PRESETS,
+  placeOf,
   toMission,
 } from "../state/draft";
 import { distance, duration } from "../state/format";
@@ -21,6 +23,7 @@ import { describing, draftShapes, drawing, fleet, mapCentre } from "../state/sto
 import { AreaFields } from "./AreaFields";
 import { Fault, Form, Text, useForm } from "./Fields";
 import { Forecast } from "./Forecast";
+import { SearchFields } from "./SearchFields";
 
 export function NewMissionForm() {
   const draft = useSignal(emptyDraft(mapCentre.peek()));
@@ -33,6 +36,7 @@ export function NewMissionForm() {
     draftShapes.value = {
       area: areaOf(draft.value),
       keepOut: draft.value.keepOut.filter((zone) => zone.length > 2).map(polygonOf),
+      marks: draft.value.kind === "search" ? draftMarks(draft.value) : [],
     };
   });
   useEffect(() => {
@@ -107,15 +111,22 @@ export function NewMissionForm() {
           </button>
         </header>
         <Text field="name" label="Name" placeholder="Leixões quay" />
+        <Kind />
         <AreaFields />
         <fieldset>
           <legend>Vehicles</legend>
           <FleetChoice />
           <Text field="simulated" label="Simulated vehicles" numeric />
         </fieldset>
-        <Planner />
-        <Text field="steps" label="Steps" numeric hint="How many waypoints every vehicle gets" />
-        <Expected />
+        {draft.value.kind === "search" ? (
+          <SearchFields />
+        ) : (
+          <>
+            <Planner />
+            <Text field="steps" label="Steps" numeric hint="How many waypoints every vehicle gets" />
+            <Expected />
+          </>
+        )}
         <details>
           <summary>Limits and grid</summary>
           <div class="pair">
@@ -173,6 +184,44 @@ export function NewMissionForm() {
       </form>
     </Form.Provider>
   );
+}
+
+/** To map the sea floor, or to look for something among obstacles. */
+function Kind() {
+  const { draft, set } = useForm();
+  const choice = (kind: Draft["kind"], title: string, words: string) => (
+    <label class="preset">
+      <input
+        type="radio"
+        name="kind"
+        checked={draft.kind === kind}
+        data-testid={`kind-${kind}`}
+        onChange={() => set({ kind })}
+      />
+      <span>
+        <b>{title}</b> <small>{words}</small>
+      </span>
+    </label>
+  );
+  return (
+    <fieldset class="planner">
+      <legend>What for</legend>
+      {choice("survey", "Survey", "Map the sea floor of the area.")}
+      {choice("search", "Search", "Look for something in a partly known site, and be back in time.")}
+    </fieldset>
+  );
+}
+
+/** Places of a search that is being described, as far as they are given. */
+function draftMarks(draft: Draft): SearchMark[] {
+  const [goal, entry] = [placeOf(draft.goal), placeOf(draft.entry)];
+  const radius_m = Number(draft.goal_radius_m);
+  return [
+    ...(goal
+      ? [{ words: "Goal", sign: "goal" as const, at: goal, radius_m: radius_m > 0 ? radius_m : 0 }]
+      : []),
+    ...(entry ? [{ words: "Entry", sign: "entry" as const, at: entry, radius_m: 0 }] : []),
+  ];
 }
 
 /** How long it takes at most and how dense it gets, before anything is created. */

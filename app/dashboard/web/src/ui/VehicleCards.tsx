@@ -11,6 +11,7 @@ import {
 } from "../state/store";
 import { hasEnded, vehicleState, WAYPOINT_WORDS } from "../state/words";
 import { WaypointShape } from "./marks";
+import { SearchCard } from "./SearchCard";
 import { TargetCards } from "./TargetCards";
 
 export function VehicleCards() {
@@ -18,6 +19,7 @@ export function VehicleCards() {
   if (!present) return null;
   return (
     <section class={`cards${socketStatus.value?.kind === "open" ? "" : " stale"}`} aria-label="Vehicles">
+      <SearchCard />
       {vehicles.value.length === 0 ? (
         <p class="empty">
           No vehicle takes part yet. Switch one on within reach of this network, or create a mission with

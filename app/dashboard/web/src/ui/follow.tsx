@@ -10,6 +10,7 @@ import { Painter } from "../map/painter";
 import { lookupTable } from "../map/palette";
 import type { Look } from "../map/paper";
 import type { SeaFloor } from "../map/seafloor";
+import { searchMarks } from "../map/site";
 import { targetMarks } from "../map/targets";
 import { replayed } from "../state/replay";
 import {
@@ -32,8 +33,10 @@ import {
   showHatching,
   shownRange,
   showRanges,
+  showSite,
   showTargets,
   showTracks,
+  site,
   stripHeight,
   theme,
   vehicles,
@@ -90,6 +93,11 @@ export function follow(chart: Chart): () => void {
         showTargets.value && replayStep.value === null ? targetMarks(mission.value?.targets ?? []) : [],
       ),
     ),
+    effect(() => chart.setSite(showSite.value && replayStep.value === null ? site.value : null)),
+    effect(() => {
+      const search = mission.value?.spec.search;
+      chart.setSearch([...(search ? searchMarks(search) : []), ...(draftShapes.value?.marks ?? [])]);
+    }),
     effect(() =>
       chart.setSpots(
         (reviewed.value ?? []).map((s) => ({

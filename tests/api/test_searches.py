@@ -1,0 +1,59 @@
+"""Missions that search, over HTTP."""
+
+from typing import Any
+
+import httpx
+
+from tests.missions.builders import lon_lat
+from tests.missions.test_search_missions import search_json
+
+
+def scan(time_s: float, **changes: Any) -> dict[str, Any]:
+    lon, lat = lon_lat(14, 5)
+    return {
+        "vehicle": "boat",
+        "time_s": time_s,
+        "lat_deg": lat,
+        "lon_deg": lon,
+        "bearing_step_deg": 2.0,
+        "reach_m": 10.0,
+        "ranges_m": [None] * 180,
+    } | changes
+
+
+async def test_scans_go_in_and_the_site_comes_out(client: httpx.AsyncClient) -> None:
+    made = await client.post("/missions", json=search_json(vehicles=[{"name": "boat", "kind": "rest", "depth_m": 0}]))
+    assert made.status_code == 201, made.text
+    path = f"/missions/{made.json()['id']}"
+    before = (await client.get(f"{path}/search")).json()
+    assert (before["version"], before["rows"], before["cols"]) == (0, 30, 30)
+    wall = scan(2.0, first_bearing_deg=-20.0, bearing_step_deg=1.0, ranges_m=[6.0] * 40)
+    answer = await client.post(f"{path}/scans", json={"items": [scan(1.0), wall]})
+    assert answer.status_code == 200, answer.text
+    assert answer.json()["accepted"] == 2
+    after = (await client.get(f"{path}/search")).json()
+    assert after["version"] == 2
+    assert after["cells"] != before["cells"]
+    assert (await client.get(f"{path}/search", params={"after": 2})).status_code == 204
+    progress = (await client.get(path)).json()["progress"]["search"]
+    assert progress["explored_pct"] > 20
+    obstacles = await client.get(f"{path}/search/obstacles.geojson")
+    assert obstacles.headers["content-type"] == "application/geo+json"
+    found = [f["properties"]["found"] for f in obstacles.json()["features"]]
+    assert found.count(False) == 1
+    assert found.count(True) >= 1
+
+
+async def test_a_survey_has_no_search_and_a_wrong_scan_is_named(
+    client: httpx.AsyncClient, mission: dict[str, Any]
+) -> None:
+    path = f"/missions/{mission['id']}"
+    for answer in (
+        await client.get(f"{path}/search"),
+        await client.get(f"{path}/search/obstacles.geojson"),
+        await client.post(f"{path}/scans", json={"items": [scan(1.0)]}),
+    ):
+        assert (answer.status_code, answer.json()["type"]) == (409, "urn:bathyfleet:problem:conflict")
+    wrong = await client.post(f"{path}/scans", json={"items": [scan(1.0, reach_m=-1)]})
+    assert wrong.status_code == 422
+    assert wrong.json()["errors"][0]["field"] == "items.0.reach_m"
