@@ -322,14 +322,27 @@ def demo(
     ] = None,
     vehicles: Annotated[int, typer.Option(min=1, max=20, help="Number of simulated AUVs.")] = 2,
     steps: Annotated[int, typer.Option(min=1, max=100_000, help="Steps of the mission.")] = 60,
+    search: Annotated[
+        str | None,
+        typer.Option(
+            metavar="SITE",
+            help="Search a partly known site instead: harbour, car-park-1, car-park-2 or car-park-3, with boats.",
+        ),
+    ] = None,
+    window: Annotated[
+        float, typer.Option(min=30, max=86_400, help="Time for a search, seconds of vehicle time.")
+    ] = 1800,
     keep_serving: Annotated[bool, typer.Option("--keep-serving", help="Go on serving after the mission.")] = False,
     port: Annotated[int, typer.Option(min=0, max=65535, help="TCP port of the service; 0: any free one.")] = 8080,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the sea floor and every random decision.")] = 0,
     output: Annotated[Path, typer.Option(file_okay=False, help="Folder for the files.")] = DEMO_FOLDER,
 ) -> None:
     """Try it without a vehicle: a whole mission with simulated AUVs that speak IMC, from start to map."""
-    from app.demo import DemoError, DemoOptions, run_demo
+    from app.demo import DemoOptions, run_demo
+    from app.demo_service import DemoError
 
+    if search is not None:
+        raise typer.Exit(_search_demo(search, vehicles, window, speed, seed, port, output, keep_serving=keep_serving))
     options = DemoOptions(
         vehicles=vehicles,
         steps=steps,
@@ -345,6 +358,22 @@ def demo(
     except DemoError as error:
         raise CommandError(str(error)) from None
     raise typer.Exit(code)
+
+
+def _search_demo(
+    site: str, vehicles: int, window_s: float, speed: float, seed: int, port: int, output: Path, *, keep_serving: bool
+) -> int:
+    from app.demo_search import SearchDemoOptions, run_search_demo
+    from app.demo_service import DemoError
+    from app.missions.search.examples import SITES
+
+    if site not in SITES:
+        raise CommandError(f"--search: there is no {site!r}", f"choose one of {', '.join(SITES)}")
+    options = SearchDemoOptions(site, vehicles, window_s, speed, seed, port, keep_serving, output)
+    try:
+        return run_search_demo(options)
+    except DemoError as error:
+        raise CommandError(str(error)) from None
 
 
 @app.command(

@@ -23,6 +23,7 @@ from rich.progress import BarColumn, Progress, ProgressColumn, Task, TextColumn,
 from rich.table import Table
 from rich.text import Text
 
+from app.demo_service import DemoError, check, get, post, serve_during
 from app.evaluation.baselines import Baseline, lawnmower_baselines
 from app.exploration.constraints import Constraints
 from app.mapping.compare import difference
@@ -41,10 +42,6 @@ START_SPACING_M = 5.0
 START_M = (2.0, 2.0)
 SIDE_M = 100.0
 FILES = ("tif", "xyz", "csv", "png")
-
-
-class DemoError(Exception):
-    """The demonstration cannot go on; the message says why and what to do."""
 
 
 @dataclass(frozen=True)
@@ -105,31 +102,8 @@ class _Demo:
             f"{self._terrain.min_depth_m:.1f} to {self._terrain.max_depth_m:.1f} m deep"
         )
         async with self._simulator():
-            from app.main import Server, serve
-
-            up: asyncio.Future[Server] = asyncio.get_running_loop().create_future()
-            serving = asyncio.create_task(serve(settings, started=lambda server: up.set_result(server)))
-            begun: list[asyncio.Future[Any]] = [serving, up]
-            await asyncio.wait(begun, return_when=asyncio.FIRST_COMPLETED)
-            if not up.done():
-                await serving
-                raise DemoError("the service ended before it began; see service.log in the output folder")
-            server = up.result()
-            flying = asyncio.create_task(self._fly(server.url))
-            await asyncio.wait([serving, flying], return_when=asyncio.FIRST_COMPLETED)
-            try:
-                if flying.done():
-                    await flying
-                    if options.keep_serving:
-                        console.print(f"Still serving at [bold]{server.url}[/]. Ctrl-C ends it.")
-                        await serving
-                else:
-                    self._outcome.interrupted = True
-                    flying.cancel()
-                    await asyncio.gather(flying, return_exceptions=True)
-            finally:
-                server.stop()
-                await serving
+            done = await serve_during(settings, self._fly, keep_serving=options.keep_serving, console=console)
+        self._outcome.interrupted = not done
         if self._outcome.interrupted:
             self._say_how_to_go_on()
             return 130
@@ -216,14 +190,14 @@ class _Demo:
     async def _fly(self, url: str) -> None:
         console = self._console
         async with httpx.AsyncClient(base_url=f"{url}/api/v1", timeout=60.0) as api:
-            mission = await _post(api, "/missions", self._mission())
+            mission = await post(api, "/missions", self._mission())
             self._outcome.mission_id = mission["id"]
             console.print(f"Dashboard: [bold]{url}/#/missions/{mission['id']}[/]", soft_wrap=True)
             await self._await_vehicles(api)
-            await _post(api, f"/missions/{mission['id']}/start")
+            await post(api, f"/missions/{mission['id']}/start")
             await self._watch(api, mission["id"])
             if self._outcome.state != "finished":
-                reason = (await _get(api, f"/missions/{mission['id']}"))["reason"]
+                reason = (await get(api, f"/missions/{mission['id']}"))["reason"]
                 raise DemoError(f"the mission is {self._outcome.state}: {reason}")
             await self._report(api, mission["id"])
 
@@ -253,7 +227,7 @@ class _Demo:
         deadline = time.monotonic() + READY_TIMEOUT_S
         with self._console.status("Waiting for the vehicles' announces …"):
             while True:
-                vehicles = {v["name"]: v for v in await _get(api, "/vehicles")}
+                vehicles = {v["name"]: v for v in await get(api, "/vehicles")}
                 waiting = [n for n in self._vehicles if vehicles.get(n, {}).get("link") not in ("ready", "engaged")]
                 if not waiting:
                     return
@@ -277,7 +251,7 @@ class _Demo:
         with bar:
             task = bar.add_task("", total=self._options.steps, coverage=0.0, rmse=rmse, eta=None)
             while True:
-                mission = await _get(api, f"/missions/{mission_id}")
+                mission = await get(api, f"/missions/{mission_id}")
                 progress = mission["progress"]
                 self._outcome.progress, self._outcome.state = progress, mission["state"]
                 if progress["step"] > 1 and time.monotonic() - mapped_at > MAP_PERIOD_S:
@@ -306,12 +280,12 @@ class _Demo:
         console = self._console
         for extension in FILES:
             answer = await api.get(f"/missions/{mission_id}/map.{extension}")
-            _check(answer)
+            check(answer)
             (self._folder / f"map.{extension}").write_bytes(answer.content)
         view = (await api.get(f"/missions/{mission_id}/map")).json()
         grid, depth = _grid_of(view)
         ours = difference(depth, self._truth(grid))
-        progress = (await _get(api, f"/missions/{mission_id}"))["progress"]
+        progress = (await get(api, f"/missions/{mission_id}"))["progress"]
         with console.status("Flying the lawnmowers for comparison …"):
             baselines = await asyncio.to_thread(
                 lawnmower_baselines,
@@ -416,22 +390,3 @@ def _cells(baseline: Baseline, ours_m: float) -> Sequence[str]:
         str(baseline.samples),
         f"{baseline.distance_m:.0f} m",
     )
-
-
-async def _get(api: httpx.AsyncClient, path: str) -> Any:
-    answer = await api.get(path)
-    _check(answer)
-    return answer.json()
-
-
-async def _post(api: httpx.AsyncClient, path: str, body: dict[str, Any] | None = None) -> Any:
-    answer = await api.post(path, json=body or {})
-    _check(answer)
-    return answer.json()
-
-
-def _check(answer: httpx.Response) -> None:
-    if answer.is_error:
-        problem = answer.json()
-        remedy = f". {problem['remedy']}" if problem.get("remedy") else ""
-        raise DemoError(f"{answer.request.url.path}: {problem.get('detail', answer.text)}{remedy}")

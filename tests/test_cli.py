@@ -158,6 +158,7 @@ def test_every_command_explains_its_options(bathyfleet: Run, command: str) -> No
         (["migrate", "--down-to", "nonsense"], {}, 1, "Can't locate revision"),
         (["demo", "--terrain", "nowhere.npz"], {}, 2, "does not exist"),
         (["demo", "--vehicles", "0"], {}, 2, "--vehicles"),
+        (["demo", "--search", "quarry"], {}, 1, "quarry"),
         (["evaluate", "explore"], {}, 2, "--terrain"),
         (["import", "nowhere", "absent.xyz"], {}, 2, "does not exist"),
         (["tide", "nowhere", "--datum", "4326"], {}, 1, "datum_epsg is 4326"),

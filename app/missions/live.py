@@ -143,6 +143,7 @@ class LiveMission:
         self.running_since_s: float | None = None
         self._database = database
         self._hub = hub
+        self._time_scale = time_scale
         self._executor = executor
         self._waypoints: dict[str, WaypointView] = {}
         self._ticker: asyncio.Task[None] | None = None
@@ -396,7 +397,6 @@ class LiveMission:
         """Return how far the mission has come."""
         built = self.builder.newest
         header = self.header
-        left = self.spec.steps - header.step
         loop_time = asyncio.get_running_loop().time()
         running_s = loop_time - self.running_since_s if self.running_since_s is not None else 0.0
         return Progress(
@@ -411,9 +411,17 @@ class LiveMission:
             objective=header.objective,
             terms=header.terms or {},
             elapsed_s=header.elapsed_s + running_s,
-            eta_s=left * self.seconds_per_step if self.seconds_per_step is not None else None,
+            eta_s=self._eta_s(),
             search=progress_of(self.search, self.team, self.frame),
         )
+
+    def _eta_s(self) -> float | None:
+        """Return how long the mission still takes, wall-clock seconds; a search as long as its time window lasts."""
+        if self.search is not None:
+            return max(self.search.left_s(), 0.0) / self._time_scale
+        if self.seconds_per_step is None:
+            return None
+        return (self.spec.steps - self.header.step) * self.seconds_per_step
 
     def summary(self) -> MissionSummary:
         """Return the mission as it stands in a list."""

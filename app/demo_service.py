@@ -1,0 +1,77 @@
+"""What demonstrations share: the real service in this process while something is done with it over REST."""
+
+import asyncio
+from collections.abc import Awaitable, Callable
+from typing import Any
+
+import httpx
+from rich.console import Console
+
+from app.settings import Settings
+
+
+class DemoError(Exception):
+    """The demonstration cannot go on; the message says why and what to do."""
+
+
+async def serve_during(
+    settings: Settings, work: Callable[[str], Awaitable[None]], *, keep_serving: bool, console: Console
+) -> bool:
+    """Serve while ``work`` is done with the service's address, with ``keep_serving`` until Ctrl-C.
+
+    Returns
+    -------
+    False when serving ended before the work was done.
+
+    Raises
+    ------
+    DemoError
+        When the service does not begin, or what ``work`` raises.
+    """
+    from app.main import Server, serve
+
+    up: asyncio.Future[Server] = asyncio.get_running_loop().create_future()
+    serving = asyncio.create_task(serve(settings, started=lambda server: up.set_result(server)))
+    begun: list[asyncio.Future[Any]] = [serving, up]
+    await asyncio.wait(begun, return_when=asyncio.FIRST_COMPLETED)
+    if not up.done():
+        await serving
+        raise DemoError("the service ended before it began; see service.log in the output folder")
+    server = up.result()
+    working = asyncio.ensure_future(work(server.url))
+    await asyncio.wait([serving, working], return_when=asyncio.FIRST_COMPLETED)
+    try:
+        if not working.done():
+            working.cancel()
+            await asyncio.gather(working, return_exceptions=True)
+            return False
+        await working
+        if keep_serving:
+            console.print(f"Still serving at [bold]{server.url}[/]. Ctrl-C ends it.")
+            await serving
+    finally:
+        server.stop()
+        await serving
+    return True
+
+
+async def get(api: httpx.AsyncClient, path: str) -> Any:
+    """Return what the service answers."""
+    answer = await api.get(path)
+    check(answer)
+    return answer.json()
+
+
+async def post(api: httpx.AsyncClient, path: str, body: dict[str, Any] | None = None) -> Any:
+    """Send something and return what the service answers."""
+    answer = await api.post(path, json=body or {})
+    check(answer)
+    return answer.json()
+
+
+def check(answer: httpx.Response) -> None:
+    """Raise DemoError with the service's own words when it refused."""
+    if answer.is_error:
+        problem = answer.json()
+        remedy = f". {problem['remedy']}" if problem.get("remedy") else ""
+        raise DemoError(f"{answer.request.url.path}: {problem.get('detail', answer.text)}{remedy}")
