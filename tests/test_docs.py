@@ -22,7 +22,7 @@ import typer
 from pydantic import BaseModel
 
 from app.api.problems import TITLES
-from app.api.schemas import API, MeasurementBatch
+from app.api.schemas import API, MeasurementBatch, ScanBatch
 from app.cli import app as command_line
 from app.estimation import SingleBeam
 from app.evaluation.commands import evaluate_app
@@ -168,6 +168,8 @@ def test_examples_are_taken_by_the_service(page: Path) -> None:
             document = json.loads(block.text)
             if "area" in document:
                 MissionSpec.model_validate(document)
+            elif isinstance(document.get("items"), list) and "ranges_m" in document["items"][0]:
+                ScanBatch.model_validate(document)
             elif isinstance(document.get("items"), list) and "accepted" not in document:
                 taken = MeasurementBatch.model_validate(document)
                 assert not [item for item in taken.items if isinstance(item, str)]
