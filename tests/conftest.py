@@ -2,17 +2,13 @@ import os
 from collections.abc import Iterator
 from pathlib import Path
 
-import numba
 import pytest
+
+from .numba_cache import share
 
 PROJECT = Path(__file__).resolve().parents[1]
 
-if "PYTEST_XDIST_WORKER" in os.environ:
-    # Workers (and the processes that their tests start) that compile the same function at once would write over each
-    # other's machine code: numba numbers the files of its cache without a lock. So each worker has a cache of its own.
-    folder = str(PROJECT / ".pytest_cache" / f"numba-{os.environ['PYTEST_XDIST_WORKER']}")
-    os.environ["NUMBA_CACHE_DIR"] = folder  # for the processes
-    numba.config.CACHE_DIR = folder  # here numba may have been imported already
+share()
 
 
 def _children() -> dict[int, str]:

@@ -15,11 +15,16 @@ PATIENCE_MS = 90_000
 """Only how long a missing thing is waited for: the first map waits for numba to compile."""
 
 
-# One service for all files that a process runs: its start and the compiling of its first map are most of their time.
 @pytest.fixture(scope="session")
-def service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Service]:
+def built() -> None:
+    """There is a dashboard to drive."""
     if not (STATIC / "index.html").is_file():
         pytest.skip("the dashboard is not built: 'pip install -e .' builds it")
+
+
+# One service for all files that a process runs: its start and the compiling of its first map are most of their time.
+@pytest.fixture(scope="session")
+def service(built: None, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Service]:
     running = Service(tmp_path_factory.mktemp("service"))
     running.start()
     yield running

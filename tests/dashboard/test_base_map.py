@@ -9,8 +9,6 @@ import pytest
 from PIL import Image
 from playwright.sync_api import Browser, Page
 
-from app.dashboard.serve import STATIC
-
 from .pmtiles import plain_tile, tile_at, write_pmtiles
 from .service import Service
 from .steps import show
@@ -22,9 +20,7 @@ CHART = (214, 160, 40)
 
 
 @pytest.fixture
-def charted(tmp_path: Path) -> Iterator[Service]:
-    if not (STATIC / "index.html").is_file():
-        pytest.skip("the dashboard is not built: 'pip install -e .' builds it")
+def charted(built: None, tmp_path: Path) -> Iterator[Service]:
     x_y = [tile_at(zoom, -8.7046, 41.1852) for zoom in (12, 13, 14)]
     file = tmp_path / "harbour.pmtiles"
     file.write_bytes(write_pmtiles(dict.fromkeys(x_y, plain_tile(CHART)), (-8.75, 41.15, -8.65, 41.22)))

@@ -3,18 +3,14 @@ from collections.abc import Iterator
 import pytest
 from playwright.sync_api import Page, expect
 
-from app.dashboard.serve import STATIC
-
 from .service import Service
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(400)]
 
 
 @pytest.fixture(scope="module")
-def service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Service]:
+def service(built: None, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Service]:
     """A service of its own: once it has a token it asks everyone for one."""
-    if not (STATIC / "index.html").is_file():
-        pytest.skip("the dashboard is not built: 'pip install -e .' builds it")
     running = Service(tmp_path_factory.mktemp("guarded"))
     running.start()
     yield running

@@ -1,0 +1,67 @@
+"""One folder of compiled functions for all processes of a test run, also for those that the tests start.
+
+numba numbers the files of its cache without a lock: processes that compile the same function for different arguments at
+once could take each other's machine code for theirs. Its setting of a class that finds the cache is how this module
+gets into every process. The folder is named after the sources, since numba itself does not notice a change in a
+function that was compiled into another one.
+"""
+
+import fcntl
+import hashlib
+import os
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numba
+from numba.core import caching
+
+PROJECT = Path(__file__).resolve().parents[1]
+ALL = PROJECT / ".pytest_cache" / "numba"
+
+
+class _Locked(caching.IndexDataCacheFile):
+    """Index and machine code of one function, which one process at a time reads or writes."""
+
+    @contextmanager
+    def _alone(self) -> Iterator[None]:
+        with Path(f"{self._index_path}.lock").open("w") as file:
+            fcntl.flock(file, fcntl.LOCK_EX)  # closing the file gives it free
+            yield
+
+    def save(self, key: Any, data: Any) -> None:
+        with self._alone():
+            super().save(key, data)
+
+    def load(self, key: Any) -> Any:
+        with self._alone():
+            return super().load(key)
+
+
+class Locator(caching.UserProvidedCacheLocator):
+    """Where ``NUMBA_CACHE_DIR`` says, as without it."""
+
+
+caching.IndexDataCacheFile = _Locked
+
+
+def share() -> None:
+    """Let this process and those that it starts use the folder of the sources as they are; forget older ones."""
+    files = sorted(path for package in ("app", "simulator", "imc_bridge") for path in (PROJECT / package).rglob("*.py"))
+    sources = hashlib.sha256()
+    for path in files:
+        if "node_modules" not in path.parts:
+            sources.update(path.read_bytes())
+    folder = ALL / sources.hexdigest()[:16]
+    if "PYTEST_XDIST_WORKER" not in os.environ and ALL.is_dir():
+        for older in ALL.iterdir():
+            if older != folder:
+                shutil.rmtree(older)
+    name = f"{Locator.__module__}.{Locator.__qualname__}"
+    # For the processes, which have to find this module, and no other one of its name.
+    path = os.pathsep.join([str(PROJECT), os.environ.get("PYTHONPATH", "")])
+    os.environ |= {"NUMBA_CACHE_DIR": str(folder), "NUMBA_CACHE_LOCATOR_CLASSES": name, "PYTHONPATH": path}
+    numba.config.CACHE_DIR = str(folder)  # here numba may have been imported already
+    numba.config.CACHE_LOCATOR_CLASSES = name
