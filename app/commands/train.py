@@ -33,8 +33,8 @@ def train(
 ) -> None:
     """Train a PCAO controller that missions fly with. Killed, the same command goes on where it was."""
     from app import __version__
-    from app.evaluation.cluster import Cluster, ClusterError
     from app.evaluation.cli import progress_bar
+    from app.evaluation.cluster import Cluster, ClusterError
     from app.evaluation.pcao.curves import draw_curve
     from app.evaluation.pcao.optimisers import METHODS, Optimiser
     from app.evaluation.pcao.scoring import DaskScorer, LocalScorer, Scorer
@@ -97,4 +97,3 @@ def train(
     keep(optimiser, curve)
     draw_curve(curve_file, {method: curve.scores})
     typer.echo(f"{out}: E(P) = {optimiser.best_score:.4g} after {len(curve.scores)} controllers; {curve_file}")
-

@@ -3,10 +3,7 @@
 import pickle
 import time
 from collections.abc import Callable, Iterator, Sequence
-from typing import TYPE_CHECKING, Any, TypeVar
-
-if TYPE_CHECKING:
-    from distributed import Future
+from typing import Any, TypeVar
 
 T = TypeVar("T")
 
@@ -30,7 +27,7 @@ class Cluster:
         except ImportError:
             raise ClusterError("--scheduler needs the package distributed: pip install 'bathyfleet[cluster]'") from None
         try:
-            self._client = Client(address, timeout=CONNECT_S, set_as_default=False)  # type: ignore[no-untyped-call]
+            self._client = Client(address, timeout=CONNECT_S, set_as_default=False)
             self._client.wait_for_workers(1, timeout=CONNECT_S)
         except (OSError, TimeoutError, ValueError) as error:
             raise ClusterError(
@@ -43,11 +40,11 @@ class Cluster:
         """Pieces of work that the workers do at the same time, as far as is known now."""
         return sum(self._client.nthreads().values())
 
-    def share(self, what: Any) -> "Future":
+    def share(self, what: Any) -> Any:
         """Give something to the workers that many pieces of work need; made anew where a worker took it with it."""
-        return self._client.submit(pickle.loads, pickle.dumps(what), pure=True)  # noqa: S301 - our own bytes
+        return self._client.submit(pickle.loads, pickle.dumps(what), pure=True)
 
-    def map(self, work: Callable[[Any, Any], T], shared: "Future", pieces: Sequence[Any]) -> list[T]:
+    def map(self, work: Callable[[Any, Any], T], shared: Any, pieces: Sequence[Any]) -> list[T]:
         """Return ``work(shared, piece)`` of every piece, in their order."""
         futures = self._client.map(work, [shared] * len(pieces), pieces, pure=False, retries=ATTEMPTS)
         return self._gather(futures)
@@ -58,8 +55,8 @@ class Cluster:
         for future in futures:
             yield self._gather([future])[0]
 
-    def _gather(self, futures: "list[Future]") -> list[Any]:
-        """Wait for results. A piece that was with several workers when they died is not its fault: it is tried again."""
+    def _gather(self, futures: list[Any]) -> list[Any]:
+        """Wait for results. A piece that several workers died with is tried again: it need not be its fault."""
         from distributed import KilledWorker
 
         for attempt in range(ATTEMPTS):

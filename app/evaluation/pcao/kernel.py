@@ -210,9 +210,7 @@ def fly(
         for v in range(n):
             heights[v] = floor_at(raster, p, positions[v, 0], positions[v, 1]) - positions[v, 2]
         what_is_left(known.accurate, known.variance, p.accuracy_sd, left)
-        vectors, figures, schedule = reduced_state(
-            positions, moves, heights, xy, known.depth, left, density, p.unit
-        )
+        vectors, figures, schedule = reduced_state(positions, moves, heights, xy, known.depth, left, density, p.unit)
         u = control(vectors, figures, schedule, horizontal, vertical)
         move(raster, p, positions, headings, moves, within_step(u, p.step, True))
         sense(p, truth, positions, headings, known, visible, rng)

@@ -1,4 +1,4 @@
-"""Where controllers are scored: on this machine's cores, or on the workers of a Dask cluster; the same runs either way."""
+"""Where controllers are scored: on this machine's cores or on a Dask cluster, the same runs either way."""
 
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor

@@ -51,7 +51,9 @@ class Checkpoint:
         if lines:
             differing = [name for name in settings if lines[0].get(name) != settings[name]]
             if differing:
-                said = "; ".join(f"{name} is {lines[0].get(name)!r} there, {settings[name]!r} here" for name in differing)
+                said = "; ".join(
+                    f"{name} is {lines[0].get(name)!r} there, {settings[name]!r} here" for name in differing
+                )
                 raise CheckpointError(
                     f"{path} is of another training ({said}): take the same settings, another --out, or remove it"
                 )

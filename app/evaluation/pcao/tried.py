@@ -1,7 +1,7 @@
 """SE(C), SPSA and FDSA in PCAO18's simulation, compiled: yardsticks that really try their moves and take them back.
 
-They judge by AURO15's objective (eq. 8-15, :mod:`app.exploration.objective` says how it is read), as the paper's SE does
-([20, algorithm 1]). A try is flown, pinged with and judged; its measurements are dropped.
+They judge by AURO15's objective (eq. 8-15, :mod:`app.exploration.objective` says how it is read), as the paper's SE
+does ([20, algorithm 1]). A try is flown, pinged with and judged; its measurements are dropped.
 """
 
 import numpy as np

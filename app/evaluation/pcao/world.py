@@ -9,7 +9,15 @@ from scipy.ndimage import distance_transform_edt
 
 from app.estimation.beams import Multibeam
 from app.evaluation.cube_world import (
-    CEILING, CLEARANCE, DEEPEST, MAX_STEP, SHALLOWEST, START_CORNER, START_HEIGHT, START_SPREAD, CubeTerrain,
+    CEILING,
+    CLEARANCE,
+    DEEPEST,
+    MAX_STEP,
+    SHALLOWEST,
+    START_CORNER,
+    START_HEIGHT,
+    START_SPREAD,
+    CubeTerrain,
 )  # fmt: skip
 from app.evaluation.pcao.kernel import Physics
 from simulator.terrain import Terrain

@@ -4,6 +4,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 from shapely import Polygon
 
 from app.estimation import RangeSensor, Sensor
@@ -13,15 +14,17 @@ from app.exploration.pcao.controller import control, within_step
 from app.exploration.pcao.model import default_model
 from app.exploration.pcao.state import reduced_state
 from app.exploration.planners.base import PlannerBase, at_depth, settle
-from app.exploration.problem import Belief, Proposal, Situation
+from app.exploration.problem import Proposal, Situation
 
 FloatArray = NDArray[np.float64]
 
 UNIT_OF_SIGHT = 0.25
 """The state's unit where landmarks are seen from afar, as a part of the sight; in training, of the swath's range."""
 
-UNIT_OF_CORRELATION = 0.5
-"""The state's unit where the bottom is sounded along the way, as a part of the distance that a sounding informs."""
+FINER = (1.0, 0.5, 0.25)
+"""How near, in units, a survey has to come to a cell. Once it was that near everywhere it goes on with the next."""
+
+COVERED = 0.99
 
 TURNS_RAD = tuple(float(x) for x in np.radians([0, 20, -20, 45, -45, 70, -70, 95, -95, 120, -120, 150, -150, 180]))
 """By how much a vehicle turns off its course when a limit bars it; the smallest that is allowed is taken."""
@@ -52,7 +55,9 @@ class PcaoPlanner(PlannerBase):
 
     def _decide(self, team: Situation, bottom: Bottom, seed: int) -> Proposal:
         belief, limits, here = team.belief, team.constraints, team.positions
-        left = self._left(belief)
+        area = Polygon(limits.area).area
+        unit = self._unit(team, area)
+        left = self._left(team, unit)
         vectors, figures, schedule = reduced_state(
             np.ascontiguousarray(here),
             self._moves(team),
@@ -60,10 +65,12 @@ class PcaoPlanner(PlannerBase):
             np.ascontiguousarray(belief.xy_m),
             np.ascontiguousarray(belief.depth_m),
             left,
-            len(left) / Polygon(limits.area).area,
-            self._unit(team),
+            len(left) / area,
+            unit,
         )
         u = control(vectors, figures, schedule, self._horizontal, self._vertical)
+        if self._surveys:
+            u[:, 2] = 0.0
         way = within_step(u, limits.max_step_m * (1.0 - 1e-9), False)
         lead = self._leader(team.vehicles, np.linalg.norm(vectors[:, 0], axis=1))
         positions = self._within_limits(team, bottom, way, lead)
@@ -88,7 +95,7 @@ class PcaoPlanner(PlannerBase):
         return positions
 
     def _clear(self, team: Situation, bottom: Bottom, wish: FloatArray) -> FloatArray:
-        """Return the wishes (..., n, 3) clear of the bottom: at the depths wished for, or in surveys at the cruise's."""
+        """Return the wishes (..., n, 3) clear of the bottom, at the depths wished for; in surveys at the cruise's."""
         if self._surveys:
             return self._at_cruise(team, bottom, wish[..., :2])
         return at_depth(team.constraints, bottom, team.positions, wish[..., :2], wish[..., 2])
@@ -101,24 +108,32 @@ class PcaoPlanner(PlannerBase):
         self._lead = names[nearest]
         return nearest
 
-    def _unit(self, team: Situation) -> float:
+    def _unit(self, team: Situation, area: float) -> float:
+        """Return the state's unit: half of what a vehicle maps to its sides.
+
+        A survey's lines can lie as close together as the whole way that the team can travel allows.
+        """
         if isinstance(self.sensor, RangeSensor):
             return UNIT_OF_SIGHT * self.sensor.visibility_m
-        return max(UNIT_OF_CORRELATION * team.belief.correlation_length_m, 0.25 * team.constraints.max_step_m)
+        step = team.constraints.max_step_m
+        return float(np.clip(0.5 * area / (team.steps_total * len(team.vehicles) * step), 0.5 * step, area**0.5 / 8.0))
 
-    def _left(self, belief: Belief) -> FloatArray:
-        """Return how much is left to learn of every landmark, 0 to 1.
-
-        A survey that knows all of its cells well enough goes on where they are known worst.
-        """
-        if self._surveys:
-            left = np.where(belief.accurate, 0.0, 1.0)
-            if len(left) and not left.any():
-                left[belief.sd_m > np.median(belief.sd_m)] = 1.0
-            return left
-        with np.errstate(divide="ignore"):
-            lacking = 1.0 - (self.options.accuracy_sd_m / belief.sd_m) ** 2
-        return np.where(belief.accurate, 0.0, np.maximum(0.25, lacking))
+    def _left(self, team: Situation, unit: float) -> FloatArray:
+        """Return how much is left to learn of every landmark, 0 to 1; in a survey, of every cell that it passed far."""
+        belief = team.belief
+        open_ = np.where(belief.accurate, 0.0, 1.0)
+        if not self._surveys:
+            with np.errstate(divide="ignore"):
+                lacking = 1.0 - (self.options.accuracy_sd_m / belief.sd_m) ** 2
+            return open_ * np.maximum(0.25, lacking)
+        if not len(team.soundings_en_m) or not len(belief.xy_m):
+            return open_
+        distance, _ = cKDTree(team.soundings_en_m, balanced_tree=False, compact_nodes=False).query(belief.xy_m)
+        for part in FINER:
+            left = np.where(distance > part * unit, open_, 0.0)
+            if left.mean() > 1.0 - COVERED:
+                return left
+        return np.where(distance > np.median(distance), 1.0, 0.0)
 
     def _moves(self, team: Situation) -> FloatArray:
         """Return the directions (n, 2) that the vehicles came from their last places in; else their headings'."""
@@ -138,7 +153,10 @@ class PcaoPlanner(PlannerBase):
         for i, place in enumerate(team.positions):
             way = wish[i] - place
             turned = np.array(
-                [[c * way[0] + s * way[1], c * way[1] - s * way[0]] for c, s in ((np.cos(a), np.sin(a)) for a in TURNS_RAD)]
+                [
+                    [c * way[0] + s * way[1], c * way[1] - s * way[0]]
+                    for c, s in ((np.cos(a), np.sin(a)) for a in TURNS_RAD)
+                ]
             )
             tries = np.repeat(result[None], len(turned), axis=0)
             tries[:, i, :2] = place[:2] + turned
