@@ -14,6 +14,7 @@ from app import __version__
 from app.commands.common import CommandError, Database, command_settings
 from app.commands.data import export, import_file, tide
 from app.commands.logs import import_logs
+from app.commands.train import train
 
 if TYPE_CHECKING:
     from imc_bridge.doctor import Diagnosis
@@ -31,6 +32,7 @@ app.command()(export)
 app.command("import")(import_file)
 app.command("import-log")(import_logs)
 app.command()(tide)
+app.command()(train)
 
 
 DEMO_FOLDER = Path("bathyfleet-demo")

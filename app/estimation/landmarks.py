@@ -131,6 +131,32 @@ class LandmarkEstimator:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def fit_depth(
+    prior: float, prior_variance: float, h2: float, vehicle_depth: float, measured: float, noise: float
+) -> tuple[float, float]:
+    """Return depth and variance of one landmark after one range to it, by Gauss-Newton.
+
+    ``h2`` is the squared horizontal distance; an infinite prior variance means that nothing was known.
+    """
+    information = 1.0 / prior_variance if np.isfinite(prior_variance) else 0.0
+    # A range shorter than the horizontal distance is noise: the floor keeps the first estimate below the vehicle.
+    least = 0.05 * measured
+    anchor, depth = prior, prior
+    if information <= 0.0:
+        anchor = 0.0
+        depth = vehicle_depth + np.sqrt(max(measured**2 - h2, least**2))
+    gained = 0.0
+    for _ in range(ITERATIONS):
+        drop = max(depth - vehicle_depth, least)
+        r = np.sqrt(h2 + drop**2)
+        slope = drop / r
+        gained = (slope / (noise * r)) ** 2
+        pseudo = depth + (measured - r) / slope
+        depth = max((information * anchor + gained * pseudo) / (information + gained), vehicle_depth + least)
+    return depth, 1.0 / (information + gained)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def _fit(
     xy: FloatArray,
     prior: FloatArray,
@@ -144,23 +170,8 @@ def _fit(
     depths, variances = np.empty(len(index)), np.empty(len(index))
     for k in range(len(index)):
         m = index[k]
-        information = 1.0 / prior_variance[m] if np.isfinite(prior_variance[m]) else 0.0
         h2 = (xy[m, 0] - position[0]) ** 2 + (xy[m, 1] - position[1]) ** 2
-        # A range shorter than the horizontal distance is noise: the floor keeps the first estimate below the vehicle.
-        least = 0.05 * ranges[k]
-        anchor, depth = prior[m], prior[m]
-        if information <= 0.0:
-            anchor = 0.0
-            depth = position[2] + np.sqrt(max(ranges[k] ** 2 - h2, least**2))
-        gained = 0.0
-        for _ in range(ITERATIONS):
-            drop = max(depth - position[2], least)
-            r = np.sqrt(h2 + drop**2)
-            slope = drop / r
-            gained = (slope / (noise * r)) ** 2
-            pseudo = depth + (ranges[k] - r) / slope
-            depth = max((information * anchor + gained * pseudo) / (information + gained), position[2] + least)
-        depths[k], variances[k] = depth, 1.0 / (information + gained)
+        depths[k], variances[k] = fit_depth(prior[m], prior_variance[m], h2, position[2], ranges[k], noise)
     return depths, variances
 
 

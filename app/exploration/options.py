@@ -5,6 +5,7 @@ from typing import Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from app.exploration.objective import Terms
+from app.exploration.pcao.model import PcaoModel
 
 
 class PlannerOptions(BaseModel):
@@ -51,4 +52,9 @@ class PlannerOptions(BaseModel):
     tries: int = Field(0, ge=0, le=10_000, description="Real tries per step of OSARSES (only in simulation).")
     accuracy_sd_m: float = Field(
         0.02, gt=0, description="Standard deviation below which a landmark counts as accurately estimated."
+    )
+    model: PcaoModel | None = Field(
+        None,
+        description="What pcao flies with: the content of a model file that bathyfleet train wrote; without one, the "
+        "controller that ships with bathyfleet.",
     )

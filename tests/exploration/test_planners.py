@@ -22,6 +22,7 @@ KINDS = [
     ("random", "map"),
     ("spsa", "map"),
     ("fdsa", "map"),
+    ("pcao", "map"),
     ("rollout", "map"),
 ]
 SENSORS = [SingleBeam(), RangeSensor(visibility_m=25.0)]
@@ -119,7 +120,7 @@ def test_a_foreign_memory_is_refused(name, memory):
 
 
 def test_an_unknown_planner_is_refused_with_the_known_ones():
-    with pytest.raises(ValueError, match="choose one of cao, fdsa, lawnmower, random, rollout, spsa"):
+    with pytest.raises(ValueError, match="choose one of cao, fdsa, lawnmower, pcao, random, rollout, spsa"):
         create_planner("magic")
 
 

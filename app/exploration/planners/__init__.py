@@ -12,6 +12,7 @@ from app.exploration.planners.cao import CaoPlanner
 from app.exploration.planners.formation import FormationLawnmower
 from app.exploration.planners.gradient import FdsaPlanner, SpsaPlanner
 from app.exploration.planners.lawnmower import LawnmowerPlanner
+from app.exploration.planners.pcao import PcaoPlanner
 from app.exploration.planners.random_walk import RandomPlanner
 from app.exploration.planners.rollout import RolloutPlanner
 from app.exploration.planners.search_cao import CaoSearch, SpsaSearch
@@ -22,7 +23,7 @@ from app.exploration.search import SearchTask
 
 PLANNERS: dict[str, type[PlannerBase]] = {
     planner.name: planner
-    for planner in (CaoPlanner, LawnmowerPlanner, RandomPlanner, RolloutPlanner, SpsaPlanner, FdsaPlanner)
+    for planner in (CaoPlanner, LawnmowerPlanner, PcaoPlanner, RandomPlanner, RolloutPlanner, SpsaPlanner, FdsaPlanner)
 }
 
 SEARCHERS: dict[str, type[PlannerBase]] = {

@@ -166,7 +166,7 @@ def at_depth(
         Where the legs begin.
     en_m : (..., n_vehicles, 2)
         Where they should end.
-    wish_m : (n_vehicles,)
+    wish_m : (..., n_vehicles)
         Wanted depths; clipped to the band and to the clearance above the estimated bottom along the leg.
     """
     leg = en_m - origin[:, :2]

@@ -1050,6 +1050,22 @@ export interface components {
             replayed: boolean;
         };
         /**
+         * Block
+         * @description The blocks of P of one mixing signal; both symmetric, with eigenvalues between e1 and e2.
+         */
+        Block: {
+            /**
+             * Horizontal
+             * @description 7 x 7, in the order of state.vectors
+             */
+            horizontal: number[][];
+            /**
+             * Vertical
+             * @description 4 x 4, in the order of state.figures
+             */
+            vertical: number[][];
+        };
+        /**
          * Cause
          * @description What a finding is about; the first of a node's problems is the one to look at.
          * @enum {string}
@@ -2010,6 +2026,75 @@ export interface components {
          */
         OverlayLayer: "depth" | "uncertainty" | "count" | "slope" | "tvu_fraction" | "difference";
         /**
+         * PcaoModel
+         * @description A controller that ``bathyfleet train`` wrote.
+         */
+        PcaoModel: {
+            /**
+             * Format
+             * @default bathyfleet-pcao
+             * @constant
+             */
+            format: "bathyfleet-pcao";
+            /**
+             * Version
+             * @default 1
+             * @constant
+             */
+            version: 1;
+            /**
+             * @default {
+             *       "vectors": [
+             *         "nearest",
+             *         "close",
+             *         "far",
+             *         "short_gain",
+             *         "long_gain",
+             *         "apart",
+             *         "momentum"
+             *       ],
+             *       "figures": [
+             *         "height",
+             *         "rise",
+             *         "one",
+             *         "left_here"
+             *       ],
+             *       "mixing_signals": 3
+             *     }
+             */
+            state: components["schemas"]["StateDefinition"];
+            /**
+             * E1
+             * @default 0.01
+             */
+            e1: number;
+            /**
+             * E2
+             * @default 10
+             */
+            e2: number;
+            /**
+             * P
+             * @description One block per mixing signal
+             */
+            P: components["schemas"]["Block"][];
+            /**
+             * @default {
+             *       "command": "",
+             *       "bathyfleet": "",
+             *       "method": "",
+             *       "seed": 0,
+             *       "terrains": [],
+             *       "seeds": [],
+             *       "robots": 3,
+             *       "landmarks": 1100,
+             *       "steps": 500,
+             *       "evaluations": 0
+             *     }
+             */
+            training: components["schemas"]["Training"];
+        };
+        /**
          * PlannerOptions
          * @description Settings of the planners. Every planner reads those that concern it.
          */
@@ -2105,6 +2190,8 @@ export interface components {
              * @default 0.02
              */
             accuracy_sd_m: number;
+            /** @description What pcao flies with: the content of a model file that bathyfleet train wrote; without one, the controller that ships with bathyfleet. */
+            model?: components["schemas"]["PcaoModel"] | null;
         };
         /**
          * PlannerSpec
@@ -2826,6 +2913,40 @@ export interface components {
             reason: string;
         };
         /**
+         * StateDefinition
+         * @description What P multiplies; docs/pcao.md says how each is made.
+         */
+        StateDefinition: {
+            /**
+             * Vectors
+             * @default [
+             *       "nearest",
+             *       "close",
+             *       "far",
+             *       "short_gain",
+             *       "long_gain",
+             *       "apart",
+             *       "momentum"
+             *     ]
+             */
+            vectors: string[];
+            /**
+             * Figures
+             * @default [
+             *       "height",
+             *       "rise",
+             *       "one",
+             *       "left_here"
+             *     ]
+             */
+            figures: string[];
+            /**
+             * Mixing Signals
+             * @default 3
+             */
+            mixing_signals: number;
+        };
+        /**
          * StateMessage
          * @description The mission's state or progress changed.
          */
@@ -3263,6 +3384,73 @@ export interface components {
              * @default 10
              */
             standoff_m: number;
+        };
+        /**
+         * Training
+         * @description How the controller came about.
+         */
+        Training: {
+            /**
+             * Command
+             * @description What makes it again
+             * @default
+             */
+            command: string;
+            /**
+             * Bathyfleet
+             * @description The version that trained it
+             * @default
+             */
+            bathyfleet: string;
+            /**
+             * Method
+             * @description pcao, cma or random
+             * @default
+             */
+            method: string;
+            /**
+             * Seed
+             * @description Of the optimiser
+             * @default 0
+             */
+            seed: number;
+            /**
+             * Terrains
+             * @default []
+             */
+            terrains: string[];
+            /**
+             * Seeds
+             * @description Of the Monte-Carlo runs on each terrain
+             * @default []
+             */
+            seeds: number[];
+            /**
+             * Robots
+             * @default 3
+             */
+            robots: number;
+            /**
+             * Landmarks
+             * @default 1100
+             */
+            landmarks: number;
+            /**
+             * Steps
+             * @default 500
+             */
+            steps: number;
+            /**
+             * Evaluations
+             * @description Controllers that were scored
+             * @default 0
+             */
+            evaluations: number;
+            /**
+             * Score
+             * @description E(P) of eq. (17), per run
+             */
+            score?: number | null;
         };
         /**
          * VehicleDiagnosis

@@ -310,20 +310,22 @@ interface OptionSchema {
   default?: unknown;
   type?: string;
   enum?: string[];
-  anyOf?: { type?: string }[];
+  anyOf?: { type?: string; $ref?: string }[];
 }
 
 /** The planner's settings as the service declares them; an empty field takes the default. */
 function Options({ schema }: { schema: Record<string, unknown> | undefined }) {
   const { draft, set } = useForm();
-  const properties = (schema?.properties ?? {}) as Record<string, OptionSchema>;
+  const all = Object.entries((schema?.properties ?? {}) as Record<string, OptionSchema>);
+  // A whole document, such as a trained model, is no field of a form: it comes by REST.
+  const properties = all.filter(([, option]) => !option.anyOf?.some((kind) => kind.$ref));
   const change = (name: string, value: unknown) => {
     const { [name as keyof typeof draft.options]: _, ...rest } = draft.options;
     set({ options: value === undefined ? rest : { ...rest, [name]: value } });
   };
   return (
     <div class="options">
-      {Object.entries(properties).map(([name, option]) => (
+      {properties.map(([name, option]) => (
         <div key={name} class="field">
           <label for={`option-${name}`}>{name.replaceAll("_", " ")}</label>
           {option.enum ? (
