@@ -33,7 +33,7 @@ from app.missions.hub import FleetHub
 from app.missions.live import RISES, LiveMission
 from app.missions.members import SETTLED, Member
 from app.missions.sampling import keep_telemetry
-from app.missions.search.course import REST_S, Course
+from app.missions.search.lookout import Lookout
 from app.missions.spec import Guidance
 from app.missions.views import Level
 from app.storage import missions as mission_queries
@@ -89,7 +89,7 @@ class Runner:
         self._mapping_s = 0.0
         self._mapping: asyncio.Task[None] | None = None
         self._bottom = Bottom.unknown()
-        self._course = None if live.search is None else Course(live.search, live.spec, live.frame)
+        self._lookout = Lookout(live, time_scale, self._wait)
 
     async def run(self) -> str:
         """Fly all remaining steps. Returns why there are no more; raises whatever went wrong."""
@@ -108,7 +108,7 @@ class Runner:
                 started_s = asyncio.get_running_loop().time()
                 if decision is None:
                     await self._gather_team(patient=live.header.step == 0)
-                    await self._look_round()
+                    await self._lookout.look_round()
                     decision = await self._decide(planner, self._places())
                 await self._commit(decision)
                 await self._send()
@@ -119,7 +119,7 @@ class Runner:
                 decision = await self._travel(planner)
                 step_s = asyncio.get_running_loop().time() - started_s
                 self._keep_pace(step_s)
-                if self._course is not None and await self._search_is_over(self._course, taken, step_s):
+                if await self._lookout.is_over(taken, step_s):
                     return "everybody is back at the entry"
             return "every step is done"
         finally:
@@ -183,10 +183,11 @@ class Runner:
         """
         deadline_s = self._deadline_s()
         close = await self._wait(
-            lambda: all(self._about_to_arrive(m) for m in self._live.team if m.busy) or bool(self._barred()), deadline_s
+            lambda: all(self._about_to_arrive(m) for m in self._live.team if m.busy) or bool(self._lookout.barred()),
+            deadline_s,
         )
         last = self._live.header.step >= self._spec.steps
-        if not close or last or not self._live.team.present or self._barred():
+        if not close or last or not self._live.team.present or self._lookout.barred():
             await self._arrive(deadline_s)
             return None
         memory = planner.snapshot()
@@ -197,7 +198,7 @@ class Runner:
             decision = await deciding
         finally:
             deciding.cancel()
-        if self._came_true(expected) and self._still_clear(decision):
+        if self._came_true(expected) and self._lookout.still_clear(decision):
             return decision
         planner.restore(memory)
         return None
@@ -277,7 +278,7 @@ class Runner:
         step_s = self._spec.limits.max_step_m / self._spec.speed_mps
         await live.ranges.flush()
         targets = live.ranges.tracking.told(live.ranges.times.now_s(), step_s)
-        task = None if self._course is None else self._course.task(live.header.step + 1)
+        task = self._lookout.task(live.header.step + 1)
 
         def work() -> Decision:
             sounded_m, doubtful_m = live.builder.sounded_at_m()
@@ -389,7 +390,7 @@ class Runner:
     def _order(self, row: WaypointRow, member: Member) -> WaypointOrder:
         lead: Position | None = None
         bottom: tuple[Position, ...] = ()
-        if member.report is not None and self._course is None:
+        if member.report is not None and not self._lookout.needed:
             start, target = member.place_m(self._live.frame), np.array([row.east_m, row.north_m])
             beyond = safety.lead_point(self._constraints, start, target, LEAD_M)
             lead = self._position(beyond[0], beyond[1], row.depth_m)
@@ -432,8 +433,10 @@ class Runner:
 
     async def _arrive(self, deadline_s: float) -> None:
         """Wait until every vehicle under way arrived or refused; at the deadline go on without the others."""
-        if await self._wait(lambda: not any(m.busy for m in self._live.team) or bool(self._barred()), deadline_s):
-            await self._turn_back(self._barred())
+        if await self._wait(
+            lambda: not any(m.busy for m in self._live.team) or bool(self._lookout.barred()), deadline_s
+        ):
+            await self._end_early(self._lookout.barred())
             return
         late = [member for member in self._live.team if member.busy]
         for member in late:
@@ -446,72 +449,15 @@ class Runner:
             vehicles=[m.name for m in late],
         )
 
-    def _barred(self) -> list[Member]:
-        """Return the vehicles under way that have something on their way, as a search's scans tell by now."""
-        course = self._course
-        return [] if course is None else [m for m in self._live.team if m.busy and course.barred(m)]
-
-    def _still_clear(self, decision: Decision) -> bool:
-        """Return whether the legs of a decision are still clear by what was seen since; so they are but in searches."""
-        if self._course is None:
-            return True
-        search = self._course.search
-        return all(
-            leg.refusal or search.clear(member.place_m(self._live.frame), leg.target_m[:2])
-            for leg in decision.legs
-            if (member := self._live.team.get(leg.vehicle)) is not None and member.report is not None
-        )
-
-    async def _turn_back(self, barred: list[Member]) -> None:
-        """Where something stands on a vehicle's way: end the step, so that everybody is sent anew from where it is."""
+    async def _end_early(self, barred: list[Member]) -> None:
+        """Where something stands on a vehicle's way, end the step: everybody is sent anew from where it is."""
         if not barred:
             return
         for member in self._live.team:
             if member.busy:
                 reason = "something stands on its way" if member in barred else "the step ended before it was there"
                 self._settle(member, WaypointStatus.MISSED, reason)
-        names = [member.name for member in barred]
-        message = f"something was seen on the way of {', '.join(names)}: another way is taken"
-        await self._live.journal.log(Level.WARNING, "obstacle", message, step=self._live.header.step, vehicles=names)
-
-    async def _look_round(self) -> None:
-        """In a search, wait for scans: from every vehicle's place, and for a new one where nobody could go on."""
-        course, live = self._course, self._live
-        if course is None:
-            return
-        rest_s = asyncio.get_running_loop().time() + REST_S / self._time_scale
-        if course.idle:
-            version = course.search.version
-            await self._wait(lambda: course.search.version > version, rest_s)
-        if await self._wait(lambda: not course.unseen(live.team.present), rest_s):
-            return
-        blind = course.unseen(live.team.present)
-        await live.journal.log(
-            Level.ALARM,
-            "waiting",
-            f"no scan tells what is around {', '.join(blind)}: the search waits for one",
-            vehicles=blind,
-        )
-        await self._wait(lambda: not course.unseen(live.team.present), None)
-
-    async def _search_is_over(self, course: Course, decision: Decision, step_s: float) -> bool:
-        """Note how a step of a search went; tell whether it was the last one."""
-        live = self._live
-        places = {member.name: member.place_m(live.frame) for member in live.team.present}
-        legs = [np.hypot(*(leg.target_m[:2] - decision.origin_m[leg.vehicle])) for leg in decision.legs]
-        course.note(np.array(legs), step_s * self._time_scale)
-        over = course.over(live.team.present, int(decision.terms.get("homebound", 0)))
-        away = course.away(live.team.present)
-        last = live.header.step >= self._spec.steps
-        if away and (course.search.left_s() <= 0 or last) and not course.told_late:
-            course.told_late = True
-            why = "the time is up" if course.search.left_s() <= 0 else "every step is done"
-            far = ", ".join(f"{name} {course.search.way_to_entry_m(places[name]):.0f} m" for name in away)
-            then = "the mission ends where they are" if last else "they go on to the entry"
-            await live.journal.log(
-                Level.ALARM, "late", f"{why} and not everybody is back (from the entry: {far}): {then}", vehicles=away
-            )
-        return over
+        await self._lookout.tell_of(barred)
 
     def _deadline_s(self) -> float:
         """Return the event loop's time at which a step that begins now goes on without stragglers."""
