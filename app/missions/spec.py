@@ -23,6 +23,8 @@ ProfileDepth = Annotated[float, Field(ge=0, le=12_000)]
 ProfileSpeed = Annotated[float, Field(ge=1300, le=1700)]
 
 MAX_GRID_CELLS = 4_000_000
+MAX_SEARCH_CELLS = 1_000_000
+"""Of a search, which plans on every cell at every step."""
 
 NO_TIDE = "none applied"
 
@@ -362,6 +364,13 @@ class MissionSpec(Model):
                     f"search.{name} lies {outside_m:.1f} m outside the area: it must be a place [longitude, latitude] "
                     "in it"
                 )
+        size = self.local_area().max(axis=0)
+        cells = float(np.prod(np.ceil(size / self.cell_m)))
+        if cells > MAX_SEARCH_CELLS:
+            raise ValueError(
+                f"the site has {cells:.0f} cells of {self.cell_m} m, at most {MAX_SEARCH_CELLS} are searched: make "
+                "cell_m larger or the area smaller"
+            )
         if self.search.safety_m < self.arrival_radius_m:
             raise ValueError(
                 f"search.safety_m is {self.search.safety_m} m but arrival_radius_m is {self.arrival_radius_m} m: a "

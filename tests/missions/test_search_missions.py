@@ -206,6 +206,7 @@ async def test_what_a_search_lacks_is_told_field_by_field(service: MissionServic
         ({"kind": "survey"}, "kind is survey and search is given"),
         ({"search": None}, "kind is search and search is missing"),
         ({"search": {"goal": lon_lat(50, 5)}}, "search.goal lies 20.0 m outside the area"),
+        ({"cell_m": 0.02}, "at most 1000000 are searched"),
         ({"search": {"safety_m": 0.5}}, "search.safety_m is 0.5 m but arrival_radius_m is 1.0 m"),
     ]
     for change, words in wrong:

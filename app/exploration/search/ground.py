@@ -46,6 +46,12 @@ class Ground:
         hazard = task.states != Cell.EXPLORED
         return cls(task, hazard, ~hazard & ~binary_dilation(hazard, _within(_margin(task))))
 
+    @classmethod
+    def for_legs(cls, task: SearchTask) -> "Ground":
+        """Make it for nothing but :meth:`clear`, which takes less: no place of it is passable."""
+        hazard = task.states != Cell.EXPLORED
+        return cls(task, hazard, np.zeros_like(hazard))
+
     def places(self, en_m: FloatArray) -> IntArray:
         """Return the cells (n, 2) of positions (n, 2), at the border those within."""
         row, col = self.task.grid.cell_of(np.asarray(en_m, dtype=np.float64))

@@ -111,7 +111,7 @@ def hold_before_hazards(
 
     Planners keep off by themselves; this is the check that does not trust them.
     """
-    ground, checked, notes = Ground.of(replace(task, spare_m=0.0)), proposed.copy(), []
+    ground, checked, notes = Ground.for_legs(replace(task, spare_m=0.0)), proposed.copy(), []
     for i, name in enumerate(names):
         still = np.hypot(*(proposed[i, :2] - origin[i, :2])) <= 0.0
         if not still and np.isfinite(proposed[i]).all() and not ground.clear(origin[i, :2], proposed[i : i + 1, :2])[0]:

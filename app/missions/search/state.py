@@ -146,7 +146,7 @@ class Search:
     def clear(self, origin_m: FloatArray, end_m: FloatArray) -> bool:
         """Return whether a straight leg between places (2,) keeps the safety distance from every hazard known now."""
         if self._ground is None:
-            self._ground = Ground.of(self.task(0.0))
+            self._ground = Ground.for_legs(self.task(0.0))
         return bool(self._ground.clear(origin_m, end_m[None])[0])
 
     @property
