@@ -10,8 +10,10 @@ from app.evaluation.jobs import Progress
 from app.evaluation.rescue_world import RescueScenario, explored_pct, fully_explored, run_search
 from app.exploration.options import PlannerOptions
 
-TRAPPED_M = 200.0
-"""Way without a single new cell after which a team counts as trapped; ways home are left out."""
+TRAPPED_M, LEFT_PCT = 200.0, 5.0
+"""A team is trapped that saw nothing new in at least so much of the window, the last in which it searched, while so
+much of what can be seen was left: it never got away. Standstills that it got away from are reported apart.
+"""
 HOME_M = 3.0
 """Distance to the entry, per robot, within which one is back."""
 
@@ -22,7 +24,9 @@ class RescueRun:
 
     ``goal_area_pct`` and ``map_pct``: explored part of all free cells that a robot could see from anywhere it can get
     to. ``too_close``: legs on which the safety distance was not kept; ``collisions``: legs on which an obstacle was
-    touched.
+    touched. ``trapped``: see :data:`TRAPPED_M`. ``longest_standstill_m``: most of the window that went by between one
+    new cell and the next. ``plan_cpu_ms``: what the deciding thread computed; on a busy machine a decision takes
+    longer.
     """
 
     planner: str
@@ -43,6 +47,8 @@ class RescueRun:
     steps: int
     plan_ms_median: float
     plan_ms_p99: float
+    plan_cpu_ms_median: float
+    plan_cpu_ms_p99: float
 
 
 @dataclass(frozen=True)
@@ -91,7 +97,9 @@ def run_rescue(
     whole = fully_explored(scenario)
     away = np.hypot(*(track.positions_m[-1, :, :2] - world.entry_m).T)
     # A first decision compiles or loads machine code.
-    plan_ms = 1e3 * track.plan_s[1:] if len(track.plan_s) > 1 else 1e3 * track.plan_s
+    later = slice(1, None) if len(track.plan_s) > 1 else slice(None)
+    plan_ms, plan_cpu_ms = 1e3 * track.plan_s[later], 1e3 * track.plan_cpu_s[later]
+    seen = explored_pct(track.grid, whole)
     return RescueRun(
         planner=planner,
         scenario=world.name,
@@ -101,14 +109,16 @@ def run_rescue(
         clock=scenario.clock,
         window_m=scenario.window_m,
         goal_area_pct=explored_pct(track.grid, whole & goal),
-        map_pct=explored_pct(track.grid, whole),
+        map_pct=seen,
         returned_in_time=bool(away.max() <= HOME_M * scenario.robots and track.left_m[-1] >= -1e-6),
         collisions=track.collisions,
         too_close=track.too_close,
-        trapped=bool(track.longest_standstill_m > TRAPPED_M),
+        trapped=bool(track.last_standstill_m >= TRAPPED_M and 100.0 - seen >= LEFT_PCT),
         longest_standstill_m=track.longest_standstill_m,
         way_m=float(np.linalg.norm(np.diff(track.positions_m, axis=0), axis=2).sum(axis=0).max()),
         steps=len(track.plan_s),
         plan_ms_median=float(np.median(plan_ms)),
         plan_ms_p99=float(np.quantile(plan_ms, 0.99)),
+        plan_cpu_ms_median=float(np.median(plan_cpu_ms)),
+        plan_cpu_ms_p99=float(np.quantile(plan_cpu_ms, 0.99)),
     )

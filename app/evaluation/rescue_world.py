@@ -99,10 +99,11 @@ class RescueTrack:
         What was known in the end.
     collisions, too_close : int
         Legs on which a robot touched an obstacle, or came closer than the safety distance.
-    longest_standstill_m : float
-        Longest way without a new cell; ways home and waiting there are left out.
-    plan_s : (steps,)
-        Time that decisions took.
+    longest_standstill_m, last_standstill_m : float
+        Most of the window that went by between one new cell and the next, and what went by after the last one, while
+        the team searched: ways home and waiting there are left out.
+    plan_s, plan_cpu_s : (steps,)
+        Time that decisions took, and what of it they computed.
     """
 
     positions_m: FloatArray
@@ -113,7 +114,9 @@ class RescueTrack:
     collisions: int
     too_close: int
     longest_standstill_m: float
+    last_standstill_m: float
     plan_s: FloatArray
+    plan_cpu_s: FloatArray
 
 
 def run_search(
@@ -134,6 +137,7 @@ def run_search(
     left, standstill, longest = scenario.window_m, 0.0, 0.0
     task = _task(scenario, grid, left)
     history, explored, goal, lefts, times = [positions], [task.explored_part], [task.explored_goal_part], [left], []
+    computed = []
     collisions = too_close = 0
     nothing = Belief(np.zeros((0, 2)), np.zeros(0), np.zeros(0), np.zeros(0, dtype=np.bool_), np.zeros(0), 1.0)
     total = int(np.ceil(scenario.window_m / scenario.step_m))
@@ -142,9 +146,10 @@ def run_search(
             step, total, names, positions, np.full(scenario.robots, np.nan), nothing, np.zeros((0, 2)),
             scenario.constraints, search=task,
         )  # fmt: skip
-        begun = time.perf_counter()
+        begun = time.perf_counter(), time.thread_time()
         proposal = chooser.propose(situation, rng)
-        times.append(time.perf_counter() - begun)
+        times.append(time.perf_counter() - begun[0])
+        computed.append(time.thread_time() - begun[1])
         legs = np.linalg.norm(proposal.positions - positions, axis=1)
         gone = float(legs.max())
         for start, end in zip(positions, proposal.positions, strict=True):
@@ -155,12 +160,13 @@ def run_search(
             for point in _along(start, end, scenario.step_m):
                 grid = _scanned(grid, scenario, point)
         positions = proposal.positions
-        left -= gone if gone > 0.0 and scenario.clock == "way" else scenario.step_m
+        used = gone if gone > 0.0 and scenario.clock == "way" else scenario.step_m
+        left -= used
         before = task.explored_part
         task = _task(scenario, grid, left)
         home = proposal.terms["at_home"] == scenario.robots
-        idle = bool(proposal.terms["homebound"]) or home
-        standstill = 0.0 if task.explored_part > before or idle else standstill + max(gone, scenario.step_m)
+        searching = not (home or proposal.terms["homewards"] or proposal.terms["homebound"])
+        standstill = 0.0 if task.explored_part > before else standstill + used * searching
         longest = max(longest, standstill)
         history.append(positions)
         explored.append(task.explored_part)
@@ -171,7 +177,7 @@ def run_search(
             break
     return RescueTrack(
         np.array(history), np.array(explored), np.array(goal), np.array(lefts), grid, collisions, too_close, longest,
-        np.array(times),
+        standstill, np.array(times), np.array(computed),
     )  # fmt: skip
 
 

@@ -16,7 +16,7 @@ from app.exploration.planners import SEARCHERS, create_planner
 from app.exploration.problem import Belief, Situation
 from app.exploration.search import SearchTask
 from app.exploration.search.criteria import Standstill, Supervisor, Weights, in_contact, nearness, terms
-from app.exploration.search.gains import gains
+from app.exploration.search.gains import Gains, gains, take
 from app.exploration.search.ground import STRAIGHT, UNREACHED, Ground
 from simulator.obstacles import ObstacleWorld
 
@@ -125,6 +125,31 @@ def test_a_view_shows_what_was_foretold_where_all_obstacles_are_known(seed):
     seen = look(blueprint_only.grid, world, place[::-1] + 0.5)
     shown = np.count_nonzero(seen.states == Cell.EXPLORED)
     assert 0.75 * shown - 4 <= foretold <= shown + 2  # it promises a little less, hardly ever more
+
+
+@given(st.integers(0, 5000))
+@settings(max_examples=5, deadline=None)
+def test_gains_that_are_kept_are_those_worked_out_anew(seed):
+    world, task = explored(seed, looks=1)
+    rng, kept = np.random.default_rng([seed, 4]), Gains()
+    for _ in range(6):
+        places = np.argwhere(rng.random(world.solid.shape) < 0.3)
+        worth = np.where(task.in_goal, 1.0, rng.choice([0.15, 1.0]))
+        np.testing.assert_array_equal(kept.of(task, worth, places), gains(task, worth, places))
+        take(task, worth, places[0])
+        np.testing.assert_array_equal(kept.of(task, worth, places), gains(task, worth, places))
+        task = replace(task, grid=look(task.grid, world, rng.uniform(0.0, SIDE, 2)))
+
+
+@given(st.integers(0, 5000))
+@settings(max_examples=5, deadline=None)
+def test_distances_that_end_at_some_cells_are_right_up_to_there(seed):
+    _, task = explored(seed)
+    ground, rng = Ground.of(task), np.random.default_rng([seed, 5])
+    start, until = CORNER[None].astype(np.int64), rng.integers(0, SIDE, (3, 2))
+    whole, part = ground.distances(start), ground.distances(start, until)
+    up_to = whole[tuple(until.T)].max()
+    np.testing.assert_array_equal(part[whole <= up_to], whole[whole <= up_to])
 
 
 def test_the_criteria_are_those_of_the_paper():

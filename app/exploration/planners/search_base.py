@@ -96,9 +96,15 @@ class SearchPlanner(PlannerBase):
             "F_1": task.explored_part,
             "F_2": task.explored_goal_part,
             "homebound": float(late),
+            "homewards": float(self._homewards),
             "at_home": float(at_home.sum()),
         }
         return Proposal(positions, self._objective(scene, positions), figures)
+
+    @property
+    def _homewards(self) -> bool:
+        """Whether the planner has begun to come home by itself: no view is left to go to, or a criterion says so."""
+        return False
 
     @abstractmethod
     def _seek(self, scene: Scene, seed: int) -> FloatArray:
@@ -118,11 +124,18 @@ def give_way(scene: Scene, bottom: Bottom, wishes: FloatArray, seed: int) -> Flo
     team, positions = scene.team, scene.team.positions.copy()
     for i in np.roll(np.arange(len(positions)), -team.step):
         here = positions[i, :2].copy()
-        aside = _aside(scene, int(i), wishes[i], seed) if len(positions) > 1 else np.zeros((0, 2))
-        options = np.repeat(positions[None], 2 + len(aside), axis=0)
-        options[:, i, :2] = np.vstack([wishes[i], aside, here])
-        ok = team.constraints.feasible(team.positions, options, bottom)
-        positions = options[int(np.argmax(ok))] if ok.any() else positions
+
+        def may(ends: FloatArray, i: int = int(i), others: FloatArray = positions) -> FloatArray | None:
+            options = np.repeat(others[None], len(ends), axis=0)
+            options[:, i, :2] = ends
+            ok = team.constraints.feasible(team.positions, options, bottom)
+            return options[int(np.argmax(ok))] if ok.any() else None
+
+        decided = may(wishes[i : i + 1])
+        if decided is None:  # a step aside is dear to work out
+            aside = _aside(scene, int(i), wishes[i], seed) if len(positions) > 1 else np.zeros((0, 2))
+            decided = may(np.vstack([aside, here]))
+        positions = positions if decided is None else decided
     return positions
 
 

@@ -57,6 +57,10 @@ class CriterionSearch(SearchPlanner):
         super().__init__(options, sensor)
         self._criterion = Criterion()
 
+    @property
+    def _homewards(self) -> bool:
+        return self._criterion.homewards
+
     def _objective(self, scene: Scene, positions: FloatArray) -> float:
         return float(self._terms(scene, positions[None, :, :2])[0].sum())
 

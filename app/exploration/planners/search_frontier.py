@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from app.estimation import Cell
 from app.exploration.planners.search_base import Scene, SearchPlanner, hold
-from app.exploration.search.gains import gains, take
+from app.exploration.search.gains import Gains, take
 from app.exploration.search.ground import UNREACHED, Ground
 
 FloatArray = NDArray[np.float64]
@@ -36,6 +36,11 @@ class FrontierSearch(SearchPlanner):
         super().__init__(*args, **kwargs)
         self._views: dict[str, tuple[int, int]] = {}
         self._spent: list[tuple[int, int]] = []
+        self._gains = Gains()  # no memory of the search: what it says could be found out anew
+
+    @property
+    def _homewards(self) -> bool:
+        return not self._views
 
     def _seek(self, scene: Scene, seed: int) -> FloatArray:
         ground, team = scene.ground, scene.team
@@ -56,7 +61,8 @@ class FrontierSearch(SearchPlanner):
             place = places[chosen[i]]
             self._views[name] = (int(place[0]), int(place[1]))
             here = wishes[i].copy()
-            wishes[i] = ground.towards(here, ground.distances(place[None]), scene.step_m)
+            way = ground.distances(place[None], until=ground.beside(here))
+            wishes[i] = ground.towards(here, way, scene.step_m)
             if np.array_equal(wishes[i], here):
                 self._spent.append(self._views[name])  # nothing leads closer
         return wishes
@@ -102,7 +108,7 @@ class FrontierSearch(SearchPlanner):
         near = NEAR * task.scanner.reach_m
         waiting = set(range(len(far)))
         while waiting:
-            seen = gains(task, worth, places)
+            seen = self._gains.of(task, worth, places)
             seen = np.where(seen >= LEAST * worth.max(initial=0.0) * ELSEWHERE, seen, 0.0)
             value = np.where(in_time, under_way * seen / (far + near), 0.0)
             value[[i for i in range(len(far)) if i not in waiting]] = 0.0

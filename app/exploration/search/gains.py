@@ -54,6 +54,34 @@ def gains(task: SearchTask, worth: FloatArray, places: IntArray) -> FloatArray:
     return _gains(task.states, worth, np.ascontiguousarray(places, dtype=np.int64), *table)
 
 
+class Gains:
+    """What :func:`gains` says of places on one site again and again, where only little changes from time to time.
+
+    A place is looked at again once a cell within its reach has changed, be it in its worth or in what is known of it.
+    """
+
+    def __init__(self) -> None:
+        self._shown = np.zeros((0, 0))
+        self._gains = np.zeros((0, 0))
+
+    def of(self, task: SearchTask, worth: FloatArray, places: IntArray) -> FloatArray:
+        """Return what :func:`gains` returns."""
+        table = rays(task.scanner.reach_m / task.grid.cell_m)
+        shown = np.where(task.states == Cell.UNEXPLORED, worth, 0.0)
+        shown[task.states >= Cell.KNOWN] = -1.0
+        if self._shown.shape != shown.shape:
+            self._shown = np.full(shown.shape, np.nan)
+            self._gains = np.full(shown.shape, np.nan)
+        _forget(self._gains, np.argwhere(shown != self._shown), int(np.abs(table.offsets).max()))
+        self._shown = shown
+        kept = self._gains[places[:, 0], places[:, 1]]
+        again = np.isnan(kept)
+        if again.any():
+            kept[again] = _gains(task.states, worth, np.ascontiguousarray(places[again]), *table)
+            self._gains[places[again, 0], places[again, 1]] = kept[again]
+        return kept
+
+
 def take(task: SearchTask, worth: FloatArray, place: IntArray) -> None:
     """Set the worth of everything in sight of a cell (2,) to 0: another vehicle will look at it."""
     table = rays(task.scanner.reach_m / task.grid.cell_m)
@@ -90,6 +118,19 @@ def _gains(
                     counted[row, col] = k
                     result[k] += worth[row, col]
     return result
+
+
+@njit(cache=True, nogil=True)
+def _forget(kept: FloatArray, changed: IntArray, reach: int) -> None:
+    """Set to NaN what lies in the squares about the changed cells (n, 2)."""
+    rows, cols = kept.shape
+    if 2 * len(changed) > rows * cols:
+        kept[:] = np.nan
+        return
+    for k in range(len(changed)):
+        for row in range(max(0, changed[k, 0] - reach), min(rows, changed[k, 0] + reach + 1)):
+            for col in range(max(0, changed[k, 1] - reach), min(cols, changed[k, 1] + reach + 1)):
+                kept[row, col] = np.nan
 
 
 @njit(cache=True, nogil=True)

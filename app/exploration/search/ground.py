@@ -1,11 +1,11 @@
 """Where a vehicle may go: explored cells away from everything else, straight legs over them, ways and distances."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cache
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
-from scipy.ndimage import binary_dilation
 
 from app.estimation.occupancy import Cell
 from app.exploration.search.task import SearchTask
@@ -39,12 +39,13 @@ class Ground:
     task: SearchTask
     hazard: BoolArray
     passable: BoolArray
+    _beside: dict[tuple[float, float], IntArray] = field(default_factory=dict, repr=False)
 
     @classmethod
     def of(cls, task: SearchTask) -> "Ground":
         """Make it from what is known now."""
         hazard = task.states != Cell.EXPLORED
-        return cls(task, hazard, ~hazard & ~binary_dilation(hazard, _within(_margin(task))))
+        return cls(task, hazard, _away_from(hazard, _within(_margin(task))))
 
     @classmethod
     def for_legs(cls, task: SearchTask) -> "Ground":
@@ -54,17 +55,13 @@ class Ground:
 
     def places(self, en_m: FloatArray) -> IntArray:
         """Return the cells (n, 2) of positions (n, 2), at the border those within."""
-        row, col = self.task.grid.cell_of(np.asarray(en_m, dtype=np.float64))
-        rows, cols = self.hazard.shape
-        return np.column_stack([np.clip(row, 0, rows - 1), np.clip(col, 0, cols - 1)])
+        places = np.stack(self.task.grid.cell_of(np.asarray(en_m, dtype=np.float64)), axis=-1)
+        return np.asarray(np.minimum(np.maximum(places, 0), np.array(self.hazard.shape) - 1))
 
     def centre_m(self, place: IntArray) -> FloatArray:
         """Return centres (..., 2), east and north, of cells (..., 2)."""
         grid = self.task.grid
-        return np.stack(
-            [grid.west_m + grid.cell_m * (place[..., 1] + 0.5), grid.south_m + grid.cell_m * (place[..., 0] + 0.5)],
-            axis=-1,
-        )
+        return np.asarray(np.array([grid.west_m, grid.south_m]) + grid.cell_m * (place[..., ::-1] + 0.5))
 
     def clear(self, origin_m: FloatArray, ends_m: FloatArray) -> BoolArray:
         """Return which straight legs from (2,) to (n, 2) keep the safety distance from every hazard, all along.
@@ -84,6 +81,9 @@ class Ground:
 
     def beside(self, origin_m: FloatArray) -> IntArray:
         """Return the passable cells (n, 2) close to a position (2,) to whose centres a clear leg leads."""
+        key = (float(origin_m[0]), float(origin_m[1]))
+        if key in self._beside:
+            return self._beside[key]
         place = self.places(origin_m[None])[0]
         around = place + _AROUND
         rows, cols = self.passable.shape
@@ -91,11 +91,16 @@ class Ground:
         around = around[self.passable[around[:, 0], around[:, 1]]]
         around = around[self.clear(origin_m, self.centre_m(around))] if len(around) else around
         away = self.centre_m(around) - origin_m
-        return np.asarray(around[np.argsort(np.hypot(away[:, 0], away[:, 1]), kind="stable")])
+        self._beside[key] = around[np.argsort(np.hypot(away[:, 0], away[:, 1]), kind="stable")]
+        return self._beside[key]
 
-    def distances(self, places: IntArray) -> NDArray[np.int32]:
-        """Return how far every passable cell is from the closest of some cells (n, 2), in fifths of a cell."""
-        return _distances(self.passable, np.ascontiguousarray(places, dtype=np.int64))
+    def distances(self, places: IntArray, until: IntArray | None = None) -> NDArray[np.int32]:
+        """Return how far every passable cell is from the closest of some cells (n, 2), in fifths of a cell.
+
+        ``until`` (m, 2): cells beyond the farthest of which nothing is asked; there it may say too much.
+        """
+        asked = np.zeros((0, 2), dtype=np.int64) if until is None else until
+        return _distances(self.passable, np.ascontiguousarray(places, dtype=np.int64), asked)
 
     def hoped(self, places: BoolArray) -> NDArray[np.int32]:
         """Return how far every cell may be from the closest of some cells (rows, cols), unexplored ones taken as free.
@@ -103,8 +108,8 @@ class Ground:
         In fifths of a cell, as in :meth:`distances`.
         """
         solid = self.task.states >= Cell.KNOWN
-        open_ = ~binary_dilation(solid, _within(_margin(self.task)))
-        return _distances(open_, np.argwhere(places))
+        open_ = _away_from(solid, _within(_margin(self.task)))
+        return _distances(open_, np.argwhere(places), np.zeros((0, 2), dtype=np.int64))
 
     def way_m(self, origin_m: FloatArray, distance: NDArray[np.int32]) -> float:
         """Return how far it is from a position (2,) to where ``distance`` is 0; inf where there is no way."""
@@ -146,12 +151,28 @@ def _margin(task: SearchTask) -> float:
     return (task.safety_m + task.spare_m) / task.grid.cell_m
 
 
-def _within(radius: float) -> BoolArray:
-    """Return the offsets at which a hazard's edge is closer than ``radius`` cells to a cell's centre."""
+@cache
+def _within(radius: float) -> IntArray:
+    """Return the offsets (n, 2) at which a hazard's edge is closer than ``radius`` cells to a cell's centre."""
     k = int(np.ceil(radius + 0.5))
     row, col = np.indices((2 * k + 1, 2 * k + 1)) - k
     edge = np.hypot(np.maximum(np.abs(row) - 0.5, 0.0), np.maximum(np.abs(col) - 0.5, 0.0))
-    return np.asarray((edge < radius - 1e-9) | ((row == 0) & (col == 0)))
+    return np.argwhere((edge < radius - 1e-9) | ((row == 0) & (col == 0))) - k
+
+
+@njit(cache=True, nogil=True)
+def _away_from(hazard: BoolArray, offsets: IntArray) -> BoolArray:
+    """Return the cells from which there is no hazard at any of the offsets, which lie evenly about a cell."""
+    rows, cols = hazard.shape
+    away = np.ones((rows, cols), dtype=np.bool_)
+    for row in range(rows):
+        for col in range(cols):
+            for k in range(len(offsets)):
+                r, c = row + offsets[k, 0], col + offsets[k, 1]
+                if 0 <= r < rows and 0 <= c < cols and hazard[r, c]:
+                    away[row, col] = False
+                    break
+    return away
 
 
 @njit(cache=True, nogil=True)
@@ -191,48 +212,73 @@ def _clear(hazard: BoolArray, origin: FloatArray, ends: FloatArray, safety: floa
 
 
 @njit(cache=True, nogil=True)
-def _distances(passable: BoolArray, starts: IntArray) -> NDArray[np.int32]:
-    """Dial's algorithm: a ring of buckets, as many as the longest move is long."""
+def _distances(passable: BoolArray, starts: IntArray, until: IntArray) -> NDArray[np.int32]:
+    """Dial's algorithm: a ring of buckets, as many as the longest move is long.
+
+    The cells lie in one line, with closed ones about the site, so that no neighbour has to be asked whether it is on
+    it. Closed cells are closer than anything, so that no way to them is shorter.
+    """
     rows, cols = passable.shape
-    distance = np.full((rows, cols), UNREACHED, dtype=np.int32)
+    line = cols + 2
+    distance = np.full((rows + 2) * line, -1, dtype=np.int32)
+    free = np.zeros(len(distance), dtype=np.bool_)
+    for row in range(rows):
+        for col in range(cols):
+            if passable[row, col]:
+                free[(row + 1) * line + col + 1] = True
+                distance[(row + 1) * line + col + 1] = UNREACHED
+    asked = np.zeros(len(distance), dtype=np.bool_)
+    open_ = 0
+    for k in range(len(until)):
+        place = (until[k, 0] + 1) * line + until[k, 1] + 1
+        if not asked[place]:
+            asked[place] = True
+            open_ += 1
     # A cell enters the bucket of one distance at most once.
     ring = np.empty((DIAGONAL + 1, rows * cols + len(starts)), dtype=np.int32)
     filled = np.zeros(DIAGONAL + 1, dtype=np.int64)
     for k in range(len(starts)):
-        row, col = starts[k]
-        if distance[row, col] > 0:
-            distance[row, col] = 0
-            ring[0, filled[0]] = row * cols + col
+        place = (starts[k, 0] + 1) * line + starts[k, 1] + 1
+        if distance[place] != 0:
+            distance[place] = 0
+            ring[0, filled[0]] = place
             filled[0] += 1
     waiting, now = filled[0], 0
-    while waiting > 0:
+    while waiting > 0 and (open_ > 0 or len(until) == 0):
         bucket = now % (DIAGONAL + 1)
-        at = 0
-        while at < filled[bucket]:
+        straight, diagonal = now + STRAIGHT, now + DIAGONAL
+        beside, across = straight % (DIAGONAL + 1), diagonal % (DIAGONAL + 1)
+        for at in range(filled[bucket]):
             place = ring[bucket, at]
-            at += 1
-            row, col = place // cols, place % cols
-            if distance[row, col] != now:
+            if distance[place] != now:
                 continue
-            for dr in range(-1, 2):
-                for dc in range(-1, 2):
-                    r, c = row + dr, col + dc
-                    if (dr == 0 and dc == 0) or not (0 <= r < rows and 0 <= c < cols) or not passable[r, c]:
-                        continue
-                    diagonal = dr != 0 and dc != 0
-                    if diagonal and not (passable[row, c] and passable[r, col]):
-                        continue
-                    far = now + (DIAGONAL if diagonal else STRAIGHT)
-                    if far < distance[r, c]:
-                        distance[r, c] = far
-                        b = far % (DIAGONAL + 1)
-                        ring[b, filled[b]] = r * cols + c
-                        filled[b] += 1
+            if asked[place]:
+                asked[place] = False
+                open_ -= 1
+            for step in (-line, line, -1, 1):
+                if straight < distance[place + step]:
+                    distance[place + step] = straight
+                    ring[beside, filled[beside]] = place + step
+                    filled[beside] += 1
+                    waiting += 1
+            for up in (-line, line):
+                if not free[place + up]:
+                    continue
+                for aside in (-1, 1):
+                    if diagonal < distance[place + up + aside] and free[place + aside]:
+                        distance[place + up + aside] = diagonal
+                        ring[across, filled[across]] = place + up + aside
+                        filled[across] += 1
                         waiting += 1
         waiting -= filled[bucket]
         filled[bucket] = 0
         now += 1
-    return distance
+    result = np.empty((rows, cols), dtype=np.int32)
+    for row in range(rows):
+        for col in range(cols):
+            far = distance[(row + 1) * line + col + 1]
+            result[row, col] = far if far >= 0 else UNREACHED
+    return result
 
 
 @njit(cache=True, nogil=True)
