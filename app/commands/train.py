@@ -58,7 +58,9 @@ def train(
         "method": method, "seed": seed, "terrains": names, "runs": runs, "robots": robots, "landmarks": landmarks,
         "steps": steps,
     }  # fmt: skip
-    command = "bathyfleet train --out FILE" + f" --terrains {','.join(names)}"
+    said = [part.strip() for several in [*terrains, *(more or [])] for part in several.split(",")]
+    shown = ",".join(Path(part).name if Path(part).exists() else part for part in said)
+    command = f"bathyfleet train --out FILE --terrains {shown}"
     command += f" --iterations {iterations} --method {method} --runs {runs} --seed {seed}"
     command += f" --robots {robots} --landmarks {landmarks} --steps {steps}"
     curve_file = out.with_suffix(".png")
@@ -80,11 +82,11 @@ def train(
             cluster = Cluster(scheduler)
             scorer = DaskScorer(task, cluster)
         with progress_bar() as bar:
-            shown = bar.add_task("train", total=iterations)
+            task_id = bar.add_task("train", total=iterations)
 
             def progress(curve: Curve) -> None:
                 best = f"train: E(P) {curve.best[-1]:.4g}" if curve.scores else "train"
-                bar.update(shown, description=best, completed=min(len(curve.scores), iterations))
+                bar.update(task_id, description=best, completed=min(len(curve.scores), iterations))
 
             curve = run_training(optimiser, scorer, checkpoint, iterations, progress, keep)
     except (CheckpointError, ClusterError) as error:

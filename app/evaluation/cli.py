@@ -8,11 +8,13 @@ from typing import Annotated, Any
 
 import orjson
 import typer
+from pydantic import ValidationError
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
 from app.estimation import Sensor
+from app.evaluation.cluster import ClusterError
 from app.evaluation.cube_world import COM_RANGE, ExploreScenario
 from app.evaluation.explore import EXPLORERS, OSARSES, run_explore
 from app.evaluation.jobs import Job, run_jobs
@@ -26,6 +28,7 @@ from app.evaluation.team_changes import TeamChanges, parse_changes
 from app.exploration.communication.messages import MAX_ENTRIES
 from app.exploration.objective import TERMS
 from app.exploration.options import PlannerOptions
+from app.exploration.pcao.model import PcaoModel
 from app.exploration.planners import PLANNERS
 from simulator.terrain import Terrain, TerrainError
 from simulator.terrain_files import load_terrain
@@ -38,6 +41,13 @@ Seeds = Annotated[str | None, typer.Option(help="Several runs: FIRST:END (END ex
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object, nothing else, to standard output.")]
 Regressors = Annotated[str, typer.Option(help="What CAO's estimator is linear in: map or polynomial.")]
 Jobs = Annotated[int, typer.Option(min=1, help="Processes; with several seeds or planners, runs at a time.")]
+
+Scheduler = Annotated[
+    str | None, typer.Option(metavar="ADDRESS", help="Run on a Dask cluster instead: tcp://HOST:PORT.")
+]
+ModelFile = Annotated[
+    Path | None, typer.Option(help="What pcao flies with, a file of bathyfleet train [default: the one that ships]")
+]
 
 EVERY_CELL = "all"
 
@@ -114,7 +124,9 @@ def explore(
     contribution: Annotated[
         str, typer.Option(help="CAO learns from the whole team's J or each vehicle's.")
     ] = "vehicle",
+    model: ModelFile = None,
     jobs: Jobs = 1,
+    scheduler: Scheduler = None,
     as_json: Json = False,
 ) -> None:
     """Run the papers' scenario: landmarks in the cube [-1, 1]^3 (AURO15 section 6)."""
@@ -127,8 +139,10 @@ def explore(
     count = _landmark_count(landmarks)
     changes = TeamChanges(_changes(lose, "--lose"), _changes(join, "--join"))
     runs = []
+    trained = model_of(model)
     for name in names:
         options = _options(regressors, None if name == "osarses" else candidates, objective, contribution)
+        options = options.model_copy(update={"model": trained if name == "pcao" else None})
         if name == "osarses":
             options = options.model_copy(update={"tries": candidates or 0})
         for which in seed_list(seed, seeds):
@@ -151,7 +165,7 @@ def explore(
             runs.append(ExploreJob(scenario, name, options))
 
     columns = ("planner", "seed", "remaining_pct", "t99", "broken_constraints", "plan_ms_median")
-    compare(runs, columns, jobs, as_json=as_json)
+    compare(runs, columns, jobs, scheduler, as_json=as_json)
 
 
 @evaluate_app.command()
@@ -173,7 +187,9 @@ def survey(
     seeds: Seeds = None,
     candidates: Annotated[int | None, typer.Option(min=4, help="Candidates per vehicle.")] = None,
     regressors: Regressors = "map",
+    model: ModelFile = None,
     jobs: Jobs = 1,
+    scheduler: Scheduler = None,
     as_json: Json = False,
 ) -> None:
     """Run the papers' field experiment: map a sea floor with a single beam, beside the usual practice (AURO15)."""
@@ -189,7 +205,7 @@ def survey(
         raise typer.BadParameter(f"{symmetries!r} goes beyond {SYMMETRIES - 1}, the last", param_hint="--symmetries")
     sea_floor = terrain_of(terrain)
     recorded = recorded_soundings(terrain)
-    options = _options(regressors, candidates)
+    options = _options(regressors, candidates).model_copy(update={"model": model_of(model)})
     runs = [
         SurveyJob(
             SurveyScenario(
@@ -204,7 +220,7 @@ def survey(
         for turn in turns
     ]
     columns = ("planner", "seed", "symmetry", "rmse_m", "ratio", "gap_closed", "samples", "distance_m", "plan_ms_p99")
-    compare(runs, columns, jobs, as_json=as_json)
+    compare(runs, columns, jobs, scheduler, as_json=as_json)
 
 
 @evaluate_app.command()
@@ -218,6 +234,7 @@ def tables(
     ] = None,
     steps: Annotated[int, typer.Option(min=1)] = 500,
     jobs: Jobs = 1,
+    scheduler: Scheduler = None,
     only: Annotated[str | None, typer.Option(help="One or more tables, separated by commas.")] = None,
     quick: Annotated[bool, typer.Option("--quick", help="A small version: few tries, few landmarks.")] = False,
     no_run: Annotated[bool, typer.Option("--no-run", help="Only report the results that are there.")] = False,
@@ -250,7 +267,7 @@ def tables(
     open_ = [] if no_run else open_
     with progress_bar() as bar:
         task = bar.add_task("tables", total=len(open_))
-        for run in run_jobs(open_, jobs, lambda job, step: bar.update(task, description=job.title)):
+        for run in run_jobs(open_, jobs, lambda job, step: bar.update(task, description=job.title), scheduler):
             results.add(run)
             bar.advance(task)
 
@@ -287,7 +304,9 @@ def progress_bar() -> Iterator[Progress]:
         yield bar
 
 
-def compare(jobs: Sequence[Job], columns: tuple[str, ...], processes: int, *, as_json: bool) -> None:
+def compare(
+    jobs: Sequence[Job], columns: tuple[str, ...], processes: int, scheduler: str | None = None, *, as_json: bool
+) -> None:
     """Run everything and print a table, or one JSON object."""
     runs: list[dict[str, Any]] = []
     with progress_bar() as bar:
@@ -296,8 +315,11 @@ def compare(jobs: Sequence[Job], columns: tuple[str, ...], processes: int, *, as
         def show(job: Job, step: int) -> None:
             bar.update(task, description=job.title, completed=sum(j.steps for j in jobs[: len(runs)]) + step)
 
-        for run in run_jobs(jobs, processes, show):
-            runs.append(run)  # noqa: PERF402 - ``show`` counts them
+        try:
+            for run in run_jobs(jobs, processes, show, scheduler):
+                runs.append(run)  # noqa: PERF402 - ``show`` counts them
+        except ClusterError as error:
+            raise typer.BadParameter(str(error), param_hint="--scheduler") from None
     if as_json:
         single = len(runs) == 1
         document = runs[0] if single else {"runs": runs, "summary": summarise(runs)}
@@ -307,6 +329,21 @@ def compare(jobs: Sequence[Job], columns: tuple[str, ...], processes: int, *, as
     for row in runs:
         table.add_row(*(f"{row[c]:.3g}" if isinstance(row[c], float) else str(row[c]) for c in columns))
     Console().print(table)
+
+
+def model_of(path: Path | None) -> PcaoModel | None:
+    """Return the trained controller in a file; None without one."""
+    if path is None:
+        return None
+    try:
+        return PcaoModel.model_validate_json(path.read_bytes())
+    except OSError as error:
+        raise typer.BadParameter(f"{path} cannot be read: {error.strerror}", param_hint="--model") from None
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        where = ".".join(str(part) for part in first["loc"])
+        said = f"{where}: {first['msg']}" if where else first["msg"]
+        raise typer.BadParameter(f"{path} is no model file: {said}", param_hint="--model") from None
 
 
 def planners_named(text: str, known: tuple[str, ...]) -> list[str]:

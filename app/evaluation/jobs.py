@@ -1,4 +1,4 @@
-"""Many runs, one after the other or in several processes, with the same results in the same order."""
+"""Many runs, one after the other, in several processes or on a cluster, with the same results in the same order."""
 
 import multiprocessing
 from collections.abc import Callable, Iterator, Sequence
@@ -6,6 +6,7 @@ from concurrent.futures import ProcessPoolExecutor
 from typing import Any, Protocol
 
 from app.estimation import Sensor
+from app.evaluation.cluster import Cluster
 from app.exploration.planners import warm_up
 
 Progress = Callable[[int], None]
@@ -25,8 +26,8 @@ class Job(Protocol):
         ...
 
     @property
-    def sensor(self) -> Sensor:
-        """What its vehicles measure with."""
+    def sensor(self) -> Sensor | None:
+        """What its vehicles measure with, for which planners are warmed up; None where no planner flies."""
         ...
 
     def run(self, progress: Progress) -> dict[str, Any]:
@@ -35,14 +36,27 @@ class Job(Protocol):
 
 
 def run_jobs(
-    jobs: Sequence[Job], processes: int, progress: Callable[[Job, int], None] = lambda job, step: None
+    jobs: Sequence[Job],
+    processes: int,
+    progress: Callable[[Job, int], None] = lambda job, step: None,
+    scheduler: str | None = None,
 ) -> Iterator[dict[str, Any]]:
     """Yield the result of every job, in the order of ``jobs``.
 
     With one process ``progress`` is told every step of the job that runs; with several, each job once it is done.
-    Processes are spawned, so nothing depends on what this one has loaded.
+    Processes are spawned, so nothing depends on what this one has loaded. With the address of a Dask ``scheduler`` the
+    cluster's workers do the jobs; raises ClusterError when there is none.
     """
-    sensors = tuple(dict.fromkeys(job.sensor for job in jobs))
+    if scheduler is not None:
+        cluster = Cluster(scheduler)
+        try:
+            for job, result in zip(jobs, cluster.imap(_run, jobs), strict=True):
+                progress(job, job.steps)
+                yield result
+        finally:
+            cluster.close()
+        return
+    sensors = tuple(dict.fromkeys(job.sensor for job in jobs if job.sensor is not None))
     warm_up(*sensors)  # the spawned processes then find everything compiled
     if processes == 1 or len(jobs) < 2:
         for job in jobs:

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 import typer
 from rich.progress import Progress as ProgressBar
 
-from app.evaluation.cli import Jobs, Json, Seed, Seeds, compare, evaluate_app, planners_named, seed_list
+from app.evaluation.cli import Jobs, Json, Scheduler, Seed, Seeds, compare, evaluate_app, planners_named, seed_list
 from app.evaluation.rescue import RescueJob
 from app.evaluation.rescue_report import VARIANTS, report_jobs, rescue_report
 from app.evaluation.rescue_world import RescueScenario
@@ -37,6 +37,7 @@ def rescue(
     seed: Seed = 0,
     seeds: Seeds = None,
     jobs: Jobs = 1,
+    scheduler: Scheduler = None,
     as_json: Json = False,
     write: Annotated[
         Path | None,
@@ -58,7 +59,7 @@ def rescue(
         raise typer.BadParameter("goes with --write only", param_hint="--only" if only is not None else "--no-run")
     chosen = seed_list(seed, seeds)
     if write is not None:
-        _report(write, chosen, seeds or str(seed), jobs, only, no_run=no_run)
+        _report(write, chosen, seeds or str(seed), jobs, scheduler, only, no_run=no_run)
         return
     runs = [
         RescueJob(
@@ -71,7 +72,7 @@ def rescue(
         for name in planners_named(planner, tuple(SEARCHERS))
         for which in chosen
     ]
-    compare(runs, COLUMNS, jobs, as_json=as_json)
+    compare(runs, COLUMNS, jobs, scheduler, as_json=as_json)
 
 
 def _world(scenario: str, seed: int) -> ObstacleWorld:
@@ -83,7 +84,9 @@ def _world(scenario: str, seed: int) -> ObstacleWorld:
     return car_park(int(scenario), seed)
 
 
-def _report(out: Path, seeds: list[int], said: str, jobs: int, only: str | None, *, no_run: bool) -> None:
+def _report(
+    out: Path, seeds: list[int], said: str, jobs: int, scheduler: str | None, only: str | None, *, no_run: bool
+) -> None:
     from app.evaluation.jobs import run_jobs
     from app.evaluation.tables.facts import made
     from app.evaluation.tables.store import Results
@@ -99,7 +102,7 @@ def _report(out: Path, seeds: list[int], said: str, jobs: int, only: str | None,
     open_: list[Any] = [] if no_run else [job for job in wanted if job.key not in results.runs]
     with ProgressBar(disable=not open_) as bar:
         task = bar.add_task("searches", total=len(open_))
-        for run in run_jobs(open_, jobs, lambda job, step: bar.update(task, description=job.title)):
+        for run in run_jobs(open_, jobs, lambda job, step: bar.update(task, description=job.title), scheduler):
             results.add(run)
             bar.advance(task)
     facts = made(f"bathyfleet evaluate rescue --write FOLDER --seeds {said} --jobs {jobs}", jobs)

@@ -11,6 +11,7 @@ from app.estimation import Fading
 from app.evaluation.cli import (
     Jobs,
     Json,
+    Scheduler,
     Seed,
     Seeds,
     compare,
@@ -65,6 +66,7 @@ def track(
     ] = False,
     rollouts: Annotated[int, typer.Option(min=0, help="Changes to the team's plan that a rollout step tries.")] = 100,
     jobs: Jobs = 1,
+    scheduler: Scheduler = None,
     as_json: Json = False,
     write: Annotated[
         Path | None,
@@ -94,7 +96,9 @@ def track(
     sea_floor = generated if terrain is None else replace(terrain_of(terrain), name=terrain.stem)
     chosen = seed_list(seed, seeds)
     if write is not None:
-        _report(write, sea_floor, chosen, seeds or str(seed), steps, rollouts, jobs, only, terrain, no_run=no_run)
+        _report(
+            write, sea_floor, chosen, seeds or str(seed), steps, rollouts, jobs, scheduler, only, terrain, no_run=no_run
+        )
         return
     from app.evaluation.tracking.setups import TrackJob
 
@@ -116,7 +120,7 @@ def track(
         for name in planners_named(planner, TRACKERS)
         for which in chosen
     ]
-    compare(runs, COLUMNS, jobs, as_json=as_json)
+    compare(runs, COLUMNS, jobs, scheduler, as_json=as_json)
 
 
 def _report(
@@ -127,6 +131,7 @@ def _report(
     steps: int,
     rollouts: int,
     jobs: int,
+    scheduler: str | None,
     only: str | None,
     terrain: Path | None,
     *,
@@ -153,7 +158,7 @@ def _report(
     open_ = [] if no_run else [job for job in wanted if job.key not in results.runs]
     with progress_bar() as bar:
         task = bar.add_task("track", total=len(open_))
-        for run in run_jobs(open_, jobs, lambda job, step: bar.update(task, description=job.title)):
+        for run in run_jobs(open_, jobs, lambda job, step: bar.update(task, description=job.title), scheduler):
             results.add(run)
             bar.advance(task)
     command = f"bathyfleet evaluate track --write FOLDER --seeds {said} --steps {steps} --rollouts {rollouts}"

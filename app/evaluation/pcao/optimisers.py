@@ -5,6 +5,7 @@ it was told, and from nothing else: whoever tells it the same scores again has i
 """
 
 from abc import ABC, abstractmethod
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -42,7 +43,7 @@ class RandomSearch(Optimiser):
 
     def ask(self) -> list[FloatArray]:
         """Return one random controller."""
-        return [random_parameters(self._rng)]
+        return [random_parameters(self._rng)[0]]
 
 
 class Pcao(Optimiser):
@@ -52,7 +53,7 @@ class Pcao(Optimiser):
         super().__init__(seed)
         self._phi: list[FloatArray] = []
         self._scores: list[float] = []
-        self._next = random_parameters(self._rng)
+        self._next = random_parameters(self._rng)[0]
 
     def ask(self) -> list[FloatArray]:
         """Return P(k)."""
@@ -61,13 +62,12 @@ class Pcao(Optimiser):
     def tell(self, asked: list[FloatArray], scores: list[float]) -> None:
         """Do steps 2 to 5."""
         super().tell(asked, scores)
-        self._phi += [regressors(parameters) for parameters in asked]
+        self._phi += list(regressors(np.array(asked)))
         self._scores += scores
         theta = self._fit()
         a = step_size(len(self._scores))
-        candidates = [(1.0 - a) * self.best + a * random_parameters(self._rng) for _ in range(CANDIDATES)]
-        expected = [float(theta @ regressors(candidate)) for candidate in candidates]
-        self._next = candidates[int(np.argmin(expected))]
+        candidates = (1.0 - a) * self.best + a * random_parameters(self._rng, CANDIDATES)
+        self._next = candidates[int(np.argmin(regressors(candidates) @ theta))]
 
     def _fit(self) -> FloatArray:
         """Return theta_best; of many equally good ones (few scores, many regressors) the smallest."""
@@ -121,6 +121,12 @@ def step_size(k: int) -> float:
 
 
 def regressors(parameters: FloatArray) -> FloatArray:
-    """Return phi(P): 1, the gains B'P (all that a controller does follows from them), their squares, in tens."""
-    g = np.concatenate([part.ravel() for part in gains(parameters)]) / 10.0
-    return np.concatenate([[1.0], g, g**2])
+    """Return phi(P) of many P (k, SIZE): 1, the gains B'P (all that a controller does), their squares, in tens."""
+    g = parameters @ _gains_of_entries().T / 10.0
+    return np.hstack([np.ones((len(g), 1)), g, g**2])
+
+
+@cache
+def _gains_of_entries() -> FloatArray:
+    """Return the matrix that makes all gains of the free entries: they are linear in them."""
+    return np.array([np.concatenate([part.ravel() for part in gains(unit)]) for unit in np.eye(SIZE)]).T

@@ -117,11 +117,12 @@ def gains(parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
     return horizontal, vertical
 
 
-def random_parameters(rng: np.random.Generator, e1: float = E1, e2: float = E2) -> FloatArray:
-    """Return a random P (SIZE,) within the bounds: random axes, eigenvalues even in their logarithm."""
+def random_parameters(rng: np.random.Generator, count: int = 1, e1: float = E1, e2: float = E2) -> FloatArray:
+    """Return random P (count, SIZE) within the bounds: random axes, eigenvalues even in their logarithm."""
     result = []
     for size in BLOCKS:
-        axes, _ = np.linalg.qr(rng.standard_normal((size, size)))
-        values = np.exp(rng.uniform(np.log(e1), np.log(e2), size))
-        result.append((axes * values) @ axes.T)
-    return entries(result)
+        axes, _ = np.linalg.qr(rng.standard_normal((count, size, size)))
+        values = np.exp(rng.uniform(np.log(e1), np.log(e2), (count, 1, size)))
+        of = (axes * values) @ axes.transpose(0, 2, 1)
+        result.append(of[(slice(None), *np.triu_indices(size))])
+    return np.concatenate(result, axis=1)

@@ -9,12 +9,14 @@ from shapely import Polygon
 
 from app.estimation import RangeSensor, Sensor
 from app.exploration.bottom import Bottom
+from app.exploration.constraints import inside_area
 from app.exploration.options import PlannerOptions
 from app.exploration.pcao.controller import control, within_step
 from app.exploration.pcao.model import default_model
 from app.exploration.pcao.state import reduced_state
 from app.exploration.planners.base import PlannerBase, at_depth, settle
 from app.exploration.problem import Proposal, Situation
+from app.exploration.routes import FreeSpace, next_waypoint
 
 FloatArray = NDArray[np.float64]
 
@@ -35,6 +37,12 @@ STAYS_LEADER = 1.5
 LINK_SHARE = 0.92
 """Part of the communication range that the team's wishes are drawn together to."""
 
+TRAIL = 8
+"""Last places that are remembered: whoever came no farther than STUCK_STEPS in so many steps is stuck."""
+STUCK_STEPS = 2.0
+STUCK_LEFT = 0.1
+"""Share of what is left round a vehicle above which it is not stuck but busy."""
+
 SLOWER = (0.6, 0.3, 0.0)
 """Parts of its move that the leader tries when the others cannot follow."""
 GATHERING = (0.15, 0.05, 0.02)
@@ -50,7 +58,8 @@ class PcaoPlanner(PlannerBase):
         super().__init__(options, sensor)
         model = default_model() if options.model is None else options.model
         self._horizontal, self._vertical = model.gains
-        self._was: dict[str, list[float]] = {}
+        self._trail: dict[str, list[list[float]]] = {}
+        self._detours: dict[str, list[list[float]]] = {}
         self._lead = ""
 
     def _decide(self, team: Situation, bottom: Bottom, seed: int) -> Proposal:
@@ -72,10 +81,34 @@ class PcaoPlanner(PlannerBase):
         if self._surveys:
             u[:, 2] = 0.0
         way = within_step(u, limits.max_step_m * (1.0 - 1e-9), False)
+        self._go_round(team, left, schedule[:, 0], way)
         lead = self._leader(team.vehicles, np.linalg.norm(vectors[:, 0], axis=1))
         positions = self._within_limits(team, bottom, way, lead)
-        self._was = {name: [float(x), float(y)] for name, (x, y, _) in zip(team.vehicles, here, strict=True)}
+        for name, place in zip(team.vehicles, here, strict=True):
+            self._trail[name] = [*self._trail.get(name, [])[1 - TRAIL :], [float(place[0]), float(place[1])]]
         return Proposal(positions, -float(left.sum()), {"left": float(left.mean()) if len(left) else 0.0})
+
+    def _go_round(self, team: Situation, left: FloatArray, here_left: FloatArray, way: FloatArray) -> None:
+        """Lead vehicles that get nowhere to the nearest landmark that is left, round whatever bars them.
+
+        Writes into their moves ``way`` (n, 3). ``here_left`` (n,) is the share left round each vehicle.
+        """
+        step = team.constraints.max_step_m * (1.0 - 1e-9)
+        for i, name in enumerate(team.vehicles):
+            place, trail = team.positions[i, :2], self._trail.get(name, [])
+            stuck = len(trail) == TRAIL and np.hypot(*(place - np.array(trail[0]))) < STUCK_STEPS * step
+            if stuck and name not in self._detours and here_left[i] < STUCK_LEFT and left.any():
+                open_ = np.flatnonzero(left)
+                nearest = open_[np.argmin(np.hypot(*(team.belief.xy_m[open_] - place).T))]
+                free = FreeSpace(team.constraints, 0.0)
+                self._detours[name] = free.way(place, free.nearest(team.belief.xy_m[nearest])).tolist()
+            route = np.array(self._detours.get(name, [])).reshape(-1, 2)
+            if len(route):
+                x, y, passed = next_waypoint(place[0], place[1], route, 0, len(route), step, 0.0)
+                way[i, :2] = x - place[0], y - place[1]
+                self._detours[name] = route[passed:].tolist()
+            if not len(self._detours.get(name, [])):
+                self._detours.pop(name, None)
 
     def _within_limits(self, team: Situation, bottom: Bottom, way: FloatArray, lead: int) -> FloatArray:
         """Return where the team goes (n, 3): by the controller's moves ``way`` (n, 3) as far as the limits allow."""
@@ -122,7 +155,9 @@ class PcaoPlanner(PlannerBase):
         """Return how much is left to learn of every landmark, 0 to 1; in a survey, of every cell that it passed far."""
         belief = team.belief
         open_ = np.where(belief.accurate, 0.0, 1.0)
-        if not self._surveys:
+        if self._surveys:  # nobody gets to the others
+            open_ *= inside_area(team.constraints, belief.xy_m)
+        else:
             with np.errstate(divide="ignore"):
                 lacking = 1.0 - (self.options.accuracy_sd_m / belief.sd_m) ** 2
             return open_ * np.maximum(0.25, lacking)
@@ -139,7 +174,8 @@ class PcaoPlanner(PlannerBase):
         """Return the directions (n, 2) that the vehicles came from their last places in; else their headings'."""
         moves = np.zeros((len(team.vehicles), 2))
         for i, name in enumerate(team.vehicles):
-            way = team.positions[i, :2] - np.array(self._was.get(name, team.positions[i, :2]))
+            was = self._trail[name][-1] if self._trail.get(name) else team.positions[i, :2]
+            way = team.positions[i, :2] - np.array(was)
             length = float(np.hypot(*way))
             if length > 1e-3 * team.constraints.max_step_m:
                 moves[i] = way / length
@@ -169,11 +205,16 @@ class PcaoPlanner(PlannerBase):
         return result
 
     def _remember(self) -> dict[str, Any]:
-        return {"was": self._was, "lead": self._lead}
+        return {"trail": self._trail, "detours": self._detours, "lead": self._lead}
 
     def _recall(self, state: dict[str, Any]) -> None:
-        self._was = {str(name): [float(x) for x in place] for name, place in state["was"].items()}
+        self._trail = _places(state["trail"])
+        self._detours = _places(state["detours"])
         self._lead = str(state["lead"])
+
+
+def _places(of: dict[str, Any]) -> dict[str, list[list[float]]]:
+    return {str(name): [[float(x) for x in place] for place in places] for name, places in of.items()}
 
 
 def alone(here: FloatArray, com_range: float) -> NDArray[np.bool_]:
