@@ -108,6 +108,7 @@ class LiveMission:
         counts: Counts,
         tide_table: TideTable | None = None,
         time_scale: float = 1.0,
+        search: Search | None = None,
     ) -> None:
         self.id = row.id
         self.spec = spec
@@ -129,7 +130,7 @@ class LiveMission:
         self.trails = Trails(database, row.id)
         self.changed = asyncio.Event()
         """Set whenever a vehicle reported something that the step loop may be waiting for."""
-        self.search = None if spec.search is None else Search(spec, spec.search, self.frame, time_scale)
+        self.search = search
         """What a mission of kind search knows of its site."""
         take_scans = None if self.search is None else partial(take, self.search, row.id, self.changed.set)
         self.journal = Journal(database, row.id, self.gate, counts, self.broadcaster, self.builder.add, take_scans)
@@ -178,8 +179,11 @@ class LiveMission:
         table = None
         if tide is not None:
             table = await loop.run_in_executor(executor, partial(parse_tid, tide.text, name=tide.name))
+        search = None
+        if spec.search is not None:
+            search = await loop.run_in_executor(executor, Search, spec, spec.search, spec.frame(), time_scale)
         counts = Counts(counted.get("accepted", 0), counted.get("rejected", 0))
-        live = cls(database, hub, executor, row, spec, counts, table, time_scale)
+        live = cls(database, hub, executor, row, spec, counts, table, time_scale, search)
         if spec.targets:
             await loop.run_in_executor(executor, tracking_warm_up)
             async with database.reading() as session:

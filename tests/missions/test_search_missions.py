@@ -264,3 +264,18 @@ def test_the_examples_are_missions() -> None:
         truth = harbour_basin(0) if site == "harbour" else car_park(int(site[-1]), 0)
         np.testing.assert_array_equal(cells, truth.known)
         np.testing.assert_array_equal(world.solid, truth.solid)
+
+
+async def test_who_is_not_at_the_entry_and_sees_no_way_to_it_is_an_alarm(service: MissionService) -> None:
+    boat = {"name": "boat", "kind": "sim", "depth_m": 0, "start": lon_lat(14, 25)}
+    walls = [rectangle(0, 8, 30, 10)]
+    mission = await service.create(search_spec(vehicles=[boat], search={"obstacles": walls, "simulated_obstacles": []}))
+    warned = {check.id: check.status for check in (await service.preflight(mission.id)).checks}
+    assert warned["search.ways"] is CheckStatus.WARNING
+    await service.act(mission.id, "start", actor="Ana")
+
+    async def said() -> bool:
+        return any(event.kind == "stuck" for event in await service.events(mission.id))
+
+    await until(said, "the operator is told")
+    await service.act(mission.id, "abort", actor="Ana")

@@ -54,7 +54,7 @@ def example(site: str = "harbour", *, seed: int = 0, vehicles: int = 1, window_s
 
 def _obstacles(frame: LocalFrame, world: ObstacleWorld, cells: NDArray[np.bool_]) -> list[dict[str, Any]]:
     shapes = [part for outline in outlines(cells, 0.0, 0.0, world.cell_m) for part in _without_holes(outline)]
-    return [_polygon(frame, np.asarray(polygon.exterior.simplify(0.0).coords)) for polygon in shapes]
+    return [_polygon(frame, np.asarray(polygon.exterior.coords)) for polygon in shapes]
 
 
 def _without_holes(outline: Polygon) -> list[Polygon]:

@@ -9,7 +9,7 @@ from app.exploration.search import SearchTask
 from app.missions.decision import Decision
 from app.missions.live import LiveMission
 from app.missions.members import Member
-from app.missions.search.course import REST_S, Course
+from app.missions.search.course import IDLE_STEPS, REST_S, Course
 from app.missions.views import Level
 
 Wait = Callable[[Callable[[], bool], float | None], Awaitable[bool]]
@@ -97,4 +97,10 @@ class Lookout:
             then = "the mission ends where they are" if last else "they go on to the entry"
             message = f"{why} and not everybody is back (from the entry: {far}): {then}"
             await live.journal.log(Level.ALARM, "late", message, vehicles=away)
+        if away and course.idle == IDLE_STEPS:
+            message = (
+                f"nobody can go anywhere from where {', '.join(away)} stand: no way that was looked at is wide enough "
+                "and leads on, or to the entry. Bring them there, or make search.safety_m smaller in a new mission"
+            )
+            await live.journal.log(Level.ALARM, "stuck", message, vehicles=away)
         return course.over(team, int(decision.terms.get("homebound", 0)))

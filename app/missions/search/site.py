@@ -5,14 +5,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from rasterio.features import rasterize
-from rasterio.transform import from_origin
 from scipy.ndimage import distance_transform_edt
 from shapely.geometry import Polygon, box
 from shapely.geometry.base import BaseGeometry
 
 from app.estimation.occupancy import OccupancyGrid, Scanner
 from app.mapping.georeference import LocalFrame
+from app.mapping.outlines import touched
 from app.missions.safety import widened
 from app.missions.search_spec import SearchSpec
 from app.missions.spec import MissionSpec
@@ -94,16 +93,5 @@ def _place(frame: LocalFrame, lon_lat: tuple[float, float]) -> FloatArray:
 
 
 def _touched(shapes: Sequence[BaseGeometry], rows: int, cols: int, cell_m: float) -> BoolArray:
-    """Return the cells (rows, cols) that any of the shapes touches; row 0 is south."""
     # Coordinates come from degrees and back: a quay that ends at a cell's border must not take the next cell, too.
-    there = [shape for shape in (s.buffer(-0.01 * cell_m, join_style="mitre") for s in shapes) if not shape.is_empty]
-    if not there:
-        return np.zeros((rows, cols), dtype=np.bool_)
-    north_up = rasterize(
-        there,
-        out_shape=(rows, cols),
-        transform=from_origin(0.0, rows * cell_m, cell_m, cell_m),
-        all_touched=True,
-        dtype=np.uint8,
-    )
-    return np.asarray(north_up[::-1] > 0)
+    return touched([shape.buffer(-0.01 * cell_m, join_style="mitre") for shape in shapes], rows, cols, cell_m)

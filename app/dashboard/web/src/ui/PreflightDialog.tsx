@@ -85,7 +85,7 @@ export function PreflightDialog() {
           </li>
         ))}
       </ul>
-      {open && selectedId.value ? (
+      {open && selectedId.value && mission.value?.spec.kind !== "search" ? (
         <Forecast of={selectedId.value} ask={(gone) => api.forecast(selectedId.peek() ?? "", gone)} />
       ) : null}
       <div class="dialog-actions">
