@@ -6,6 +6,7 @@ from typing import Any
 import httpx
 import pytest
 
+from app.exploration.pcao.model import default_model
 from tests.api.conftest import mission_spec, soundings
 
 
@@ -67,6 +68,19 @@ async def test_an_action_takes_no_unknown_fields(client: httpx.AsyncClient, miss
     assert answer.status_code == 422
     assert answer.json()["errors"][0]["expected"] == "did you mean note?"
     assert (await client.get(f"/missions/{mission['id']}")).json()["state"] == "ready"
+
+
+async def test_a_mission_flies_with_the_trained_controller_that_it_holds(client: httpx.AsyncClient) -> None:
+    model = default_model().model_dump(mode="json")
+    spec = mission_spec(planner={"name": "pcao", "options": {"model": model}})
+    created = (await client.post("/missions", json=spec)).json()
+    assert created["spec"]["planner"]["options"]["model"]["P"] == model["P"]
+    model["P"][1]["vertical"][0][0] = 99.0
+    refused = await client.post("/missions", json=spec)
+    assert refused.status_code == 422
+    error = refused.json()["errors"][0]
+    assert error["field"] == "planner.options.model"
+    assert "P[1].vertical has eigenvalues" in error["message"]
 
 
 async def test_two_starts_at_the_same_time_start_once(client: httpx.AsyncClient, mission: dict[str, Any]) -> None:

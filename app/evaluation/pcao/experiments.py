@@ -136,7 +136,6 @@ class FlightJob:
             "t99": int(done[0]) + 1 if len(done) else None, "mapping_time": self.steps * (1 + tries),
             "cpu_s": time.process_time() - began,
             "history": [round(float(x), 3) for x in share[HISTORY_EVERY - 1 :: HISTORY_EVERY]],
-            "error": [round(float(x), 4) for x in error[HISTORY_EVERY - 1 :: HISTORY_EVERY]],
         }  # fmt: skip
 
 

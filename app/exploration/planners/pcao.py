@@ -119,7 +119,10 @@ class PcaoPlanner(PlannerBase):
             ok = limits.feasible(here, np.stack(back), bottom)
             if ok.any():
                 return back[int(np.argmax(ok))]
-        wish = self._clear(team, bottom, linked(here, here + way, *ties))
+        wish = linked(here, here + way, *ties)
+        if not self._surveys and limits.feasible(here, wish[None], bottom)[0]:
+            return wish
+        wish = self._clear(team, bottom, wish)
         if limits.feasible(here, wish[None], bottom)[0]:
             return wish
         # A vehicle that has to climb falls behind: the leader goes slower, or waits.
