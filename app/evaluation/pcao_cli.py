@@ -25,7 +25,7 @@ def pcao(
     model: Annotated[Path | None, typer.Option(help="Model file [default: the one that ships]")] = None,
     steps: Annotated[int, typer.Option(min=1)] = 500,
     landmarks: Annotated[int, typer.Option(min=10)] = 1100,
-    iterations: Annotated[int, typer.Option(min=1, help="Controllers tried per search of figure 2.")] = 400,
+    iterations: Annotated[int, typer.Option(min=1, help="Controllers tried per search of figure 2.")] = 250,
     searches: Annotated[int, typer.Option(min=1, help="Searches per method of figure 2.")] = 2,
     team_runs: Annotated[int, typer.Option(min=1, help="Runs per team size and sea floor.")] = 5,
     jobs: Annotated[int | None, typer.Option(min=1, help="Runs at a time [default: all cores]")] = None,

@@ -12,7 +12,7 @@ from app.exploration.pcao.controller import BLOCKS, E1, E2, L, blocks, entries, 
 from app.exploration.pcao.state import FIGURES, N_FIGURES, N_VECTORS, VECTORS
 
 FloatArray = NDArray[np.float64]
-Number = Annotated[float, Field(allow_inf_nan=False)]
+Number = Annotated[float, Field(ge=-1e6, le=1e6, allow_inf_nan=False)]
 Matrix = Annotated[tuple[tuple[Number, ...], ...], Field(max_length=64)]
 
 TOLERANCE = 1e-6
