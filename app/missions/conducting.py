@@ -178,17 +178,19 @@ class Conductor:
     async def set_state(
         self, live: LiveMission, state: MissionState, reason: str, actor: str, level: Level = Level.INFO
     ) -> None:
-        """Commit a mission's new state, then tell everyone."""
+        """Commit a mission's new state together with its line in the log, then tell everyone."""
         changed_at = now()
+        words = f"{state} by {actor}" + (f": {reason}" if reason else "")
+        line = live.journal.line(level, "state", words, state=state, actor=actor)
         async with self._database.writing() as session:
             await mission_queries.set_state(session, live.id, state, reason, changed_at)
+            session.add(line)
         live.header.state = state
         live.header.reason = reason
         live.header.updated_at = changed_at
         live.changed.set()
         live.publish_summary()
-        words = f"{state} by {actor}" + (f": {reason}" if reason else "")
-        await live.journal.log(level, "state", words, state=state, actor=actor)
+        live.journal.tell(line)
 
 
 def _log_failure(mission_id: str, done: asyncio.Task[None]) -> None:
