@@ -380,8 +380,9 @@ def fly_plan(
         if t + cost + waypoints + least * (1.0 + 0.5 * WORTH_OF_EARLY * left / work.total) >= bound:
             return np.inf
         next_k = fly_step(at, plan, k, count, floor, rules, after)
-        # What the flight looks at in this step is saved as it was before the step.
-        while saved < next_k and saved < count:
+        # What the flight looks at in this step is saved as it was before the step; that may be one waypoint more than
+        # it passes, when the step ends just as it turns to it.
+        while saved < min(next_k + 1, count):
             saved += 1
             save.at_m[saved] = at
             save.need[saved] = left_need
