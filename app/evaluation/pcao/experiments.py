@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from app.estimation import RangeSensor, Sensor
 from app.evaluation.cube_world import ExploreScenario
 from app.evaluation.explore import OSARSES, run_explore
-from app.evaluation.jobs import Progress
+from app.evaluation.jobs import Job, Progress
 from app.evaluation.pcao.optimisers import METHODS
 from app.evaluation.pcao.task import TrainingTask
 from app.evaluation.pcao.tried import FDSA, SE, SPSA, fly_tried, tries_per_step
@@ -60,31 +60,12 @@ YARDSTICKS = {
 TEAMS = (2, 5, 10)
 
 
-class ReportJob(Protocol):
+class ReportJob(Job, Protocol):
     """One piece of the report."""
 
     @property
     def key(self) -> str:
         """What makes it what it is, as text."""
-        ...
-
-    @property
-    def title(self) -> str:
-        """What it is, for the progress bar."""
-        ...
-
-    @property
-    def steps(self) -> int:
-        """Its length."""
-        ...
-
-    @property
-    def sensor(self) -> Sensor | None:
-        """What planners are warmed up for; None where none flies."""
-        ...
-
-    def run(self, progress: Progress) -> dict[str, Any]:
-        """Run it."""
         ...
 
 
