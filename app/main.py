@@ -32,6 +32,7 @@ from app.api import (
     targets,
 )
 from app.api.auth import console_log_in
+from app.api.forwarding import ForwardingMiddleware
 from app.api.health import health_router
 from app.api.middleware import BodyMiddleware, RequestMiddleware
 from app.api.schemas import API
@@ -49,8 +50,12 @@ GRACE_S = 5
 log = structlog.get_logger(__name__)
 
 
-def create_app(settings: Settings | None = None) -> FastAPI:
-    """Return the application. Without ``settings`` they are read from the environment and ``bathyfleet.toml``."""
+def create_app(settings: Settings | None = None, *, port: int | None = None) -> FastAPI:
+    """Return the application.
+
+    Without ``settings`` they are read from the environment and ``bathyfleet.toml``. ``port``: where it is served, if
+    that is not the port of the settings.
+    """
     settings = settings or load_settings()
     if not structlog.is_configured():
         logs.configure(settings.log_level, settings.log_format)
@@ -77,6 +82,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
                 settings.service(),
                 database,
                 lambda password, host: console_log_in(tokens, password, host, insecure=settings.insecure),
+                url=settings.peer_url or _own_url(settings, port or settings.port),
             )
             app.state.edge = EdgeState(settings, service, tokens)
             await service.startup()
@@ -85,6 +91,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
             finally:
                 app.state.edge.stopping.set()
                 await service.shutdown()
+                await app.state.edge.peers.close()
         finally:
             await database.close()
 
@@ -125,9 +132,21 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         app.add_middleware(
             CORSMiddleware, allow_origins=settings.allowed_origins, allow_methods=["*"], allow_headers=["*"]
         )
+    app.add_middleware(ForwardingMiddleware)
     app.add_middleware(BodyMiddleware, max_bytes=settings.max_body_bytes, max_file_bytes=settings.max_import_bytes)
     app.add_middleware(RequestMiddleware)
     return app
+
+
+def _own_url(settings: Settings, port: int) -> str:
+    """Return where other processes on the same database reach this one, as far as can be told from here."""
+    host = settings.host
+    if host in ("0.0.0.0", "::"):  # noqa: S104 - another machine needs one of our addresses
+        try:
+            host = socket.gethostbyname(socket.gethostname())
+        except OSError:
+            host = "127.0.0.1"
+    return f"http://[{host}]:{port}" if ":" in host else f"http://{host}:{port}"
 
 
 class Server(uvicorn.Server):
@@ -218,7 +237,7 @@ async def serve(settings: Settings, *, started: Callable[[Server], None] | None 
     """
     listening = listen(settings)
     try:
-        app = create_app(settings)
+        app = create_app(settings, port=listening.getsockname()[1])
         async with app.router.lifespan_context(app):
             await Server(app, listening, started).serve(sockets=[listening])
     finally:

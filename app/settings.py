@@ -68,6 +68,12 @@ class Settings(BaseSettings):
         default="sqlite+aiosqlite:///bathyfleet.db",
         description="SQLAlchemy URL: sqlite+aiosqlite:///FILE or postgresql+asyncpg://USER:PASSWORD@HOST/NAME",
     )
+    peer_url: str = Field(
+        default="",
+        pattern=r"^$|^https?://[^\s/]+$",
+        description="Where other processes on the same database reach this one, for example http://10.0.0.5:8080; "
+        "empty: host and port",
+    )
     auto_migrate: bool | None = Field(
         default=None,
         description="Bring the database's tables up to date at the start; without a value: only for SQLite",

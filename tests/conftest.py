@@ -1,14 +1,44 @@
 import os
 from collections.abc import Iterator
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
 
+from .databases import KINDS, Databases
 from .numba_cache import share
 
 PROJECT = Path(__file__).resolve().parents[1]
 
 share()
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption(
+        "--database",
+        choices=KINDS,
+        default="sqlite",
+        help="What every test runs on that does not ask for one of them; PostgreSQL is started by the tests",
+    )
+
+
+@pytest.fixture(scope="session")
+def databases(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Databases]:
+    """Databases as many as are wanted, gone in the end."""
+    with ExitStack() as stack:
+        yield Databases(request.config.getoption("--database"), tmp_path_factory.mktemp("databases"), stack)
+
+
+@pytest.fixture
+def database_url(databases: Databases) -> str:
+    """A database with every table and no row."""
+    return databases.fresh()
+
+
+@pytest.fixture(params=KINDS)
+def either_url(request: pytest.FixtureRequest, databases: Databases) -> str:
+    """A database of each kind with every table and no row."""
+    return databases.fresh(request.param)
 
 
 def _children() -> dict[int, str]:

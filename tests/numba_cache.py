@@ -2,13 +2,14 @@
 
 numba numbers the files of its cache without a lock: processes that compile the same function for different arguments at
 once could take each other's machine code for theirs. Its setting of a class that finds the cache is how this module
-gets into every process. The folder is named after the sources, since numba itself does not notice a change in a
+gets into every process. The folder is named after their sources, since numba itself does not notice a change in a
 function that was compiled into another one.
 """
 
 import fcntl
 import hashlib
 import os
+import re
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -19,6 +20,8 @@ import numba
 from numba.core import caching
 
 PROJECT = Path(__file__).resolve().parents[1]
+PACKAGES = ("app", "simulator", "imc_bridge")
+IMPORT = re.compile(rf"^from ((?:{'|'.join(PACKAGES)})[\w.]*) import (\([^)]*\)|.*)", re.MULTILINE)
 ALL = PROJECT / ".pytest_cache" / "numba"
 
 
@@ -47,13 +50,30 @@ class Locator(caching.UserProvidedCacheLocator):
 caching.IndexDataCacheFile = _Locked
 
 
+def _compiled_sources() -> set[Path]:
+    """Files with compiled functions, and all that they import: constants are compiled in."""
+    files = [path for package in PACKAGES for path in (PROJECT / package).rglob("*.py")]
+    texts = {path: path.read_text() for path in files if "node_modules" not in path.parts}
+    found: set[Path] = set()
+    new = {path for path, text in texts.items() if "njit" in text}
+    while new:
+        found |= new
+        new = {path for file in new for path in _imported(texts[file])} & texts.keys() - found
+    return found
+
+
+def _imported(text: str) -> Iterator[Path]:
+    for module, names in IMPORT.findall(text):
+        path = PROJECT.joinpath(*module.split("."))
+        yield from (path.with_suffix(".py"), path / "__init__.py")
+        yield from (path / f"{name}.py" for name in re.findall(r"\w+", names))
+
+
 def share() -> None:
     """Let this process and those that it starts use the folder of the sources as they are; forget older ones."""
-    files = sorted(path for package in ("app", "simulator", "imc_bridge") for path in (PROJECT / package).rglob("*.py"))
     sources = hashlib.sha256()
-    for path in files:
-        if "node_modules" not in path.parts:
-            sources.update(path.read_bytes())
+    for path in sorted(_compiled_sources()):
+        sources.update(path.read_bytes())
     folder = ALL / sources.hexdigest()[:16]
     if "PYTEST_XDIST_WORKER" not in os.environ and ALL.is_dir():
         for older in ALL.iterdir():

@@ -1,21 +1,28 @@
 """Everything that missions are made of: the vehicles that are heard and the planners that can decide."""
 
-from fastapi import APIRouter
+from fastapi import APIRouter, Request
+from pydantic import TypeAdapter
 
 from app.api.auth import Reader
+from app.api.peers import from_peers
 from app.api.problems import problems
 from app.api.schemas import API
-from app.api.state import Service
+from app.api.state import Service, State
 from app.missions.doctoring import DoctorView
 from app.missions.views import PlannerView, VehicleView
+
+_views = TypeAdapter(list[VehicleView])
 
 router = APIRouter(prefix=API, responses=problems("unauthenticated", "forbidden"))
 
 
 @router.get("/vehicles", operation_id="listVehicles", summary="List the vehicles", tags=["vehicles"])
-async def list_vehicles(service: Service, reader: Reader) -> list[VehicleView]:
+async def list_vehicles(request: Request, state: State, service: Service, reader: Reader) -> list[VehicleView]:
     """Return every vehicle that was heard or takes part in a mission: its link and what is missing, its position."""
-    return await service.vehicles()
+    heard = await service.vehicles() + await from_peers(request, state, _views)
+    # Several processes may hear the same vehicle: the one that leads it knows it best.
+    known = {(view.kind, view.name): view for view in sorted(heard, key=lambda view: view.mission_id is not None)}
+    return [view for view in heard if known[view.kind, view.name] is view]
 
 
 @router.get("/doctor", operation_id="examineLinks", summary="Say what is missing", tags=["vehicles"])

@@ -3,17 +3,21 @@
 from enum import StrEnum
 from typing import Annotated
 
-from fastapi import APIRouter, Body, Query, Response
+from fastapi import APIRouter, Body, Query, Request, Response
+from pydantic import TypeAdapter
 
 from app.api.auth import Operator, Reader
+from app.api.peers import from_peers
 from app.api.problems import problems
 from app.api.schemas import API, ActionRequest, MissionId, NoteRequest, VehicleName
-from app.api.state import Service
+from app.api.state import Service, State
 from app.missions.spec import MissionSpec, VehicleSpec
 from app.missions.telemetry import TelemetryView
 from app.missions.views import ActionView, EventView, MissionSummary, MissionView, PreflightView, StepView
 
 router = APIRouter(prefix=f"{API}/missions", tags=["missions"], responses=problems("unauthenticated", "forbidden"))
+
+_summaries = TypeAdapter(list[MissionSummary])
 
 EXAMPLE_SPEC = {
     "name": "Leixoes quay",
@@ -64,9 +68,10 @@ async def create_mission(
 
 
 @router.get("", operation_id="listMissions", summary="List the missions")
-async def list_missions(service: Service, reader: Reader) -> list[MissionSummary]:
+async def list_missions(request: Request, state: State, service: Service, reader: Reader) -> list[MissionSummary]:
     """Return every mission, newest first, with its state and progress."""
-    return await service.missions()
+    found = await service.missions() + await from_peers(request, state, _summaries)
+    return sorted(found, key=lambda mission: mission.created_at, reverse=True)
 
 
 @router.get(

@@ -19,6 +19,7 @@ from app.missions.errors import (
     ImportNotFoundError,
     InvalidRequestError,
     MapNotReadyError,
+    MissionElsewhereError,
     MissionNotFoundError,
     SoundingNotFoundError,
     TargetNotFoundError,
@@ -80,6 +81,7 @@ TITLES: dict[str, tuple[int, str]] = {
     "invalid-request": (422, "Some values cannot be taken"),
     "too-many-streams": (429, "Too many live views"),
     "internal": (500, "Something went wrong inside the service"),
+    "mission-elsewhere": (503, "Another process has the mission"),
     "not-ready": (503, "The service is not ready"),
 }
 """Every kind of problem: its status and its title."""
@@ -355,6 +357,7 @@ def describe_mission_error(error: Exception) -> tuple[str, str, str]:
         (TargetNotFoundError, "target-not-found"),
         (ImportNotFoundError, "import-not-found"),
         (MapNotReadyError, "map-not-ready"),
+        (MissionElsewhereError, "mission-elsewhere"),
         (MoveRefusedError, "move-refused"),
         (ConflictError, "conflict"),
         (InvalidRequestError, "invalid-request"),
@@ -399,6 +402,7 @@ def install(app: FastAPI) -> None:
         TargetNotFoundError,
         ImportNotFoundError,
         MapNotReadyError,
+        MissionElsewhereError,
         MoveRefusedError,
         ConflictError,
         InvalidRequestError,

@@ -11,6 +11,7 @@ from fastapi import Depends
 from starlette.requests import HTTPConnection
 
 from app.api.metrics import LIVE_VIEWERS
+from app.api.peers import PeerClients
 from app.api.problems import ProblemError
 from app.api.tokens import TokenStore
 from app.missions.service import MissionService
@@ -35,6 +36,7 @@ class EdgeState:
     stopping: asyncio.Event = field(default_factory=asyncio.Event)
     run_id: str = field(default_factory=lambda: secrets.token_hex(4))
     streams: int = 0
+    peers: PeerClients = field(default_factory=PeerClients)
 
     @contextmanager
     def stream(self, kind: str) -> Iterator[None]:

@@ -16,7 +16,7 @@ from app.api.problems import ProblemError, describe_mission_error, problems
 from app.api.racing import first_of
 from app.api.schemas import API, MissionId
 from app.api.state import EdgeState, Service, State, edge_state
-from app.missions.broadcast import WatcherTooSlowError
+from app.missions.broadcast import WatchEndedError
 from app.missions.errors import MissionError
 from app.missions.service import MissionService
 from app.missions.views import EventMessage, EventView, LiveMessage, SnapshotMessage
@@ -148,7 +148,7 @@ async def _stream(
                     if isinstance(message, EventMessage) and message.event.id > sent:
                         yield _sse(message.event)
                         sent = message.event.id
-            except WatcherTooSlowError:
+            except WatchEndedError:
                 return  # the client reconnects with its Last-Event-ID and misses nothing
 
 
@@ -190,8 +190,8 @@ async def live(websocket: WebSocket, mission_id: str) -> None:
         await _close(websocket, codes[error.kind], error.detail)
     except MissionError as error:
         await _close(websocket, CLOSE_NOT_FOUND, describe_mission_error(error)[1])
-    except WatcherTooSlowError:
-        await _close(websocket, CLOSE_TRY_AGAIN, "messages were not taken in time: reconnect")
+    except WatchEndedError as error:
+        await _close(websocket, CLOSE_TRY_AGAIN, f"{error}: reconnect")
     except WebSocketDisconnect:
         pass
 

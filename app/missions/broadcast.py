@@ -11,8 +11,8 @@ MAX_BACKLOG = 5000
 """A watcher that is this far behind is cut off; it reconnects and gets a fresh snapshot."""
 
 
-class WatcherTooSlowError(Exception):
-    """A watcher did not take its messages in time."""
+class WatchEndedError(Exception):
+    """A watcher gets no more: it was too slow, or the mission went to another process. It may ask again."""
 
 
 class Subscription:
@@ -22,26 +22,31 @@ class Subscription:
         self._all: deque[LiveMessage] = deque()
         self._newest: dict[str, LiveMessage] = {}
         self._wake = asyncio.Event()
-        self._too_slow = False
+        self._end = ""
 
     def put(self, message: LiveMessage) -> None:
         """Queue a message."""
         if isinstance(message, EventMessage | WaypointsMessage):
             if len(self._all) >= MAX_BACKLOG:
-                self._too_slow = True
+                self.end(f"more than {MAX_BACKLOG} messages were not taken in time")
             else:
                 self._all.append(message)
         else:
             self._newest[message.type] = message
         self._wake.set()
 
+    def end(self, why: str) -> None:
+        """Let nothing more come."""
+        self._end = why
+        self._wake.set()
+
     async def __aiter__(self) -> AsyncIterator[LiveMessage]:
-        """Yield messages as they come. Raises WatcherTooSlowError."""
+        """Yield messages as they come. Raises WatchEndedError."""
         while True:
             await self._wake.wait()
             self._wake.clear()
-            if self._too_slow:
-                raise WatcherTooSlowError(f"more than {MAX_BACKLOG} messages were not taken in time")
+            if self._end:
+                raise WatchEndedError(self._end)
             while self._all:
                 yield self._all.popleft()
             newest, self._newest = self._newest, {}
@@ -69,6 +74,11 @@ class Broadcaster:
         """Hand out a message."""
         for subscription in self._subscriptions:
             subscription.put(message)
+
+    def end(self, why: str) -> None:
+        """End every subscription."""
+        for subscription in self._subscriptions:
+            subscription.end(why)
 
     @contextmanager
     def subscribe(self) -> Iterator[Subscription]:

@@ -4,14 +4,18 @@ import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
+from sqlalchemy.ext.asyncio import AsyncSession
 
 from app.missions.errors import ConflictError
 from app.missions.fleet import LinkState
 from app.missions.hub import FleetHub
 from app.missions.links.sim import Launch, Lookout, SimFleetLink
 from app.missions.live import LiveMission
+from app.missions.ownership import AT_SEA
 from app.missions.search.site import simulated_world
 from app.missions.spec import VehicleKind, VehicleSpec
+from app.storage import processes
+from app.storage.database import Guard
 from simulator.targets import RangingNoise
 
 Lead = Callable[[str, str, str | None], None]
@@ -19,6 +23,29 @@ Lead = Callable[[str, str, str | None], None]
 
 ShowArea = Callable[[str, Sequence[tuple[float, float]]], None]
 """What other consoles are shown of a mission: its name and its area's ring; an empty ring takes it away."""
+
+
+def free_elsewhere(live: LiveMission, vehicles: Sequence[VehicleSpec] | None = None) -> Guard:
+    """Return what refuses a transaction by which a mission goes to sea with vehicles that another process leads.
+
+    ``vehicles``: those that are asked about, else the mission's own.
+    """
+    wanted = [(str(v.kind), v.name) for v in (vehicles or [member.spec for member in live.team])]
+
+    async def check(session: AsyncSession) -> None:
+        await processes.stand_in_line(session)
+        taken = await processes.missions_with_vehicles(session, AT_SEA, wanted, live.id)
+        for (_, name), mission_id in taken.items():
+            raise _taken(name, mission_id)
+
+    return check
+
+
+def _taken(vehicle: str, mission_id: str) -> ConflictError:
+    return ConflictError(
+        f"vehicle {vehicle!r} takes part in mission {mission_id}",
+        "finish or abort that mission, or take the vehicle out of one of them",
+    )
 
 
 class Claims:
@@ -37,10 +64,7 @@ class Claims:
         for member in live.team:
             owner = self._hub.claimed_by(member.key)
             if owner not in (None, live.id):
-                raise ConflictError(
-                    f"vehicle {member.name!r} takes part in mission {owner}",
-                    "finish or abort that mission, or take the vehicle out of one of them",
-                )
+                raise _taken(member.name, owner)
 
     def check_links(self, live: LiveMission) -> None:
         """Refuse to start while a vehicle that is commanded over IMC is not ready. Raises ConflictError."""

@@ -19,7 +19,7 @@ from app.missions.runner import Runner
 from app.missions.states import MissionState
 from app.missions.views import Level
 from app.storage import missions as mission_queries
-from app.storage.database import Database
+from app.storage.database import Guard
 from app.storage.shielding import to_the_end
 
 PATIENCE_S = 0.5
@@ -41,14 +41,12 @@ class Conductor:
 
     def __init__(
         self,
-        database: Database,
         hub: FleetHub,
         claims: Claims,
         executor: Executor,
         maps: MapKeeper,
         time_scale: float,
     ) -> None:
-        self._database = database
         self._hub = hub
         self._claims = claims
         self._executor = executor
@@ -72,7 +70,7 @@ class Conductor:
         for member in live.team:
             member.engaged = False
             member.refusal = ""
-        runner = Runner(live, self._database, self._hub, self._executor, self._time_scale)
+        runner = Runner(live, self._hub, self._executor, self._time_scale)
         self.runs[live.id] = asyncio.create_task(self._supervise(live, runner.run), name=f"mission {live.id}")
 
     async def _supervise(self, live: LiveMission, run: Callable[[], Awaitable[str]]) -> None:
@@ -176,13 +174,25 @@ class Conductor:
             await live.journal.log(level, "stop", f"{stop.vehicle} {words}: {stop.detail}", **receipt(stop))
 
     async def set_state(
-        self, live: LiveMission, state: MissionState, reason: str, actor: str, level: Level = Level.INFO
+        self,
+        live: LiveMission,
+        state: MissionState,
+        reason: str,
+        actor: str,
+        level: Level = Level.INFO,
+        *,
+        check: Guard | None = None,
     ) -> None:
-        """Commit a mission's new state together with its line in the log, then tell everyone."""
+        """Commit a mission's new state together with its line in the log, then tell everyone.
+
+        ``check`` is called within the transaction before anything is changed, and raises what speaks against it.
+        """
         changed_at = now()
         words = f"{state} by {actor}" + (f": {reason}" if reason else "")
         line = live.journal.line(level, "state", words, state=state, actor=actor)
-        async with self._database.writing() as session:
+        async with live.database.writing() as session:
+            if check is not None:
+                await check(session)
             await mission_queries.set_state(session, live.id, state, reason, changed_at)
             session.add(line)
         live.header.state = state

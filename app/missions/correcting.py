@@ -20,7 +20,6 @@ from app.missions.live import LiveMission
 from app.missions.spec import MissionSpec, SoundSpeed, Tide
 from app.missions.views import CorrectionsView, Level, Ruling, TideCorrection, TideTableView, Verdict
 from app.storage import soundings as sounding_queries
-from app.storage.database import Database
 from app.storage.models import MissionRow, SoundingRow, TideTableRow
 
 
@@ -40,7 +39,7 @@ def corrections_view(live: LiveMission) -> CorrectionsView:
     )
 
 
-async def set_tide(live: LiveMission, database: Database, executor: Executor, tide: TideCorrection, actor: str) -> None:
+async def set_tide(live: LiveMission, executor: Executor, tide: TideCorrection, actor: str) -> None:
     """Change level, datum and table, or nothing when the table cannot be read (InvalidRequestError)."""
     table: TideTable | None = None
     row: TideTableRow | None = None
@@ -62,21 +61,19 @@ async def set_tide(live: LiveMission, database: Database, executor: Executor, ti
         if row is not None:
             session.add(row)
 
-    await _recorrect(live, database, executor, spec, table, store)
+    await _recorrect(live, executor, spec, table, store)
     what = f"tide table {table.name}" if table is not None else f"a constant level of {plain.level_m:+.2f} m"
     await live.journal.log(Level.INFO, "corrections", f"tide corrected by {what}, set by {actor}", actor=actor)
 
 
-async def set_sound_speed(
-    live: LiveMission, database: Database, executor: Executor, sound_speed: SoundSpeed | None, actor: str
-) -> None:
+async def set_sound_speed(live: LiveMission, executor: Executor, sound_speed: SoundSpeed | None, actor: str) -> None:
     """Change the sound speed profile; None: the sonars' own ranges are taken."""
 
     async def store(_session: AsyncSession) -> None:
         pass
 
     spec = live.spec.model_copy(update={"sound_speed": sound_speed})
-    await _recorrect(live, database, executor, spec, live.gate.corrections.table, store)
+    await _recorrect(live, executor, spec, live.gate.corrections.table, store)
     words = "sound speed is not corrected" if sound_speed is None else f"sound speed: {sound_speed.source or 'profile'}"
     await live.journal.log(Level.INFO, "corrections", f"{words}, set by {actor}", actor=actor)
 
@@ -90,17 +87,17 @@ def check_level_is_known(live: LiveMission) -> None:
 
 
 async def _recorrect(
-    live: LiveMission, database: Database, executor: Executor, spec: MissionSpec, table: TideTable | None, store: Any
+    live: LiveMission, executor: Executor, spec: MissionSpec, table: TideTable | None, store: Any
 ) -> None:
     corrections = Corrections(live.frame, spec.tide, table=table, sound_speed=spec.sound_speed)
     loop = asyncio.get_running_loop()
     async with live.journal.writing:
         # Nothing else changes soundings meanwhile. Computing may have to wait for a thread, and the database's turn is
         # for all missions, whose stops are written, too.
-        async with database.reading() as session:
+        async with live.database.reading() as session:
             rows = await sounding_queries.all_soundings(session, live.id)
         changes = await loop.run_in_executor(executor, recorrected, rows, corrections, live.gate)
-        async with database.writing() as session:
+        async with live.database.writing() as session:
             if changes:
                 await session.execute(update(SoundingRow), changes)
             mission = await session.get_one(MissionRow, live.id)

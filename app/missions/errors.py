@@ -45,3 +45,7 @@ class SoundingNotFoundError(MissionError):
 
 class MapNotReadyError(MissionError):
     """No sounding was accepted yet, so there is no map."""
+
+
+class MissionElsewhereError(MissionError):
+    """Another process has this mission, or none has it at the moment; this one may not touch it."""

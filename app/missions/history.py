@@ -7,12 +7,11 @@ from app.missions.maps import MapSnapshot
 from app.missions.views import StepView, WaypointView
 from app.storage import missions as mission_queries
 from app.storage import soundings as sounding_queries
-from app.storage.database import Database
 
 
-async def steps_after(live: LiveMission, database: Database, after: int, limit: int) -> list[StepView]:
+async def steps_after(live: LiveMission, after: int, limit: int) -> list[StepView]:
     """Return up to ``limit`` steps with a number above ``after``, each with its waypoints as they ended."""
-    async with database.reading() as session:
+    async with live.database.reading() as session:
         steps = await mission_queries.steps_after(session, live.id, after, limit)
         if not steps:
             return []
@@ -34,11 +33,11 @@ async def steps_after(live: LiveMission, database: Database, after: int, limit: 
     ]
 
 
-async def map_at_step(live: LiveMission, database: Database, step: int) -> MapSnapshot:
+async def map_at_step(live: LiveMission, step: int) -> MapSnapshot:
     """Return the map that the soundings until the end of a step make. Raises MapNotReadyError without any."""
     if live.builder.newest is None or live.builder.stale:
         await live.build_map()
-    async with database.reading() as session:
+    async with live.database.reading() as session:
         accepted = await sounding_queries.accepted_arrays(session, live.id, until_step=step)
     newest = live.builder.newest
     if newest is None:

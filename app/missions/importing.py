@@ -29,7 +29,6 @@ from app.missions.live import LiveMission
 from app.missions.states import ENDED
 from app.missions.views import ImportOptions, ImportView, Level, ReferenceView
 from app.storage import soundings as sounding_queries
-from app.storage.database import Database
 from app.storage.models import ImportRow, ReferenceRow
 from app.storage.shielding import to_the_end
 
@@ -41,15 +40,15 @@ MAX_PRIOR = 100_000
 """Imported soundings per file that the map takes one by one; where there are more they are merged per cell."""
 
 
-async def imports_of(live: LiveMission, database: Database) -> list[ImportView]:
+async def imports_of(live: LiveMission) -> list[ImportView]:
     """Return what was imported, oldest first."""
-    async with database.reading() as session:
+    async with live.database.reading() as session:
         query = select(ImportRow).where(ImportRow.mission_id == live.id).order_by(ImportRow.created_at, ImportRow.id)
         return [_view(row) for row in await session.scalars(query)]
 
 
 async def import_soundings(
-    live: LiveMission, database: Database, executor: Executor, content: bytes, options: ImportOptions, actor: str
+    live: LiveMission, executor: Executor, content: bytes, options: ImportOptions, actor: str
 ) -> ImportView:
     """Add the soundings of a file to what is known before a mission measures.
 
@@ -61,7 +60,7 @@ async def import_soundings(
         When the file cannot be used; when the mission has ended, or has the same file with other options.
     """
     digest = hashlib.sha256(content).hexdigest()
-    known = await _same_file(live, database, digest, options)
+    known = await _same_file(live, digest, options)
     if known is not None:
         return known
     if live.header.state in ENDED:
@@ -90,15 +89,15 @@ async def import_soundings(
         soundings=sounding_queries.pack(kept),
     )
     view = _view(row)
-    await to_the_end(_store_import(live, database, row))
+    await to_the_end(_store_import(live, row))
     words = f"{view.taken} prior soundings of {view.filename} imported by {actor}"
     await live.journal.log(Level.INFO, "import", words, actor=actor)
     return view
 
 
-async def delete_import(live: LiveMission, database: Database, import_id: str, actor: str) -> None:
+async def delete_import(live: LiveMission, import_id: str, actor: str) -> None:
     """Take an import back. Raises ImportNotFoundError."""
-    async with database.writing() as session:
+    async with live.database.writing() as session:
         row = await session.get(ImportRow, import_id)
         if row is None or row.mission_id != live.id:
             raise ImportNotFoundError(
@@ -112,9 +111,7 @@ async def delete_import(live: LiveMission, database: Database, import_id: str, a
     await live.journal.log(Level.INFO, "import", f"import of {filename} taken back by {actor}", actor=actor)
 
 
-async def set_reference(
-    live: LiveMission, database: Database, content: bytes, options: ImportOptions, actor: str
-) -> ReferenceView:
+async def set_reference(live: LiveMission, content: bytes, options: ImportOptions, actor: str) -> ReferenceView:
     """Compare the mission's map with the grid in a file from now on. Raises InvalidRequestError."""
     depths, said = await _read(live, content, options, "reference")
     row = ReferenceRow(
@@ -127,7 +124,7 @@ async def set_reference(
         depths=sounding_queries.pack(depths),
     )
     view = _reference_view(row)
-    async with database.writing() as session:
+    async with live.database.writing() as session:
         await _forget_reference(session, live.id)
         session.add(row)
     live.show_reference(depths)
@@ -135,19 +132,19 @@ async def set_reference(
     return view
 
 
-async def reference_of(live: LiveMission, database: Database) -> ReferenceView:
+async def reference_of(live: LiveMission) -> ReferenceView:
     """Return what the map is compared with. Raises ImportNotFoundError when there is nothing."""
-    async with database.reading() as session:
+    async with live.database.reading() as session:
         row = await session.get(ReferenceRow, live.id)
     if row is None:
         raise ImportNotFoundError("the mission has no reference grid", "PUT /api/v1/missions/{id}/reference sets one")
     return _reference_view(row)
 
 
-async def delete_reference(live: LiveMission, database: Database, actor: str) -> None:
+async def delete_reference(live: LiveMission, actor: str) -> None:
     """Compare with nothing any more. Raises ImportNotFoundError when there was nothing."""
-    await reference_of(live, database)
-    async with database.writing() as session:
+    await reference_of(live)
+    async with live.database.writing() as session:
         await _forget_reference(session, live.id)
     live.show_reference(None)
     await live.journal.log(Level.INFO, "import", f"reference grid taken away by {actor}", actor=actor)
@@ -160,9 +157,9 @@ async def _forget_reference(session: Any, mission_id: str) -> None:
         await session.flush()
 
 
-async def _same_file(live: LiveMission, database: Database, digest: str, options: ImportOptions) -> ImportView | None:
+async def _same_file(live: LiveMission, digest: str, options: ImportOptions) -> ImportView | None:
     """Return the answer once given to the same file. Raises ConflictError when it was read otherwise then."""
-    async with database.reading() as session:
+    async with live.database.reading() as session:
         query = select(ImportRow).where(ImportRow.mission_id == live.id, ImportRow.digest == digest)
         row = (await session.scalars(query)).first()
     if row is None:
@@ -176,8 +173,8 @@ async def _same_file(live: LiveMission, database: Database, digest: str, options
     return _view(row).model_copy(update={"replayed": True})
 
 
-async def _store_import(live: LiveMission, database: Database, row: ImportRow) -> None:
-    async with database.writing() as session:
+async def _store_import(live: LiveMission, row: ImportRow) -> None:
+    async with live.database.writing() as session:
         session.add(row)
         await session.flush()
         prior = await sounding_queries.imported_arrays(session, live.id)

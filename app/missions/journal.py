@@ -230,6 +230,11 @@ class Journal:
         async with self.writing:
             self.counts = await read()
 
+    def abandon(self) -> None:
+        """Forget what is left: the mission is another process's."""
+        for noted in (self._soundings, self._scans, self._positions, self._statuses, self._telemetry):
+            noted.clear()
+
     async def close(self) -> None:
         """Write what is left and stop."""
         if self._pump is not None:

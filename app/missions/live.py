@@ -142,7 +142,8 @@ class LiveMission:
         """Set while vehicles are being stopped: the step loop must not send them off again as it ends."""
         self.seconds_per_step: float | None = None
         self.running_since_s: float | None = None
-        self._database = database
+        self.database = database
+        """What is written through it is refused once another process has the mission."""
         self._hub = hub
         self._time_scale = time_scale
         self._executor = executor
@@ -208,7 +209,7 @@ class LiveMission:
         """Make the site's grid of every scan that was accepted."""
         if self.search is None:
             return
-        async with self._database.reading() as session:
+        async with self.database.reading() as session:
             scans = await scan_queries.accepted_scans(session, self.id)
             self.search.began_at = await mission_queries.first_step_at(session, self.id)
         await self.in_thread(self.search.see, [report_of(row) for row in scans])
@@ -221,13 +222,13 @@ class LiveMission:
         return Gate(corrections, Polygon(self.area), margin_m=self.margin_m, noise=self.spec.sounding_noise)
 
     async def _notice_imports(self) -> None:
-        async with self._database.reading() as session:
+        async with self.database.reading() as session:
             newest = await event_queries.last_event_id(session, self.id, kind="import")
         if newest <= self._imports_noticed:
             return
 
         async def read() -> Counts:
-            async with self._database.reading() as session:
+            async with self.database.reading() as session:
                 counted = await sounding_queries.counts(session, self.id)
                 accepted = await sounding_queries.accepted_arrays(session, self.id)
                 prior = await sounding_queries.imported_arrays(session, self.id)
@@ -512,6 +513,14 @@ class LiveMission:
             self._tell_of_search()
             self._tell_of_map()
             await asyncio.sleep(live_period_s(self.broadcaster.viewers))
+
+    def abandon(self) -> None:
+        """Write nothing any more, and send everyone who watches to the process that has the mission now."""
+        if self._ticker is not None:
+            self._ticker.cancel()
+        self.ranges.abandon()
+        self.journal.abandon()
+        self.broadcaster.end("another process has the mission now")
 
     async def close(self) -> None:
         """Write what is left."""

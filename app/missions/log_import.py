@@ -24,7 +24,6 @@ from app.missions.spec_base import Name
 from app.missions.views import Level, LogImportView, Verdict
 from app.storage import missions as mission_queries
 from app.storage import soundings as sounding_queries
-from app.storage.database import Database
 from app.storage.models import BatchRow
 from imc_bridge import Sounding, StateReport
 from imc_bridge.logs import LogError, VehicleLog
@@ -79,11 +78,8 @@ class LogImport:
         When the file cannot be read or holds nothing that can be used.
     """
 
-    def __init__(
-        self, live: LiveMission, database: Database, settings: ServiceSettings, path: Path, vehicle: str | None
-    ) -> None:
+    def __init__(self, live: LiveMission, settings: ServiceSettings, path: Path, vehicle: str | None) -> None:
         self._live = live
-        self._database = database
         bridge = bridge_settings(settings.imc, settings.time_scale)
         try:
             self._digest = _digest(path)
@@ -161,7 +157,7 @@ class LogImport:
         for report in batch:
             tally.span(report.time_s)
         key = f"{self._key}-{tally.batches}"
-        async with live.journal.writing, self._database.writing() as session:
+        async with live.journal.writing, live.database.writing() as session:
             known = await sounding_queries.answer_to(session, live.id, key)
             if known is not None:
                 # Read once more all the same: the gate judges jumps from one batch to the next.

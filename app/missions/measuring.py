@@ -20,7 +20,6 @@ from app.missions.tracking import Arrived
 from app.missions.verdicts import batch_verdict
 from app.missions.views import BatchVerdict, ItemVerdict, Verdict
 from app.storage import soundings as sounding_queries
-from app.storage.database import Database
 from app.storage.models import BatchRow
 from imc_bridge.soundings import Beam, StateSample, footprint
 
@@ -29,7 +28,6 @@ MAX_BATCH = 10_000
 
 async def measure(
     live: LiveMission,
-    database: Database,
     hub: FleetHub,
     rest: RestFleetLink,
     items: Sequence[Measurement],
@@ -51,7 +49,7 @@ async def measure(
     strangers = {i: _stranger(live, item) for i, item in enumerate(items)}
     reports = {i: report for i, item in enumerate(items) if not strangers[i] and (report := _sounding(item))}
     ranges = _ranges(live, items, strangers)
-    async with live.journal.writing, live.ranges.writing, database.writing() as session:
+    async with live.journal.writing, live.ranges.writing, live.database.writing() as session:
         if idempotency_key is not None:
             known = await sounding_queries.answer_to(session, live.id, idempotency_key)
             if known is not None:

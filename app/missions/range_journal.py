@@ -162,6 +162,10 @@ class RangeJournal:
                 raise
             committed()
 
+    def abandon(self) -> None:
+        """Forget what is left: the mission is another process's."""
+        self._noted.clear()
+
     async def close(self) -> None:
         """Write what is left and stop."""
         if self._pump is not None:

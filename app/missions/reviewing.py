@@ -12,7 +12,6 @@ from app.missions.journal import Counts
 from app.missions.live import LiveMission
 from app.missions.views import Level, Ruling, SoundingPage, SoundingState, SoundingView, Verdict
 from app.storage import soundings as sounding_queries
-from app.storage.database import Database
 from app.storage.models import EventRow, SoundingRow
 from app.storage.shielding import to_the_end
 
@@ -21,11 +20,11 @@ Doubts = dict[int, str]
 
 
 async def soundings_page(
-    live: LiveMission, database: Database, states: Sequence[SoundingState], vehicle: str | None, after: int, limit: int
+    live: LiveMission, states: Sequence[SoundingState], vehicle: str | None, after: int, limit: int
 ) -> SoundingPage:
     """Return up to ``limit`` soundings in any of the states with an id above ``after``, in the order they came."""
     await live.journal.flush()
-    async with database.reading() as session:
+    async with live.database.reading() as session:
         doubts = await _doubts(live, session)
         wanted = [SoundingRow.mission_id == live.id, or_(*(_condition(state, doubts) for state in states))]
         if vehicle is not None:
@@ -40,9 +39,7 @@ async def soundings_page(
     )
 
 
-async def rule(
-    live: LiveMission, database: Database, sounding_id: int, ruling: Ruling, note: str, actor: str
-) -> SoundingView:
+async def rule(live: LiveMission, sounding_id: int, ruling: Ruling, note: str, actor: str) -> SoundingView:
     """Restore a sounding or reject it; the map is that of the new choice when this returns. Raw values stay.
 
     Raises
@@ -52,22 +49,20 @@ async def rule(
     """
     await live.journal.flush()
     async with live.journal.writing:
-        line = await to_the_end(_store(live, database, sounding_id, ruling, note, actor))
+        line = await to_the_end(_store(live, sounding_id, ruling, note, actor))
     if line is not None:
         live.journal.tell(line)
         live.changed.set()
     await live.build_map()
     live.publish_summary()
-    async with database.reading() as session:
+    async with live.database.reading() as session:
         row = await session.get_one(SoundingRow, sounding_id)
         return _view(row, await _doubts(live, session))
 
 
-async def _store(
-    live: LiveMission, database: Database, sounding_id: int, ruling: Ruling, note: str, actor: str
-) -> EventRow | None:
+async def _store(live: LiveMission, sounding_id: int, ruling: Ruling, note: str, actor: str) -> EventRow | None:
     """Write verdict and log line down together; None when it was so already."""
-    async with database.writing() as session:
+    async with live.database.writing() as session:
         row = await session.get(SoundingRow, sounding_id)
         if row is None or row.mission_id != live.id:
             raise SoundingNotFoundError(

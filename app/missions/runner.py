@@ -37,7 +37,6 @@ from app.missions.search.lookout import Lookout
 from app.missions.spec import Guidance
 from app.missions.views import Level
 from app.storage import missions as mission_queries
-from app.storage.database import Database
 from app.storage.models import StepRow, WaypointRow
 from app.storage.shielding import to_the_end
 from imc_bridge.plans import leg_time_s
@@ -75,11 +74,8 @@ class Runner:
         How much faster than the wall clock the vehicles live.
     """
 
-    def __init__(
-        self, live: LiveMission, database: Database, hub: FleetHub, executor: Executor, time_scale: float
-    ) -> None:
+    def __init__(self, live: LiveMission, hub: FleetHub, executor: Executor, time_scale: float) -> None:
         self._live = live
-        self._database = database
         self._hub = hub
         self._executor = executor
         self._time_scale = time_scale
@@ -135,7 +131,7 @@ class Runner:
         """Take up the last committed step: the planner's memory, and the waypoints that were not settled."""
         sensor = SingleBeam() if self._live.search is None else self._live.search.site.scanner
         planner = create_planner(self._spec.planner.name, self._spec.planner.options, sensor)
-        async with self._database.reading() as session:
+        async with self._live.database.reading() as session:
             step = await mission_queries.last_step(session, self._live.id)
             if step is None:
                 return planner
@@ -360,7 +356,7 @@ class Runner:
             await self._live.journal.log(Level.INFO, "target", words, step=number, vehicle=member.name)
 
     async def _store(self, step: StepRow, waypoints: list[WaypointRow]) -> None:
-        async with self._database.writing() as session:
+        async with self._live.database.writing() as session:
             session.add(step)
             await session.flush()
             session.add_all(waypoints)
@@ -506,7 +502,7 @@ class Runner:
         seconds = loop_time - live.running_since_s
         live.running_since_s = loop_time
         live.header.elapsed_s += seconds
-        async with self._database.writing() as session:
+        async with live.database.writing() as session:
             await mission_queries.add_elapsed(session, live.id, seconds, now())
 
 

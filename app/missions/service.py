@@ -20,19 +20,19 @@ from app.exploration.planners import warm_up as planning_warm_up
 from app.mapping.gp import warm_up as mapping_warm_up
 from app.mapping.products.tracks import Track, TrackPoint
 from app.missions import importing, states
-from app.missions.admission import check_spec, check_vehicle
+from app.missions.admission import check_spec
 from app.missions.broadcast import Subscription
-from app.missions.claims import Claims, Lead, ShowArea
+from app.missions.claims import Claims, Lead, ShowArea, free_elsewhere
 from app.missions.clock import now
-from app.missions.conducting import PATIENCE_S, Conductor, receipt
+from app.missions.conducting import Conductor, receipt
 from app.missions.correcting import check_level_is_known, corrections_view, set_sound_speed, set_tide
+from app.missions.crews import Crews, refuse_ended, vehicle_row
 from app.missions.doctoring import DoctorView, Examine, doctor_view, switched_off
 from app.missions.errors import (
     ConflictError,
     InvalidRequestError,
     MapNotReadyError,
-    MissionNotFoundError,
-    VehicleNotFoundError,
+    MissionElsewhereError,
 )
 from app.missions.fleet import (
     FleetLink,
@@ -49,7 +49,8 @@ from app.missions.map_keeping import MapKeeper
 from app.missions.maps import MapSnapshot
 from app.missions.measurement import Measurement
 from app.missions.measuring import measure
-from app.missions.members import Member
+from app.missions.memory import Memory
+from app.missions.ownership import Ownership
 from app.missions.polling import waypoint
 from app.missions.preflight import preflight
 from app.missions.products import (
@@ -100,16 +101,16 @@ from app.missions.views import (
     VehicleView,
     WaypointView,
 )
+from app.missions.watch import Watch
 from app.storage import events as event_queries
 from app.storage import missions as mission_queries
 from app.storage import soundings as sounding_queries
 from app.storage import telemetry as telemetry_queries
 from app.storage.database import Database
-from app.storage.models import MissionRow, MissionVehicleRow, SoundingRow
+from app.storage.models import MissionRow, SoundingRow
 
 Action = Literal["start", "pause", "resume", "abort", "finish"]
 
-ENDED_MISSIONS_IN_MEMORY = 8
 NO_FORECAST = "what a search will find cannot be forecast: it depends on what stands there"
 WORKERS = 2
 
@@ -127,6 +128,8 @@ class MissionService:
         Migrated and open; the caller closes it after ``shutdown``.
     log_in
         Who may use the Neptus gateway with a password from a host; without it nobody.
+    url, certificate
+        Where other processes on the same database reach this one, and the certificate (PEM) that it shows them.
     """
 
     def __init__(
@@ -134,6 +137,9 @@ class MissionService:
         settings: ServiceSettings,
         database: Database,
         log_in: Callable[[str, str], Awaitable[str | None]] | None = None,
+        *,
+        url: str = "",
+        certificate: str | None = None,
     ) -> None:
         self._settings = settings
         self._database = database
@@ -160,12 +166,13 @@ class MissionService:
         self._claims = Claims(self._hub, self._sim, lead, show_area)
         self._maps = MapKeeper()
         self._forecaster = Forecaster()
-        self._conductor = Conductor(database, self._hub, self._claims, self._executor, self._maps, settings.time_scale)
+        self._conductor = Conductor(self._hub, self._claims, self._executor, self._maps, settings.time_scale)
         self._runs = self._conductor.runs
-        self._live: dict[str, LiveMission] = {}
-        # As they were when they left memory.
-        self._left: dict[str, MissionSummary] = {}
-        self._loading = asyncio.Lock()
+        self._crews = Crews(self._hub, self._claims, self._conductor)
+        self._memory = Memory(database, self._hub, self._executor, self._maps, settings.time_scale)
+        self.process = Ownership(database, url, certificate)
+        """This process among those that share the database."""
+        self._watch = Watch(database, self._hub, self.process, self._memory, self._conductor, self._claims)
         # One file after the other: reading takes memory and a core.
         self._importing = asyncio.Lock()
         self._started = False
@@ -173,32 +180,25 @@ class MissionService:
     # Life of the service
 
     async def startup(self) -> None:
-        """Open the links and go on with every mission that was running when the process ended."""
+        """Open the links, join the processes that share the database and go on with missions that nobody has."""
         self._conductor.warm = asyncio.get_running_loop().run_in_executor(self._executor, _warm_up)
         await self._hub.start()
-        async with self._database.reading() as session:
-            rows = await mission_queries.missions_in(session, [MissionState.RUNNING, MissionState.PAUSED])
-        for row in rows:
-            live = await self._get(row.id)
-            try:
-                self._claims.claim_team(live)
-            except ConflictError as error:
-                # The settings changed while the service was down: one mission's trouble is not the others'.
-                await self._conductor.set_state(live, MissionState.FAILED, str(error), "service", Level.ALARM)
-                continue
-            if live.header.state is MissionState.RUNNING:
-                self._conductor.run(live)
+        self._memory.share(self.process, self._watch.may_take_up, self._watch.resume)
+        await self._watch.begin()
         self._started = True
 
     async def shutdown(self) -> None:
-        """Stop every vehicle and write everything down; running missions stay running and go on at the next start."""
+        """Stop every vehicle and write everything down.
+
+        Running missions stay running: another process takes them up, or this one at its next start.
+        """
         self._started = False
-        running = [await self._get(mission_id) for mission_id in self._runs]
-        await asyncio.gather(*(self._conductor.halt(live) for live in running))
+        await self._watch.end()
+        await asyncio.gather(*(self._conductor.halt(live) for live in self._memory if live.id in self._runs))
         await self._maps.close()
         await self._hub.close()
-        for live in self._live.values():
-            await live.close()
+        await self._memory.close()
+        await self.process.leave()
         self._executor.shutdown(wait=True, cancel_futures=True)
         self._forecaster.close()
 
@@ -231,20 +231,24 @@ class MissionService:
         async with self._database.writing() as session:
             session.add(row)
             await session.flush()
-            session.add_all(_vehicle_row(row.id, vehicle, slot) for slot, vehicle in enumerate(spec.vehicles))
+            session.add_all(vehicle_row(row.id, vehicle, slot) for slot, vehicle in enumerate(spec.vehicles))
         live = await self._get(row.id)
         await live.journal.log(Level.INFO, "state", f"created by {actor}", state=row.state, actor=actor)
         return self._view(live)
 
     async def missions(self) -> list[MissionSummary]:
-        """Return every mission, newest first."""
+        """Return every mission that no other process has, newest first."""
         async with self._database.reading() as session:
             rows = await mission_queries.all_missions(session)
         # One that ended and left memory is as it was then: taking it up again for every list would be slow.
-        return [self._left[row.id] if self._is_away(row.id) else (await self._get(row.id)).summary() for row in rows]
+        found = [self._memory.left(row.id) or await self._summary(row.id) for row in rows]
+        return [summary for summary in found if summary is not None]
 
-    def _is_away(self, mission_id: str) -> bool:
-        return mission_id in self._left and mission_id not in self._live
+    async def _summary(self, mission_id: str) -> MissionSummary | None:
+        try:
+            return (await self._get(mission_id)).summary()
+        except MissionElsewhereError:
+            return None
 
     async def mission(self, mission_id: str) -> MissionView:
         """Return one mission. Raises MissionNotFoundError."""
@@ -268,7 +272,11 @@ class MissionService:
                 if action == "start":
                     self._claims.check_links(live)
                 self._claims.claim_team(live)
-                await self._conductor.set_state(live, target, note, actor)
+                try:
+                    await self._conductor.set_state(live, target, note, actor, check=free_elsewhere(live))
+                except ConflictError:
+                    self._claims.release_team(live)
+                    raise
                 self._conductor.run(live)
             else:
                 stops = await self._conductor.stand_down(live, target, note, actor)
@@ -280,44 +288,15 @@ class MissionService:
     async def add_vehicle(self, mission_id: str, vehicle: VehicleSpec, *, actor: str = "operator") -> MissionView:
         """Let a vehicle join, while the mission runs too. Raises ConflictError, InvalidRequestError."""
         live = await self._get(mission_id)
-        async with self._conductor.acting(mission_id):
-            self._refuse_ended(live, "takes no more vehicles")
-            check_vehicle(vehicle, live.spec, self._hub.kinds)
-            if live.team.get(vehicle.name) is not None:
-                raise ConflictError(
-                    f"vehicle {vehicle.name!r} takes part already", "choose another name, or remove the vehicle first"
-                )
-            if live.header.state in (MissionState.RUNNING, MissionState.PAUSED):
-                self._claims.claim(live, vehicle)
-            try:
-                slot = await self._store_vehicle(mission_id, vehicle)
-            except BaseException:
-                self._hub.release((vehicle.kind, vehicle.name), mission_id)
-                raise
-            live.team.join(vehicle, slot)
-            if live.header.state is MissionState.DRAFT:
-                await self._conductor.set_state(live, states.move(MissionState.DRAFT, "complete_draft"), "", actor)
-            await live.journal.log(Level.INFO, "vehicle", f"{vehicle.name} joined", vehicle=vehicle.name, actor=actor)
-            live.changed.set()
+        await self._crews.join(live, vehicle, actor)
         return self._view(live)
-
-    async def _store_vehicle(self, mission_id: str, vehicle: VehicleSpec) -> int:
-        """Write a vehicle's part in a mission down; returns its place in the depth stack."""
-        async with self._database.writing() as session:
-            rows = await mission_queries.vehicles_of(session, mission_id)
-            known = next((row for row in rows if row.name == vehicle.name), None)
-            if known is not None:
-                # It comes back: it keeps its place.
-                known.spec, known.left_at = vehicle.model_dump(mode="json"), None
-                return known.slot
-            session.add(_vehicle_row(mission_id, vehicle, len(rows)))
-            return len(rows)
 
     async def remove_vehicle(self, mission_id: str, name: str, *, actor: str = "operator") -> MissionView:
         """Stop a vehicle and take it out of the mission. Raises VehicleNotFoundError, ConflictError."""
-        self._refuse_ended(await self._get(mission_id), "keeps its vehicles")
-        await self.abort_vehicle(mission_id, name, actor=actor)
-        return self._view(await self._get(mission_id))
+        live = await self._get(mission_id)
+        refuse_ended(live, "keeps its vehicles")
+        await self._crews.stop_one(live, name, actor)
+        return self._view(live)
 
     async def abort_vehicle(self, mission_id: str, name: str, *, actor: str = "operator") -> ActionView:
         """Stop a vehicle and take it out of the mission; returns whether it acknowledged that.
@@ -325,52 +304,7 @@ class MissionService:
         When the mission has ended the vehicle stays in it and is told once more.
         """
         live = await self._get(mission_id)
-        async with self._conductor.acting(mission_id):
-            member = live.team.get(name)
-            if member is None:
-                present = ", ".join(m.name for m in live.team) or "none"
-                raise VehicleNotFoundError(
-                    f"vehicle {name!r} takes no part in this mission", f"those that do: {present}"
-                )
-            if live.header.state in ENDED:
-                stops = [await self._stop_again(live, member)]
-            else:
-                stops = await self._take_out(live, member, actor)
-        return _action_view(live, stops)
-
-    async def _stop_again(self, live: LiveMission, member: Member) -> StopReceipt:
-        owner = self._hub.claimed_by(member.key)
-        if owner is not None:
-            raise ConflictError(
-                f"the mission is {live.header.state}, and vehicle {member.name!r} takes part in mission {owner} now",
-                f"stop it there: POST /api/v1/missions/{owner}/vehicles/{member.name}/abort",
-            )
-        return await self._conductor.stop_vehicle(live, member)
-
-    async def _take_out(self, live: LiveMission, member: Member, actor: str) -> list[StopReceipt]:
-        stops: list[StopReceipt] = []
-        # As with a mission: a vehicle does not wait for a slow disk.
-        written = asyncio.ensure_future(self._store_leaving(live.id, member.name))
-        await asyncio.wait([written], timeout=PATIENCE_S)
-        claimed = self._hub.claimed_by(member.key) == live.id
-        live.team.leave(member.name)
-        live.changed.set()
-        live.publish_summary()
-        if claimed:
-            stops = [await self._conductor.stop_vehicle(live, member)]
-            self._hub.release(member.key, live.id)
-        await written
-        if live.header.state is MissionState.READY and not list(live.team):
-            move = states.move(MissionState.READY, "reopen_draft")
-            await self._conductor.set_state(live, move, "no vehicle left", actor)
-        await live.journal.log(Level.INFO, "vehicle", f"{member.name} left", vehicle=member.name, actor=actor)
-        return stops
-
-    async def _store_leaving(self, mission_id: str, name: str) -> None:
-        async with self._database.writing() as session:
-            for row in await mission_queries.vehicles_of(session, mission_id):
-                if row.name == name:
-                    row.left_at = now()
+        return _action_view(live, await self._crews.stop_one(live, name, actor))
 
     async def preflight(self, mission_id: str) -> PreflightView:
         """Return what stands before a mission's start."""
@@ -386,7 +320,7 @@ class MissionService:
     async def forecast_of(self, mission_id: str, *, floor_depth_m: float | None = None) -> ForecastView:
         """Return what is to be expected of a stored mission from now on. Raises ConflictError, InvalidRequestError."""
         live = await self._get(mission_id)
-        self._refuse_ended(live, "has nothing before it")
+        refuse_ended(live, "has nothing before it")
         if live.search is not None:
             raise ConflictError(NO_FORECAST, "see its time window, search.window_s")
         async with self._database.reading() as session:
@@ -416,7 +350,7 @@ class MissionService:
     ) -> BatchVerdict:
         """Take in measurements; see ``measuring.measure``."""
         live = await self._get(mission_id)
-        return await measure(live, self._database, self._hub, self._rest, items, idempotency_key=idempotency_key)
+        return await measure(live, self._hub, self._rest, items, idempotency_key=idempotency_key)
 
     async def waypoint(
         self, mission_id: str, vehicle: str, *, after_step: int | None = None, timeout_s: float = 0.0
@@ -445,7 +379,7 @@ class MissionService:
         from app.missions.log_import import LogImport
 
         live = await self._get(mission_id)
-        work = await asyncio.to_thread(LogImport, live, self._database, self._settings, path, vehicle)
+        work = await asyncio.to_thread(LogImport, live, self._settings, path, vehicle)
         return await work.run(actor=actor, progress=progress)
 
     # Soundings that are not in the map
@@ -460,13 +394,13 @@ class MissionService:
         limit: int = 200,
     ) -> SoundingPage:
         """Return soundings in any of the states, a page of them."""
-        return await soundings_page(await self._get(mission_id), self._database, states, vehicle, after, limit)
+        return await soundings_page(await self._get(mission_id), states, vehicle, after, limit)
 
     async def rule(
         self, mission_id: str, sounding_id: int, ruling: Ruling, *, note: str = "", actor: str = "operator"
     ) -> SoundingView:
         """Restore a sounding or reject it; see ``reviewing.rule``."""
-        return await rule(await self._get(mission_id), self._database, sounding_id, ruling, note, actor)
+        return await rule(await self._get(mission_id), sounding_id, ruling, note, actor)
 
     # Moving targets
 
@@ -478,13 +412,13 @@ class MissionService:
         self, mission_id: str, *, target: str | None = None, after: int = 0, limit: int = 200
     ) -> TargetRangePage:
         """Return ranges to targets, a page of them."""
-        return await target_ranges_page(await self._get(mission_id), self._database, target, after, limit)
+        return await target_ranges_page(await self._get(mission_id), target, after, limit)
 
     # Searches
 
     async def scan(self, mission_id: str, items: Sequence[Scan]) -> BatchVerdict:
         """Take in scans; see ``scanning.scan``."""
-        return await scan(await self._get(mission_id), self._database, items)
+        return await scan(await self._get(mission_id), items)
 
     async def search_grid(self, mission_id: str, *, after: int | None = None) -> SearchGridView | None:
         """Return a search's site as known now; None when nothing is newer than ``after``. Raises ConflictError."""
@@ -507,7 +441,7 @@ class MissionService:
         """Change the tide and correct every sounding anew. Raises InvalidRequestError for a table that is wrong."""
         live = await self._get(mission_id)
         async with live.correcting:
-            await set_tide(live, self._database, self._executor, tide, actor)
+            await set_tide(live, self._executor, tide, actor)
         return corrections_view(live)
 
     async def set_sound_speed(
@@ -516,14 +450,14 @@ class MissionService:
         """Change the sound speed profile, or take it away, and correct every sounding anew."""
         live = await self._get(mission_id)
         async with live.correcting:
-            await set_sound_speed(live, self._database, self._executor, sound_speed, actor)
+            await set_sound_speed(live, self._executor, sound_speed, actor)
         return corrections_view(live)
 
     # From elsewhere
 
     async def imports(self, mission_id: str) -> list[ImportView]:
         """Return what was imported, oldest first."""
-        return await importing.imports_of(await self._get(mission_id), self._database)
+        return await importing.imports_of(await self._get(mission_id))
 
     async def import_soundings(
         self, mission_id: str, content: bytes, options: ImportOptions, *, actor: str = "operator"
@@ -531,17 +465,17 @@ class MissionService:
         """Begin with the soundings of a file; see ``importing.import_soundings``."""
         live = await self._get(mission_id)
         async with self._importing:
-            return await importing.import_soundings(live, self._database, self._executor, content, options, actor)
+            return await importing.import_soundings(live, self._executor, content, options, actor)
 
     async def delete_import(self, mission_id: str, import_id: str, *, actor: str = "operator") -> None:
         """Take an import back. Raises ImportNotFoundError."""
         live = await self._get(mission_id)
         async with self._importing:
-            await importing.delete_import(live, self._database, import_id, actor)
+            await importing.delete_import(live, import_id, actor)
 
     async def reference(self, mission_id: str) -> ReferenceView:
         """Return what the map is compared with. Raises ImportNotFoundError."""
-        return await importing.reference_of(await self._get(mission_id), self._database)
+        return await importing.reference_of(await self._get(mission_id))
 
     async def set_reference(
         self, mission_id: str, content: bytes, options: ImportOptions, *, actor: str = "operator"
@@ -549,19 +483,19 @@ class MissionService:
         """Compare the map with the grid in a file from now on. Raises InvalidRequestError."""
         live = await self._get(mission_id)
         async with self._importing:
-            return await importing.set_reference(live, self._database, content, options, actor)
+            return await importing.set_reference(live, content, options, actor)
 
     async def delete_reference(self, mission_id: str, *, actor: str = "operator") -> None:
         """Compare the map with nothing any more. Raises ImportNotFoundError."""
         live = await self._get(mission_id)
         async with self._importing:
-            await importing.delete_reference(live, self._database, actor)
+            await importing.delete_reference(live, actor)
 
     # What came of it
 
     async def steps(self, mission_id: str, *, after: int = 0, limit: int = 1000) -> list[StepView]:
         """Return up to ``limit`` steps with a number above ``after``."""
-        return await steps_after(await self._get(mission_id), self._database, after, limit)
+        return await steps_after(await self._get(mission_id), after, limit)
 
     async def telemetry(self, mission_id: str, points: int) -> TelemetryView:
         """Return what the vehicles told of themselves, at about ``points`` moments at most."""
@@ -582,7 +516,7 @@ class MissionService:
         if step is None:
             snapshot = await self.map(mission_id)
         else:
-            snapshot = await map_at_step(live, self._database, step)
+            snapshot = await map_at_step(live, step)
         at = "" if step is None else f"@{step}"
         tag = f"{run}.{snapshot.version}.{snapshot.revision}{at}"
         return await live.tiles.answer(snapshot, tag, since, tuple(sorted(set(further))))
@@ -696,32 +630,7 @@ class MissionService:
     # Helpers
 
     async def _get(self, mission_id: str) -> LiveMission:
-        live = self._live.get(mission_id)
-        if live is not None:
-            return live
-        async with self._loading:
-            if mission_id in self._live:
-                return self._live[mission_id]
-            async with self._database.reading() as session:
-                row = await session.get(MissionRow, mission_id)
-            if row is None:
-                raise MissionNotFoundError(f"there is no mission {mission_id!r}", "GET /api/v1/missions lists all")
-            live = await LiveMission.load(self._database, self._hub, self._executor, row, self._settings.time_scale)
-            await self._make_room()
-            self._live[mission_id] = live
-            self._maps.take_up(live)
-            return live
-
-    async def _make_room(self) -> None:
-        idle = [
-            m
-            for m in self._live.values()
-            if m.header.state in ENDED and not m.broadcaster.watched and not self._maps.busy(m.id)
-        ]
-        for live in idle[: max(0, len(idle) - ENDED_MISSIONS_IN_MEMORY + 1)]:
-            del self._live[live.id]
-            self._left[live.id] = live.summary()
-            await live.close()
+        return await self._memory.get(mission_id)
 
     def _view(self, live: LiveMission) -> MissionView:
         frame = live.frame
@@ -746,10 +655,6 @@ class MissionService:
             last_event_id=last_event_id,
         )
 
-    def _refuse_ended(self, live: LiveMission, words: str) -> None:
-        if live.header.state in ENDED:
-            raise ConflictError(f"the mission is {live.header.state} and {words}", "create a new mission")
-
 
 def _action_view(live: LiveMission, stops: Sequence[StopReceipt]) -> ActionView:
     return ActionView(mission=live.summary(), stops=[StopView(**receipt(stop)) for stop in stops])
@@ -772,17 +677,6 @@ def _warm_up() -> None:
 
 def _summary(kind: type[object]) -> str:
     return (inspect.getdoc(kind) or "").partition("\n\n")[0].replace("\n", " ")
-
-
-def _vehicle_row(mission_id: str, vehicle: VehicleSpec, slot: int) -> MissionVehicleRow:
-    return MissionVehicleRow(
-        mission_id=mission_id,
-        name=vehicle.name,
-        slot=slot,
-        spec=vehicle.model_dump(mode="json"),
-        joined_at=now(),
-        left_at=None,
-    )
 
 
 async def _after(first: LiveMessage, rest: Subscription) -> AsyncIterator[LiveMessage]:

@@ -5,19 +5,16 @@ from app.missions.live import LiveMission
 from app.missions.target_views import TargetRangePage, TargetRangeView
 from app.missions.views import Verdict
 from app.storage import target_ranges as range_queries
-from app.storage.database import Database
 
 
-async def target_ranges_page(
-    live: LiveMission, database: Database, target: str | None, after: int, limit: int
-) -> TargetRangePage:
+async def target_ranges_page(live: LiveMission, target: str | None, after: int, limit: int) -> TargetRangePage:
     """Return a page of the ranges. Raises TargetNotFoundError for a target that the mission does not have."""
     names = list(live.ranges.tracking.specs)
     if target is not None and target not in names:
         there = ", ".join(names) or "it has none"
         raise TargetNotFoundError(f"{target!r} is not a target of this mission", f"Those that are: {there}")
     await live.ranges.flush()
-    async with database.reading() as session:
+    async with live.database.reading() as session:
         rows = await range_queries.ranges_after(session, live.id, after, limit + 1, target)
     items = [
         TargetRangeView(

@@ -1,8 +1,9 @@
 """The database behind the service: connections, transactions, SQLite's settings."""
 
 import asyncio
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager, nullcontext
+from copy import copy
 from typing import Any
 
 from sqlalchemy import Connection, event, make_url, text
@@ -50,6 +51,10 @@ def make_engine(url: str) -> AsyncEngine:
     return engine
 
 
+Guard = Callable[[AsyncSession], Awaitable[None]]
+"""Looks, within a transaction that is about to write, whether it may; raises when it may not."""
+
+
 class Database:
     """Hands out sessions: ``reading`` for queries, ``writing`` for transactions that commit at the end."""
 
@@ -59,6 +64,13 @@ class Database:
         # SQLite's writers wait for each other by asking again and again, and the unlucky one gives up ("database is
         # locked"). Those of this process stand in line instead; the timeout is left for other processes.
         self._turn = asyncio.Lock() if self._engine.dialect.name == "sqlite" else None
+        self._guard: Guard | None = None
+
+    def guarded(self, guard: Guard) -> "Database":
+        """Return the same database with a guard before everything that is written through it."""
+        guarded = copy(self)
+        guarded._guard = guard
+        return guarded
 
     @asynccontextmanager
     async def reading(self) -> AsyncIterator[AsyncSession]:
@@ -72,6 +84,8 @@ class Database:
         async with self._turn or nullcontext(), self._connected() as connection:
             await connection.execution_options(bathyfleet_writes=True)
             async with connection.begin(), _session_on(connection) as session:
+                if self._guard is not None:
+                    await self._guard(session)
                 yield session
                 await session.flush()
 

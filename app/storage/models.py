@@ -338,6 +338,31 @@ class EventRow(Base):
     data: Mapped[dict[str, Any]]
 
 
+class ProcessRow(Base):
+    """A service process that shares this database. Whether it still lives, its membership tells (``membership.py``)."""
+
+    __tablename__ = "processes"
+
+    id: Mapped[int] = mapped_column(Integer, primary_key=True, autoincrement=True)
+    url: Mapped[str] = mapped_column(String(200))
+    """Where other processes reach it."""
+    secret: Mapped[str] = mapped_column(String(64))
+    """What they show to it; it ends with the process."""
+    certificate: Mapped[str | None] = mapped_column(Text)
+    """PEM of the certificate that it serves TLS with; None: plain HTTP, or one that everybody can check."""
+    began_at: Mapped[datetime]
+
+
+class MissionOwnerRow(Base):
+    """The one process that has a mission in memory; only it changes the mission."""
+
+    __tablename__ = "mission_owners"
+
+    mission_id: Mapped[str] = mapped_column(ForeignKey("missions.id", ondelete="CASCADE"), primary_key=True)
+    process_id: Mapped[int] = mapped_column(ForeignKey("processes.id", ondelete="CASCADE"), index=True)
+    since: Mapped[datetime]
+
+
 class TokenRow(Base):
     """An access token; only its hash is kept."""
 

@@ -1,5 +1,4 @@
 import asyncio
-import shutil
 import threading
 from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import asynccontextmanager, contextmanager
@@ -12,7 +11,7 @@ import pytest
 from app.main import Server, serve
 from app.missions.settings import ImcSettings
 from app.settings import Settings
-from app.storage import migrate
+from tests.databases import Databases
 
 # About 55 m by 55 m.
 AREA = {
@@ -69,14 +68,6 @@ def make_client(server: Server) -> httpx.AsyncClient:
     return httpx.AsyncClient(base_url=server.url + "/api/v1", timeout=20, verify=False)  # noqa: S501
 
 
-@pytest.fixture(scope="session")
-def empty_database(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """An SQLite file with every table and no row."""
-    path = tmp_path_factory.mktemp("database") / "empty.db"
-    migrate.upgrade_now(f"sqlite+aiosqlite:///{path}")
-    return path
-
-
 @contextmanager
 def running_in_thread(settings: Settings) -> Iterator[Server]:
     """The real server in a thread of its own, for fixtures that outlive one event loop."""
@@ -98,24 +89,19 @@ def running_in_thread(settings: Settings) -> Iterator[Server]:
 
 
 @pytest.fixture(scope="session")
-def shared_server(empty_database: Path) -> Iterator[Server]:
+def shared_server(databases: Databases) -> Iterator[Server]:
     """One server for every test that only asks."""
-    path = empty_database.with_name("shared.db")
-    shutil.copy(empty_database, path)
-    settings = Settings(port=0, database_url=f"sqlite+aiosqlite:///{path}", imc=ImcSettings(enabled=False))
+    settings = Settings(port=0, database_url=databases.fresh(), imc=ImcSettings(enabled=False))
     with running_in_thread(settings) as server:
         yield server
 
 
 @pytest.fixture
-def make_settings(tmp_path: Path, empty_database: Path) -> Callable[..., Settings]:
-    path = tmp_path / "fleet.db"
-    shutil.copy(empty_database, path)
-
+def make_settings(tmp_path: Path, database_url: str) -> Callable[..., Settings]:
     def make(**changes: Any) -> Settings:
         values: dict[str, Any] = {
             "port": 0,
-            "database_url": f"sqlite+aiosqlite:///{path}",
+            "database_url": database_url,
             "imc": ImcSettings(enabled=False),
             "output_dir": tmp_path / "output",
         }

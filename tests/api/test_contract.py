@@ -1,10 +1,8 @@
 """Whatever the OpenAPI document allows, and much that it does not, is answered as it says."""
 
 import asyncio
-import shutil
 from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import httpx
@@ -21,6 +19,7 @@ from app.settings import Settings
 from app.storage.database import Database
 from tests.api.conftest import mission_spec, running_in_thread, soundings
 from tests.api.test_openapi import CONTRACT
+from tests.databases import Databases
 
 # What the schema cannot say, the answer does: rings are closed, planners exist, max is above min, tables and files are
 # what they are called, profiles go down, there is a reference grid to differ from.
@@ -59,11 +58,9 @@ async def _admin_token(url: str) -> str:
 
 
 @pytest.fixture(scope="module")
-def service(empty_database: Path) -> Iterator[Service]:
+def service(databases: Databases) -> Iterator[Service]:
     load_all_checks()
-    path = empty_database.with_name("contract.db")
-    shutil.copy(empty_database, path)
-    url = f"sqlite+aiosqlite:///{path}"
+    url = databases.fresh()
     headers = {"Authorization": f"Bearer {asyncio.run(_admin_token(url))}"}
     with (
         running_in_thread(Settings(port=0, database_url=url, imc=ImcSettings(enabled=False))) as server,

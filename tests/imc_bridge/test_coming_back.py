@@ -12,10 +12,10 @@ from app.missions.states import MissionState
 from app.storage.database import Database
 from imc_bridge import Bridge, LinkChange, NodeState, RefusedError, WaypointStatus
 from tests.imc_bridge.conftest import Sea, open_sea, until
-from tests.missions.conftest import database_path, empty_database, make_settings
+from tests.missions.conftest import make_settings
 from tests.missions.fleet import until as until_done
 
-__all__ = ["database_path", "empty_database", "make_settings"]
+__all__ = ["make_settings"]
 
 COMMANDS = {message().msg_id.to_bytes(2, "little") for message in (imcpy.PlanControl, imcpy.Abort)}
 REFERENCE = imcpy.Reference().msg_id.to_bytes(2, "little")

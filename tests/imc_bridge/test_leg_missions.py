@@ -15,12 +15,12 @@ from app.storage.database import Database
 from imc_bridge import NodeState, Sounding
 from imc_bridge.logs import VehicleLog
 from tests.imc_bridge.conftest import open_sea
-from tests.missions.conftest import database_path, empty_database, make_settings
+from tests.missions.conftest import make_settings
 from tests.missions.fleet import until
 
 SPEED = 20.0
 
-__all__ = ["database_path", "empty_database", "make_settings"]
+__all__ = ["make_settings"]
 
 
 async def test_a_mission_by_legs_finishes_without_contact_under_water_and_has_every_sounding_in_the_end(

@@ -1,12 +1,9 @@
-import shutil
 from collections.abc import AsyncIterator, Callable
-from pathlib import Path
 
 import pytest
 
 from app.missions.service import MissionService
 from app.missions.settings import ImcSettings, ServiceSettings
-from app.storage import migrate
 from app.storage.database import Database
 from tests.imc_bridge.conftest import captures
 from tests.missions.fleet import Harbour
@@ -14,26 +11,11 @@ from tests.missions.fleet import Harbour
 __all__ = ["captures"]
 
 
-@pytest.fixture(scope="session")
-def empty_database(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """An SQLite file with every table and no row."""
-    path = tmp_path_factory.mktemp("database") / "empty.db"
-    migrate.upgrade_now(f"sqlite+aiosqlite:///{path}")
-    return path
-
-
 @pytest.fixture
-def database_path(tmp_path: Path, empty_database: Path) -> Path:
-    path = tmp_path / "fleet.db"
-    shutil.copy(empty_database, path)
-    return path
-
-
-@pytest.fixture
-def make_settings(database_path: Path) -> Callable[..., ServiceSettings]:
+def make_settings(database_url: str) -> Callable[..., ServiceSettings]:
     def make(**changes: object) -> ServiceSettings:
         values = {
-            "database_url": f"sqlite+aiosqlite:///{database_path}",
+            "database_url": database_url,
             "imc": ImcSettings(enabled=False),
             "time_scale": 50.0,
         }
@@ -44,7 +26,7 @@ def make_settings(database_path: Path) -> Callable[..., ServiceSettings]:
 
 @pytest.fixture
 async def harbour(make_settings: Callable[..., ServiceSettings]) -> AsyncIterator[Harbour]:
-    """A service that can be ended and started again on the same file."""
+    """A service that can be ended and started again on the same database."""
     harbour = Harbour(make_settings)
     await harbour.open()
     yield harbour
@@ -57,8 +39,8 @@ async def service(harbour: Harbour) -> MissionService:
 
 
 @pytest.fixture
-async def database(database_path: Path) -> AsyncIterator[Database]:
-    """The file beside the service."""
-    database = Database(f"sqlite+aiosqlite:///{database_path}")
+async def database(database_url: str) -> AsyncIterator[Database]:
+    """The database beside the service."""
+    database = Database(database_url)
     yield database
     await database.close()

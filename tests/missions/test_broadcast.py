@@ -6,7 +6,7 @@ from datetime import UTC, datetime
 import pytest
 
 from app.missions import broadcast
-from app.missions.broadcast import Broadcaster, Subscription, WatcherTooSlowError
+from app.missions.broadcast import Broadcaster, Subscription, WatchEndedError
 from app.missions.live import live_period_s
 from app.missions.views import EventMessage, EventView, Level, LiveMessage, VehiclesMessage, WaypointsMessage
 
@@ -61,7 +61,7 @@ async def test_a_watcher_that_never_takes_anything_is_cut_off(monkeypatch: pytes
     with broadcaster.subscribe() as stuck:
         for i in range(21):
             broadcaster.publish(event(i))
-        with pytest.raises(WatcherTooSlowError, match="more than 20 messages"):
+        with pytest.raises(WatchEndedError, match="more than 20 messages"):
             await take(stuck, 1)
 
 

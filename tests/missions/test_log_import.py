@@ -4,7 +4,6 @@ import asyncio
 import json
 import os
 import signal
-import sqlite3
 import subprocess
 import sys
 import time
@@ -21,6 +20,7 @@ from app.missions.settings import ServiceSettings
 from app.missions.views import LogImportView
 from app.storage import missions as mission_queries
 from app.storage.database import Database
+from tests.databases import query
 from tests.imc_bridge import log_writer as writer
 from tests.missions.builders import make_spec, rectangle
 
@@ -30,20 +30,12 @@ PINGS = 300
 Rows = list[tuple[Any, ...]]
 
 
-def stored(database: Path, columns: str = "time_s, beam, verdict, depth_m") -> Rows:
-    connection = sqlite3.connect(database)
-    try:
-        return connection.execute(f"select {columns} from soundings order by time_s, beam").fetchall()  # noqa: S608
-    finally:
-        connection.close()
+def stored(url: str, columns: str = "time_s, beam, verdict, depth_m") -> Rows:
+    return query(url, f"select {columns} from soundings order by time_s, beam")  # noqa: S608
 
 
-def points(database: Path) -> Rows:
-    connection = sqlite3.connect(database)
-    try:
-        return connection.execute("select vehicle, time_s from positions order by id").fetchall()
-    finally:
-        connection.close()
+def points(url: str) -> Rows:
+    return query(url, "select vehicle, time_s from positions order by id")
 
 
 @pytest.fixture
@@ -69,12 +61,12 @@ async def take(service: MissionService, mission_id: str, log: Path, **options: A
 
 
 async def test_a_log_becomes_soundings_a_track_a_map_and_a_line_in_the_log(
-    service: MissionService, log: Path, database_path: Path
+    service: MissionService, log: Path, database_url: str
 ) -> None:
     mission = await service.create(make_spec(vehicles=[]))
     seen: list[tuple[int, int]] = []
     view = await take(service, mission.id, log, progress=lambda done, total: seen.append((done, total)))
-    rows = stored(database_path)
+    rows = stored(database_url)
     assert (view.vehicle, view.soundings + view.rejected) == (writer.NAME, PINGS)
     assert len(rows) == PINGS
     assert view.soundings == sum(row[2] == "accepted" for row in rows) > 100
@@ -95,17 +87,17 @@ async def test_a_log_becomes_soundings_a_track_a_map_and_a_line_in_the_log(
 
 
 async def test_a_log_imported_again_changes_nothing(
-    service: MissionService, log: Path, database_path: Path, tmp_path: Path
+    service: MissionService, log: Path, database_url: str, tmp_path: Path
 ) -> None:
     mission = await service.create(make_spec())
     first = await take(service, mission.id, log)
-    before = stored(database_path, "*"), points(database_path), await service.events(mission.id)
+    before = stored(database_url, "*"), points(database_url), await service.events(mission.id)
     again = await take(service, mission.id, log)
     assert again == first.model_copy(update={"known": True})
     # The same records in another file: known one by one.
     plain = writer.write(tmp_path / "Data.lsf", writer.survey(PINGS))
     assert (await take(service, mission.id, plain)).duplicate == PINGS
-    assert stored(database_path, "*") == before[0]
+    assert stored(database_url, "*") == before[0]
     assert (await service.mission(mission.id)).progress.soundings == first.soundings
 
 
@@ -116,7 +108,7 @@ async def test_an_import_that_failed_anywhere_goes_on_where_it_was(
     make_settings: Callable[..., ServiceSettings],
     database: Database,
     log: Path,
-    database_path: Path,
+    database_url: str,
     monkeypatch: pytest.MonkeyPatch,
     fails_after: int,
 ) -> None:
@@ -139,14 +131,12 @@ async def test_an_import_that_failed_anywhere_goes_on_where_it_was(
     finished = await take(later, broken.id, log)
     straight = await take(later, whole.id, log)
     assert finished == straight
-    connection = sqlite3.connect(database_path)
     for table, columns in (("soundings", "time_s, beam, verdict, reason, depth_m, lat_deg"), ("positions", "time_s")):
         rows = [
-            connection.execute(f"select {columns} from {table} where mission_id = ? order by id", (m.id,)).fetchall()  # noqa: S608
+            query(database_url, f"select {columns} from {table} where mission_id = :id order by id", id=m.id)  # noqa: S608
             for m in (whole, broken)
         ]
         assert rows[0] == rows[1]
-    connection.close()
     assert (await later.mission(broken.id)).progress.soundings == straight.soundings
     await later.shutdown()
 
@@ -172,13 +162,13 @@ async def test_a_running_service_notices_what_another_process_imported(
 
 
 async def test_live_telemetry_of_the_same_dive_is_not_stored_twice(
-    service: MissionService, log: Path, database_path: Path
+    service: MissionService, log: Path, database_url: str
 ) -> None:
     mission = await service.create(make_spec(area=rectangle(0, 0, 30, 120)))
     first = await take(service, mission.id, writer.write(log.with_name("part.lsf"), writer.survey(100)))
     rest = await take(service, mission.id, log)
     assert (first.soundings, rest.duplicate, rest.soundings) == (100, 100, PINGS - 100)
-    assert len({row[:2] for row in stored(database_path)}) == PINGS == len(stored(database_path))
+    assert len({row[:2] for row in stored(database_url)}) == PINGS == len(stored(database_url))
 
 
 @pytest.mark.parametrize(
@@ -190,7 +180,7 @@ async def test_live_telemetry_of_the_same_dive_is_not_stored_twice(
     ],
 )
 async def test_what_cannot_be_imported_is_refused_and_nothing_is_stored(
-    service: MissionService, tmp_path: Path, database_path: Path, content: bytes | None, vehicle: str | None, words: str
+    service: MissionService, tmp_path: Path, database_url: str, content: bytes | None, vehicle: str | None, words: str
 ) -> None:
     mission = await service.create(make_spec())
     path = tmp_path / "Data.lsf"
@@ -199,10 +189,10 @@ async def test_what_cannot_be_imported_is_refused_and_nothing_is_stored(
     with pytest.raises(InvalidRequestError, match=words) as refused:
         await take(service, mission.id, path, vehicle=vehicle)
     assert refused.value.remedy
-    assert stored(database_path) == []
+    assert stored(database_url) == []
 
 
-def kill_after_the_first_batch(command: list[str], environment: dict[str, str], database: Path) -> None:
+def kill_after_the_first_batch(command: list[str], environment: dict[str, str], database: str) -> None:
     with subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
         while not stored(database) and process.poll() is None:
             time.sleep(0.005)
@@ -210,7 +200,7 @@ def kill_after_the_first_batch(command: list[str], environment: dict[str, str], 
 
 
 async def test_a_command_that_was_killed_and_run_again_has_imported_everything_once(
-    service: MissionService, tmp_path: Path, database_path: Path
+    service: MissionService, tmp_path: Path, database_url: str
 ) -> None:
     mission = await service.create(make_spec(area=rectangle(0, 0, 30, 1600)))
     log = writer.write(tmp_path / "Data.lsf.gz", writer.survey(5000))
@@ -223,23 +213,23 @@ async def test_a_command_that_was_killed_and_run_again_has_imported_everything_o
         str(log),
         "--json",
     ]
-    command += ["--database", f"sqlite+aiosqlite:///{database_path}"]
+    command += ["--database", database_url]
     environment = {name: value for name, value in os.environ.items() if not name.startswith("BATHYFLEET_")}
-    await asyncio.to_thread(kill_after_the_first_batch, command, environment, database_path)
+    await asyncio.to_thread(kill_after_the_first_batch, command, environment, database_url)
     ended = await asyncio.to_thread(
         subprocess.run, command, env=environment, cwd=tmp_path, capture_output=True, text=True, check=False
     )
     assert (ended.returncode, ended.stderr) == (0, ""), "no progress bar where there is no terminal"
     (view,) = json.loads(ended.stdout)
     assert (view["soundings"], view["rejected"], view["duplicate"]) == (5000, 0, 0)
-    rows = stored(database_path)
+    rows = stored(database_url)
     assert len(rows) == len({row[:2] for row in rows}) == 5000
-    times = [time_s for _, time_s in points(database_path)]
+    times = [time_s for _, time_s in points(database_url)]
     assert times == sorted(set(times)), "no part of the track twice"
 
 
 async def test_a_real_log_of_dune_maps_the_relief_it_flew_over(
-    service: MissionService, captures: Path, database_path: Path
+    service: MissionService, captures: Path, database_url: str
 ) -> None:
     west, south = -8.7075, 41.1835
     east, north = -8.7035, 41.1865
@@ -249,4 +239,4 @@ async def test_a_real_log_of_dune_maps_the_relief_it_flew_over(
     view = await take(service, mission.id, captures / "lauv-xplore-1.lsf.gz")
     assert (view.vehicle, view.soundings, view.rejected) == ("lauv-xplore-1", 958, 0)
     assert view.refused == {}
-    assert {row[2] for row in stored(database_path)} == {"accepted"}
+    assert {row[2] for row in stored(database_url)} == {"accepted"}

@@ -2,8 +2,6 @@
 
 import asyncio
 import io
-import sqlite3
-from pathlib import Path
 
 import httpx
 import numpy as np
@@ -13,6 +11,7 @@ import rasterio
 from app.main import serve
 from app.missions.settings import ImcSettings
 from app.settings import Settings
+from tests.databases import query
 from tests.missions.builders import FRAME, spec_json
 from tests.missions.polling import PollingVehicle
 
@@ -21,10 +20,8 @@ STEPS = 12
 
 
 @pytest.mark.timeout(300)
-async def test_a_mission_of_two_polling_vehicles_from_create_to_geotiff(database_path: Path) -> None:
-    settings = Settings(
-        port=0, database_url=f"sqlite+aiosqlite:///{database_path}", imc=ImcSettings(enabled=False), time_scale=10
-    )
+async def test_a_mission_of_two_polling_vehicles_from_create_to_geotiff(database_url: str) -> None:
+    settings = Settings(port=0, database_url=database_url, imc=ImcSettings(enabled=False), time_scale=10)
     started: asyncio.Future[object] = asyncio.get_running_loop().create_future()
     serving = asyncio.create_task(serve(settings, started=started.set_result))
     await asyncio.wait([serving, started], return_when=asyncio.FIRST_COMPLETED)
@@ -69,9 +66,8 @@ async def test_a_mission_of_two_polling_vehicles_from_create_to_geotiff(database
         depth = np.abs(image.read(1, masked=True))
         assert image.shape == (50, 50)
     assert 8.0 < float(depth.min()) <= float(depth.max()) < 16.0
-    rows = sqlite3.connect(database_path)
-    stored = dict(rows.execute("select vehicle, count(*) from soundings where verdict = 'accepted' group by vehicle"))
-    statuses = {status for (status,) in rows.execute("select status from waypoints")}
-    rows.close()
+    counts = "select vehicle, count(*) from soundings where verdict = 'accepted' group by vehicle"
+    stored = dict(query(database_url, counts))
+    statuses = {status for (status,) in query(database_url, "select status from waypoints")}
     assert stored == {vehicle.name: len(vehicle.accepted) for vehicle in vehicles}
     assert statuses == {"reached"}

@@ -9,9 +9,11 @@ from app.storage.models import (
     BatchRow,
     EventRow,
     ImportRow,
+    MissionOwnerRow,
     MissionRow,
     MissionVehicleRow,
     PositionRow,
+    ProcessRow,
     ReferenceRow,
     ScanRow,
     SoundingRow,
@@ -159,8 +161,8 @@ def scan(mission_id: str = "m1", time_s: float = 1.0) -> dict[str, Any]:
 def one_of_each() -> list[list[Any]]:
     """Rows in the order in which foreign keys allow them."""
     return [
-        [mission()],
-        [vehicle(), step()],
+        [mission(), ProcessRow(id=1, url="http://10.0.0.5", secret="e" * 64, certificate=None, began_at=TIME)],
+        [vehicle(), step(), MissionOwnerRow(mission_id="m1", process_id=1, since=TIME)],
         [waypoint()],
         [
             SoundingRow(**sounding()),

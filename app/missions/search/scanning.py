@@ -11,12 +11,11 @@ from app.missions.spec import VehicleKind
 from app.missions.states import MissionState
 from app.missions.verdicts import batch_verdict
 from app.missions.views import BatchVerdict, ItemVerdict, Verdict
-from app.storage.database import Database
 
 MAX_SCANS = 1000
 
 
-async def scan(live: LiveMission, database: Database, items: Sequence[Scan]) -> BatchVerdict:
+async def scan(live: LiveMission, items: Sequence[Scan]) -> BatchVerdict:
     """Take in scans; what is counted accepted is stored for good and in the grid when this returns.
 
     A scan is known by its vehicle and time: sent again, it is a duplicate.
@@ -35,7 +34,7 @@ async def scan(live: LiveMission, database: Database, items: Sequence[Scan]) -> 
         raise InvalidRequestError("items", f"{len(items)} scans are too many", f"send at most {MAX_SCANS} at once")
     refused = {i: reason for i, item in enumerate(items) if (reason := _stranger(live, item.vehicle))}
     taken = {i: report_of_posted(item) for i, item in enumerate(items) if i not in refused}
-    async with live.journal.writing, database.writing() as session:
+    async with live.journal.writing, live.database.writing() as session:
         verdicts, committed = await live.journal.take_scans(list(taken.values()), session)
     committed()
     answers = [ItemVerdict(index=i, verdict=Verdict.REJECTED, reason=reason) for i, reason in refused.items()]

@@ -1,0 +1,228 @@
+"""Requests and live views of a mission that another process has are sent on to it; when it ended, to its successor."""
+
+import asyncio
+import contextlib
+import re
+from collections.abc import AsyncIterator
+from types import SimpleNamespace
+from urllib.parse import quote
+
+import httpx
+import structlog
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+from websockets.asyncio.client import ClientConnection, connect
+from websockets.exceptions import ConnectionClosed, InvalidHandshake
+from websockets.typing import Subprotocol
+
+from app.api.peers import comes_from_peer, end_to_end, headers_for, recognise, tls_of
+from app.api.problems import instance_of, make_problem, problem_response
+from app.api.racing import first_of
+from app.api.schemas import API
+from app.api.state import EdgeState
+from app.missions.ownership import Peer
+
+_OF_A_MISSION = re.compile(rf"^{API}/missions/([0-9a-f]{{8}}-[0-9a-f-]{{27}})(?:/|$)")
+
+TAKEOVER_S = 10.0
+"""How long a request waits for a mission whose process ended to be taken up by another one."""
+RETRY_S = 0.2
+
+MISDIRECTED = 421
+"""What a process answers that does not have the mission (any more)."""
+CLOSE_TRY_AGAIN = 1013
+NO_CODE = (1005, 1006)
+"""Codes of a WebSocket's end that may not be sent."""
+
+_OUR_OWN = frozenset(("date", "server", "x-request-id", "x-content-type-options"))
+"""Headers of answers that this process sets itself."""
+
+_ROUTE = SimpleNamespace(path=f"{API}/missions/{{mission_id}} (sent on)")
+
+log = structlog.get_logger(__name__)
+
+
+class ForwardingMiddleware:
+    """Answers what concerns this process's missions here, and lets their owners answer the rest."""
+
+    def __init__(self, app: ASGIApp) -> None:
+        self.app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Serve one request or live view."""
+        if scope["type"] not in ("http", "websocket"):
+            await self.app(scope, receive, send)
+            return
+        edge: EdgeState = scope["app"].state.edge
+        recognise(scope, edge.service.process.secret)
+        found = _OF_A_MISSION.match(scope["path"])
+        peer = await edge.service.process.owner(found[1]) if found else None
+        if found is None or peer is None:
+            await self.app(scope, receive, send)
+        elif scope["type"] == "websocket":
+            await _send_view_on(edge, peer, scope, receive, send)
+        elif comes_from_peer(scope):
+            problem = make_problem("mission-elsewhere", "it is another process's now", instance=instance_of(scope))
+            answer = problem_response(problem)
+            answer.status_code = MISDIRECTED
+            await answer(scope, receive, send)
+        else:
+            scope["route"] = _ROUTE
+            await self._send_on(edge, found[1], scope, receive, send)
+
+    async def _send_on(self, edge: EdgeState, mission_id: str, scope: Scope, receive: Receive, send: Send) -> None:
+        body = await _body(receive)
+        loop = asyncio.get_running_loop()
+        deadline_s = loop.time() + TAKEOVER_S
+        while loop.time() < deadline_s:
+            peer = await edge.service.process.owner(mission_id)
+            if peer is None:
+                await self.app(scope, _once(body, receive), send)
+                return
+            try:
+                async with _asked(edge, peer, scope, body) as answer:
+                    if answer.status_code != MISDIRECTED:
+                        await first_of(_relay(answer, send), _until_left(receive))
+                        return
+            except (httpx.ConnectError, httpx.ConnectTimeout):
+                log.warning("the process that has the mission is not there", url=peer.url, mission=mission_id)
+            except httpx.TransportError as error:
+                if scope["method"] not in ("GET", "HEAD"):
+                    await _refuse(
+                        scope,
+                        receive,
+                        send,
+                        f"the process that has the mission broke off ({type(error).__name__}): "
+                        "perhaps it did what was asked, perhaps not",
+                        "See how the mission stands, then ask again; measurements with an Idempotency-Key may be "
+                        "sent again at once",
+                    )
+                    return
+            edge.service.process.called.set()
+            await asyncio.sleep(RETRY_S)
+        await _refuse(
+            scope,
+            receive,
+            send,
+            f"the process that had the mission does not answer, and none took it up within {TAKEOVER_S:g} s",
+            "Ask again in a moment; see whether a process runs that reaches the mission's vehicles",
+        )
+
+
+@contextlib.asynccontextmanager
+async def _asked(edge: EdgeState, peer: Peer, scope: Scope, body: bytes) -> AsyncIterator[httpx.Response]:
+    client = edge.peers.to(peer)
+    request = client.build_request(scope["method"], _target(scope), headers=headers_for(peer, scope), content=body)
+    answer = await client.send(request, stream=True)
+    try:
+        yield answer
+    finally:
+        await answer.aclose()
+
+
+def _target(scope: Scope) -> str:
+    path = scope.get("raw_path") or quote(scope["path"]).encode()
+    query = scope.get("query_string", b"")
+    return (path.split(b"?")[0] + (b"?" + query if query else b"")).decode("latin-1")
+
+
+async def _relay(answer: httpx.Response, send: Send) -> None:
+    headers = [
+        (name, value)
+        for name, value in answer.headers.raw
+        if end_to_end([(name.decode("latin-1"), "")])
+        and name.lower() not in (b"x-request-id", b"x-content-type-options")
+    ]
+    length = answer.headers.get("content-length")
+    if length is not None:
+        headers.append((b"content-length", length.encode()))
+    await send(
+        {
+            "type": "http.response.start",
+            "status": answer.status_code,
+            "headers": [(name.encode("latin-1"), value.encode("latin-1")) for name, value in headers],
+        }
+    )
+    try:
+        async for part in answer.aiter_raw():
+            await send({"type": "http.response.body", "body": part, "more_body": True})
+    except httpx.TransportError:
+        if length is not None:
+            raise
+        # A stream: its reader connects anew and goes on after the last event it has.
+    await send({"type": "http.response.body", "body": b"", "more_body": False})
+
+
+async def _until_left(receive: Receive) -> None:
+    while (await receive())["type"] != "http.disconnect":
+        pass
+
+
+async def _body(receive: Receive) -> bytes:
+    parts = []
+    more = True
+    while more:
+        message = await receive()
+        parts.append(message.get("body", b""))
+        more = message.get("more_body", False)
+    return b"".join(parts)
+
+
+def _once(body: bytes, receive: Receive) -> Receive:
+    given = False
+
+    async def replay() -> Message:
+        nonlocal given
+        if given:
+            return await receive()
+        given = True
+        return {"type": "http.request", "body": body, "more_body": False}
+
+    return replay
+
+
+async def _refuse(scope: Scope, receive: Receive, send: Send, detail: str, remedy: str) -> None:
+    problem = make_problem("mission-elsewhere", detail, instance=instance_of(scope), remedy=remedy)
+    await problem_response(problem, {"Retry-After": "1"})(scope, receive, send)
+
+
+async def _send_view_on(edge: EdgeState, peer: Peer, scope: Scope, receive: Receive, send: Send) -> None:
+    """Show a live view of another process; when that ends, the viewer asks again and finds its successor."""
+    assert (await receive())["type"] == "websocket.connect"  # noqa: S101 - the protocol's first message
+    try:
+        async with connect(
+            peer.url.replace("http", "ws", 1) + _target(scope),
+            ssl=tls_of(peer),
+            subprotocols=[Subprotocol(name) for name in scope.get("subprotocols", ())] or None,
+            additional_headers=[
+                (name, value) for name, value in headers_for(peer, scope) if name != "sec-websocket-protocol"
+            ],
+            origin=None,
+            max_size=None,
+            compression=None,
+            open_timeout=TAKEOVER_S,
+            proxy=None,
+        ) as upstream:
+            await send({"type": "websocket.accept", "subprotocol": upstream.subprotocol})
+            await first_of(_pump_down(upstream, send), _pump_up(upstream, receive), edge.stopping.wait())
+            code = upstream.close_code or CLOSE_TRY_AGAIN
+            reason = upstream.close_reason or ""
+    except (OSError, TimeoutError, InvalidHandshake) as error:
+        log.warning("live view cannot be had from another process", url=peer.url, error=str(error))
+        await send({"type": "websocket.accept"})
+        code, reason = CLOSE_TRY_AGAIN, "the process that has the mission does not answer: reconnect"
+    with contextlib.suppress(RuntimeError, OSError):
+        await send({"type": "websocket.close", "code": CLOSE_TRY_AGAIN if code in NO_CODE else code, "reason": reason})
+
+
+async def _pump_down(upstream: ClientConnection, send: Send) -> None:
+    with contextlib.suppress(ConnectionClosed):
+        async for message in upstream:
+            await send({"type": "websocket.send", "text" if isinstance(message, str) else "bytes": message})
+
+
+async def _pump_up(upstream: ClientConnection, receive: Receive) -> None:
+    """Pass on what a viewer sends, until it leaves."""
+    with contextlib.suppress(ConnectionClosed):
+        while (message := await receive())["type"] != "websocket.disconnect":
+            text = message.get("text")
+            await upstream.send(text if text is not None else message.get("bytes") or b"")

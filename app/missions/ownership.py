@@ -1,0 +1,189 @@
+"""Which process has which mission, where several share a database.
+
+A mission lives in the memory of one process only: whoever asks for it first takes it, everybody else sends requests on
+to its owner. When a process ends, what it had belongs to nobody; missions that run are taken up by others at once.
+What an owner writes for a mission carries a guard, so that a process that was taken for dead cannot write any more.
+"""
+
+import asyncio
+import secrets
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import structlog
+from sqlalchemy.ext.asyncio import AsyncSession
+
+from app.missions.clock import now
+from app.missions.errors import MissionElsewhereError
+from app.missions.states import MissionState
+from app.storage import processes
+from app.storage.database import Database, Guard
+from app.storage.membership import MembershipLostError, make_membership
+from app.storage.models import ProcessRow
+
+PERIOD_S = 1.0
+"""How often is looked whether other processes ended."""
+
+TRIES = 5
+"""Entering is tried again when another process looks at the wrong moment."""
+
+AT_SEA = (MissionState.RUNNING, MissionState.PAUSED)
+"""States in which somebody has to have a mission."""
+
+log = structlog.get_logger(__name__)
+
+
+@dataclass(frozen=True)
+class Peer:
+    """Another process that shares the database, and what it takes to speak to it."""
+
+    number: int
+    url: str
+    secret: str
+    certificate: str | None
+
+
+class Ownership:
+    """What one process has, among those that share a database.
+
+    Parameters
+    ----------
+    url, certificate
+        Where the others reach this process, and the certificate (PEM) that it shows them if it serves TLS with its own.
+
+    Attributes
+    ----------
+    secret
+        What others show who send a request on to this process.
+    called
+        Set when another process says that something changed.
+    """
+
+    def __init__(self, database: Database, url: str, certificate: str | None = None) -> None:
+        self._database = database
+        self._url = url
+        self._certificate = certificate
+        self.secret = secrets.token_hex(32)
+        self.called = asyncio.Event()
+        self._membership = make_membership(database.url, self.called.set)
+        self._number = 0
+        self._mine: set[str] = set()
+        self._peers: dict[int, Peer] = {}
+
+    @property
+    def number(self) -> int:
+        """What this process is called among the others; 0 before it entered."""
+        return self._number
+
+    @property
+    def peers(self) -> Sequence[Peer]:
+        """The other processes that were alive when we last looked."""
+        return list(self._peers.values())
+
+    async def enter(self) -> bool:
+        """Become one of the processes; False when what we had before may have been others' meanwhile.
+
+        Raises
+        ------
+        MembershipLostError
+            When that is not possible now.
+        """
+        if self._number:
+            await self._membership.enter(self._number)
+            if await self._is_known():
+                return True
+        self._mine.clear()
+        for _ in range(TRIES):
+            row = ProcessRow(url=self._url, secret=self.secret, certificate=self._certificate, began_at=now())
+            async with self._database.writing() as session:
+                session.add(row)
+                await session.flush()
+                self._number = row.id
+            await self._membership.enter(self._number)
+            # Between the two another process may have found the lock free and taken us for dead.
+            if await self._is_known():
+                return False
+        raise MembershipLostError(f"this process was taken for dead {TRIES} times while it began")
+
+    async def _is_known(self) -> bool:
+        async with self._database.reading() as session:
+            return await session.get(ProcessRow, self._number) is not None
+
+    async def leave(self) -> None:
+        """Give everything up and tell the others."""
+        if self._number:
+            try:
+                async with self._database.writing() as session:
+                    await processes.bury(session, [self._number])
+                await self._membership.call()
+            except Exception as error:
+                # The others find out by themselves.
+                log.warning("could not say that this process ends", error=str(error))
+            self._number = 0
+        self._mine.clear()
+        await self._membership.leave()
+
+    async def look(self) -> Sequence[str]:
+        """Look who lives. Returns the missions at sea that nobody has, oldest first.
+
+        Raises
+        ------
+        MembershipLostError
+            When the others may take this process for dead.
+        """
+        async with self._database.reading() as session:
+            known = await processes.all_processes(session)
+        alive = await self._membership.alive([row.id for row in known])
+        if self._number not in alive:
+            raise MembershipLostError("this process was taken for dead")
+        dead = {row.id for row in known} - alive
+        if dead:
+            async with self._database.writing() as session:
+                await processes.bury(session, dead)
+            log.warning("another process ended", processes=sorted(dead))
+        self._peers = {
+            row.id: Peer(row.id, row.url, row.secret, row.certificate)
+            for row in known
+            if row.id in alive and row.id != self._number
+        }
+        async with self._database.reading() as session:
+            return await processes.orphans(session, AT_SEA)
+
+    async def owner(self, mission_id: str) -> Peer | None:
+        """Return the other process that has a mission; None when it is ours, nobody's or unknown."""
+        if mission_id in self._mine:
+            return None
+        async with self._database.reading() as session:
+            number = await processes.owner(session, mission_id)
+        if number is None or number == self._number:
+            return None
+        if number not in self._peers:
+            await self.look()
+        return self._peers.get(number)
+
+    async def take(self, mission_id: str) -> bool:
+        """Have a mission from now on; False when another process has it."""
+        async with self._database.writing() as session:
+            await processes.take(session, mission_id, self._number, now())
+            mine = await processes.owner(session, mission_id) == self._number
+        if mine:
+            self._mine.add(mission_id)
+        return mine
+
+    async def release(self, mission_ids: Iterable[str]) -> None:
+        """Give missions up."""
+        given = set(mission_ids)
+        self._mine -= given
+        async with self._database.writing() as session:
+            await processes.release(session, given, self._number)
+
+    def guard(self, mission_id: str) -> Guard:
+        """Return what keeps a transaction from writing for a mission that is another process's now."""
+
+        async def check(session: AsyncSession) -> None:
+            if await processes.owner(session, mission_id, hold=True) != self._number:
+                raise MissionElsewhereError(
+                    f"mission {mission_id} belongs to another process now", "ask again: the request finds its way there"
+                )
+
+        return check
