@@ -13,6 +13,7 @@ from concurrent.futures import Executor, Future
 import numpy as np
 import structlog
 from numpy.typing import NDArray
+from sqlalchemy.orm import make_transient
 
 from app.estimation import SingleBeam
 from app.exploration.bottom import Bottom
@@ -262,8 +263,8 @@ class Runner:
         live = self._live
         patient = live.builder.newest is None or self._mapping_s * self._time_scale <= PATIENCE_S
         if self._mapping is not None and (patient or self._mapping.done()):
-            await self._mapping
-            self._mapping = None
+            mapping, self._mapping = self._mapping, None
+            await mapping
         await live.journal.flush()
         await live.notice_imports()
         if patient and live.builder.stale:
@@ -273,10 +274,10 @@ class Runner:
         """Bring the map up to date, then make the decision, in a worker thread."""
         live = self._live
         started_s = asyncio.get_running_loop().time()
-        await self._renew_map()
+        await live.journal.storage.done(self._renew_map)
 
         step_s = self._spec.limits.max_step_m / self._spec.speed_mps
-        await live.ranges.flush()
+        await live.journal.storage.done(live.ranges.flush)
         targets = live.ranges.tracking.told(live.ranges.times.now_s(), step_s)
         task = self._lookout.task(live.header.step + 1)
 
@@ -321,7 +322,8 @@ class Runner:
             memory=decision.memory,
             targets=live.ranges.memory(),
         )
-        await to_the_end(self._store(step, rows))
+        # The step is not flown before it is on disk, however long that takes; the vehicles wait where they are.
+        await live.journal.storage.done(lambda: to_the_end(self._store(step, rows)))
         if live.search is not None and live.search.began_at is None:
             live.search.began_at = step.committed_at
         metrics.STEPS.inc()
@@ -361,6 +363,11 @@ class Runner:
 
     async def _store(self, step: StepRow, waypoints: list[WaypointRow]) -> None:
         async with self._database.writing() as session:
+            known = await session.get(StepRow, (step.mission_id, step.number))
+            if known is not None and known.committed_at == step.committed_at:
+                return  # written before the connection broke
+            for row in (step, *waypoints):
+                make_transient(row)  # of a transaction that failed
             session.add(step)
             await session.flush()
             session.add_all(waypoints)
@@ -504,10 +511,14 @@ class Runner:
         if live.running_since_s is None:
             return
         seconds = loop_time - live.running_since_s
-        live.running_since_s = loop_time
+        try:
+            async with self._database.writing() as session:
+                await mission_queries.add_elapsed(session, live.id, seconds, now())
+        except Exception as error:
+            live.journal.storage.note(error)  # the next time counts these seconds, too
+            return
+        live.running_since_s += seconds
         live.header.elapsed_s += seconds
-        async with self._database.writing() as session:
-            await mission_queries.add_elapsed(session, live.id, seconds, now())
 
 
 def _log_failure(done: Future[None]) -> None:

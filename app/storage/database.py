@@ -1,6 +1,7 @@
 """The database behind the service: connections, transactions, SQLite's settings."""
 
 import asyncio
+import time
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager, nullcontext
 from typing import Any
@@ -9,9 +10,12 @@ from sqlalchemy import Connection, event, make_url, text
 from sqlalchemy.ext.asyncio import AsyncConnection, AsyncEngine, AsyncSession, create_async_engine
 
 from app.storage.shielding import to_the_end
+from app.storage.trouble import trouble_of
 
 BUSY_TIMEOUT_MS = 30_000
 """How long a writer waits for one of another process."""
+RECENT_S = 60.0
+"""A trouble that did not show for so long is taken to be over."""
 
 
 def make_engine(url: str) -> AsyncEngine:
@@ -59,6 +63,8 @@ class Database:
         # SQLite's writers wait for each other by asking again and again, and the unlucky one gives up ("database is
         # locked"). Those of this process stand in line instead; the timeout is left for other processes.
         self._turn = asyncio.Lock() if self._engine.dialect.name == "sqlite" else None
+        self._trouble = ""
+        self._troubled_s = 0.0
 
     @asynccontextmanager
     async def reading(self) -> AsyncIterator[AsyncSession]:
@@ -69,11 +75,23 @@ class Database:
     @asynccontextmanager
     async def writing(self) -> AsyncIterator[AsyncSession]:
         """Yield a session whose changes are committed together, or not at all when the block raises."""
-        async with self._turn or nullcontext(), self._connected() as connection:
-            await connection.execution_options(bathyfleet_writes=True)
-            async with connection.begin(), _session_on(connection) as session:
-                yield session
-                await session.flush()
+        try:
+            async with self._turn or nullcontext(), self._connected() as connection:
+                await connection.execution_options(bathyfleet_writes=True)
+                async with connection.begin(), _session_on(connection) as session:
+                    yield session
+                    await session.flush()
+        except Exception as error:
+            trouble = trouble_of(error)
+            if trouble:
+                self._trouble, self._troubled_s = trouble, time.monotonic()
+            raise
+        self._trouble = ""
+
+    @property
+    def trouble(self) -> str:
+        """What kept the last transaction from being written, a moment ago, and what to do about it; else empty."""
+        return self._trouble if time.monotonic() - self._troubled_s < RECENT_S else ""
 
     async def ping(self) -> None:
         """Raise when the database cannot be reached."""
