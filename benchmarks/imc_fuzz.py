@@ -6,9 +6,9 @@ is one JSON object: what became of them, errors of the handlers (must be 0) and 
 with its growth over the second half, in which every bounded store is full (must stay below 4 MB). ``--write`` puts
 it into a page. A crash ends the command with a traceback.
 
-Behind the bridge stands a mission's gate, as in the service: what it lets through must be finite, inside its zone and no
-deeper than any ocean. ``--keep FILE`` writes the first packet of every kind of outcome (message, what the
-decoder, the bridge and the gate said to it) into a corpus, which the tests feed in again; take it without ``--captures``.
+Behind the bridge stands a mission's gate, as in the service: what it lets through must be finite, inside its zone and
+no deeper than any ocean. ``--keep FILE`` writes the first packet of every kind of outcome (message, what the decoder,
+the bridge and the gate said to it) into a corpus, which the tests feed in again; take it without ``--captures``.
 """
 
 import argparse
@@ -337,7 +337,7 @@ async def fuzz(packets: int, seed: int, captures: Path | None = None, keep: Path
             marks_mb.append(round(memory_mb(), 1))
     await target.end()
     if keep is not None and corpus is not None:
-        keep.write_text("\n".join(corpus.lines) + "\n", encoding="utf-8")
+        await asyncio.to_thread(keep.write_text, "\n".join(corpus.lines) + "\n", encoding="utf-8")
     return {
         "packets": packets,
         "seed": seed,

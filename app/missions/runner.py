@@ -44,6 +44,8 @@ from app.storage.shielding import to_the_end
 from imc_bridge.plans import leg_time_s
 
 ELAPSED_PERIOD_S = 5.0
+CLOCK_SET_S = 2.0
+"""A wall clock that gained or lost more than this between two looks was set."""
 PACE_MEMORY = 0.9
 """Weight of the past in the running mean of a step's duration."""
 
@@ -501,9 +503,23 @@ class Runner:
         self._live.seconds_per_step = seconds if before is None else PACE_MEMORY * before + (1 - PACE_MEMORY) * seconds
 
     async def _keep_time(self) -> None:
+        loop = asyncio.get_running_loop()
+        ahead_s = now().timestamp() - loop.time()
         while True:
             await asyncio.sleep(ELAPSED_PERIOD_S)
             await to_the_end(self._save_elapsed())
+            before_s, ahead_s = ahead_s, now().timestamp() - loop.time()
+            await self._tell_of_clock(ahead_s - before_s)
+
+    async def _tell_of_clock(self, by_s: float) -> None:
+        """Say that the wall clock was set; nothing that moves vehicles depends on it."""
+        if abs(by_s) < CLOCK_SET_S:
+            return
+        message = (
+            f"this machine's clock was set {'forward' if by_s > 0 else 'back'} by {abs(by_s):.0f} s: times in the log, "
+            "and the water level that a tide table gives for now, follow it. See that it is right"
+        )
+        await self._live.journal.log(Level.WARNING, "clock", message, seconds=round(by_s))
 
     async def _save_elapsed(self) -> None:
         live = self._live

@@ -69,7 +69,7 @@ async def until(condition: Callable[[], Awaitable[Any]], what: str, patience_s: 
     """Wait for a condition; fail by its name when it does not come."""
     try:
         async with asyncio.timeout(patience_s):
-            while not await condition():
+            while not await condition():  # noqa: ASYNC110 - the condition is of another process
                 await asyncio.sleep(0.02)
     except TimeoutError:
         raise AssertionError(f"waited {patience_s:g} s in vain until {what}") from None

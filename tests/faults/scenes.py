@@ -6,7 +6,7 @@ Tests play them short, ``benchmarks/faults.py`` at length.
 import asyncio
 import random
 import sqlite3
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Sequence
 from contextlib import asynccontextmanager, closing
 from pathlib import Path
 from typing import Any
@@ -15,6 +15,7 @@ import httpx
 
 from tests.faults.disks import Disk
 from tests.faults.missions import (
+    FRAME,
     check_rows,
     ended,
     flying,
@@ -25,6 +26,7 @@ from tests.faults.missions import (
     until,
 )
 from tests.faults.service import PATIENCE_S, Service, service_in
+from tests.missions.polling import PollingVehicle
 
 LONGEST_DELAY_S = 0.4
 
@@ -101,7 +103,7 @@ async def locked(folder: Path, *, steps: int, locks: int, busy_ms: int) -> dict[
 
 
 async def aborted_without_a_disk(folder: Path, disk: Disk) -> dict[str, Any]:
-    """Abort a mission that cannot write: its vehicles are stopped and the operator is answered, and it stays aborted."""
+    """Abort a mission that cannot write: its vehicles are stopped, the operator is answered, and it stays aborted."""
     vehicles = pollers()
     async with (
         service_in(folder, database=disk.folder / "fleet.db") as (service, api),
@@ -135,6 +137,104 @@ async def aborted_without_a_disk(folder: Path, disk: Disk) -> dict[str, Any]:
         lines = await log_of(api, mission_id)
         assert sum("acknowledged the stop" in line for line in lines) == 2
     return {"disk": disk.kind, "said": said["mission"]["reason"]}
+
+
+async def clock_jumps(folder: Path, jumps_s: Sequence[float]) -> dict[str, Any]:
+    """Set the wall clock of the service's machine forward and back in the middle of a mission."""
+    clock = folder / "clock"
+    clock.write_text("0")
+    vehicles = pollers()
+    steps = 6 * (len(jumps_s) + 1)
+    async with (
+        service_in(folder, world={"CLOCK": str(clock)}) as (service, api),
+        flying(api, vehicles, steps=steps) as (mission_id, tasks),
+    ):
+        for count, jump_s in enumerate(jumps_s, 1):
+            await steps_more(service, mission_id, 3)
+            clock.with_suffix(".new").write_text(str(jump_s))
+            clock.with_suffix(".new").rename(clock)
+
+            async def told(count: int = count) -> bool:
+                return sum("clock was set" in line for line in await log_of(api, mission_id)) == count
+
+            for vehicle in vehicles:
+                vehicle.waits = True  # so that the mission does not end before
+            await until(told, "the log tells of the clock")
+            for vehicle in vehicles:
+                vehicle.waits = False
+        await _flown_to_the_end(service, api, mission_id, tasks, steps)
+        check_rows(service, mission_id, vehicles)
+        shown = await state_of(api, mission_id)
+        assert 0.0 <= shown["progress"]["elapsed_s"] < 3600.0, "a mission lasts as long as it lasted"
+        lines = await log_of(api, mission_id)
+    return {"steps": steps, "set by s": list(jumps_s), "said": [line for line in lines if " clock: " in line]}
+
+
+class Liar(PollingVehicle):
+    """Does its part, and with every batch posts what cannot be."""
+
+    def lies(self) -> list[dict[str, object]]:
+        """One of each kind of nonsense."""
+        self.time_s += 1.0
+        honest = self.measurement()
+        here = {"lat_deg": honest["lat_deg"], "lon_deg": honest["lon_deg"]}
+        wrong: list[dict[str, object]] = [
+            {"range_m": 20_000.0},
+            {"range_m": -4.0},
+            {"range_m": 0.0},
+            {"depth_m": -500.0},
+            {"depth_m": 12_000.0},
+            {"lat_deg": 95.0},
+            {"lon_deg": -190.0},
+            {"lat_deg": 0.0, "lon_deg": 0.0},
+            {"lat_deg": FRAME.origin_lat_deg + 0.02},
+            {"range_m": 1e308},
+            {"depth_m": 1e308},
+            {"vehicle": "nobody"},
+        ]
+        return [honest | here | lie | {"time_s": self.time_s + 0.01 * n} for n, lie in enumerate(wrong, 1)]
+
+    async def travel(self, api: httpx.AsyncClient, mission_id: str, waypoint: dict[str, float]) -> None:
+        """Lie, then go there."""
+        lies = self.lies()
+        answer = await api.post(f"/missions/{mission_id}/measurements", json={"items": lies})
+        assert answer.status_code == httpx.codes.OK, answer.text
+        for lie, verdict in zip(lies, answer.json()["items"], strict=True):
+            assert verdict["verdict"] == "rejected", (lie, verdict)
+            assert verdict["reason"].partition(":")[0], verdict
+        for text in ("NaN", "Infinity", "1e999", "null"):
+            body = (
+                f'{{"items": [{{"vehicle": "{self.name}", "time_s": {self.time_s}, "lat_deg": {text}, "lon_deg": 1}}]}}'
+            )
+            said = await api.post(
+                f"/missions/{mission_id}/measurements", content=body, headers={"Content-Type": "application/json"}
+            )
+            assert said.status_code < httpx.codes.INTERNAL_SERVER_ERROR, said.text
+            assert not any(item["verdict"] == "accepted" for item in said.json().get("items", []))
+        await super().travel(api, mission_id, waypoint)
+
+
+async def lied_to(folder: Path, *, steps: int) -> dict[str, Any]:
+    """Fly with a vehicle that posts impossible depths, numbers that are none, and places where it cannot be."""
+    liar, honest = Liar("one", FRAME, 2.0, 2.0), PollingVehicle("two", FRAME, 8.0, 2.0)
+    async with (
+        service_in(folder) as (service, api),
+        flying(api, [liar, honest], steps=steps) as (mission_id, tasks),
+    ):
+        await _flown_to_the_end(service, api, mission_id, tasks, steps)
+        check_rows(service, mission_id, [liar, honest])
+        rejected = dict(
+            service.rows(
+                "select substr(reason, 1, instr(reason, ':')), count(*) from soundings where verdict = 'rejected' "
+                "group by 1"
+            )
+        )
+        assert len(rejected) >= 4, "what was refused is kept with the reason"
+        depths = [d for (d,) in service.rows("select depth_m from soundings where verdict = 'accepted'")]
+        assert all(5.0 < depth < 20.0 for depth in depths)
+        shown = await state_of(api, mission_id)
+        assert shown["progress"]["rejected"] == sum(rejected.values()), "the page counts what was refused"
+    return {"steps": steps, "rejected by reason": rejected, "accepted": len(depths)}
 
 
 async def _nothing_is_written(service: Service, api: httpx.AsyncClient, mission_id: str, why: str) -> None:

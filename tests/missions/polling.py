@@ -27,6 +27,8 @@ class PollingVehicle:
     steps_seen: list[int] = field(default_factory=list)
     accepted: list[float] = field(default_factory=list)
     told_to_stop: bool = False
+    waits: bool = False
+    """Stays where it is and asks for nothing."""
     gives_up: bool = False
     """Asks for its waypoint, too, while its batch is not taken, and forgets the batch."""
 
@@ -100,6 +102,8 @@ class PollingVehicle:
         """Take part until told to stop."""
         await self.post(api, mission_id, [self.measurement()])
         while not self.told_to_stop:
+            while self.waits:  # noqa: ASYNC110 - whoever set it takes it back
+                await asyncio.sleep(RETRY_S)
             waypoint = await self.next_waypoint(api, mission_id)
             if waypoint is not None:
                 await self.travel(api, mission_id, waypoint)
