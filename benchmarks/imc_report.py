@@ -22,19 +22,21 @@ def command_line(hidden: dict[Path | None, str]) -> str:
     return "python benchmarks/" + " ".join(shown.get(word, shlex.quote(word)) for word in words)
 
 
-def write_section(page: Path, title: str, figures: dict[str, Any], hidden: dict[Path | None, str]) -> None:
-    """Write the section ``title`` of a page, in the place of an older one."""
+def write_section(
+    page: Path, title: str, figures: dict[str, Any], hidden: dict[Path | None, str], *, head: str = HEAD
+) -> None:
+    """Write the section ``title`` of a page, in the place of an older one; a new page begins with ``head``."""
     shown = f"docs/{page.as_posix().rpartition('docs/')[2]}" if "docs/" in page.as_posix() else page.name
     facts = made(command_line({page: shown, **hidden}), 1)
     lines = [f"## {title}", "", *(f"- {name}: {facts[name]}" for name in ("command", "date", "machine", "versions"))]
     lines += ["", "| | |", "| --- | --- |", *(f"| {name} | {_shown(value)} |" for name, value in figures.items()), ""]
-    text = page.read_text(encoding="utf-8") if page.exists() else HEAD
-    head, *sections = re.split(r"(?m)^(?=## )", text)
+    text = page.read_text(encoding="utf-8") if page.exists() else head
+    beginning, *sections = re.split(r"(?m)^(?=## )", text)
     kept = [section for section in sections if not section.startswith(f"## {title}\n")]
     place = next((i for i, section in enumerate(sections) if section.startswith(f"## {title}\n")), len(kept))
     kept.insert(place, "\n".join(lines))
     page.parent.mkdir(parents=True, exist_ok=True)
-    page.write_text("\n\n".join(part.strip() for part in (head, *kept)) + "\n", encoding="utf-8")
+    page.write_text("\n\n".join(part.strip() for part in (beginning, *kept)) + "\n", encoding="utf-8")
 
 
 def _shown(value: Any) -> str:

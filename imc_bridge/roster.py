@@ -114,7 +114,8 @@ class Roster:
         mine = _claim(new)
         rivals = [claim for claim in claims if claim != mine]
         known = node.announcement
-        returned = mine in claims and known is not None and _claim(known) != mine
+        # One that is not heard any more, as after a single forged announce, bars nobody.
+        returned = mine in claims and known is not None and _claim(known) in rivals
         renamed = any(name != new.name for name, _ in rivals)
         if len(claims) < MAX_CLAIMS or mine in claims:
             claims[mine] = now

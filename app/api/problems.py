@@ -3,6 +3,7 @@
 import difflib
 import json
 import math
+import sqlite3
 import types
 from collections.abc import Iterable, Mapping, Sequence
 from http import HTTPStatus
@@ -11,6 +12,7 @@ from typing import Annotated, Any, Union, get_args, get_origin
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from pydantic import BaseModel, ConfigDict, Field
+from sqlalchemy.exc import DBAPIError
 from starlette.exceptions import HTTPException
 from starlette.responses import Response
 
@@ -26,12 +28,14 @@ from app.missions.errors import (
     VehicleNotFoundError,
 )
 from app.missions.states import MoveRefusedError
+from app.storage.trouble import trouble_of
 
 MEDIA_TYPE = "application/problem+json"
 URN = "urn:bathyfleet:problem:"
 
 MAX_ERRORS = 50
 """More faults than these in one request are counted but not listed."""
+RETRY_AFTER_S = 5
 MAX_SHOWN = 200
 """Longer values are shown shortened."""
 
@@ -83,6 +87,7 @@ TITLES: dict[str, tuple[int, str]] = {
     "internal": (500, "Something went wrong inside the service"),
     "mission-elsewhere": (503, "Another process has the mission"),
     "not-ready": (503, "The service is not ready"),
+    "database-unavailable": (503, "The database cannot be used now"),
 }
 """Every kind of problem: its status and its title."""
 
@@ -390,11 +395,22 @@ def _edge_problem(request: Request, error: ProblemError) -> Response:
     return problem_response(problem, error.headers)
 
 
+def _database_problem(request: Request, error: Exception) -> Response:
+    trouble = trouble_of(error)
+    if not trouble:
+        raise error
+    detail, _, remedy = trouble.partition(": ")
+    problem = make_problem("database-unavailable", detail, instance=instance_of(request.scope), remedy=remedy)
+    return problem_response(problem, {"Retry-After": str(RETRY_AFTER_S)})
+
+
 def install(app: FastAPI) -> None:
     """Make every error of ``app`` a problem document."""
     app.add_exception_handler(RequestValidationError, _validation_problem)  # type: ignore[arg-type]
     app.add_exception_handler(HTTPException, _http_problem)  # type: ignore[arg-type]
     app.add_exception_handler(ProblemError, _edge_problem)  # type: ignore[arg-type]
+    app.add_exception_handler(DBAPIError, _database_problem)
+    app.add_exception_handler(sqlite3.Error, _database_problem)
     for cls in (
         MissionNotFoundError,
         VehicleNotFoundError,

@@ -10,6 +10,7 @@ import structlog
 from app.exploration.planners import warm_up
 from app.missions.claims import Claims
 from app.missions.clock import now
+from app.missions.errors import MissionElsewhereError
 from app.missions.fleet import LinkState, StopReceipt
 from app.missions.hub import FleetHub
 from app.missions.live import LiveMission
@@ -24,6 +25,9 @@ from app.storage.shielding import to_the_end
 
 PATIENCE_S = 0.5
 """How long a stop waits for the database, so that a restart knows of it too; vehicles wait no longer for a disk."""
+ANSWER_S = 2.0
+"""How long whoever stops a mission waits for that to be written down, once its vehicles were stopped."""
+NOT_WRITTEN = "not written down yet, a restart of the service would go on with the mission"
 
 log = structlog.get_logger(__name__)
 
@@ -54,6 +58,8 @@ class Conductor:
         self._time_scale = time_scale
         self.runs: dict[str, asyncio.Task[None]] = {}
         self._acting: dict[str, asyncio.Lock] = {}
+        self._unwritten: dict[str, asyncio.Task[None]] = {}
+        """States that are in force and will be written down when that is possible again."""
         self.warm: asyncio.Future[None] | None = None
 
     def acting(self, mission_id: str) -> asyncio.Lock:
@@ -84,6 +90,13 @@ class Conductor:
             reason = await run()
         except asyncio.CancelledError:
             raise
+        except MissionElsewhereError as error:
+            # What another process makes of the mission is not ours to write down.
+            log.error("the mission was taken from this process", mission=live.id, error=str(error))
+            live.halt()
+            await self.stop_team(live)
+            self.runs.pop(live.id, None)
+            return
         except Exception as error:
             log.exception("the step loop failed", mission=live.id)
             target, level, reason = MissionState.FAILED, Level.ALARM, f"the step loop failed: {error}"
@@ -103,8 +116,41 @@ class Conductor:
         await self.log_stops(live, stops)
         # Who reads that the mission has ended finds its vehicles free.
         self._claims.release_team(live)
-        await self.set_state(live, target, reason, "service", level)
+        await self._settle(live, self._begin_state(live, target, reason, "service", level), target, reason)
         self._maps.map_last(live)
+
+    def _begin_state(
+        self, live: LiveMission, state: MissionState, reason: str, actor: str, level: Level = Level.INFO
+    ) -> asyncio.Task[None]:
+        """Begin to write a state down, if need be when the database can be used again."""
+        work = live.journal.storage.done(partial(self._write_state, live, state, reason, actor, level))
+        return asyncio.create_task(work, name=f"{state} of {live.id}")
+
+    async def _settle(self, live: LiveMission, written: asyncio.Task[None], state: MissionState, reason: str) -> None:
+        """Wait for a state to be written down; where that takes long it is in force before."""
+        await asyncio.wait([written], timeout=ANSWER_S)
+        if written.done():
+            written.result()
+            return
+        self._unwritten[live.id] = written
+        written.add_done_callback(partial(self._forget_unwritten, live.id))
+        live.header.state = state
+        live.header.reason = f"{reason}: {NOT_WRITTEN}" if reason else NOT_WRITTEN
+        live.changed.set()
+        live.publish_summary()
+
+    def _forget_unwritten(self, mission_id: str, done: asyncio.Task[None]) -> None:
+        if self._unwritten.get(mission_id) is done:
+            del self._unwritten[mission_id]
+        if not done.cancelled() and done.exception() is not None:
+            log.error("a mission's state could not be written", mission=mission_id, exc_info=done.exception())
+
+    async def close(self) -> None:
+        """Give up what could not be written down."""
+        unwritten = list(self._unwritten.values())
+        for task in unwritten:
+            task.cancel()
+        await asyncio.gather(*unwritten, return_exceptions=True)
 
     async def stand_down(self, live: LiveMission, state: MissionState, reason: str, actor: str) -> list[StopReceipt]:
         """Commit a state in which vehicles do not follow, and stop them; returns what each answered.
@@ -113,10 +159,11 @@ class Conductor:
         hangs, or a long transaction, keeps no vehicle from being stopped.
         """
         live.halt()
-        written = asyncio.ensure_future(self.set_state(live, state, reason, actor))
+        self._supersede(live)
+        written = self._begin_state(live, state, reason, actor)
         await asyncio.wait([written], timeout=PATIENCE_S)
         stops = await self.halt(live)
-        await written
+        await self._settle(live, written, state, reason)
         await self.log_stops(live, stops)
         return stops
 
@@ -171,7 +218,11 @@ class Conductor:
         for stop in stops:
             level = Level.INFO if stop.acknowledged else Level.ALARM
             words = "acknowledged the stop" if stop.acknowledged else "has NOT acknowledged the stop"
-            await live.journal.log(level, "stop", f"{stop.vehicle} {words}: {stop.detail}", **receipt(stop))
+            text = f"{stop.vehicle} {words}: {stop.detail}"
+            if live.id in self._unwritten:
+                live.journal.note_line(live.journal.line(level, "stop", text, **receipt(stop)))
+            else:
+                await live.journal.log(level, "stop", text, **receipt(stop))
 
     async def set_state(
         self,
@@ -187,6 +238,24 @@ class Conductor:
 
         ``check`` is called within the transaction before anything is changed, and raises what speaks against it.
         """
+        self._supersede(live)
+        await self._write_state(live, state, reason, actor, level, check)
+
+    def _supersede(self, live: LiveMission) -> None:
+        """Leave off writing an earlier state down: another one comes."""
+        unwritten = self._unwritten.pop(live.id, None)
+        if unwritten is not None:
+            unwritten.cancel()
+
+    async def _write_state(
+        self,
+        live: LiveMission,
+        state: MissionState,
+        reason: str,
+        actor: str,
+        level: Level,
+        check: Guard | None = None,
+    ) -> None:
         changed_at = now()
         words = f"{state} by {actor}" + (f": {reason}" if reason else "")
         line = live.journal.line(level, "state", words, state=state, actor=actor)

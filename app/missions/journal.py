@@ -1,7 +1,8 @@
 """What a mission writes down as it goes: soundings, tracks, waypoint states and its log.
 
 Everything that arrives from vehicles is buffered for a moment and written in one transaction; a sounding counts as
-accepted only when that transaction has committed.
+accepted only when that transaction has committed. What cannot be written, because the disk is full for example, stays
+noted until it can.
 """
 
 import asyncio
@@ -21,6 +22,7 @@ from app.missions.clock import now
 from app.missions.corrections import NO_LEVEL
 from app.missions.fleet import ScanReport, SoundingReport, VehicleReport, WaypointReport
 from app.missions.gate import Gate, GatedSounding
+from app.missions.outlasting import RETRY_S, Outlasting
 from app.missions.telemetry import VehicleSample
 from app.missions.views import EventMessage, EventView, ItemVerdict, Level, Verdict
 from app.storage import missions as mission_queries
@@ -83,6 +85,11 @@ class Journal:
         self._positions: list[dict[str, Any]] = []
         self._statuses: list[WaypointReport] = []
         self._telemetry: list[dict[str, Any]] = []
+        self._lines: list[EventRow] = []
+        self.storage = Outlasting(mission_id, lambda: self.on_trouble(), self._note_trouble)
+        """Waits where the database cannot be used."""
+        self.on_trouble: Callable[[], None] = lambda: None
+        """Called when the database cannot be used any more, or can be again."""
         self.told_of_missing_level = False
         """Whether the log has it that no water level is known for soundings; once is enough."""
         self._untold = ""
@@ -142,14 +149,19 @@ class Journal:
             positions, self._positions = self._positions, []
             statuses, self._statuses = self._statuses, []
             telemetry, self._telemetry = self._telemetry, []
-            if not (soundings or scans or positions or statuses or telemetry):
+            lines, self._lines = self._lines, []
+            if not (soundings or scans or positions or statuses or telemetry or lines):
                 return
+            told = [self.line(Level(line.level), line.kind, line.message, **line.data) for line in lines]
             try:
                 async with self._database.writing() as session:
                     gated, new = await self._store(session, soundings)
                     _, seen = await self.take_scans(scans, session)
                     await mission_queries.add_positions(session, positions)
                     await telemetry_queries.add(session, telemetry)
+                    for row, line in zip(told, lines, strict=True):
+                        row.time = line.time
+                    session.add_all(told)
                     for report in statuses:
                         await mission_queries.set_waypoint_status(
                             session, self._mission_id, report.step, report.vehicle, report.status, report.reason, now()
@@ -160,9 +172,12 @@ class Journal:
                 self._positions[:0] = positions
                 self._statuses[:0] = statuses
                 self._telemetry[:0] = telemetry
+                self._lines[:0] = lines
                 raise
             self._count(gated, new)
             seen()
+            for row in told:
+                self.tell(row)
 
     async def take_scans(
         self, reports: Sequence[ScanReport], session: AsyncSession
@@ -202,12 +217,33 @@ class Journal:
             verdicts.append(ItemVerdict(index=index, verdict=verdict, reason=item.reason))
         return verdicts, lambda: self._count(gated, new)
 
-    async def log(self, level: Level, kind: str, message: str, **data: Any) -> EventRow:
-        """Write a line of the mission's log and show it to everyone who watches."""
+    async def log(self, level: Level, kind: str, message: str, **data: Any) -> None:
+        """Write a line of the mission's log and show it to everyone who watches.
+
+        Where the database cannot be written the line is noted like a sounding: nobody who has to tell something waits.
+        """
         row = self.line(level, kind, message, **data)
+        if self._lines or self.storage.trouble:
+            self.note_line(row)
+            return
+        try:
+            await self.write(row)
+        except Exception as error:
+            self.storage.note(error)
+            self.note_line(self.line(level, kind, message, **data))
+
+    def note_line(self, row: EventRow) -> None:
+        """Note a line; it is written within a moment, or when that is possible again."""
+        self._lines.append(row)
+        self._start_pump()
+
+    async def write(self, row: EventRow) -> None:
+        """Write a line now and show it; raises when that cannot be."""
         await to_the_end(self._add(row))
         self.tell(row)
-        return row
+
+    def _note_trouble(self, message: str) -> None:
+        self.note_line(self.line(Level.ALARM, "storage", message))
 
     def line(self, level: Level, kind: str, message: str, **data: Any) -> EventRow:
         """Return a line of the mission's log for a transaction of the caller's; ``tell`` of it once that is done."""
@@ -232,28 +268,37 @@ class Journal:
 
     def abandon(self) -> None:
         """Forget what is left: the mission is another process's."""
-        for noted in (self._soundings, self._scans, self._positions, self._statuses, self._telemetry):
-            noted.clear()
+        self._soundings, self._scans, self._positions, self._statuses = [], [], [], []
+        self._telemetry, self._lines = [], []
 
     async def close(self) -> None:
         """Write what is left and stop."""
         if self._pump is not None:
             self._pump.cancel()
             await asyncio.gather(self._pump, return_exceptions=True)
-        await self.flush()
+        try:
+            await self.flush()
+        except Exception as error:
+            self.storage.note(error)
+            log.error(
+                "what was heard last is lost, it could not be written",
+                mission=self._mission_id,
+                soundings=len(self._soundings),
+                why=self.storage.trouble,
+            )
 
     def _start_pump(self) -> None:
         if self._pump is None or self._pump.done():
             self._pump = asyncio.create_task(self._flush_soon())
 
     async def _flush_soon(self) -> None:
-        while self._soundings or self._scans or self._positions or self._statuses or self._telemetry:
+        while any((self._soundings, self._scans, self._positions, self._statuses, self._telemetry, self._lines)):
             await asyncio.sleep(FLUSH_PERIOD_S)
             try:
-                await self.flush()
+                await self.storage.done(self.flush)
             except Exception:
-                # A locked or full database: everything stays noted and is tried again.
                 log.exception("could not write to the database, trying again", mission=self._mission_id)
+                await asyncio.sleep(RETRY_S)
 
     async def _store(
         self, session: AsyncSession, reports: Sequence[SoundingReport], gate: Gate | None = None

@@ -134,6 +134,7 @@ class LiveMission:
         """What a mission of kind search knows of its site."""
         take_scans = None if self.search is None else partial(take, self.search, row.id, self.changed.set)
         self.journal = Journal(database, row.id, self.gate, counts, self.broadcaster, self.builder.add, take_scans)
+        self.journal.on_trouble = self.publish_summary
         self.ranges = RangeJournal(database, row.id, Tracking(spec, self.frame), self.journal, time_scale)
         """Ranges to moving targets, and what they tell."""
         self.correcting = asyncio.Lock()
@@ -435,11 +436,18 @@ class LiveMission:
             id=self.id,
             name=self.spec.name,
             state=header.state,
-            reason=header.reason,
+            reason=self._why_it_waits() or header.reason,
             created_at=header.created_at,
             updated_at=header.updated_at,
             progress=self.progress(),
         )
+
+    def _why_it_waits(self) -> str:
+        trouble = self.journal.storage.trouble
+        if not trouble:
+            return ""
+        waits = "; the vehicles wait at their waypoints" if self.header.state is MissionState.RUNNING else ""
+        return f"nothing can be written down: {trouble}{waits}"
 
     def publish_summary(self) -> None:
         """Tell everyone who watches about state and progress."""

@@ -21,7 +21,7 @@ async def waypoint(
     """
     member = live.team.get(vehicle)
     if member is None:
-        rest.told_to_stop(vehicle)
+        rest.told_to_stop(vehicle, live.id)
         raise VehicleNotFoundError(
             f"vehicle {vehicle!r} takes no part in this mission", "stop; nothing more comes from here for it"
         )
@@ -47,7 +47,7 @@ async def waypoint(
     await _wait_watching(live, settled, timeout_s)
     if must_stop():
         if polls:
-            rest.told_to_stop(vehicle)
+            rest.told_to_stop(vehicle, live.id)
         state = live.header.state if live.team.get(vehicle) is not None else "without this vehicle"
         state = "ending" if state is MissionState.RUNNING else state
         raise ConflictError(f"the mission is {state}: stop and hold", "ask again after it was started or resumed")

@@ -14,6 +14,7 @@ from sqlalchemy.ext.asyncio import AsyncSession
 from app.missions.clock import now
 from app.missions.fleet import Position, RangeReport
 from app.missions.journal import Journal
+from app.missions.outlasting import RETRY_S
 from app.missions.tracking import Arrived, Judged, Tracking
 from app.missions.vehicle_times import VehicleTimes
 from app.missions.views import ItemVerdict, Level, Verdict
@@ -171,7 +172,11 @@ class RangeJournal:
         if self._pump is not None:
             self._pump.cancel()
             await asyncio.gather(self._pump, return_exceptions=True)
-        await self.flush()
+        try:
+            await self.flush()
+        except Exception as error:
+            self._journal.storage.note(error)
+            log.error("ranges are lost, they could not be written", mission=self._mission_id, ranges=len(self._noted))
 
     def _start_pump(self) -> None:
         if self._pump is None or self._pump.done():
@@ -181,9 +186,10 @@ class RangeJournal:
         while self._noted:
             await asyncio.sleep(GATHER_S)
             try:
-                await self.flush()
+                await self._journal.storage.done(self.flush)
             except Exception:
                 log.exception("could not write ranges to the database, trying again", mission=self._mission_id)
+                await asyncio.sleep(RETRY_S)
 
     def _tell_once(self, report: RangeReport, stranger: str) -> None:
         if report.target in self._strangers or not self.tracking:

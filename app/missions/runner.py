@@ -13,6 +13,7 @@ from concurrent.futures import Executor, Future
 import numpy as np
 import structlog
 from numpy.typing import NDArray
+from sqlalchemy.orm import make_transient
 
 from app.estimation import SingleBeam
 from app.exploration.bottom import Bottom
@@ -42,6 +43,8 @@ from app.storage.shielding import to_the_end
 from imc_bridge.plans import leg_time_s
 
 ELAPSED_PERIOD_S = 5.0
+CLOCK_SET_S = 2.0
+"""A wall clock that gained or lost more than this between two looks was set."""
 PACE_MEMORY = 0.9
 """Weight of the past in the running mean of a step's duration."""
 
@@ -258,8 +261,8 @@ class Runner:
         live = self._live
         patient = live.builder.newest is None or self._mapping_s * self._time_scale <= PATIENCE_S
         if self._mapping is not None and (patient or self._mapping.done()):
-            await self._mapping
-            self._mapping = None
+            mapping, self._mapping = self._mapping, None
+            await mapping
         await live.journal.flush()
         await live.notice_imports()
         if patient and live.builder.stale:
@@ -269,10 +272,10 @@ class Runner:
         """Bring the map up to date, then make the decision, in a worker thread."""
         live = self._live
         started_s = asyncio.get_running_loop().time()
-        await self._renew_map()
+        await live.journal.storage.done(self._renew_map)
 
         step_s = self._spec.limits.max_step_m / self._spec.speed_mps
-        await live.ranges.flush()
+        await live.journal.storage.done(live.ranges.flush)
         targets = live.ranges.tracking.told(live.ranges.times.now_s(), step_s)
         task = self._lookout.task(live.header.step + 1)
 
@@ -317,7 +320,8 @@ class Runner:
             memory=decision.memory,
             targets=live.ranges.memory(),
         )
-        await to_the_end(self._store(step, rows))
+        # The step is not flown before it is on disk, however long that takes; the vehicles wait where they are.
+        await live.journal.storage.done(lambda: to_the_end(self._store(step, rows)))
         if live.search is not None and live.search.began_at is None:
             live.search.began_at = step.committed_at
         metrics.STEPS.inc()
@@ -357,6 +361,11 @@ class Runner:
 
     async def _store(self, step: StepRow, waypoints: list[WaypointRow]) -> None:
         async with self._live.database.writing() as session:
+            known = await session.get(StepRow, (step.mission_id, step.number))
+            if known is not None and known.committed_at == step.committed_at:
+                return  # written before the connection broke
+            for row in (step, *waypoints):
+                make_transient(row)  # of a transaction that failed
             session.add(step)
             await session.flush()
             session.add_all(waypoints)
@@ -490,9 +499,23 @@ class Runner:
         self._live.seconds_per_step = seconds if before is None else PACE_MEMORY * before + (1 - PACE_MEMORY) * seconds
 
     async def _keep_time(self) -> None:
+        loop = asyncio.get_running_loop()
+        ahead_s = now().timestamp() - loop.time()
         while True:
             await asyncio.sleep(ELAPSED_PERIOD_S)
             await to_the_end(self._save_elapsed())
+            before_s, ahead_s = ahead_s, now().timestamp() - loop.time()
+            await self._tell_of_clock(ahead_s - before_s)
+
+    async def _tell_of_clock(self, by_s: float) -> None:
+        """Say that the wall clock was set; nothing that moves vehicles depends on it."""
+        if abs(by_s) < CLOCK_SET_S:
+            return
+        message = (
+            f"this machine's clock was set {'forward' if by_s > 0 else 'back'} by {abs(by_s):.0f} s: times in the log, "
+            "and the water level that a tide table gives for now, follow it. See that it is right"
+        )
+        await self._live.journal.log(Level.WARNING, "clock", message, seconds=round(by_s))
 
     async def _save_elapsed(self) -> None:
         live = self._live
@@ -500,10 +523,14 @@ class Runner:
         if live.running_since_s is None:
             return
         seconds = loop_time - live.running_since_s
-        live.running_since_s = loop_time
+        try:
+            async with live.database.writing() as session:
+                await mission_queries.add_elapsed(session, live.id, seconds, now())
+        except Exception as error:
+            live.journal.storage.note(error)  # the next time counts these seconds, too
+            return
+        live.running_since_s += seconds
         live.header.elapsed_s += seconds
-        async with live.database.writing() as session:
-            await mission_queries.add_elapsed(session, live.id, seconds, now())
 
 
 def _log_failure(done: Future[None]) -> None:

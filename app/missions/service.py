@@ -197,6 +197,7 @@ class MissionService:
         await asyncio.gather(*(self._conductor.halt(live) for live in self._memory if live.id in self._runs))
         await self._maps.close()
         await self._hub.close()
+        await self._conductor.close()
         await self._memory.close()
         await self.process.leave()
         self._executor.shutdown(wait=True, cancel_futures=True)
@@ -207,7 +208,7 @@ class MissionService:
         components = {"links": "ok" if self._started else "not started"}
         try:
             await self._database.ping()
-            components["database"] = "ok"
+            components["database"] = self._database.trouble or "ok"
         except Exception as error:
             components["database"] = f"cannot be reached: {error}"
         return all(state == "ok" for state in components.values()), components
@@ -337,7 +338,9 @@ class MissionService:
     async def write_note(self, mission_id: str, text: str, *, actor: str) -> EventView:
         """Keep an operator's words in a mission's log."""
         live = await self._get(mission_id)
-        return event_view(await live.journal.log(Level.INFO, "note", text, actor=actor))
+        row = live.journal.line(Level.INFO, "note", text, actor=actor)
+        await live.journal.write(row)
+        return event_view(row)
 
     async def note(self, mission_id: str, level: Level, kind: str, message: str, **data: str | float) -> None:
         """Write a line of a mission's log."""

@@ -1,6 +1,7 @@
 """The database behind the service: connections, transactions, SQLite's settings."""
 
 import asyncio
+import time
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager, nullcontext
 from copy import copy
@@ -10,9 +11,12 @@ from sqlalchemy import Connection, event, make_url, text
 from sqlalchemy.ext.asyncio import AsyncConnection, AsyncEngine, AsyncSession, create_async_engine
 
 from app.storage.shielding import to_the_end
+from app.storage.trouble import trouble_of
 
 BUSY_TIMEOUT_MS = 30_000
 """How long a writer waits for one of another process."""
+RECENT_S = 60.0
+"""A trouble that did not show for so long is taken to be over."""
 
 
 def make_engine(url: str) -> AsyncEngine:
@@ -55,6 +59,23 @@ Guard = Callable[[AsyncSession], Awaitable[None]]
 """Looks, within a transaction that is about to write, whether it may; raises when it may not."""
 
 
+class _Trouble:
+    """What kept a transaction from being written."""
+
+    def __init__(self) -> None:
+        self.what = ""
+        self._noted_s = 0.0
+
+    def note(self, error: Exception) -> None:
+        trouble = trouble_of(error)
+        if trouble:
+            self.what, self._noted_s = trouble, time.monotonic()
+
+    @property
+    def recent(self) -> str:
+        return self.what if time.monotonic() - self._noted_s < RECENT_S else ""
+
+
 class Database:
     """Hands out sessions: ``reading`` for queries, ``writing`` for transactions that commit at the end."""
 
@@ -65,6 +86,7 @@ class Database:
         # locked"). Those of this process stand in line instead; the timeout is left for other processes.
         self._turn = asyncio.Lock() if self._engine.dialect.name == "sqlite" else None
         self._guard: Guard | None = None
+        self._trouble = _Trouble()
 
     def guarded(self, guard: Guard) -> "Database":
         """Return the same database with a guard before everything that is written through it."""
@@ -81,13 +103,23 @@ class Database:
     @asynccontextmanager
     async def writing(self) -> AsyncIterator[AsyncSession]:
         """Yield a session whose changes are committed together, or not at all when the block raises."""
-        async with self._turn or nullcontext(), self._connected() as connection:
-            await connection.execution_options(bathyfleet_writes=True)
-            async with connection.begin(), _session_on(connection) as session:
-                if self._guard is not None:
-                    await self._guard(session)
-                yield session
-                await session.flush()
+        try:
+            async with self._turn or nullcontext(), self._connected() as connection:
+                await connection.execution_options(bathyfleet_writes=True)
+                async with connection.begin(), _session_on(connection) as session:
+                    if self._guard is not None:
+                        await self._guard(session)
+                    yield session
+                    await session.flush()
+        except Exception as error:
+            self._trouble.note(error)
+            raise
+        self._trouble.what = ""
+
+    @property
+    def trouble(self) -> str:
+        """What kept the last transaction from being written, a moment ago, and what to do about it; else empty."""
+        return self._trouble.recent
 
     async def ping(self) -> None:
         """Raise when the database cannot be reached."""

@@ -27,6 +27,10 @@ class PollingVehicle:
     steps_seen: list[int] = field(default_factory=list)
     accepted: list[float] = field(default_factory=list)
     told_to_stop: bool = False
+    waits: bool = False
+    """Stays where it is and asks for nothing."""
+    gives_up: bool = False
+    """Asks for its waypoint, too, while its batch is not taken, and forgets the batch."""
 
     def depth_here_m(self) -> float:
         return 10.0 + 2.0 * math.sin(self.east_m / 15.0) + 0.05 * self.north_m
@@ -52,6 +56,8 @@ class PollingVehicle:
                 await asyncio.sleep(RETRY_S)
                 continue
             if answer.status_code == httpx.codes.SERVICE_UNAVAILABLE:
+                if self.gives_up:
+                    return
                 await asyncio.sleep(RETRY_S)
                 continue
             assert answer.status_code == httpx.codes.OK, answer.text
@@ -96,6 +102,8 @@ class PollingVehicle:
         """Take part until told to stop."""
         await self.post(api, mission_id, [self.measurement()])
         while not self.told_to_stop:
+            while self.waits:  # noqa: ASYNC110 - whoever set it takes it back
+                await asyncio.sleep(RETRY_S)
             waypoint = await self.next_waypoint(api, mission_id)
             if waypoint is not None:
                 await self.travel(api, mission_id, waypoint)

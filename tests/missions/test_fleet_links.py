@@ -186,7 +186,7 @@ class RestBench(Bench):
     def _poll(self) -> None:
         if self.state() is not LinkState.ENGAGED:
             self._goal = None
-            self.rest.told_to_stop(self.name)
+            self.rest.told_to_stop(self.name, MISSION)
         elif self._laid_out is not None:
             self._goal = self._laid_out
             self.rest.has_waypoint(self.name, self._goal.step)
@@ -395,7 +395,7 @@ async def test_a_polling_vehicle_that_is_silent_too_long_counts_as_lost_and_come
 async def test_a_stranger_that_is_told_to_stop_is_not_taken_up() -> None:
     link = RestFleetLink()
     await link.start(lambda _event: None)
-    link.told_to_stop("nobody")
+    link.told_to_stop("nobody", "m")
     assert link.vehicles() == []
     await link.close()
 

@@ -132,13 +132,17 @@ class RestFleetLink(VisitedLink):
         if horizontal_distance_m(report.position, order.position) <= order.arrival_radius_m:
             self._report(poller, WaypointStatus.REACHED)
 
-    def told_to_stop(self, vehicle: str) -> None:
-        """Note that a vehicle was told to stop, which acknowledges the stop."""
+    def told_to_stop(self, vehicle: str, mission_id: str) -> None:
+        """Note that a vehicle was told to stop, which acknowledges the stop, also one that is yet to come."""
         if vehicle not in self._pollers:
             return
         poller = self._touch(vehicle)
         poller.stopping = False
         poller.told.set()
+        if poller.order is not None and poller.order.mission_id == mission_id:
+            poller.order = None
+            poller.status = None
+            self._set_state(poller, LinkState.READY)
 
     def _touch(self, vehicle: str) -> _Poller:
         now_s = asyncio.get_running_loop().time()

@@ -1,0 +1,40 @@
+"""Troubles of the database that pass: its disk is full, somebody holds it locked, its server is away."""
+
+import sqlite3
+
+from sqlalchemy.exc import DBAPIError, InterfaceError
+
+_SQLITE = {
+    sqlite3.SQLITE_FULL: "the disk with the database is full: free some space on it",
+    sqlite3.SQLITE_IOERR: "the disk with the database reports an error: see whether it is full, unplugged or broken",
+    sqlite3.SQLITE_BUSY: "another program holds the database locked: end it",
+    sqlite3.SQLITE_LOCKED: "another program holds the database locked: end it",
+    sqlite3.SQLITE_READONLY: "the database's file cannot be written: see its rights and whether its disk is read-only",
+    sqlite3.SQLITE_CANTOPEN: "the database's file cannot be opened: see whether its disk is there",
+}
+_PRIMARY = 0xFF
+"""SQLite's codes carry details in their higher bits."""
+
+_SERVER = {
+    "08": "the connection to the database's server broke: see whether it runs and can be reached",
+    "53": "the database's server lacks room or memory: free some space on its disk",
+    "57": "the database's server is stopping or starting: wait for it, or start it",
+    "58": "the disk of the database's server reports an error: see whether it is full or broken",
+}
+"""By class of SQLSTATE."""
+
+
+def trouble_of(error: BaseException) -> str:
+    """Return in words what keeps the database from being used and what to do about it.
+
+    Empty when waiting will not help: the error is in what was asked of the database.
+    """
+    cause = error.orig if isinstance(error, DBAPIError) and error.orig is not None else error
+    code = getattr(cause, "sqlite_errorcode", None)
+    if code is not None:
+        return _SQLITE.get(code & _PRIMARY, "")
+    state = getattr(cause, "sqlstate", None) or getattr(cause, "pgcode", None)
+    if state:
+        return _SERVER.get(str(state)[:2], "")
+    lost = isinstance(error, InterfaceError) or (isinstance(error, DBAPIError) and error.connection_invalidated)
+    return _SERVER["08"] if lost or isinstance(cause, ConnectionError | TimeoutError) else ""

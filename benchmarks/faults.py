@@ -1,0 +1,93 @@
+"""What goes wrong at sea, at length: ``python benchmarks/faults.py [SCENE …] [--write docs/results/faults.md]``.
+
+The scenes of ``tests/faults`` with the real service as a process of its own: killed again and again, without room on
+its disk, locked out of its database, with a clock that jumps, a network that loses and delays, vehicles that lie
+or vanish, another service beside it, a cut network. Each asserts that no accepted sounding is lost, that every
+waypoint lies in the area, that no order comes twice, and that the operator is told. Printed is one JSON object for each
+scene; ``--write`` puts it into a page. A scene that does not hold ends the command with exit code 1.
+"""
+
+import argparse
+import asyncio
+import json
+import sys
+import tempfile
+import time
+import traceback
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+from typing import Any
+
+from imc_report import write_section
+
+from tests.faults import scenes
+from tests.faults.disks import small_disk
+
+HEAD = """# Faults: what was tried
+
+Every section is written by the command that stands in it (`--write` with this page's path). The service runs as a
+process of its own with the database it has in the field; polling vehicles repeat what was not answered, IMC vehicles
+are the simulator's fake DUNE nodes. In every scene it is asserted that no accepted sounding is lost or stored twice,
+that every waypoint lies in the area, that no vehicle is sent to an earlier step again, and that log and page say why.
+"""
+
+Scene = Callable[[Path, int], Awaitable[dict[str, Any]]]
+
+
+async def killed(folder: Path, seed: int) -> dict[str, Any]:
+    """50 kills in 500 steps."""
+    return await scenes.killed_again_and_again(folder, kills=50, steps=500, seed=seed)
+
+
+async def full(folder: Path, _seed: int) -> dict[str, Any]:
+    """A disk that is full ten times."""
+    with small_disk(folder / "disk") as disk:
+        return await scenes.disk_full(folder, disk, steps=100, fills=10)
+
+
+async def locked(folder: Path, _seed: int) -> dict[str, Any]:
+    """A lock that is held longer than a writer waits by default."""
+    return await scenes.locked(folder, steps=40, locks=2, busy_ms=30_000)
+
+
+async def aborted(folder: Path, _seed: int) -> dict[str, Any]:
+    """An abort while the disk is full."""
+    with small_disk(folder / "disk") as disk:
+        return await scenes.aborted_without_a_disk(folder, disk)
+
+
+SCENES: dict[str, tuple[str, Scene]] = {
+    "kill": ("Killed 50 times in 500 steps", killed),
+    "full": ("The disk is full, ten times", full),
+    "locked": ("Another program holds the database locked", locked),
+    "abort": ("Aborted while nothing can be written", aborted),
+}
+
+
+def main() -> None:
+    """Play and print; exit code 1 when a scene did not hold."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("scene", nargs="*", choices=[*SCENES, []], help="which ones; without any: all")
+    parser.add_argument("--seed", type=int, default=2026)
+    parser.add_argument("--write", type=Path, help="page of results in which each scene gets a section")
+    options = parser.parse_args()
+    broken = 0
+    for name in options.scene or SCENES:
+        title, scene = SCENES[name]
+        begun = time.monotonic()
+        with tempfile.TemporaryDirectory(prefix="bathyfleet-faults-") as folder:
+            try:
+                result = asyncio.run(scene(Path(folder), options.seed))
+            except (AssertionError, TimeoutError):
+                traceback.print_exc()
+                broken += 1
+                continue
+        result["wall_s"] = round(time.monotonic() - begun)
+        print(json.dumps({"scene": name} | result), flush=True)
+        if options.write is not None:
+            write_section(options.write, title, result, {}, head=HEAD)
+    sys.exit(1 if broken else 0)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,15 @@
+"""kill -9 at any moment: the mission goes on from its last committed step, and nothing that was accepted is lost."""
+
+from pathlib import Path
+
+import pytest
+
+from tests.faults.scenes import killed_again_and_again
+
+KILLS, STEPS = 5, 60
+"""The long version is ``benchmarks/faults.py``."""
+
+
+@pytest.mark.timeout(900)
+async def test_a_mission_survives_being_killed_at_random_moments(tmp_path: Path) -> None:
+    await killed_again_and_again(tmp_path, kills=KILLS, steps=STEPS, seed=2026)
