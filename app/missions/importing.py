@@ -29,6 +29,7 @@ from app.missions.live import LiveMission
 from app.missions.states import ENDED
 from app.missions.views import ImportOptions, ImportView, Level, ReferenceView
 from app.storage import soundings as sounding_queries
+from app.storage import stored_maps
 from app.storage.database import Database
 from app.storage.models import ImportRow, ReferenceRow
 from app.storage.shielding import to_the_end
@@ -98,7 +99,7 @@ async def import_soundings(
 
 async def delete_import(live: LiveMission, database: Database, import_id: str, actor: str) -> None:
     """Take an import back. Raises ImportNotFoundError."""
-    async with database.writing() as session:
+    async with live.journal.writing, database.writing() as session:
         row = await session.get(ImportRow, import_id)
         if row is None or row.mission_id != live.id:
             raise ImportNotFoundError(
@@ -107,8 +108,9 @@ async def delete_import(live: LiveMission, database: Database, import_id: str, a
         filename = row.filename
         await session.delete(row)
         await session.flush()
+        await stored_maps.forget(session, live.id)
         prior = await sounding_queries.imported_arrays(session, live.id)
-    live.builder.replace_prior(prior)
+    live.builder.arrivals.replace_prior(prior)
     await live.journal.log(Level.INFO, "import", f"import of {filename} taken back by {actor}", actor=actor)
 
 
@@ -177,11 +179,13 @@ async def _same_file(live: LiveMission, database: Database, digest: str, options
 
 
 async def _store_import(live: LiveMission, database: Database, row: ImportRow) -> None:
-    async with database.writing() as session:
+    # A map that is stored meanwhile would lack these.
+    async with live.journal.writing, database.writing() as session:
         session.add(row)
         await session.flush()
+        await stored_maps.forget(session, live.id)
         prior = await sounding_queries.imported_arrays(session, live.id)
-    live.builder.replace_prior(prior)
+    live.builder.arrivals.replace_prior(prior)
     live.changed.set()
     live.publish_summary()
 
