@@ -523,9 +523,9 @@ class LiveMission:
         if self._ticker is not None:
             self._ticker.cancel()
             await asyncio.gather(self._ticker, return_exceptions=True)
-        await self.whole.close()
         await self.ranges.close()
         await self.journal.close()
+        await self.whole.close(self.header.step)
 
 
 def builder_of(spec: MissionSpec) -> MapBuilder:

@@ -367,6 +367,8 @@ class Runner:
             session.add(step)
             await session.flush()
             session.add_all(waypoints)
+            # Only the last one's is ever needed; on a day's mission all of them would fill the disk.
+            await mission_queries.forget_memory(session, self._live.id, step.number - 1)
 
     def _waypoint_row(
         self,

@@ -43,7 +43,7 @@ class WholeSet:
         self._builder = builder
         self._journal = journal
         self._reading: asyncio.Task[None] | None = None
-        self._kept = 0
+        self._kept: BuiltMap | None = None
         self._shown: BuiltMap | None = None
         self._shown_step = 0
         self.imports_noticed = 0
@@ -65,7 +65,7 @@ class WholeSet:
                 row = None
             else:
                 self._builder.show(built, doubted)
-                self._shown, self._shown_step, self._kept = built, row.step, built.soundings
+                self._shown, self._shown_step, self._kept = built, row.step, built
         whole = row is not None and row.soundings == stored.accepted and (row.thorough or not ended)
         if not whole and (stored.accepted or imported):
             self._builder.arrivals.expect()
@@ -101,21 +101,21 @@ class WholeSet:
 
     async def keep_when_grown(self, step: int) -> None:
         """Store the map of a mission that runs, unless it is small or was stored of almost as many soundings."""
-        built = self._builder.newest
-        if built is not None and built.soundings >= max(WORTH_KEEPING, GROWTH * self._kept):
+        built, kept = self._builder.newest, self._kept.soundings if self._kept is not None else 0
+        if built is not None and built.soundings >= max(WORTH_KEEPING, GROWTH * kept):
             await self.keep(step)
 
     async def keep(self, step: int, *, ended: bool = False) -> None:
         """Store the newest map, so that the mission can be opened without its soundings."""
         built = self._builder.newest
-        if built is None:
+        if built is None or built is self._kept:
             return
         content = await asyncio.to_thread(pack, built.map, self._builder.doubted())
         async with self._journal.writing:
             if built is not self._builder.newest or not self._builder.true:
                 return  # something else is the case by now
             await to_the_end(self._store(built, step, content))
-        self._kept = built.soundings
+        self._kept = built
         if ended and built.thorough and built.soundings >= TOO_MANY_TO_HOLD:
             self._builder.release()
 
@@ -137,11 +137,12 @@ class WholeSet:
             }
             await stored_maps.keep(session, values)
 
-    async def close(self) -> None:
-        """Read no more."""
+    async def close(self, step: int) -> None:
+        """Read no more, and store the newest map."""
         if self._reading is not None:
             self._reading.cancel()
             await asyncio.gather(self._reading, return_exceptions=True)
+        await self.keep(step)
 
 
 async def accepted(

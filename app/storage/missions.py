@@ -56,6 +56,12 @@ async def last_step(session: AsyncSession, mission_id: str) -> StepRow | None:
     return (await session.scalars(query)).first()
 
 
+async def forget_memory(session: AsyncSession, mission_id: str, step: int) -> None:
+    """Drop what planner and targets' filters remembered after a step."""
+    of_step = (StepRow.mission_id == mission_id, StepRow.number == step)
+    await session.execute(update(StepRow).where(*of_step).values(memory=b"", targets=None))
+
+
 async def first_step_at(session: AsyncSession, mission_id: str) -> datetime | None:
     """Return when the first step was committed."""
     query = select(StepRow.committed_at).where(StepRow.mission_id == mission_id).order_by(StepRow.number).limit(1)
