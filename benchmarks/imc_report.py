@@ -1,5 +1,6 @@
 """Puts a benchmark's figures into a page of results: one section each, which the next run replaces."""
 
+import os
 import re
 import shlex
 import sys
@@ -7,6 +8,14 @@ from pathlib import Path
 from typing import Any
 
 from app.evaluation.tables.facts import made
+
+LOAD = Path(__file__).parents[1] / "docs" / "results" / "load.md"
+LOAD_HEAD = """# Load and endurance: what was measured
+
+Every section is written by the command that stands in it (`--write`). Service, vehicles and clients share the cores of
+one machine, on which other programs may run beside: processor time and ratios say more than seconds by the clock. A
+machine that was busy is told by `load_of_the_machine`, the mean number of programs that wanted a core.
+"""
 
 HEAD = """# The IMC bridge: what was measured
 
@@ -23,14 +32,17 @@ def command_line(hidden: dict[Path | None, str]) -> str:
 
 
 def write_section(
-    page: Path, title: str, figures: dict[str, Any], hidden: dict[Path | None, str], *, head: str = HEAD
+    page: Path, title: str, figures: dict[str, Any], hidden: dict[Path | None, str], *, head: str | None = None
 ) -> None:
     """Write the section ``title`` of a page, in the place of an older one; a new page begins with ``head``."""
     shown = f"docs/{page.as_posix().rpartition('docs/')[2]}" if "docs/" in page.as_posix() else page.name
+    if page == LOAD:
+        figures = figures | {"load_of_the_machine": round(os.getloadavg()[1], 1)}
     facts = made(command_line({page: shown, **hidden}), 1)
     lines = [f"## {title}", "", *(f"- {name}: {facts[name]}" for name in ("command", "date", "machine", "versions"))]
     lines += ["", "| | |", "| --- | --- |", *(f"| {name} | {_shown(value)} |" for name, value in figures.items()), ""]
-    text = page.read_text(encoding="utf-8") if page.exists() else head
+    begin = head or (LOAD_HEAD if page == LOAD else HEAD)
+    text = page.read_text(encoding="utf-8") if page.exists() else begin
     beginning, *sections = re.split(r"(?m)^(?=## )", text)
     kept = [section for section in sections if not section.startswith(f"## {title}\n")]
     place = next((i for i, section in enumerate(sections) if section.startswith(f"## {title}\n")), len(kept))

@@ -126,15 +126,10 @@ def _target(scope: Scope) -> str:
 
 
 async def _relay(answer: httpx.Response, send: Send) -> None:
-    headers = [
-        (name, value)
-        for name, value in answer.headers.raw
-        if end_to_end([(name.decode("latin-1"), "")])
-        and name.lower() not in (b"x-request-id", b"x-content-type-options")
-    ]
+    headers = [(name, value) for name, value in end_to_end(answer.headers.multi_items()) if name not in _OUR_OWN]
     length = answer.headers.get("content-length")
     if length is not None:
-        headers.append((b"content-length", length.encode()))
+        headers.append(("content-length", length))
     await send(
         {
             "type": "http.response.start",

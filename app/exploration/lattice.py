@@ -4,8 +4,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+import shapely
 from numpy.typing import NDArray
-from shapely import LineString, Polygon, minimum_rotated_rectangle
+from shapely import Polygon, minimum_rotated_rectangle
 
 from app.exploration.constraints import Constraints, inside_area
 from app.exploration.routes import FreeSpace
@@ -66,21 +67,31 @@ class Sweep:
         cuts = np.quantile(u, np.arange(1, n) / n)
         return np.concatenate([[u_area.min()], cuts, [u_area.max()]])
 
-    def line(self, u: float) -> list[FloatArray]:
-        """Return the parts (2, 2) of the line at ``u`` that lie in the free space, by increasing v."""
+    def lines(self, lines_u: FloatArray) -> list[list[FloatArray]]:
+        """Return the parts (2, 2) of each line at ``lines_u`` that lie in the free space, by increasing v."""
         v = self.to_uv(self.constraints.area)[:, 1]
-        ends = self.to_en(np.array([[u, v.min() - 1.0], [u, v.max() + 1.0]]))
-        cut = self.free.region.intersection(LineString(ends))
-        parts = [cut] if cut.geom_type == "LineString" else list(getattr(cut, "geoms", []))
-        pieces = [np.asarray(p.coords)[[0, -1]] for p in parts if p.geom_type == "LineString" and not p.is_empty]
-        ordered = [p if self.to_uv(p)[0, 1] <= self.to_uv(p)[1, 1] else p[::-1] for p in pieces]
-        return sorted(ordered, key=lambda p: float(self.to_uv(p)[0, 1]))
+        n = len(lines_u)
+        u = np.repeat(lines_u, 2)
+        ends = self.to_en(np.column_stack([u, np.tile([v.min() - 1.0, v.max() + 1.0], n)])).reshape(n, 2, 2)
+        cuts, of = shapely.get_parts(
+            shapely.intersection(self.free.region, shapely.linestrings(ends)), return_index=True
+        )
+        lines = (shapely.get_type_id(cuts) == shapely.GeometryType.LINESTRING) & ~shapely.is_empty(cuts)
+        cuts, of = cuts[lines], of[lines]
+        pieces = np.stack([shapely.get_coordinates(shapely.get_point(cuts, k)).reshape(-1, 2) for k in (0, -1)], axis=1)
+        along = self.to_uv(pieces)[..., 1]
+        backwards = along[:, 0] > along[:, 1]
+        pieces[backwards] = pieces[backwards, ::-1]
+        found: list[list[FloatArray]] = [[] for _ in range(n)]
+        for i in np.lexsort((np.minimum(*along.T), of)):
+            found[of[i]].append(pieces[i])
+        return found
 
     def stops(self, lines_u: FloatArray, *, upwards: bool) -> FloatArray:
         """Return the stops (k, 2) of flying the lines at ``lines_u`` in order, the first one ``upwards`` (along v)."""
         stops: list[FloatArray] = []
-        for u in lines_u:
-            pieces = self.line(float(u))
+        # All lines at once: one by one they take most of the time of planning a long mission, and hold others up.
+        for pieces in self.lines(lines_u):
             if not pieces:
                 continue
             stops.extend(pieces if upwards else [p[::-1] for p in reversed(pieces)])

@@ -20,6 +20,7 @@ from app.missions.live import LiveMission
 from app.missions.spec import MissionSpec, SoundSpeed, Tide
 from app.missions.views import CorrectionsView, Level, Ruling, TideCorrection, TideTableView, Verdict
 from app.storage import soundings as sounding_queries
+from app.storage import stored_maps
 from app.storage.models import MissionRow, SoundingRow, TideTableRow
 
 
@@ -104,14 +105,13 @@ async def _recorrect(
             mission.spec = mission.spec | spec.model_dump(mode="json", include={"tide", "sound_speed"})
             await store(session)
             await session.flush()
-            accepted = await sounding_queries.accepted_arrays(session, live.id)
+            await stored_maps.forget(session, live.id)
             counted = await sounding_queries.counts(session, live.id)
-            prior = await sounding_queries.imported_arrays(session, live.id)
         # Committed: from here on nothing waits until all of it holds.
         live.spec = spec
         live.gate.corrections = corrections
         live.journal.counts = Counts(counted.get("accepted", 0), counted.get("rejected", 0))
-        live.builder.replace(accepted.table, prior, accepted.trusted)
+        live.whole.changed()
         live.journal.told_of_missing_level = False
         live.revision += 1
     live.changed.set()

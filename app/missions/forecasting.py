@@ -82,7 +82,7 @@ def forecast(
     cruise = [member.cruise_depth_m(spec.limits) for member in members]
     floor = floor_of(spec, prior, max(cruise), floor_depth_m)
     builder = MapBuilder(spec.local_area(), forecast_cell_m(spec), spec.accuracy_m)
-    builder.replace(np.zeros((0, 4)), prior)
+    builder.arrivals.replace(np.zeros((0, 4)), prior)
     builder.build()
     constraints, planner = make_constraints(spec), create_planner(spec.planner.name, spec.planner.options)
     rng = np.random.default_rng([spec.seed, 1])

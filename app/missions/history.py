@@ -5,8 +5,8 @@ from app.missions.live import LiveMission
 from app.missions.map_builder import BuiltMap
 from app.missions.maps import MapSnapshot
 from app.missions.views import StepView, WaypointView
+from app.missions.whole_set import accepted
 from app.storage import missions as mission_queries
-from app.storage import soundings as sounding_queries
 
 
 async def steps_after(live: LiveMission, after: int, limit: int) -> list[StepView]:
@@ -35,18 +35,17 @@ async def steps_after(live: LiveMission, after: int, limit: int) -> list[StepVie
 
 async def map_at_step(live: LiveMission, step: int) -> MapSnapshot:
     """Return the map that the soundings until the end of a step make. Raises MapNotReadyError without any."""
-    if live.builder.newest is None or live.builder.stale:
+    if live.builder.newest is None or live.builder.stale or live.builder.arrivals.at_rest:
         await live.build_map()
-    async with live.database.reading() as session:
-        accepted = await sounding_queries.accepted_arrays(session, live.id, until_step=step)
+    found = await accepted(live.database, live.id, 0, until_step=step)
     newest = live.builder.newest
     if newest is None:
         raise MapNotReadyError("no sounding was accepted, so there is no map", "choose a later step")
     try:
-        bathymetry = await live.in_thread(live.builder.as_of, accepted.table)
+        bathymetry = await live.in_thread(live.builder.as_of, found.table)
     except ValueError:
         raise MapNotReadyError(
             f"no sounding was accepted until the end of step {step}", "choose a later step"
         ) from None
-    built = BuiltMap(newest.version, len(accepted.table), bathymetry, newest.digest)
+    built = BuiltMap(newest.version, len(found.table), bathymetry, newest.digest)
     return MapSnapshot(live.facts, built, step, live.reference_m, live.revision)

@@ -29,6 +29,7 @@ from app.missions.live import LiveMission
 from app.missions.states import ENDED
 from app.missions.views import ImportOptions, ImportView, Level, ReferenceView
 from app.storage import soundings as sounding_queries
+from app.storage import stored_maps
 from app.storage.models import ImportRow, ReferenceRow
 from app.storage.shielding import to_the_end
 
@@ -97,7 +98,7 @@ async def import_soundings(
 
 async def delete_import(live: LiveMission, import_id: str, actor: str) -> None:
     """Take an import back. Raises ImportNotFoundError."""
-    async with live.database.writing() as session:
+    async with live.journal.writing, live.database.writing() as session:
         row = await session.get(ImportRow, import_id)
         if row is None or row.mission_id != live.id:
             raise ImportNotFoundError(
@@ -106,8 +107,9 @@ async def delete_import(live: LiveMission, import_id: str, actor: str) -> None:
         filename = row.filename
         await session.delete(row)
         await session.flush()
+        await stored_maps.forget(session, live.id)
         prior = await sounding_queries.imported_arrays(session, live.id)
-    live.builder.replace_prior(prior)
+    live.builder.arrivals.replace_prior(prior)
     await live.journal.log(Level.INFO, "import", f"import of {filename} taken back by {actor}", actor=actor)
 
 
@@ -174,11 +176,13 @@ async def _same_file(live: LiveMission, digest: str, options: ImportOptions) -> 
 
 
 async def _store_import(live: LiveMission, row: ImportRow) -> None:
-    async with live.database.writing() as session:
+    # A map that is stored meanwhile would lack these.
+    async with live.journal.writing, live.database.writing() as session:
         session.add(row)
         await session.flush()
+        await stored_maps.forget(session, live.id)
         prior = await sounding_queries.imported_arrays(session, live.id)
-    live.builder.replace_prior(prior)
+    live.builder.arrivals.replace_prior(prior)
     live.changed.set()
     live.publish_summary()
 

@@ -32,7 +32,7 @@ from app.missions.fleet import (
 )
 from app.missions.gate import Gate
 from app.missions.hub import FleetHub
-from app.missions.journal import Counts, Journal, track_length_m
+from app.missions.journal import Counts, Journal
 from app.missions.map_builder import BuiltMap, MapBuilder
 from app.missions.map_tiles import TileCache
 from app.missions.maps import MapSnapshot, MissionFacts
@@ -43,7 +43,7 @@ from app.missions.search.scans import report_of, take
 from app.missions.search.state import Search
 from app.missions.search.views import SearchMessage, progress_of
 from app.missions.spec import MissionSpec, VehicleSpec
-from app.missions.states import MissionState
+from app.missions.states import ENDED, MissionState
 from app.missions.target_showing import target_views
 from app.missions.target_views import TargetView
 from app.missions.tracking import Tracking
@@ -60,10 +60,12 @@ from app.missions.views import (
     WaypointsMessage,
     WaypointView,
 )
+from app.missions.whole_set import WholeSet
 from app.storage import events as event_queries
 from app.storage import missions as mission_queries
 from app.storage import scans as scan_queries
 from app.storage import soundings as sounding_queries
+from app.storage import stored_maps
 from app.storage.database import Database
 from app.storage.models import MissionRow, PositionRow, TideTableRow, WaypointRow
 from app.storage.sharing import Shared
@@ -109,6 +111,7 @@ class LiveMission:
         tide_table: TideTable | None = None,
         time_scale: float = 1.0,
         search: Search | None = None,
+        builder: MapBuilder | None = None,
     ) -> None:
         self.id = row.id
         self.spec = spec
@@ -117,7 +120,7 @@ class LiveMission:
         self.area = spec.local_area()
         self.team = Team()
         self.broadcaster = Broadcaster()
-        self.builder = MapBuilder(self.area, spec.cell_m, spec.accuracy_m)
+        self.builder = builder or builder_of(spec)
         self.margin_m = 2 * spec.limits.max_step_m
         """How far outside the area what vehicles measured still belongs to the mission and helps the map's edge."""
         corrections = Corrections(self.frame, spec.tide, table=tide_table, sound_speed=spec.sound_speed)
@@ -135,6 +138,8 @@ class LiveMission:
         take_scans = None if self.search is None else partial(take, self.search, row.id, self.changed.set)
         self.journal = Journal(database, row.id, self.gate, counts, self.broadcaster, self.builder.add, take_scans)
         self.journal.on_trouble = self.publish_summary
+        self.whole = WholeSet(database, row.id, self.builder, self.journal)
+        """All its soundings, and its map as it is stored."""
         self.ranges = RangeJournal(database, row.id, Tracking(spec, self.frame), self.journal, time_scale)
         """Ranges to moving targets, and what they tell."""
         self.correcting = asyncio.Lock()
@@ -153,7 +158,6 @@ class LiveMission:
         self._map_news: MapMessage | None = None
         self._map_told_s = -math.inf
         self._search_told = 0
-        self._imports_noticed = 0
         self.notice_imports = Shared(self._notice_imports)
         """Take up the soundings of logs that the command line imported while this process had the mission."""
 
@@ -163,17 +167,15 @@ class LiveMission:
     ) -> "LiveMission":
         """Take a mission up from the database, as it was last committed."""
         async with database.reading() as session:
-            counted = await sounding_queries.counts(session, row.id)
-            accepted = await sounding_queries.accepted_arrays(session, row.id)
+            imported = await event_queries.last_event_id(session, row.id, kind="import")
+            stored = await stored_maps.stored_map(session, row.id, imported)
+            prior = await sounding_queries.any_imported(session, row.id)
             vehicles = await mission_queries.vehicles_of(session, row.id)
             waypoints = await mission_queries.newest_waypoints(session, row.id)
             step = await mission_queries.last_step(session, row.id)
-            tracks = await mission_queries.tracks(session, row.id)
             positions = await mission_queries.last_positions(session, row.id)
-            prior = await sounding_queries.imported_arrays(session, row.id)
             reference = await sounding_queries.reference_grid(session, row.id)
             tide = await session.get(TideTableRow, row.id)
-            imported = await event_queries.last_event_id(session, row.id, kind="import")
             risings = await event_queries.count_by_vehicle(session, row.id, "surface", RISES)
         # Building the spec checks geometry, which takes milliseconds: not on the event loop.
         loop = asyncio.get_running_loop()
@@ -184,18 +186,20 @@ class LiveMission:
         search = None
         if spec.search is not None:
             search = await loop.run_in_executor(executor, Search, spec, spec.search, spec.frame(), time_scale)
-        counts = Counts(counted.get("accepted", 0), counted.get("rejected", 0))
-        live = cls(database, hub, executor, row, spec, counts, table, time_scale, search)
+        counts = Counts(stored.accepted, stored.rejected)
+        # Which cells lie in the area is quick to tell of hundreds, and holds everyone up of millions.
+        builder = await asyncio.to_thread(builder_of, spec)
+        live = cls(database, hub, executor, row, spec, counts, table, time_scale, search, builder)
         if spec.targets:
             await loop.run_in_executor(executor, tracking_warm_up)
             async with database.reading() as session:
                 await live.ranges.load(session, step)
-        if len(accepted.table) + len(prior):
-            live.builder.replace(accepted.table, prior, accepted.trusted)
+        await live.whole.show(stored, imported=prior, ended=live.header.state in ENDED)
         await live._take_up_search()
         live.reference_m = reference
-        live._imports_noticed = imported
-        live.journal.travelled_m = sum(track_length_m(track) for track in tracks.values())
+        live.whole.imports_noticed = imported
+        await live.trails.newest()
+        live.journal.travelled_m = live.trails.length_m
         if step is not None:
             live.set_step(step.number, step.objective, step.terms)
         for vehicle in vehicles:
@@ -225,19 +229,17 @@ class LiveMission:
     async def _notice_imports(self) -> None:
         async with self.database.reading() as session:
             newest = await event_queries.last_event_id(session, self.id, kind="import")
-        if newest <= self._imports_noticed:
+        if newest <= self.whole.imports_noticed:
             return
 
         async def read() -> Counts:
             async with self.database.reading() as session:
                 counted = await sounding_queries.counts(session, self.id)
-                accepted = await sounding_queries.accepted_arrays(session, self.id)
-                prior = await sounding_queries.imported_arrays(session, self.id)
-            self.builder.replace(accepted.table, prior, accepted.trusted)
+            self.whole.changed()
+            self.whole.imports_noticed = newest
             return Counts(counted.get("accepted", 0), counted.get("rejected", 0))
 
         await self.journal.count_again(read)
-        self._imports_noticed = newest
         self.publish_summary()
 
     def halt(self) -> None:
@@ -334,6 +336,7 @@ class LiveMission:
 
     async def build_map(self) -> BuiltMap | None:
         """Make the map of everything accepted so far as thoroughly as for a product, in a worker thread."""
+        await self.whole.complete()
         before = self.builder.newest
         built = await self.in_thread(partial(self.builder.build, thorough=True))
         if built is not None and built is not before:
@@ -345,6 +348,7 @@ class LiveMission:
         if self.builder.stale:
             await self.build_map()
             self.publish_summary()
+            await self.whole.keep(self.header.step, ended=self.header.state in ENDED)
 
     async def in_thread(self, work: Callable[..., Made], *arguments: Any) -> Made:
         """Compute something in a worker thread."""
@@ -362,7 +366,8 @@ class LiveMission:
 
     def snapshot(self, built: BuiltMap) -> MapSnapshot:
         """Return a map with what is needed to understand it."""
-        return MapSnapshot(self.facts, built, self.header.step, self.reference_m, self.revision)
+        step = self.whole.step_of(built, self.header.step)
+        return MapSnapshot(self.facts, built, step, self.reference_m, self.revision)
 
     def publish_map(self, built: BuiltMap) -> None:
         """Tell everyone who watches that there is a new map."""
@@ -537,6 +542,12 @@ class LiveMission:
             await asyncio.gather(self._ticker, return_exceptions=True)
         await self.ranges.close()
         await self.journal.close()
+        await self.whole.close(self.header.step)
+
+
+def builder_of(spec: MissionSpec) -> MapBuilder:
+    """Return the builder of a mission's map, which knows of no sounding yet."""
+    return MapBuilder(spec.local_area(), spec.cell_m, spec.accuracy_m)
 
 
 def live_period_s(viewers: int) -> float:

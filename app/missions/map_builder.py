@@ -3,7 +3,6 @@
 import copy
 import hashlib
 import threading
-from collections import deque
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -16,24 +15,13 @@ from app.mapping.fusion import fuse, prior_map
 from app.mapping.gp import GaussianProcessMap
 from app.mapping.outliers import flag_outliers
 from app.mapping.types import BathymetricMap, BoolArray, FloatArray, Grid, Soundings
+from app.missions.arrivals import Arrivals, Everything
 
 MAX_LANDMARKS = 4000
 """More landmarks make planning slower, not better: neighbouring cells are almost the same question."""
 
 RELEARN_GROWTH = 1.15
 """Hyperparameters are learned again when the soundings grew by this factor."""
-
-
-@dataclass(frozen=True)
-class _Everything:
-    """Soundings that take the place of all that were there, shape (n, 4), and those that were imported.
-
-    None: the mission's own stay.
-    """
-
-    soundings: NDArray[np.float64] | None
-    prior: NDArray[np.float64]
-    trusted: BoolArray
 
 
 @dataclass(frozen=True)
@@ -58,12 +46,16 @@ class _Learned:
 
 @dataclass(frozen=True)
 class BuiltMap:
-    """A map and what was known when it was made. ``version`` grows with each."""
+    """A map and what was known when it was made. ``version`` grows with each.
+
+    ``thorough`` maps are those before which outliers were judged and the model was learned of all soundings.
+    """
 
     version: int
     soundings: int
     map: BathymetricMap
     digest: str
+    thorough: bool = False
 
 
 def make_grid(area: FloatArray, cell_m: float) -> tuple[Grid, BoolArray]:
@@ -94,7 +86,7 @@ class MapBuilder:
             self._nodes = self.mask.copy()
         self._nodes_xy = self.grid.centres_m[self._nodes.ravel()]
         self._accurate = np.zeros(len(self._nodes_xy), dtype=bool)
-        self._pending: deque[NDArray[np.float64] | _Everything] = deque()
+        self.arrivals = Arrivals()
         self._soundings = np.zeros((0, 4))
         # Those that an operator restored: they are no outliers whatever their neighbours say.
         self._trusted = np.zeros(0, dtype=bool)
@@ -103,28 +95,39 @@ class MapBuilder:
         self._building = threading.Lock()
         self._learning = threading.Lock()
         self._newest: BuiltMap | None = None
+        self._doubted: list[tuple[NDArray[np.float64], str]] = []
+        # What ``arrivals.replaced`` was when the newest map's soundings were taken in.
+        self._replaced_mapped = 0
         self._version = 0
         # Counts how often all soundings were replaced: what is learned meanwhile of the old ones is void.
         self._generation = 0
 
     def add(self, soundings: NDArray[np.float64]) -> None:
         """Take in soundings, shape (n, 4): east, north, depth, standard deviation in metres."""
-        if len(soundings):
-            self._pending.append(soundings)
+        self.arrivals.add(soundings)
 
-    def replace(
-        self, soundings: NDArray[np.float64], prior: NDArray[np.float64], trusted: BoolArray | None = None
-    ) -> None:
-        """Take these in place of all soundings so far; ``prior`` are those that were imported. Shapes (n, 4).
+    def show(self, built: BuiltMap, doubted: list[tuple[NDArray[np.float64], str]]) -> None:
+        """Begin with a map that was stored, and with what it left out; its soundings stay where they are stored."""
+        self._version = built.version
+        self._newest, self._doubted = built, doubted
+        self.arrivals.rest()
 
-        ``trusted`` (n,) is True for soundings that are never taken for outliers.
-        """
-        known = np.zeros(len(soundings), dtype=bool) if trusted is None else trusted
-        self._pending.append(_Everything(soundings, prior, known))
+    def release(self) -> None:
+        """Let go of the soundings, which are read again when they are needed; map and doubts stay."""
+        # Nothing is released that a thread works with.
+        if self._building.acquire(blocking=False):
+            if self._learning.acquire(blocking=False):
+                if self.arrivals.rest():
+                    self._doubted = self.doubted()
+                    self._soundings, self._trusted = np.zeros((0, 4)), np.zeros(0, dtype=bool)
+                    self._prior, self._learned = None, _Learned(_new_model())
+                self._learning.release()
+            self._building.release()
 
-    def replace_prior(self, prior: NDArray[np.float64]) -> None:
-        """Take these, shape (n, 4), in place of all imported soundings so far."""
-        self._pending.append(_Everything(None, prior, np.zeros(0, dtype=bool)))
+    @property
+    def true(self) -> bool:
+        """Whether nothing that the newest map was made of was changed since; more may have come."""
+        return self.arrivals.replaced == self._replaced_mapped
 
     @property
     def newest(self) -> BuiltMap | None:
@@ -134,32 +137,35 @@ class MapBuilder:
     @property
     def stale(self) -> bool:
         """Whether there are soundings that the newest map does not hold."""
-        return bool(self._pending)
+        return bool(self.arrivals)
 
     def build(self, *, thorough: bool = False) -> BuiltMap | None:
         """Make a map of everything added so far; None without soundings.
 
         Gross outliers are judged by ``learn``; a sounding that came since is trusted until then. A thorough map judges
-        every sounding and learns the model first, as a product should.
+        every sounding and learns the model first, as a product should. While the soundings are not in memory the newest
+        map stays as it is.
         """
         with self._building:
-            changed = self._take_in()
+            came = self.arrivals.take()
+            if came is None:
+                return self._newest
+            self._take_in(came[0])
             if not len(self._soundings) and self._prior is None:
                 self._newest = None
                 return None
             if thorough:
                 self.learn(always=True)
-            if changed or (self._newest is not None and thorough):
-                self._newest = self._build()
+            if came[0] or (self._newest is not None and thorough):
+                self._newest = self._build(thorough=thorough)
+                self._replaced_mapped = came[1]
             return self._newest
 
-    def _take_in(self) -> bool:
-        """Add what is pending; tells whether there was anything."""
+    def _take_in(self, came: list[NDArray[np.float64] | Everything]) -> None:
+        """Add what came."""
         arrived: list[NDArray[np.float64]] = []
-        changed = bool(self._pending)
-        while self._pending:
-            item = self._pending.popleft()
-            if isinstance(item, _Everything):
+        for item in came:
+            if isinstance(item, Everything):
                 self._prior = prior_map(_as_soundings(item.prior), self.grid, self.mask) if len(item.prior) else None
                 if item.soundings is not None:
                     self._generation += 1
@@ -171,9 +177,8 @@ class MapBuilder:
             self._soundings = np.concatenate([self._soundings, *arrived])
             new = np.zeros(len(self._soundings) - len(self._trusted), dtype=bool)
             self._trusted = np.concatenate([self._trusted, new])
-        return changed
 
-    def _build(self) -> BuiltMap:
+    def _build(self, *, thorough: bool) -> BuiltMap:
         bathymetry = self._prior
         if len(self._soundings):
             measured = self._measured()
@@ -182,7 +187,7 @@ class MapBuilder:
             raise ValueError("there is no sounding to make a map of")
         digest = hashlib.sha256(bathymetry.depth_m.tobytes()).hexdigest()
         self._version += 1
-        return BuiltMap(self._version, len(self._soundings), bathymetry, digest)
+        return BuiltMap(self._version, len(self._soundings), bathymetry, digest, thorough)
 
     def _measured(self) -> BathymetricMap:
         """Return the map of the mission's own soundings."""
@@ -228,7 +233,7 @@ class MapBuilder:
 
         Does not wait for a map that is being made.
         """
-        return self._learned.doubted
+        return self._learned.doubted if self._learned.reasons else self._doubted
 
     def as_of(self, soundings: NDArray[np.float64]) -> BathymetricMap:
         """Return the map that the first soundings (n, 4) alone make, under the model learned of all of them."""
@@ -289,8 +294,7 @@ class MapBuilder:
 
         What came since the newest map was begun counts as sounded.
         """
-        since = [item for item in self._pending.copy() if not isinstance(item, _Everything)]
-        places = np.concatenate([self._soundings, *since])[:, :2]
+        places = np.concatenate([self._soundings, *self.arrivals.noted()])[:, :2]
         rejected = self._learned.rejected[: len(places)]
         doubtful = np.zeros(len(places), dtype=bool)
         doubtful[: len(rejected)] = rejected

@@ -66,3 +66,4 @@ async def _map_all(live: LiveMission) -> None:
     await live.journal.flush()
     await live.build_map()
     live.publish_summary()
+    await live.whole.keep(live.header.step, ended=True)

@@ -12,6 +12,7 @@ from app.missions.journal import Counts
 from app.missions.live import LiveMission
 from app.missions.views import Level, Ruling, SoundingPage, SoundingState, SoundingView, Verdict
 from app.storage import soundings as sounding_queries
+from app.storage import stored_maps
 from app.storage.models import EventRow, SoundingRow
 from app.storage.shielding import to_the_end
 
@@ -70,6 +71,7 @@ async def _store(live: LiveMission, sounding_id: int, ruling: Ruling, note: str,
             )
         if row.ruling == ruling:
             return None
+        was_accepted = row.verdict == Verdict.ACCEPTED
         before = row.reason or (await _doubts(live, session)).get(row.id, "")
         said = f": {note}" if note else ""
         if ruling is Ruling.RESTORED:
@@ -86,11 +88,11 @@ async def _store(live: LiveMission, sounding_id: int, ruling: Ruling, note: str,
         )
         session.add(line)
         await session.flush()
-        accepted = await sounding_queries.accepted_arrays(session, live.id)
-        counted = await sounding_queries.counts(session, live.id)
-        prior = await sounding_queries.imported_arrays(session, live.id)
-    live.journal.counts = Counts(counted.get("accepted", 0), counted.get("rejected", 0))
-    live.builder.replace(accepted.table, prior, accepted.trusted)
+        await stored_maps.forget(session, live.id)
+    # To count all of them again takes seconds where there are millions.
+    counts, more = live.journal.counts, int(row.verdict == Verdict.ACCEPTED) - int(was_accepted)
+    live.journal.counts = Counts(counts.accepted + more, counts.rejected - more)
+    live.whole.changed()
     return line
 
 

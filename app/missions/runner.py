@@ -247,11 +247,13 @@ class Runner:
         live, loop = self._live, asyncio.get_running_loop()
         started_s = loop.time()
         await live.journal.flush()
+        await live.whole.complete()
         before = live.builder.newest
         built = await loop.run_in_executor(self._executor, live.builder.build)
         if built is not None and built is not before:
             live.publish_map(built)
         self._mapping_s = loop.time() - started_s
+        await live.whole.keep_when_grown(live.header.step)
 
     async def _renew_map(self) -> None:
         """Bring the map up to date, unless vehicles would circle for long meanwhile: then the newest has to do.
@@ -265,6 +267,7 @@ class Runner:
             await mapping
         await live.journal.flush()
         await live.notice_imports()
+        await live.whole.complete()
         if patient and live.builder.stale:
             await self._make_map()
 
@@ -369,6 +372,8 @@ class Runner:
             session.add(step)
             await session.flush()
             session.add_all(waypoints)
+            # Only the last one's is ever needed; on a day's mission all of them would fill the disk.
+            await mission_queries.forget_memory(session, self._live.id, step.number - 1)
 
     def _waypoint_row(
         self,

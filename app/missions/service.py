@@ -517,16 +517,22 @@ class MissionService:
         """
         live = await self._get(mission_id)
         if step is None:
-            snapshot = await self.map(mission_id)
+            snapshot = await self.map(mission_id, patient=False)
         else:
             snapshot = await map_at_step(live, step)
         at = "" if step is None else f"@{step}"
         tag = f"{run}.{snapshot.version}.{snapshot.revision}{at}"
         return await live.tiles.answer(snapshot, tag, since, tuple(sorted(set(further))))
 
-    async def map(self, mission_id: str) -> MapSnapshot:
-        """Return the newest map. Raises MapNotReadyError when there is no sounding yet."""
+    async def map(self, mission_id: str, *, patient: bool = True) -> MapSnapshot:
+        """Return the newest map. Raises MapNotReadyError when there is no sounding yet.
+
+        Without being ``patient``: an older one, if there is one, while a newer one is being made.
+        """
         live = await self._get(mission_id)
+        built = live.builder.newest
+        if not patient and built is not None and self._maps.busy(mission_id):
+            return live.snapshot(built)
         await self._maps.last(mission_id)
         await live.notice_imports()
         built = live.builder.newest

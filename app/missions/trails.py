@@ -1,6 +1,8 @@
 """Where a mission's vehicles have been, as it is worth drawing: read once from the database, then only what is new."""
 
 import asyncio
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import shapely
@@ -8,6 +10,7 @@ from numpy.typing import NDArray
 
 from app.missions.journal import METRES_PER_DEGREE
 from app.storage import missions as mission_queries
+from app.storage.bulk import read_in_pieces
 from app.storage.database import Database
 
 TOLERANCE_M = 0.2
@@ -35,19 +38,32 @@ class Trails:
     async def newest(self) -> dict[str, Trail]:
         """Return each vehicle's trail as (longitude, latitude, depth), in the order of the vehicle's clock."""
         async with self._reading:
-            async with self._database.reading() as session:
-                rows = await mission_queries.positions_after(session, self._mission_id, self._newest_id)
-            if rows:
-                self._newest_id = rows[-1].id
-                found: dict[str, list[tuple[float, float, float, float]]] = {}
-                for row in rows:
-                    found.setdefault(row.vehicle, []).append((row.time_s, row.lon_deg, row.lat_deg, row.depth_m))
+            found: dict[str, list[FloatArray]] = {}
+            newest = self._newest_id
+
+            def take(rows: Sequence[Any]) -> None:
+                nonlocal newest
+                newest = rows[-1][0]
+                names = np.array([row[1] for row in rows])
+                places = np.array([tuple(row)[2:] for row in rows])
+                for name in np.unique(names).tolist():
+                    found.setdefault(name, []).append(places[names == name])
+
+            query = mission_queries.positions_after(self._mission_id, self._newest_id)
+            await read_in_pieces(self._database, query, take)
+            if found:
                 await asyncio.to_thread(self._add, found)
+                self._newest_id = newest
             return dict(self._trails)
 
-    def _add(self, found: dict[str, list[tuple[float, float, float, float]]]) -> None:
+    @property
+    def length_m(self) -> float:
+        """How far all vehicles went, as of the last time that someone asked for the trails."""
+        return sum(_length_m(points) for points in self._points.values())
+
+    def _add(self, found: dict[str, list[FloatArray]]) -> None:
         for vehicle, more in found.items():
-            points = np.array(more)
+            points = np.concatenate(more)
             known = self._points.get(vehicle)
             if known is not None:
                 points = np.concatenate([known, points])
@@ -56,6 +72,12 @@ class Trails:
             self._points[vehicle] = points
             kept = points[worth_drawing(points[:, 1:]), 1:]
             self._trails[vehicle] = [(round(x, DIGITS), round(y, DIGITS), round(z, 2)) for x, y, z in kept.tolist()]
+
+
+def _length_m(points: FloatArray) -> float:
+    """Return the length of a way, shape (n, 4): time, longitude, latitude, depth."""
+    east, north = np.diff(points[:, 1:3], axis=0).T
+    return float(METRES_PER_DEGREE * np.hypot(east * np.cos(np.radians(points[:-1, 2])), north).sum())
 
 
 def worth_drawing(places: FloatArray, tolerance_m: float = TOLERANCE_M) -> NDArray[np.intp]:

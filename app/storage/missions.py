@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from datetime import datetime
 from typing import Any
 
-from sqlalchemy import func, select, update
+from sqlalchemy import Select, func, select, update
 from sqlalchemy.ext.asyncio import AsyncSession
 from sqlalchemy.orm import defer
 
@@ -54,6 +54,12 @@ async def last_step(session: AsyncSession, mission_id: str) -> StepRow | None:
     """Return the newest committed step."""
     query = select(StepRow).where(StepRow.mission_id == mission_id).order_by(StepRow.number.desc()).limit(1)
     return (await session.scalars(query)).first()
+
+
+async def forget_memory(session: AsyncSession, mission_id: str, step: int) -> None:
+    """Drop what planner and targets' filters remembered after a step."""
+    of_step = (StepRow.mission_id == mission_id, StepRow.number == step)
+    await session.execute(update(StepRow).where(*of_step).values(memory=b"", targets=None))
 
 
 async def first_step_at(session: AsyncSession, mission_id: str) -> datetime | None:
@@ -114,22 +120,9 @@ async def add_positions(session: AsyncSession, rows: Sequence[dict[str, Any]]) -
         await session.execute(PositionRow.__table__.insert(), list(rows))  # type: ignore[attr-defined]
 
 
-async def tracks(session: AsyncSession, mission_id: str) -> dict[str, list[tuple[float, float]]]:
-    """Return each vehicle's track as (longitude, latitude), in the order of the vehicle's clock."""
-    query = (
-        select(PositionRow.vehicle, PositionRow.lon_deg, PositionRow.lat_deg)
-        .where(PositionRow.mission_id == mission_id)
-        .order_by(PositionRow.vehicle, PositionRow.time_s, PositionRow.id)
-    )
-    result: dict[str, list[tuple[float, float]]] = {}
-    for vehicle, lon, lat in await session.execute(query):
-        result.setdefault(vehicle, []).append((lon, lat))
-    return result
-
-
-async def positions_after(session: AsyncSession, mission_id: str, after_id: int) -> Sequence[Any]:
-    """Return places that were written after the one of this id, oldest first."""
-    query = (
+def positions_after(mission_id: str, after_id: int) -> Select[*tuple[Any, ...]]:
+    """Return the query of places that were written after the one of this id: id, vehicle, time and place."""
+    return (
         select(
             PositionRow.id,
             PositionRow.vehicle,
@@ -141,7 +134,6 @@ async def positions_after(session: AsyncSession, mission_id: str, after_id: int)
         .where(PositionRow.mission_id == mission_id, PositionRow.id > after_id)
         .order_by(PositionRow.id)
     )
-    return (await session.execute(query)).all()
 
 
 async def last_positions(session: AsyncSession, mission_id: str) -> dict[str, PositionRow]:

@@ -277,6 +277,29 @@ class ReferenceRow(Base):
     depths: Mapped[bytes] = mapped_column(LargeBinary)
 
 
+class StoredMapRow(Base):
+    """A mission's map as it was at a moment, so that the mission can be opened without all its soundings.
+
+    It is dropped in the transaction that changes soundings which were there already. Those that came later have an id
+    above ``last_sounding``, or there is an import in the log after ``last_import``.
+    """
+
+    __tablename__ = "stored_maps"
+
+    mission_id: Mapped[str] = mapped_column(ForeignKey("missions.id", ondelete="CASCADE"), primary_key=True)
+    made_at: Mapped[datetime]
+    step: Mapped[int]
+    last_sounding: Mapped[int] = mapped_column(_BigId)
+    last_import: Mapped[int] = mapped_column(_BigId)
+    accepted: Mapped[int]
+    rejected: Mapped[int]
+    """Soundings that there were; the map may be of fewer."""
+    soundings: Mapped[int]
+    thorough: Mapped[bool]
+    digest: Mapped[str] = mapped_column(String(64))
+    content: Mapped[bytes] = mapped_column(LargeBinary)
+
+
 class PositionRow(Base):
     """A point of a vehicle's track, thinned."""
 

@@ -2,11 +2,11 @@
 
 import zlib
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from sqlalchemy import func, select, tuple_
+from sqlalchemy import Select, func, select, tuple_
 from sqlalchemy.dialects import postgresql, sqlite
 from sqlalchemy.ext.asyncio import AsyncSession
 
@@ -30,29 +30,27 @@ async def insert_new(session: AsyncSession, rows: Sequence[dict[str, Any]]) -> s
     return {(vehicle, time_s, beam) for vehicle, time_s, beam in result}
 
 
-class Accepted(NamedTuple):
-    """Accepted soundings in the order they came.
+def accepted_query(
+    mission_id: str, *, until_id: int | None = None, until_step: int | None = None
+) -> Select[*tuple[Any, ...]]:
+    """Return the query of accepted soundings in the order they came, up to an id or to the end of a step.
 
-    ``table`` has shape (n, 4): east, north, depth, deviation (metres); ``trusted`` (n,) is True where an operator
-    restored the sounding.
+    Columns are east, north, depth, deviation (metres) and whether an operator restored the sounding.
     """
-
-    table: NDArray[np.float64]
-    trusted: NDArray[np.bool_]
-
-
-async def accepted_arrays(session: AsyncSession, mission_id: str, *, until_step: int | None = None) -> Accepted:
-    """Return the accepted soundings, those that came until the end of a step where one is given."""
     query = (
-        select(SoundingRow.east_m, SoundingRow.north_m, SoundingRow.depth_m, SoundingRow.sd_m, SoundingRow.ruling)
+        select(
+            SoundingRow.east_m,
+            SoundingRow.north_m,
+            SoundingRow.depth_m,
+            SoundingRow.sd_m,
+            SoundingRow.ruling.is_not(None),
+        )
         .where(SoundingRow.mission_id == mission_id, SoundingRow.verdict == "accepted")
         .order_by(SoundingRow.id)
     )
-    if until_step is not None:
-        query = query.where(SoundingRow.step <= until_step)
-    rows = (await session.execute(query)).all()
-    table = np.array([tuple(row)[:4] for row in rows], dtype=float).reshape(-1, 4)
-    return Accepted(table, np.array([row.ruling is not None for row in rows], dtype=bool))
+    if until_id is not None:
+        query = query.where(SoundingRow.id <= until_id)
+    return query if until_step is None else query.where(SoundingRow.step <= until_step)
 
 
 async def ids_at(session: AsyncSession, mission_id: str, table: Sequence[NDArray[np.float64]]) -> list[list[int]]:
@@ -108,6 +106,11 @@ async def imported_arrays(session: AsyncSession, mission_id: str) -> NDArray[np.
     query = select(ImportRow.soundings).where(ImportRow.mission_id == mission_id)
     stored = (await session.scalars(query.order_by(ImportRow.created_at, ImportRow.id))).all()
     return np.concatenate([np.zeros((0, 4)), *(unpack(soundings, -1, 4) for soundings in stored)])
+
+
+async def any_imported(session: AsyncSession, mission_id: str) -> bool:
+    """Tell whether anything was imported."""
+    return await session.scalar(select(ImportRow.id).where(ImportRow.mission_id == mission_id).limit(1)) is not None
 
 
 async def reference_grid(session: AsyncSession, mission_id: str) -> NDArray[np.float64] | None:

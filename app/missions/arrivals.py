@@ -1,0 +1,107 @@
+"""Soundings on their way into the map: noted on the event loop, taken in by the thread that makes the map."""
+
+import threading
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.mapping.types import BoolArray
+
+Rows = NDArray[np.float64]
+"""Soundings, shape (n, 4): east, north, depth, standard deviation in metres."""
+
+
+@dataclass(frozen=True)
+class Everything:
+    """Soundings that take the place of all that were there, and those that were imported.
+
+    ``soundings`` None: the mission's own stay. ``trusted`` (n,) is True for those that are never taken for outliers.
+    """
+
+    soundings: Rows | None
+    prior: Rows
+    trusted: BoolArray
+
+
+class Coming:
+    """Stands for all soundings so far while they are being read."""
+
+
+class Arrivals:
+    """What came since the map was begun.
+
+    Attributes
+    ----------
+    at_rest
+        The mission's soundings are not in memory: nothing can be made of them before they are read.
+    replaced
+        How often soundings that were there were put in place of others.
+    """
+
+    def __init__(self) -> None:
+        self._queue: deque[Rows | Everything | Coming] = deque()
+        self._lock = threading.Lock()
+        self.at_rest = False
+        self.replaced = 0
+
+    def __bool__(self) -> bool:
+        """Tell whether anything came."""
+        return bool(self._queue)
+
+    def add(self, soundings: Rows) -> None:
+        """Note soundings."""
+        if len(soundings):
+            self._queue.append(soundings)
+
+    def replace(self, soundings: Rows, prior: Rows, trusted: BoolArray | None = None) -> None:
+        """Take these in place of all soundings so far; ``prior`` are those that were imported."""
+        known = np.zeros(len(soundings), dtype=bool) if trusted is None else trusted
+        with self._lock:
+            self._queue.clear()
+            self._queue.append(Everything(soundings, prior, known))
+            self.at_rest = False
+            self.replaced += 1
+
+    def replace_prior(self, prior: Rows) -> None:
+        """Take these in place of all imported soundings so far."""
+        with self._lock:
+            self._queue.append(Everything(None, prior, np.zeros(0, dtype=bool)))
+            self.replaced += 1
+
+    def expect(self) -> Coming:
+        """Await all soundings so far, imported ones too, which are about to be read; until then nothing is taken in."""
+        coming = Coming()
+        with self._lock:
+            self._queue.clear()
+            self._queue.append(coming)
+            self.at_rest = True
+            self.replaced += 1
+        return coming
+
+    def arrived(self, coming: Coming, everything: Everything) -> None:
+        """Take what was read for ``coming``, unless all is to be read once more."""
+        with self._lock:
+            if self._queue and self._queue[0] is coming:
+                self._queue[0] = everything
+                self.at_rest = False
+
+    def rest(self) -> bool:
+        """Leave the soundings where they are stored; not while anything is on its way. Tells whether it is so now."""
+        with self._lock:
+            self.at_rest = self.at_rest or not self._queue
+            return self.at_rest
+
+    def take(self) -> tuple[list[Rows | Everything], int] | None:
+        """Return what came, and ``replaced`` as of that; None while the soundings are not in memory."""
+        with self._lock:
+            if self.at_rest:
+                return None
+            taken = [item for item in self._queue if not isinstance(item, Coming)]
+            self._queue.clear()
+            return taken, self.replaced
+
+    def noted(self) -> list[Rows]:
+        """Return the soundings that came one by one."""
+        return [item for item in self._queue.copy() if isinstance(item, np.ndarray)]
