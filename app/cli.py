@@ -11,7 +11,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from app import __version__
-from app.commands.common import CommandError, Database, command_settings
+from app.commands.audit import audit
+from app.commands.backup import backup, prune, restore
+from app.commands.common import CommandError, Database, command_settings, noted
 from app.commands.data import export, import_file, tide
 from app.commands.logs import import_logs
 from app.commands.train import train
@@ -33,6 +35,10 @@ app.command("import")(import_file)
 app.command("import-log")(import_logs)
 app.command()(tide)
 app.command()(train)
+app.command()(audit)
+app.command()(backup)
+app.command()(restore)
+app.command()(prune)
 
 
 DEMO_FOLDER = Path("bathyfleet-demo")
@@ -107,9 +113,12 @@ def serve(
     logs.configure(settings.log_level, settings.log_format)
 
     def started(server: Server) -> None:
-        typer.echo(f"bathyfleet answers at {server.url} (API: {server.url}/api/docs). Ctrl-C stops it.", err=True)
+        token = f" An operator token for others is in {server.first_token}." if server.first_token is not None else ""
+        typer.echo(
+            f"bathyfleet answers at {server.url} (API: {server.url}/api/docs).{token} Ctrl-C stops it.", err=True
+        )
 
-    asyncio.run(serve(settings, started=started))
+    asyncio.run(serve(settings, started=started, with_first_token=True))
 
 
 @app.command()
@@ -140,6 +149,8 @@ def migrate(
     except (AlembicError, SQLAlchemyError, OSError) as error:
         reason = str(getattr(error, "orig", None) or error).partition("\n")[0]
         raise CommandError(f"the database cannot be migrated: {reason}") from None
+    if before != after and down_to is None:
+        asyncio.run(noted(settings, "migrate", f"{before or 'empty'} to {after}"))
     if before == after:
         typer.echo(f"the database is at revision {after or 'empty'} already")
     else:
@@ -168,7 +179,8 @@ def create_token(
     async def run(store: TokenStore) -> tuple[str, str]:
         return await store.create(name, Role(role.value), vehicle=vehicle, expires_at=expires_at)
 
-    token_id, token = _with_tokens(database, run)
+    bound = f", vehicle {vehicle}" if vehicle else ""
+    token_id, token = _with_tokens(database, run, "token create", f"{name}, {role.value}{bound}")
     typer.echo(f"token {token_id} of role {role} for {name}; it is shown only now:", err=True)
     typer.echo(token)
 
@@ -218,17 +230,15 @@ def revoke_token(
     """Revoke an access token for good."""
     from app.api.tokens import TokenStore
 
-    async def run(store: TokenStore) -> list[str]:
-        valid = [row.id for row in await store.all() if row.revoked_at is None and row.id.startswith(token_id)]
-        if len(valid) == 1:
-            await store.revoke(valid[0])
-        return valid
+    async def run(store: TokenStore) -> str:
+        found = [row.id for row in await store.all() if row.revoked_at is None and row.id.startswith(token_id)]
+        if len(found) != 1:
+            meaning = "several tokens have ids that begin" if found else "no valid token has an id that begins"
+            raise typer.BadParameter(f"{meaning} with {token_id!r}; see bathyfleet token list", param_hint="ID")
+        await store.revoke(found[0])
+        return found[0]
 
-    found = _with_tokens(database, run)
-    if len(found) != 1:
-        meaning = "several tokens have ids that begin" if found else "no valid token has an id that begins"
-        raise typer.BadParameter(f"{meaning} with {token_id!r}; see bathyfleet token list", param_hint="ID")
-    typer.echo(f"token {found[0]} is revoked")
+    typer.echo(f"token {_with_tokens(database, run, 'token revoke', token_id)} is revoked")
 
 
 @app.command()
@@ -391,7 +401,7 @@ def evaluate(context: typer.Context) -> None:
     evaluate_app(args=context.args, prog_name="bathyfleet evaluate")
 
 
-def _with_tokens(database: str | None, run: Any) -> Any:
+def _with_tokens(database: str | None, run: Any, changing: str = "", target: str = "") -> Any:
     settings = command_settings(database_url=database)
     from app.api.tokens import TokenStore
     from app.storage.database import Database as Store
@@ -401,9 +411,15 @@ def _with_tokens(database: str | None, run: Any) -> Any:
         await prepare_database(settings.database_url, may_upgrade=settings.migrates_itself)
         store = Store(settings.database_url)
         try:
-            return await run(TokenStore(store))
+            done = await run(TokenStore(store))
+        except typer.BadParameter as error:
+            await noted(settings, changing, target, refused=error.message)
+            raise
         finally:
             await store.close()
+        if changing:
+            await noted(settings, changing, target)
+        return done
 
     return asyncio.run(use())
 

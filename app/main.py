@@ -3,19 +3,23 @@
 import asyncio
 import signal
 import socket
+import ssl
 import threading
 from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import asynccontextmanager, contextmanager
+from pathlib import Path
 from types import FrameType
 
 import structlog
 import uvicorn
 from fastapi import FastAPI
 from fastapi_offline import FastAPIOffline
+from sqlalchemy import make_url
 from starlette.middleware.cors import CORSMiddleware
 
 from app import __version__
 from app.api import (
+    auditing,
     corrections,
     fleet,
     forecasts,
@@ -31,21 +35,26 @@ from app.api import (
     streams,
     targets,
 )
+from app.api.auditing import AuditLog, AuditMiddleware
 from app.api.auth import console_log_in
-from app.api.forwarding import ForwardingMiddleware
+from app.api.connections import patient_http
+from app.api.forwarding import ForwardingMiddleware, PeerMiddleware
 from app.api.health import health_router
+from app.api.limits import LimitMiddleware, Limits
 from app.api.middleware import BodyMiddleware, RequestMiddleware
 from app.api.schemas import API
 from app.api.state import EdgeState
-from app.api.tokens import TokenStore
+from app.api.tokens import Role, TokenStore
 from app.dashboard.serve import mount_dashboard
 from app.missions.service import MissionService
 from app.settings import Settings, StartupError, is_loopback, load_settings
+from app.storage.audit import Command
 from app.storage.database import Database
 from app.storage.prepare import prepare_database
 
 GRACE_S = 5
 """Seconds that open requests get to end when the process is asked to."""
+MAX_VIEWER_MESSAGE_BYTES = 4096
 
 log = structlog.get_logger(__name__)
 
@@ -57,6 +66,7 @@ def create_app(settings: Settings | None = None, *, port: int | None = None) -> 
     that is not the port of the settings.
     """
     settings = settings or load_settings()
+    limits = Limits(settings.max_requests_per_s, settings.max_failed_logins)
     if not structlog.is_configured():
         logs.configure(settings.log_level, settings.log_format)
 
@@ -81,10 +91,12 @@ def create_app(settings: Settings | None = None, *, port: int | None = None) -> 
             service = MissionService(
                 settings.service(),
                 database,
-                lambda password, host: console_log_in(tokens, password, host, insecure=settings.insecure),
+                lambda password, host: console_log_in(tokens, limits, password, host, insecure=settings.insecure),
                 url=settings.peer_url or _own_url(settings, port or settings.port),
+                certificate=settings.tls_certificate.read_text() if settings.tls_certificate else None,
             )
-            app.state.edge = EdgeState(settings, service, tokens)
+            app.state.edge = EdgeState(settings, service, tokens, limits, AuditLog(database))
+            await app.state.edge.audit.forget(settings.audit_days)
             await service.startup()
             try:
                 yield
@@ -121,6 +133,7 @@ def create_app(settings: Settings | None = None, *, port: int | None = None) -> 
         searches.router,
         streams.router,
         fleet.router,
+        auditing.router,
         health_router(API),
     ):
         app.include_router(router)
@@ -133,7 +146,15 @@ def create_app(settings: Settings | None = None, *, port: int | None = None) -> 
             CORSMiddleware, allow_origins=settings.allowed_origins, allow_methods=["*"], allow_headers=["*"]
         )
     app.add_middleware(ForwardingMiddleware)
-    app.add_middleware(BodyMiddleware, max_bytes=settings.max_body_bytes, max_file_bytes=settings.max_import_bytes)
+    app.add_middleware(
+        BodyMiddleware,
+        max_bytes=settings.max_body_bytes,
+        max_file_bytes=settings.max_import_bytes,
+        patience_s=settings.slow_client_s,
+    )
+    app.add_middleware(AuditMiddleware)
+    app.add_middleware(LimitMiddleware, limits=limits)
+    app.add_middleware(PeerMiddleware)
     app.add_middleware(RequestMiddleware)
     return app
 
@@ -146,22 +167,41 @@ def _own_url(settings: Settings, port: int) -> str:
             host = socket.gethostbyname(socket.gethostname())
         except OSError:
             host = "127.0.0.1"
-    return f"http://[{host}]:{port}" if ":" in host else f"http://{host}:{port}"
+    scheme = "http" if settings.tls_certificate is None else "https"
+    return f"{scheme}://[{host}]:{port}" if ":" in host else f"{scheme}://{host}:{port}"
 
 
 class Server(uvicorn.Server):
     """Serves the application on a socket that already listens; ends streams when asked to stop."""
 
-    def __init__(self, app: FastAPI, listening: socket.socket, started: "Callable[[Server], None] | None") -> None:
+    def __init__(
+        self,
+        app: FastAPI,
+        listening: socket.socket,
+        started: "Callable[[Server], None] | None",
+        first_token: Path | None = None,
+    ) -> None:
+        self.first_token = first_token
+        """Where an operator's token was written to, when this was the first start."""
         # The lifespan is entered by serve(), whose caller then sees why a start failed.
+        settings: Settings = app.state.edge.settings
         super().__init__(
             uvicorn.Config(
                 app,
+                http=patient_http(settings),
                 lifespan="off",
                 log_config=None,
                 access_log=False,
                 timeout_graceful_shutdown=GRACE_S,
                 server_header=False,
+                limit_concurrency=settings.max_connections,
+                # Believed of nobody but those who were named: else anyone could speak under another's address.
+                proxy_headers=bool(settings.trusted_proxies),
+                forwarded_allow_ips=list(settings.trusted_proxies),
+                ssl_certfile=settings.tls_certificate,
+                ssl_keyfile=settings.tls_key,
+                # Viewers have nothing to say.
+                ws_max_size=MAX_VIEWER_MESSAGE_BYTES,
                 # Messages are small; to deflate each of them for each viewer costs more than all else of the live view.
                 ws_per_message_deflate=False,
             )
@@ -176,7 +216,8 @@ class Server(uvicorn.Server):
         host, port = self._listening.getsockname()[:2]
         if host in ("0.0.0.0", "::"):  # noqa: S104 - only shown
             host = "localhost"
-        return f"http://[{host}]:{port}" if ":" in host else f"http://{host}:{port}"
+        scheme = "https" if self.config.is_ssl else "http"
+        return f"{scheme}://[{host}]:{port}" if ":" in host else f"{scheme}://{host}:{port}"
 
     def stop(self) -> None:
         """Answer what is open, close every stream and end."""
@@ -211,6 +252,25 @@ class Server(uvicorn.Server):
                 loop.remove_signal_handler(number)
 
 
+def check_certificate(settings: Settings) -> None:
+    """Raise StartupError when HTTPS is set up with files that cannot be used."""
+    if settings.tls_certificate is None:
+        return
+    try:
+        # Without a password the library would ask for one at the terminal.
+        ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER).load_cert_chain(settings.tls_certificate, settings.tls_key, lambda: "")
+    except OSError as error:
+        files = f"tls_certificate {settings.tls_certificate}" + (
+            f" and tls_key {settings.tls_key}" if settings.tls_key else " (where the key has to be, too)"
+        )
+        reason = {"KEY_VALUES_MISMATCH": "the key belongs to another certificate"}.get(
+            getattr(error, "reason", "") or "", error.strerror or str(error)
+        )
+        raise StartupError(
+            f"{files} cannot be used: {reason}; both are PEM files, the key without a password"
+        ) from None
+
+
 def listen(settings: Settings) -> socket.socket:
     """Return a socket that is bound as set up. Raises StartupError when the address is taken or not ours."""
     family = socket.AF_INET6 if ":" in settings.host else socket.AF_INET
@@ -227,18 +287,38 @@ def listen(settings: Settings) -> socket.socket:
     return bound
 
 
-async def serve(settings: Settings, *, started: Callable[[Server], None] | None = None) -> None:
+async def serve(
+    settings: Settings, *, started: Callable[[Server], None] | None = None, with_first_token: bool = False
+) -> None:
     """Serve until a signal or :meth:`Server.stop`; ``started`` is called once requests are answered.
+
+    ``with_first_token`` makes an operator's token where there never was one, beside the database or here.
 
     Raises
     ------
     StartupError, DatabaseNotReadyError
         When the service cannot start as it is set up.
     """
+    check_certificate(settings)
     listening = listen(settings)
     try:
         app = create_app(settings, port=listening.getsockname()[1])
         async with app.router.lifespan_context(app):
-            await Server(app, listening, started).serve(sockets=[listening])
+            first_token = await _first_token(app.state.edge) if with_first_token else None
+            await Server(app, listening, started, first_token).serve(sockets=[listening])
     finally:
         listening.close()
+
+
+async def _first_token(edge: EdgeState) -> Path | None:
+    url = make_url(edge.settings.database_url)
+    file = url.database if url.get_backend_name() == "sqlite" else None
+    try:
+        written = await edge.tokens.first_start(Path(file).parent if file else Path())
+    except OSError as error:
+        log.warning("no operator token could be written", reason=error.strerror)
+        return None
+    if written is not None:
+        made = Command("bathyfleet", "", "first start", "token create", f"first start, {Role.OPERATOR}", "done")
+        await edge.audit.write(made)
+    return written

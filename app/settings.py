@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import BaseModel, Field, ValidationError, field_validator
+from pydantic import BaseModel, Field, ValidationError, ValidationInfo, field_validator
 from pydantic_settings import (
     BaseSettings,
     PydanticBaseSettingsSource,
@@ -74,6 +74,37 @@ class Settings(BaseSettings):
         description="Where other processes on the same database reach this one, for example http://10.0.0.5:8080; "
         "empty: host and port",
     )
+    tls_certificate: Path | None = Field(
+        default=None, description="File with the certificate and its chain (PEM): serve HTTPS instead of HTTP"
+    )
+    tls_key: Path | None = Field(
+        default=None, description="File with the certificate's private key (PEM); empty: in the same file"
+    )
+    trusted_proxies: tuple[str, ...] = Field(
+        default=(),
+        description="Addresses or networks of reverse proxies whose X-Forwarded-For and X-Forwarded-Proto are believed",
+    )
+    max_requests_per_s: float = Field(
+        default=1000.0,
+        ge=0,
+        le=1_000_000,
+        description="Most requests a second by one token, or by one address without; 0: any number",
+    )
+    max_failed_logins: int = Field(
+        default=10, ge=1, le=10_000, description="Most wrong tokens a minute from one address"
+    )
+    max_connections: int = Field(
+        default=1000,
+        ge=16,
+        le=100_000,
+        description="Most open HTTP connections; another machine may hold a quarter of them",
+    )
+    slow_client_s: float = Field(
+        default=30.0, ge=1, le=3600, description="A client that takes longer to send on is not waited for"
+    )
+    audit_days: int = Field(
+        default=400, ge=30, le=36_500, description="Days that the audit log is kept; never less than 30"
+    )
     auto_migrate: bool | None = Field(
         default=None,
         description="Bring the database's tables up to date at the start; without a value: only for SQLite",
@@ -121,6 +152,25 @@ class Settings(BaseSettings):
         if not separator or scheme not in _DRIVERS.values():
             raise ValueError("use sqlite+aiosqlite:///FILE or postgresql+asyncpg://USER:PASSWORD@HOST/NAME")
         return f"{scheme}://{rest}"
+
+    @field_validator("trusted_proxies")
+    @classmethod
+    def _are_networks(cls, proxies: tuple[str, ...]) -> tuple[str, ...]:
+        for proxy in proxies:
+            try:
+                ipaddress.ip_network(proxy)
+            except ValueError:
+                raise ValueError(
+                    f"{proxy!r} is neither an address nor a network such as 10.0.0.0/24, without host bits"
+                ) from None
+        return proxies
+
+    @field_validator("tls_key")
+    @classmethod
+    def _has_a_certificate(cls, key: Path | None, given: ValidationInfo) -> Path | None:
+        if key is not None and given.data.get("tls_certificate") is None:
+            raise ValueError("a key needs a certificate: set tls_certificate, too")
+        return key
 
     @classmethod
     def settings_customise_sources(

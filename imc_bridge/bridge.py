@@ -98,6 +98,8 @@ class Bridge:
         """What other consoles are shown."""
         self.decoder, self.announces = self._hearing.decoder, self._hearing.announces
         """Count what arrived at the traffic and at the announce socket."""
+        self.admission = self._hearing.admission
+        """Counts what was refused, and why."""
         self._task: asyncio.Task[None] | None = None
         self._started_at: float | None = None
         self._turn = asyncio.Event()

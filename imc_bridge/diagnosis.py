@@ -56,6 +56,8 @@ class Cause(StrEnum):
     NOT_READY = "not_ready"
     SEND_ERRORS = "send_errors"
     BAD_PACKETS = "bad_packets"
+    REFUSED = "refused"
+    """Packets that nobody who is trusted sent, or not now."""
     UNKNOWN_MESSAGES = "unknown_messages"
 
 

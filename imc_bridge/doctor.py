@@ -191,6 +191,14 @@ def _packet_findings(bridge: Bridge) -> list[Finding]:
         )
     findings += [
         note(
+            Cause.REFUSED,
+            f"{count} packets were not taken in: {reason}; the last one came from {bridge.admission.last[reason]}",
+            "Somebody may pretend to be a vehicle, or settings that begin with allowed_ leave one out",
+        )
+        for reason, count in bridge.admission.refused.most_common()
+    ]
+    findings += [
+        note(
             Cause.BAD_PACKETS,
             f"{faults[fault]} packets dropped: {fault.value}",
             "Another program sends to our ports, or a sender's IMC definitions differ from ours",

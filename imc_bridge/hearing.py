@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import imcpy
 
+from imc_bridge.admission import Admission
 from imc_bridge.codec import BROADCAST_ID, Decoder, Header, Message, without_argument
 from imc_bridge.control import Control
 from imc_bridge.crew import Crew
@@ -14,6 +15,7 @@ from imc_bridge.events import BridgeEvent, Sounding
 from imc_bridge.links import Links
 from imc_bridge.nodes import Node
 from imc_bridge.ranges import MESSAGES as RANGE_MESSAGES
+from imc_bridge.refusals import Refused
 from imc_bridge.roster import Roster
 from imc_bridge.settings import BridgeSettings
 from imc_bridge.soundings import offer_distance
@@ -89,6 +91,7 @@ class Hearing:
         self._wall_clock = wall_clock
         self._speaker = speaker
         self._state_reported: dict[int, float] = {}
+        self.admission = Admission(settings, roster, clock)
 
     def _now(self) -> float:
         return self._clock() * self._settings.time_scale
@@ -96,7 +99,8 @@ class Hearing:
     def on_announce(self, packet: bytes, address: Address) -> None:
         """Take a packet of the announce socket; also the way to replay a recording."""
         try:
-            self._take_announce(packet, address)
+            if self.admission.admits(address):
+                self._take_announce(packet, address)
         except Exception as error:
             self._note_error(error)
 
@@ -112,6 +116,9 @@ class Hearing:
             self._look_for_double(announcement, address)
             return
         now = self._now()
+        if not self._counts(announcement.imc_id, message.timestamp, address, now):
+            self._roster.note_rival(announcement, now)
+            return
         arrival = self._roster.announced(announcement, address[0], now)
         if arrival is None:
             return
@@ -130,6 +137,14 @@ class Hearing:
             # So that a newcomer need not wait for our next announce.
             self._speaker.announce(now)
         self._links.check(node, self._crew.get(node), now)
+
+    def _counts(self, imc_id: int, timestamp: float, address: Address, now: float) -> bool:
+        """Whether an announce may change where a node is: neither a stranger's, nor one that was recorded before."""
+        if not self.admission.admits_id(imc_id, address):
+            return False
+        if self._roster.comes_from_elsewhere(imc_id, address[0], now):
+            return self.admission.refuse(Refused.MOVED, address)
+        return not self._roster.is_old(imc_id, timestamp, now) or self.admission.refuse(Refused.OLD, address)
 
     def _look_for_double(self, announcement: Announcement, address: Address) -> None:
         """Our own announces come back to us; those of another system under our id are trouble."""
@@ -150,7 +165,8 @@ class Hearing:
     def on_packet(self, packet: bytes, address: Address) -> None:
         """Take a packet of the traffic socket; also the way to replay a recording."""
         try:
-            self._take_packet(packet, address)
+            if self.admission.admits(address):
+                self._take_packet(packet, address)
         except Exception as error:
             self._note_error(error)
 
@@ -163,14 +179,14 @@ class Hearing:
         if sender is None:
             self._pass_on(header, packet, address, now)
             return
-        if header.msg_id != SIMULATED_STATE:
-            # DUNE's simulation lets this one through where radio would not reach.
+        if header.msg_id != SIMULATED_STATE and not sender.clock.is_old(header.timestamp):
+            # DUNE's simulation lets that one through where radio would not reach.
             sender.heard(now, address)
         if not self.decoder.wants(header):
             return
         message = self.decoder.message(without_argument(packet))
         if message is not None and 0.0 < message.timestamp < MAX_PLAUSIBLE_VEHICLE_TIME_S:
-            self._take_message(sender, message, now)
+            self._take_message(sender, message, now, address)
 
     def _pass_on(self, header: Header, packet: bytes, address: Address, now: float) -> None:
         """Take a packet that is not its sender's own word: an echo of ours, one relayed by a node, a stranger's."""
@@ -186,7 +202,7 @@ class Hearing:
                 self._relayed(via, packet, now)
 
     def _from_unknown_address(self, imc_id: int, address: Address, now: float) -> None:
-        if imc_id in (self._settings.imc_id, 0, BROADCAST_ID):
+        if imc_id in (self._settings.imc_id, 0, BROADCAST_ID) or not self.admission.admits_id(imc_id, address):
             return
         node = self._roster.take_up(imc_id, f"0x{imc_id:04X}", now)
         if node is not None:
@@ -215,20 +231,21 @@ class Hearing:
                 if report is not None:
                     control.reported_by_sound(report, now)
 
-    def _take_message(self, node: Node, message: Message, now: float) -> None:
+    def _take_message(self, node: Node, message: Message, now: float, address: Address) -> None:
         name = type(message).__name__
         control = self._crew.get(node)
         rates = self._crew.asked_rates(node)
-        node.telemetry_at = now
-        node.rates.count(name, now)
         tick = node.take_time(message.timestamp, now, self._wall_clock())
         if tick is Tick.DOUBTFUL:
+            self.admission.refuse(Refused.OLD, address)
             return
+        node.telemetry_at = now
+        node.rates.count(name, now)
         if tick is Tick.JUMPED and control is not None:
             control.clock_jumped()
         match name:
             case "EstimatedState":
-                self._take_state(node, control, message, now)
+                self._take_state(node, control, message, now, address)
             case "Distance":
                 self._take_distance(node, message)
             case "NavigationUncertainty":
@@ -260,9 +277,11 @@ class Hearing:
             case "EntityParameters" if rates is not None:
                 rates.answered(message, now)
 
-    def _take_state(self, node: Node, control: Control | None, message: Message, now: float) -> None:
+    def _take_state(self, node: Node, control: Control | None, message: Message, now: float, address: Address) -> None:
         report = node.take_state(message)
-        if report is not None:
+        if isinstance(report, Refused):
+            self.admission.refuse(report, address)
+        elif report is not None:
             if control is not None:
                 control.moved(report, now)
             wall = self._clock()

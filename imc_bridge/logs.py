@@ -33,7 +33,7 @@ from imc_bridge.nodes import Node, listed_entities
 from imc_bridge.settings import BridgeSettings
 from imc_bridge.soundings import offer_distance
 from imc_bridge.texts import text
-from imc_bridge.vehicle_clock import Tick
+from imc_bridge.vehicle_clock import Tick, VehicleClock
 
 BLOCK_BYTES = 1 << 20
 GZIP_MAGIC = b"\x1f\x8b"
@@ -211,6 +211,8 @@ class VehicleLog:
     def events(self) -> Iterator[LogEvent]:
         """Yield states, soundings and refused Distances; the same file gives the same events every time."""
         node = Node(self.imc_id, self.vehicle, self._settings, 0.0)
+        # A log tells no arrival times, and nobody else speaks in it: a leap of the clock counts once it repeats.
+        node.clock = VehicleClock(quiet_s=0.0)
         node.entities = dict(self._entities) or None
         self.refused.clear()
         for packet in self.file:
@@ -231,13 +233,12 @@ class VehicleLog:
 
 
 def _take(node: Node, header: Header, message: Message) -> Iterator[LogEvent]:
-    # A log tells no arrival times: a leap of the clock counts once it repeats.
     if node.take_time(message.timestamp, 0.0, message.timestamp) is Tick.DOUBTFUL:
         return
     match type(message).__name__:
         case "EstimatedState":
             report = node.take_state(message)
-            if report is not None:
+            if isinstance(report, StateReport):
                 yield report
             yield from node.gate.resolve(node.history, node.position_sd_m())
         case "Distance":

@@ -17,7 +17,9 @@ from imcpy.coordinates import toWGS84
 from imc_bridge.codec import Message
 from imc_bridge.discovery import Announcement
 from imc_bridge.events import NodeState, StateReport
+from imc_bridge.plausibility import PlaceGate, Step
 from imc_bridge.ranges import RangeGate
+from imc_bridge.refusals import Refused
 from imc_bridge.settings import BridgeSettings
 from imc_bridge.soundings import SoundingGate, StateHistory, StateSample, beam_table
 from imc_bridge.texts import text
@@ -32,6 +34,8 @@ SLOWEST_ASCENT_MPS = 0.1
 """How fast a vehicle without motor floats up, at least."""
 CONTACT_AGAIN_S = 20.0
 """DUNE looks for contacts every 5 s; a few of our heartbeats may be lost."""
+LONGEST_BOND_S = 3600.0
+"""A vehicle that was under water for longer may come back under another address."""
 RATE_WINDOW_S = 10.0
 STATE_MESSAGES_FRESH_S = 3.0
 
@@ -116,6 +120,8 @@ class Node:
         self.first_announced_at: float | None = None
         self.addresses: tuple[Address, ...] = ()
         self.address: Address | None = None
+        self.hosts: frozenset[str] = frozenset()
+        """Where its announces may come from: the host of the last one that counted, and those it announced."""
         self.conflict: str | None = None
         self.boots = 0
 
@@ -152,6 +158,7 @@ class Node:
         self.medium: int | None = None
         self.battery_pct: float | None = None
         self.history = StateHistory()
+        self.places = PlaceGate()
         self.report: StateReport | None = None
         self.gate = SoundingGate(name, beam_table(settings.altimeter), settings.max_range_m)
         self.ranges = RangeGate(name)
@@ -197,6 +204,12 @@ class Node:
         self.controller = None
         self._latest.clear()
 
+    def given_up(self, now: float) -> bool:
+        """Whether it was silent for so long that another host may announce its id."""
+        last = max((at for at in (self.heard_at, self.announced_at) if at is not None), default=-math.inf)
+        patience = max(ANNOUNCES_MISSED * self._settings.announce_period_s, min(self.patience_s, LONGEST_BOND_S))
+        return now - last > patience
+
     # Packets and the vehicle's clock
 
     def heard(self, now: float, address: Address) -> None:
@@ -228,6 +241,7 @@ class Node:
         tick = self.clock.take(timestamp, now, wall_time_s)
         if tick is Tick.JUMPED:
             self._latest.clear()
+            self.places.clear()
             self.history.clear()
             self.gate.clear()
             self.ranges.clear()
@@ -236,8 +250,8 @@ class Node:
 
     # Telemetry
 
-    def take_state(self, message: Message) -> StateReport | None:
-        """EstimatedState: None when it is out of order, repeated or not finite."""
+    def take_state(self, message: Message) -> StateReport | Refused | None:
+        """EstimatedState: None when it is out of order, repeated or not finite, Refused where it cannot be."""
         lat, lon, _height = toWGS84(message)
         values = (lat, lon, message.depth, message.phi, message.theta, message.psi)
         if not all(map(math.isfinite, values)) or abs(lat) > math.pi / 2:
@@ -246,6 +260,12 @@ class Node:
         sample = StateSample(
             time_s, lat, lon, message.depth, message.phi, message.theta, math.remainder(message.psi, math.tau)
         )
+        step = self.places.take(sample)
+        if step is Step.DOUBTFUL:
+            return Refused.PLACE
+        if step is Step.MOVED:
+            # Nothing was measured on a line between the two places.
+            self.history.clear()
         if not self.history.add(sample) or not self.in_order("EstimatedState", time_s):
             return None
         speed = math.hypot(message.vx, message.vy)

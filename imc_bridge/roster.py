@@ -74,6 +74,26 @@ class Roster:
         """The node that announced this address, whoever's packets it passes on."""
         return self._by_address.get(address)
 
+    def comes_from_elsewhere(self, imc_id: int, source_host: str, now: float) -> bool:
+        """Whether an announce of a node that is there came from a host that is not its own.
+
+        A node is bound to the hosts of its announces as long as it is not silent for long: nobody else takes its place.
+        """
+        node = self._nodes.get(imc_id)
+        return node is not None and bool(node.hosts) and source_host not in node.hosts and not node.given_up(now)
+
+    def is_old(self, imc_id: int, timestamp: float, now: float) -> bool:
+        """Whether a node that is heard sent this long ago. While it restarts, maybe with another time, it is silent."""
+        node = self._nodes.get(imc_id)
+        heard = node is not None and node.heard_at is not None and now - node.heard_at <= self._settings.lost_after_s
+        return node is not None and heard and node.clock.is_old(timestamp)
+
+    def note_rival(self, announcement: Announcement, now: float) -> None:
+        """Note an announce that changes nothing: if it is another node's of the same id, that is for the operator."""
+        node = self._nodes.get(announcement.imc_id)
+        if node is not None:
+            self._contested(node, announcement, now)
+
     def announced(self, announcement: Announcement, source_host: str, now: float) -> Arrival | None:
         """Take an announce in; None when it does not count: too many nodes, or a second node of the same id."""
         node = self.take_up(announcement.imc_id, announcement.name, now)
@@ -86,12 +106,15 @@ class Roster:
             self._name(node, announcement.name)
         addresses = reachable_first(announcement, source_host, by_tcp=self._settings.transport == "tcp")
         stale = tuple(address for address in node.addresses if address not in addresses)
+        node.hosts = frozenset({source_host, *(host for host, _ in addresses)})
         rebooted = node.announced(announcement, addresses, now)
         for address in stale:
             if self._by_address.get(address) is node:
                 del self._by_address[address]
         for address in addresses:
-            self._by_address[address] = node
+            owner = self._by_address.get(address)
+            if owner is None or owner.given_up(now):
+                self._by_address[address] = node
         return Arrival(node, first, rebooted, stale)
 
     def pass_time(self, now: float) -> None:

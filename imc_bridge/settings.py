@@ -40,6 +40,12 @@ class BridgeSettings:
     """Where this console is, latitude and longitude; without it the place of the first vehicle heard is announced."""
     vehicles: tuple[str, ...] = ()
     """Names of the vehicles to talk to; empty means every vehicle that announces itself."""
+    allowed_ids: tuple[int, ...] = ()
+    """IMC ids of the nodes to take up, vehicles and gateways; empty means every id."""
+    allowed_addresses: tuple[str, ...] = ()
+    """IPv4 addresses or networks to take packets from; empty means every address."""
+    max_packets_per_s: int = 5000
+    """Most packets a second from one vehicle's address; a vehicle sends about 400."""
     time_scale: float = 1.0
     """How many times faster than the wall clock the vehicles live (simulations only)."""
 
@@ -106,6 +112,13 @@ class BridgeSettings:
             "an IPv4 multicast address such as 224.0.75.69",
         )
         check("interfaces", all(map(_is_ipv4, self.interfaces)), "IPv4 addresses of this machine's interfaces")
+        check("allowed_ids", all(0 < i < 0xFFFF for i in self.allowed_ids), "ids between 0x0001 and 0xFFFE")
+        check(
+            "allowed_addresses",
+            all(map(_is_network, self.allowed_addresses)),
+            "IPv4 addresses or networks such as 10.0.10.0/24, without host bits",
+        )
+        check("max_packets_per_s", self.max_packets_per_s >= 100, "at least 100")
         check("time_scale", 0.01 <= self.time_scale <= 1000.0, "between 0.01 and 1000 (1 = real time)")
         check("reference_period_s", 0.0 < self.reference_period_s < 5.0, "below 5 s, or vehicles give up")
         check("plan_id", bool(self.plan_id), "a name that no other console uses")
@@ -139,6 +152,14 @@ class BridgeSettings:
 def _is_ipv4(text: str) -> bool:
     try:
         ipaddress.IPv4Address(text)
+    except ValueError:
+        return False
+    return True
+
+
+def _is_network(text: str) -> bool:
+    try:
+        ipaddress.IPv4Network(text)
     except ValueError:
         return False
     return True

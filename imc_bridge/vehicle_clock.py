@@ -6,12 +6,14 @@ from collections import deque
 from enum import Enum
 
 LATE_S = 5.0
-"""A timestamp further back than this is no late packet but a clock that was set back, once it repeats."""
+"""A timestamp further back than this is no late packet: a recording, or a clock that was set back, once it repeats."""
 LEAP_S = 60.0
 """A timestamp further ahead than this, and than what passed meanwhile explains, is a clock set forward, if repeated."""
 FASTEST = 50.0
 """No simulation runs this many times faster than the bridge was told."""
 CONFIRMATIONS = 3
+QUIET_S = 1.0
+"""Nor is a clock believed to have been set while packets of the old one go on arriving: one of both is not its own."""
 SAMPLE_S = 1.0
 SAMPLES = 32
 MIN_SPAN_S = 4.0
@@ -22,13 +24,18 @@ class Tick(Enum):
 
     GOOD = "good"
     DOUBTFUL = "doubtful"
-    """Far ahead of everything before and not confirmed: its message is to be dropped."""
+    """Far from everything before and not confirmed: a recording, or damaged. Its message is to be dropped."""
     JUMPED = "jumped"
     """The clock was set; whatever was ordered by it before is void."""
 
 
 class VehicleClock:
     """Keeps up with one vehicle's clock.
+
+    Parameters
+    ----------
+    quiet_s
+        How long packets of the old time must have ceased until a new one is believed.
 
     Attributes
     ----------
@@ -40,12 +47,14 @@ class VehicleClock:
         How often it was set.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, quiet_s: float = QUIET_S) -> None:
+        self._quiet_s = quiet_s
         self.time_s: float | None = None
         self.offset_s: float | None = None
         self.jumps = 0
         self._arrived = 0.0
-        self._odd: list[float] = []
+        self._in_time = 0.0
+        self._odd: deque[float] = deque(maxlen=CONFIRMATIONS)
         self._samples: deque[tuple[float, float]] = deque(maxlen=SAMPLES)
 
     def take(self, timestamp: float, now: float, wall_time_s: float) -> Tick:
@@ -53,12 +62,13 @@ class VehicleClock:
         if self.time_s is not None:
             ahead = timestamp - self.time_s
             if ahead > LEAP_S + FASTEST * max(now - self._arrived, 0.0) or ahead < -LATE_S:
-                tick = self._odd_time(timestamp, ahead)
-                if tick is not Tick.JUMPED:
-                    return tick
-                self._adopt(timestamp, now, wall_time_s)
+                tick = self._odd_time(timestamp, now)
+                if tick is Tick.JUMPED:
+                    self._in_time = now
+                    self._adopt(timestamp, now, wall_time_s)
                 return tick
         self._odd.clear()
+        self._in_time = now
         if self.time_s is None or timestamp >= self.time_s:
             self._adopt(timestamp, now, wall_time_s)
         return Tick.GOOD
@@ -71,17 +81,21 @@ class VehicleClock:
         span = last_now - first_now
         return (last - first) / span * time_scale if span >= MIN_SPAN_S else None
 
-    def _odd_time(self, timestamp: float, ahead: float) -> Tick:
-        """Whether an odd timestamp is confirmed by those before it, which must lie close by."""
+    def is_old(self, timestamp: float) -> bool:
+        """Whether a packet was sent long before others of the vehicle that have arrived."""
+        return self.time_s is not None and timestamp < self.time_s - LATE_S
+
+    def _odd_time(self, timestamp: float, now: float) -> Tick:
+        """Whether an odd timestamp is confirmed by those before it, which must lie close by, and by nothing else."""
         if self._odd and abs(timestamp - self._odd[-1]) > LEAP_S:
             self._odd.clear()
         self._odd.append(timestamp)
-        if len(self._odd) >= CONFIRMATIONS:
-            self.jumps += 1
-            self._odd.clear()
-            self._samples.clear()
-            return Tick.JUMPED
-        return Tick.DOUBTFUL if ahead > 0.0 else Tick.GOOD
+        if len(self._odd) < CONFIRMATIONS or now - self._in_time < self._quiet_s:
+            return Tick.DOUBTFUL
+        self.jumps += 1
+        self._odd.clear()
+        self._samples.clear()
+        return Tick.JUMPED
 
     def _adopt(self, timestamp: float, now: float, wall_time_s: float) -> None:
         self.time_s, self._arrived = timestamp, now

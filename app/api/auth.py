@@ -9,6 +9,8 @@ from fastapi import Depends, Security
 from fastapi.security import HTTPBearer
 from starlette.requests import HTTPConnection
 
+from app.api.limits import Limits, host_of
+from app.api.peers import is_another_user
 from app.api.problems import ProblemError
 from app.api.state import EdgeState, State
 from app.api.tokens import Principal, Role, TokenStore
@@ -23,7 +25,10 @@ _bearer = HTTPBearer(
     description="A token made by `bathyfleet token create`. Needed as soon as one token exists.",
 )
 
+_PROXY_HEADERS = ("forwarded", "via", "x-forwarded-for", "x-forwarded-host", "x-forwarded-proto", "x-real-ip")
+
 READERS = frozenset(Role)
+ADMINS = frozenset({Role.ADMIN})
 OPERATORS = frozenset({Role.OPERATOR, Role.ADMIN})
 VEHICLES = OPERATORS | {Role.VEHICLE}
 
@@ -43,30 +48,42 @@ async def authenticate(connection: HTTPConnection, state: EdgeState, *, query_to
             raise _unauthenticated(f"the Authorization header has the scheme {scheme[:20]!r}")
     if token is not None:
         principal = await state.tokens.principal(token.strip())
+        state.limits.log_in(token.strip(), host_of(connection.scope), good=principal is not None)
         if principal is None:
             raise _unauthenticated("the access token is unknown, revoked or has run out")
-        return principal
+        return _remember(connection, principal)
     if await state.tokens.any():
         raise _unauthenticated("the request carries no access token")
-    if state.settings.insecure or _is_local(connection):
-        return LOCAL_OPERATOR
+    if state.settings.insecure or _is_local(connection, state):
+        return _remember(connection, LOCAL_OPERATOR)
     raise ProblemError(
         "forbidden",
-        "without access tokens only this machine may use the service",
+        "without access tokens only the user of this machine who runs the service may use it, and not by a proxy",
         remedy="Make one on the machine of the service: bathyfleet token create NAME --role operator",
     )
 
 
-async def console_log_in(tokens: TokenStore, password: str, host: str, *, insecure: bool = False) -> str | None:
+def _remember(connection: HTTPConnection, principal: Principal) -> Principal:
+    """Keep with the request who asks, for the audit log."""
+    connection.scope.setdefault("state", {})["principal"] = principal
+    return principal
+
+
+async def console_log_in(
+    tokens: TokenStore, limits: Limits, password: str, host: str, *, insecure: bool = False
+) -> str | None:
     """Return the name of an operator who logs in with a token as password; None: not let in.
 
     As with HTTP, without any token this machine's own user is an operator.
     """
+    if limits.locked_out(host):
+        return None
     principal = await tokens.principal(password.strip())
     if principal is not None:
         return principal.name if principal.role in OPERATORS else None
     if not await tokens.any() and (insecure or is_loopback(host)):
         return LOCAL_OPERATOR.name
+    limits.log_in(password.strip(), host, good=False)
     return None
 
 
@@ -79,15 +96,26 @@ def _unauthenticated(detail: str) -> ProblemError:
     )
 
 
-def _is_local(connection: HTTPConnection) -> bool:
-    """Tell whether this machine asks, under one of its own names (else a foreign page could rebind its name to us)."""
+def _is_local(connection: HTTPConnection, state: EdgeState) -> bool:
+    """Tell whether the user asks who runs the service, on this machine.
+
+    Under one of its own names, else a foreign page could rebind its name to us; and not by a proxy, which speaks for
+    whoever reaches it.
+    """
+    if any(name in connection.headers for name in _PROXY_HEADERS):
+        return False
     if connection.client is None:
         return True  # a Unix socket
+    host, port = connection.client
     try:
-        local = ipaddress.ip_address(connection.client.host).is_loopback
+        address = ipaddress.ip_address(host)
     except ValueError:
-        local = False
-    return local and is_loopback(connection.url.hostname or "localhost")
+        return False
+    if not address.is_loopback or not is_loopback(connection.url.hostname or "localhost"):
+        return False
+    if any(address in ipaddress.ip_network(proxy) for proxy in state.settings.trusted_proxies):
+        return False
+    return not is_another_user((host, port), connection.scope.get("server"))
 
 
 def _check_origin(connection: HTTPConnection, state: EdgeState) -> None:
@@ -123,6 +151,7 @@ def _allow(roles: frozenset[Role], doing: str) -> Callable[..., Awaitable[Princi
 
 Reader = Annotated[Principal, Depends(_allow(READERS, "look"))]
 VehicleOrOperator = Annotated[Principal, Depends(_allow(VEHICLES, "act as a vehicle"))]
+Admin = Annotated[Principal, Depends(_allow(ADMINS, "see the audit log"))]
 Operator = Annotated[Principal, Depends(_allow(OPERATORS, "command missions"))]
 
 

@@ -4,8 +4,8 @@ from fastapi import APIRouter, Request
 from pydantic import TypeAdapter
 
 from app.api.auth import Reader
-from app.api.peers import from_peers
 from app.api.problems import problems
+from app.api.processes import from_peers
 from app.api.schemas import API
 from app.api.state import Service, State
 from app.missions.doctoring import DoctorView

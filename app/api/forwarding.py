@@ -9,13 +9,15 @@ from urllib.parse import quote
 
 import httpx
 import structlog
+from starlette.requests import HTTPConnection
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed, InvalidHandshake
 from websockets.typing import Subprotocol
 
-from app.api.peers import comes_from_peer, end_to_end, headers_for, recognise, tls_of
-from app.api.problems import instance_of, make_problem, problem_response
+from app.api.auth import authenticate
+from app.api.problems import ProblemError, instance_of, make_problem, problem_response
+from app.api.processes import comes_from_peer, end_to_end, headers_for, recognise, tls_of
 from app.api.racing import first_of
 from app.api.schemas import API
 from app.api.state import EdgeState
@@ -41,6 +43,19 @@ _ROUTE = SimpleNamespace(path=f"{API}/missions/{{mission_id}} (sent on)")
 log = structlog.get_logger(__name__)
 
 
+class PeerMiddleware:
+    """Tells requests of other processes from those of strangers, before anything is made of them."""
+
+    def __init__(self, app: ASGIApp) -> None:
+        self.app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Serve one request or live view."""
+        if scope["type"] in ("http", "websocket"):
+            recognise(scope, scope["app"].state.edge.service.process.secret)
+        await self.app(scope, receive, send)
+
+
 class ForwardingMiddleware:
     """Answers what concerns this process's missions here, and lets their owners answer the rest."""
 
@@ -53,20 +68,23 @@ class ForwardingMiddleware:
             await self.app(scope, receive, send)
             return
         edge: EdgeState = scope["app"].state.edge
-        recognise(scope, edge.service.process.secret)
         found = _OF_A_MISSION.match(scope["path"])
         peer = await edge.service.process.owner(found[1]) if found else None
         if found is None or peer is None:
             await self.app(scope, receive, send)
-        elif scope["type"] == "websocket":
-            await _send_view_on(edge, peer, scope, receive, send)
-        elif comes_from_peer(scope):
+        elif comes_from_peer(scope) and scope["type"] == "http":
             problem = make_problem("mission-elsewhere", "it is another process's now", instance=instance_of(scope))
             answer = problem_response(problem)
             answer.status_code = MISDIRECTED
             await answer(scope, receive, send)
+        elif not await _is_known(edge, scope):
+            # Our own word for whoever may not ask; nobody is vouched for who was not looked at.
+            await self.app(scope, receive, send)
+        elif scope["type"] == "websocket":
+            await _send_view_on(edge, peer, scope, receive, send)
         else:
             scope["route"] = _ROUTE
+            scope["state"]["sent_on"] = True
             await self._send_on(edge, found[1], scope, receive, send)
 
     async def _send_on(self, edge: EdgeState, mission_id: str, scope: Scope, receive: Receive, send: Send) -> None:
@@ -106,6 +124,15 @@ class ForwardingMiddleware:
             f"the process that had the mission does not answer, and none took it up within {TAKEOVER_S:g} s",
             "Ask again in a moment; see whether a process runs that reaches the mission's vehicles",
         )
+
+
+async def _is_known(edge: EdgeState, scope: Scope) -> bool:
+    view = scope["type"] == "websocket"
+    try:
+        await authenticate(HTTPConnection(scope), edge, query_token=view)
+    except ProblemError:
+        return False
+    return True
 
 
 @contextlib.asynccontextmanager

@@ -1,5 +1,6 @@
 """What happens around every request: an id, one log line, counted time, a checked body, no leaked traceback."""
 
+import asyncio
 import email.message
 import json
 import re
@@ -9,9 +10,10 @@ from collections.abc import Iterator
 from typing import Any
 
 import structlog
-from starlette.datastructures import Headers
+from starlette.datastructures import Headers, MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from app.api.headers import add_security_headers
 from app.api.metrics import observe_request
 from app.api.problems import FieldProblem, instance_of, invalid, make_problem, problem_response
 
@@ -19,6 +21,8 @@ log = structlog.get_logger("app.api")
 
 _REQUEST_ID = re.compile(r"^[A-Za-z0-9._-]{1,64}$")
 _FILE_PATH = re.compile(r"^/api/v1/missions/[^/]+/(imports|reference)$")
+MAX_BREAKS = 20
+"""A whole body may take this many times as long as one break in it: a byte now and then is no upload."""
 _SURROGATES = re.compile("[\ud800-\udfff]")
 
 
@@ -42,11 +46,9 @@ class RequestMiddleware:
             nonlocal status
             if message["type"] == "http.response.start":
                 status = message["status"]
-                message["headers"] = [
-                    *message.get("headers", []),
-                    (b"x-request-id", request_id.encode()),
-                    (b"x-content-type-options", b"nosniff"),
-                ]
+                headers = MutableHeaders(scope=message)
+                headers["X-Request-Id"] = request_id
+                add_security_headers(scope, headers)
             await send(message)
 
         began = time.perf_counter()
@@ -84,8 +86,9 @@ class BodyMiddleware:
     Files may be of any type and have a limit of their own; they are read by whom they are for.
     """
 
-    def __init__(self, app: ASGIApp, max_bytes: int, max_file_bytes: int) -> None:
+    def __init__(self, app: ASGIApp, max_bytes: int, max_file_bytes: int, patience_s: float) -> None:
         self.app = app
+        self.patience_s = patience_s
         self.max_bytes = max_bytes
         self.max_file_bytes = max_file_bytes
 
@@ -99,7 +102,17 @@ class BodyMiddleware:
         is_file = _FILE_PATH.match(scope["path"]) is not None
         limit = self.max_file_bytes if is_file else self.max_bytes
         too_large = declared.isdigit() and int(declared) > limit
-        body = b"" if too_large else await self._read(receive, limit)
+        try:
+            body = b"" if too_large else await self._read(receive, limit)
+        except TimeoutError:
+            slow = make_problem(
+                "request-timeout",
+                "the body did not arrive in time",
+                instance=instance_of(scope),
+                remedy=f"Send it without breaks of more than {self.patience_s:g} s, or raise slow_client_s",
+            )
+            await problem_response(slow, {"Connection": "close"})(scope, receive, send)
+            return
         if body is None:
             return
         problem = None
@@ -139,11 +152,16 @@ class BodyMiddleware:
         await self.app(scope, replay, send)
 
     async def _read(self, receive: Receive, limit: int) -> bytes | None:
-        """Return the body, cut off soon after the limit; None when the client went away."""
+        """Return the body, cut off soon after the limit; None when the client went away.
+
+        Raises TimeoutError when nothing came for a while, or the whole takes far too long.
+        """
         chunks: list[bytes] = []
         size = 0
+        latest = time.monotonic() + MAX_BREAKS * self.patience_s
         while size <= limit:
-            message = await receive()
+            async with asyncio.timeout(min(self.patience_s, latest - time.monotonic())):
+                message = await receive()
             if message["type"] == "http.disconnect":
                 return None
             chunk = message.get("body", b"")

@@ -7,8 +7,8 @@ from fastapi import APIRouter, Body, Query, Request, Response
 from pydantic import TypeAdapter
 
 from app.api.auth import Operator, Reader
-from app.api.peers import from_peers
 from app.api.problems import problems
+from app.api.processes import from_peers
 from app.api.schemas import API, ActionRequest, MissionId, NoteRequest, VehicleName
 from app.api.state import Service, State
 from app.missions.spec import MissionSpec, VehicleSpec

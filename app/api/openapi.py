@@ -6,7 +6,7 @@ from fastapi import FastAPI
 from fastapi.openapi.utils import get_openapi
 from pydantic import TypeAdapter
 
-from app.api.problems import Problem
+from app.api.problems import MEDIA_TYPE, Problem, problems
 from app.missions.views import LiveMessage
 
 TAGS = [
@@ -23,6 +23,7 @@ TAGS = [
         "Browsers pass a token as `?token=`. Close codes: 4401 no valid token, 4403 forbidden, 4404 no such mission, "
         "4429 too many viewers, 1013 fell behind (reconnect), 1001 the service ends.",
     },
+    {"name": "audit", "description": "Who commanded what, from where, and what came of it."},
     {"name": "planners", "description": "Which planners decide where the vehicles go."},
     {
         "name": "health",
@@ -40,9 +41,10 @@ Times are RFC 3339 in UTC; a vehicle's own clock is Unix seconds.
 `detail` says what happened, `errors` lists each wrong field with its value and what would be right, `remedy` says what
 to do. `instance` carries the request's id, which is also in the header `X-Request-Id` and in the log.
 
-**Access.** While there is no token, requests from the service's own machine are allowed. As soon as one was made with
-`bathyfleet token create`, every request needs `Authorization: Bearer TOKEN`; health needs none. Roles: viewer, vehicle,
-operator, admin.
+**Access.** While nobody has made a token, the user who runs the service may ask from the service's own machine. As
+soon as one was made with `bathyfleet token create`, every request needs `Authorization: Bearer TOKEN`; health needs
+none. Roles: viewer, vehicle, operator, admin. Who asks too often, or with too many wrong tokens, is answered 429 with
+`Retry-After`.
 """
 
 
@@ -81,8 +83,21 @@ def _complete(schema: dict[str, Any]) -> dict[str, Any]:
             for parameter in operation.get("parameters", []):
                 parameter["schema"] = _without_null(parameter["schema"])
             responses = operation["responses"]
+            if "requestBody" in operation:
+                _add(responses, problems("request-timeout"))
+            if "401" in responses:
+                _add(responses, problems("too-many-requests"))
             operation["responses"] = dict(sorted(responses.items()))
     return schema
+
+
+def _add(responses: dict[str, Any], more: dict[int | str, dict[str, Any]]) -> None:
+    """Add problems that any operation may answer with, beside those that it already does with the same status."""
+    for status, described in more.items():
+        present = responses.setdefault(str(status), described)
+        if present is not described:
+            present["description"] += f"; {described['description'][0].lower()}{described['description'][1:]}"
+            present["content"][MEDIA_TYPE]["examples"] |= described["content"][MEDIA_TYPE]["examples"]
 
 
 def _without_null(schema: dict[str, Any]) -> dict[str, Any]:

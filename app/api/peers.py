@@ -1,125 +1,49 @@
-"""Speaking to the other processes that share the database, in the name of whoever asked this one."""
+"""Whose process is at the other end of a connection from this machine: the kernel knows."""
 
-import asyncio
-import secrets
-import ssl
-from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING, Any, TypeVar
+import ipaddress
+import os
+import socket
+import struct
 
-import httpx
-import structlog
-from pydantic import TypeAdapter
-from starlette.datastructures import Headers, MutableHeaders
-from starlette.requests import Request
-from starlette.types import Scope
-
-from app.missions.ownership import Peer
-
-if TYPE_CHECKING:
-    from app.api.state import EdgeState
-
-PEER = "x-bathyfleet-peer"
-"""Header with the secret of the process that is asked: then the two below count."""
-FOR, HOST = "x-bathyfleet-for", "x-bathyfleet-host"
-"""Headers that tell who asked, and under which name of the service."""
-
-_OF_ONE_CONNECTION = frozenset(
-    "connection host keep-alive proxy-authenticate proxy-authorization te trailer transfer-encoding upgrade "
-    f"sec-websocket-key sec-websocket-version sec-websocket-extensions content-length {PEER} {FOR} {HOST}".split()
-)
-"""Headers that are not sent on."""
-
-CONNECT_S = 2.0
-LISTS_S = 5.0
-
-T = TypeVar("T")
-
-log = structlog.get_logger(__name__)
+_SOCK_DIAG_BY_FAMILY = 20
+_REQUEST = 1
+_ANY_STATE = 0xFFFFFFFF
+_HEADER = struct.Struct("=IHHII")
+_QUESTION = struct.Struct("=BBBxI2s2s16s16sIII")
+_UID_AT = _HEADER.size + 4 + 48 + 12
+"""After the message's header come family and states, the socket's identity, and three counters (linux/inet_diag.h)."""
 
 
-def recognise(scope: Scope, secret: str) -> None:
-    """Believe what a request says of who asked, if another process sent it; else take such words out of it."""
-    headers = MutableHeaders(scope=scope)
-    given, asker, host = headers.get(PEER), headers.get(FOR), headers.get(HOST)
-    for name in (PEER, FOR, HOST):
-        del headers[name]
-    # As bytes: a stranger may send what is not ASCII.
-    if given is None or not secrets.compare_digest(given.encode(), secret.encode()):
-        return
-    scope.setdefault("state", {})["peer"] = True
-    scope["client"] = (asker, 0) if asker else None
-    if host:
-        headers["host"] = host
+def is_another_user(client: tuple[str, int] | None, server: tuple[str, int | None] | None) -> bool:
+    """Tell whether a loopback connection was made by another user of this machine, root included.
+
+    False as well where the kernel does not tell (other systems, gVisor).
+    """
+    if client is None or server is None or server[1] is None:
+        return False
+    uid = _owner(client, (server[0], server[1]))
+    return uid is not None and uid != os.geteuid()
 
 
-def comes_from_peer(scope: Mapping[str, Any]) -> bool:
-    """Tell whether another process sent a request on: it is answered here, whatever becomes of it."""
-    return bool(scope.get("state", {}).get("peer", False))
-
-
-def end_to_end(headers: Iterable[tuple[str, str]]) -> list[tuple[str, str]]:
-    """Return those headers that are not about one connection only."""
-    return [(name, value) for name, value in headers if name.lower() not in _OF_ONE_CONNECTION]
-
-
-def headers_for(peer: Peer, scope: Scope) -> list[tuple[str, str]]:
-    """Return the headers with which a request is sent on."""
-    headers = Headers(scope=scope)
-    client = scope.get("client")
-    own = [(PEER, peer.secret), (HOST, headers.get("host", ""))]
-    own += [(FOR, client[0])] if client else []
-    own += [("x-request-id", scope.get("state", {}).get("request_id", ""))]
-    return [*((name, value) for name, value in end_to_end(headers.items()) if name != "x-request-id"), *own]
-
-
-def tls_of(peer: Peer) -> ssl.SSLContext | None:
-    """Return how a process that serves TLS is recognised: by its very certificate, which the database vouches for."""
-    if not peer.url.startswith("https:"):
+def _owner(near: tuple[str, int], far: tuple[str, int]) -> int | None:
+    """Return the user whose TCP socket is bound to ``near`` and connected to ``far``; None when that cannot be told."""
+    try:
+        places = [ipaddress.ip_address(host) for host, _ in (near, far)]
+    except ValueError:
         return None
-    context = ssl.create_default_context(cadata=peer.certificate)
-    context.check_hostname = peer.certificate is None
-    return context
-
-
-class PeerClients:
-    """Kept-alive connections to the other processes."""
-
-    def __init__(self) -> None:
-        self._clients: dict[Peer, httpx.AsyncClient] = {}
-
-    def to(self, peer: Peer) -> httpx.AsyncClient:
-        """Return the client for a process. Answers may take their time: some wait for a waypoint, some never end."""
-        if peer not in self._clients:
-            self._clients[peer] = httpx.AsyncClient(
-                base_url=peer.url,
-                verify=tls_of(peer) or False,
-                timeout=httpx.Timeout(None, connect=CONNECT_S),
-                limits=httpx.Limits(max_connections=None, max_keepalive_connections=50),
-                trust_env=False,
-            )
-        return self._clients[peer]
-
-    async def close(self) -> None:
-        """Close every connection."""
-        await asyncio.gather(*(client.aclose() for client in self._clients.values()))
-        self._clients.clear()
-
-
-async def from_peers(request: Request, edge: "EdgeState", kind: TypeAdapter[list[T]]) -> list[T]:
-    """Return what the other processes answer to the same request for a list; one that does not answer is left out."""
-    if comes_from_peer(request.scope):
-        return []
-
-    async def ask(peer: Peer) -> list[T]:
-        try:
-            answer = await edge.peers.to(peer).get(
-                request.url.path, headers=headers_for(peer, request.scope), timeout=LISTS_S
-            )
-            answer.raise_for_status()
-        except httpx.HTTPError as error:
-            log.warning("another process does not answer", url=peer.url, error=str(error) or type(error).__name__)
-            return []
-        return kind.validate_json(answer.content)
-
-    lists = await asyncio.gather(*(ask(peer) for peer in edge.service.process.peers))
-    return [item for found in lists for item in found]
+    family = socket.AF_INET if all(place.version == 4 for place in places) else socket.AF_INET6
+    ends = [place.packed.ljust(16, b"\0") for place in places]
+    ports = [struct.pack(">H", port) for _, port in (near, far)]
+    unknown = 0xFFFFFFFF  # the socket's cookie
+    question = _QUESTION.pack(family, socket.IPPROTO_TCP, 0, _ANY_STATE, *ports, *ends, 0, unknown, unknown)
+    try:
+        with socket.socket(socket.AF_NETLINK, socket.SOCK_RAW, 4) as kernel:
+            kernel.settimeout(1.0)
+            kernel.send(_HEADER.pack(_HEADER.size + len(question), _SOCK_DIAG_BY_FAMILY, _REQUEST, 1, 0) + question)
+            answer = kernel.recv(4096)
+    except (OSError, AttributeError):
+        return None
+    if len(answer) < _UID_AT + 4 or _HEADER.unpack_from(answer)[1] != _SOCK_DIAG_BY_FAMILY:
+        return None
+    uid: int = struct.unpack_from("=I", answer, _UID_AT)[0]
+    return uid

@@ -6,6 +6,7 @@ import uuid
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from enum import StrEnum
+from pathlib import Path
 
 from app.storage import tokens
 from app.storage.database import Database
@@ -13,6 +14,7 @@ from app.storage.models import TokenRow
 from app.storage.sharing import Shared
 
 TOKEN_PREFIX = "bf_"  # noqa: S105 - makes leaked tokens easy to search for
+FIRST_TOKEN_FILE = "operator.token"  # noqa: S105 - the file's name
 
 
 class Role(StrEnum):
@@ -54,20 +56,26 @@ class TokenStore:
         self, name: str, role: Role, *, vehicle: str | None = None, expires_at: datetime | None = None
     ) -> tuple[str, str]:
         """Store a new token; return its id and the token itself, which cannot be seen again."""
-        token = TOKEN_PREFIX + secrets.token_urlsafe(32)
-        row = TokenRow(
-            id=str(uuid.uuid4()),
-            name=name,
-            role=role.value,
-            vehicle=vehicle,
-            token_hash=token_hash(token),
-            created_at=datetime.now(UTC),
-            expires_at=expires_at,
-            revoked_at=None,
-        )
+        token, row = _made(str(uuid.uuid4()), name, role, vehicle, expires_at)
         async with self._database.writing() as session:
             session.add(row)
         return row.id, token
+
+    async def first_start(self, folder: Path) -> Path | None:
+        """Make an operator's token where there never was a token; returns the file that it is in.
+
+        For other users of this machine, and for programs that want one. The file is for its owner only.
+        """
+        token, row = _made(tokens.FIRST_START, "first start", Role.OPERATOR, None, None)
+        async with self._database.writing() as session:
+            if await tokens.all_tokens(session):
+                return None
+            file = folder / FIRST_TOKEN_FILE
+            file.unlink(missing_ok=True)
+            file.touch(0o600, exist_ok=False)
+            file.write_text(token + "\n")
+            session.add(row)
+        return file
 
     async def all(self) -> list[TokenRow]:
         """Return every token that was ever made, newest first."""
@@ -96,6 +104,23 @@ class TokenStore:
         if row.expires_at is not None and _aware(row.expires_at) <= datetime.now(UTC):
             return None
         return Principal(row.name, Role(row.role), row.vehicle)
+
+
+def _made(
+    token_id: str, name: str, role: Role, vehicle: str | None, expires_at: datetime | None
+) -> tuple[str, TokenRow]:
+    token = TOKEN_PREFIX + secrets.token_urlsafe(32)
+    row = TokenRow(
+        id=token_id,
+        name=name,
+        role=role.value,
+        vehicle=vehicle,
+        token_hash=token_hash(token),
+        created_at=datetime.now(UTC),
+        expires_at=expires_at,
+        revoked_at=None,
+    )
+    return token, row
 
 
 def _aware(moment: datetime) -> datetime:

@@ -39,8 +39,50 @@ def command_settings(**overrides: Any) -> "Settings":
     return settings
 
 
-def with_missions(settings: "Settings", run: "Callable[[MissionService], Awaitable[T]]") -> "T":
-    """Run something with the missions of a database; nothing is started, the links stay closed."""
+def this_user() -> str:
+    """Return who gives a command on this machine."""
+    import getpass
+    import os
+
+    try:
+        return getpass.getuser()
+    except (KeyError, OSError):
+        return f"user {os.getuid()}"
+
+
+async def noted(
+    settings: "Settings", action: str, target: str, mission_id: str | None = None, *, refused: str | None = None
+) -> None:
+    """Write a command that was given on this machine into the audit log; ``refused`` is why it was not carried out."""
+    from app.storage import audit
+    from app.storage.database import Database as Store
+    from app.storage.prepare import prepare_database
+
+    await prepare_database(settings.database_url, may_upgrade=settings.migrates_itself)
+    store = Store(settings.database_url)
+    result = "done" if refused is None else "refused"
+    try:
+        async with store.writing() as session:
+            audit.add(
+                session,
+                audit.Command(this_user(), "", "command line", action, target, result, refused or "", mission_id),
+            )
+    finally:
+        await store.close()
+
+
+def with_missions(
+    settings: "Settings",
+    run: "Callable[[MissionService], Awaitable[T]]",
+    *,
+    changing: str = "",
+    mission: str = "",
+) -> "T":
+    """Run something with the missions of a database; nothing is started, the links stay closed.
+
+    A command that is ``changing`` a mission is named by that for the audit log, which it goes into with its result.
+    """
+    from app.missions.errors import MissionError
     from app.missions.service import MissionService
     from app.storage.database import Database as Store
     from app.storage.prepare import prepare_database
@@ -51,10 +93,17 @@ def with_missions(settings: "Settings", run: "Callable[[MissionService], Awaitab
         closed = settings.service().model_copy(update={"imc": settings.imc.model_copy(update={"enabled": False})})
         service = MissionService(closed, store)
         try:
-            return await run(service)
+            done = await run(service)
+        except (CommandError, MissionError) as error:
+            if changing:
+                await noted(settings, changing, mission, refused=str(error))
+            raise
         finally:
             await service.shutdown()
             await store.close()
+        if changing:
+            await noted(settings, changing, mission)
+        return done
 
     return asyncio.run(use())
 

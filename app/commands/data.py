@@ -148,7 +148,9 @@ def import_file(
                 return await service.set_reference(mission_id, content, options, actor="command line")
             return await service.import_soundings(mission_id, content, options, actor="command line")
 
-        view = with_missions(command_settings(database_url=database), run)
+        view = with_missions(
+            command_settings(database_url=database), run, changing="import", mission=f"{mission} {file.name}"
+        )
     for note in view.notes:
         typer.echo(f"note: {note}", err=True)
     if isinstance(view, ReferenceView):
@@ -203,5 +205,5 @@ def tide(
         async def run(service: "MissionService") -> CorrectionsView:
             return await service.set_tide(await resting_mission(service, mission), wanted, actor="command line")
 
-        view = with_missions(command_settings(database_url=database), run)
+        view = with_missions(command_settings(database_url=database), run, changing="tide", mission=mission)
     typer.echo(f"depths are below {view.vertical_datum}; {view.accepted} soundings accepted, {view.rejected} rejected")

@@ -53,7 +53,7 @@ def import_logs(
 
     try:
         with Progress(*columns, console=console, disable=not console.is_terminal) as bar:
-            with_missions(settings, run)
+            with_missions(settings, run, changing="import-log", mission=mission)
     finally:
         # What one log brought is told also when the next one cannot be read.
         if as_json:

@@ -44,6 +44,20 @@ class ImcSettings(Section):
         "DUNE's simulated radio range counts from there",
     )
     vehicles: tuple[str, ...] = Field(default=(), description="Names of the vehicles to talk to; empty: all")
+    allowed_ids: tuple[int, ...] = Field(
+        default=(), description="IMC ids of the vehicles and gateways to listen to; empty: all"
+    )
+    allowed_addresses: tuple[str, ...] = Field(
+        default=(),
+        description="IPv4 addresses or networks (10.0.10.0/24) to take IMC packets from; empty: all. "
+        "127.0.0.0/8 has to be among them for vehicles on this machine",
+    )
+    max_packets_per_s: int = Field(
+        default=5000,
+        ge=100,
+        le=1_000_000,
+        description="Most IMC packets a second from one vehicle; all strangers at one address get a quarter of that",
+    )
     rate_limiters: str = Field(
         default="Distance:5, EstimatedState:10",
         description="Rates in Hz asked of every engaged vehicle and taken back at the end; empty: as they are",

@@ -399,3 +399,29 @@ class TokenRow(Base):
     created_at: Mapped[datetime]
     expires_at: Mapped[datetime | None]
     revoked_at: Mapped[datetime | None]
+
+
+class AuditRow(Base):
+    """Somebody's command and what came of it. The database refuses changes, and removals before 30 days are over.
+
+    Without a foreign key to missions: what was done with one is kept when it is removed.
+    """
+
+    __tablename__ = "audit"
+    __table_args__ = (Index("ix_audit_time", "time"),)
+
+    id: Mapped[int] = mapped_column(_BigId, primary_key=True, autoincrement=True)
+    time: Mapped[datetime]
+    actor: Mapped[str] = mapped_column(String(120))
+    role: Mapped[str] = mapped_column(String(16))
+    origin: Mapped[str] = mapped_column(String(64))
+    """The address that the command came from, or ``command line``."""
+    action: Mapped[str] = mapped_column(String(64))
+    target: Mapped[str] = mapped_column(String(300))
+    mission_id: Mapped[str | None] = mapped_column(String(64))
+    result: Mapped[str] = mapped_column(String(16))
+    """done, refused or failed."""
+    status: Mapped[int | None]
+    """The HTTP status of the answer."""
+    detail: Mapped[str] = mapped_column(Text)
+    request_id: Mapped[str] = mapped_column(String(64))

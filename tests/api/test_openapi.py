@@ -73,6 +73,7 @@ CONTRACT = {
     "GET /missions/{mission_id}/events": "getEvents",
     "GET /vehicles": "listVehicles",
     "GET /doctor": "examineLinks",
+    "GET /audit": "listAudit",
     "GET /planners": "listPlanners",
     "GET /health": "getHealth",
     "GET /health/live": "getLiveness",

@@ -53,6 +53,7 @@ class Script:
         state = imcpy.EstimatedState()
         state.timestamp = self.time_s
         state.lat, state.lon, state.depth = math.radians(lat_deg), math.radians(lon_deg), depth_m
+        self.node.places.clear()  # the script puts it where it wants
         self.follower.moved(self.node.take_state(state), self.now)
 
     def echo(self, state=2, reference=None):

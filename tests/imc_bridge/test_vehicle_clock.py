@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from imc_bridge.vehicle_clock import CONFIRMATIONS, Tick, VehicleClock
+from imc_bridge.vehicle_clock import CONFIRMATIONS, QUIET_S, Tick, VehicleClock
 
 T = 1.7e9
 
@@ -49,12 +49,23 @@ def test_single_packet_from_the_future_changes_nothing():
 @pytest.mark.parametrize("leap", [3600.0, -3600.0, -30.0])
 def test_clock_that_was_set_is_followed_once_it_is_confirmed(leap):
     clock, now = running()
-    later = [0.1 * k for k in range(1, CONFIRMATIONS + 2)]
-    ticks = [clock.take(T + now + leap + dt, now + dt, T + now) for dt in later]
-    assert ticks.count(Tick.JUMPED) == 1
+    later = [QUIET_S / 2 * k for k in range(1, CONFIRMATIONS + 2)]
+    ticks = [clock.take(T + now + leap + dt, now + dt, T + now + dt) for dt in later]
+    assert ticks[: CONFIRMATIONS - 1] == [Tick.DOUBTFUL] * (CONFIRMATIONS - 1)
     assert ticks[CONFIRMATIONS - 1] is Tick.JUMPED
     assert ticks[-1] is Tick.GOOD
     assert clock.offset_s == pytest.approx(leap, abs=1.0)
+
+
+@pytest.mark.parametrize("leap", [3600.0, -3600.0, -30.0])
+def test_recording_that_is_played_beside_the_vehicle_sets_no_clock(leap):
+    clock, now = running()
+    for k in range(200):
+        now += 0.1
+        assert clock.take(T + now, now, T + now) is Tick.GOOD
+        recorded = [clock.take(T + now + leap + 0.001 * j, now, T + now) for j in range(10)]
+        assert recorded == [Tick.DOUBTFUL] * 10, k
+    assert (clock.jumps, clock.time_s) == (0, T + now)
 
 
 def test_late_packets_are_no_jump():

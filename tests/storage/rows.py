@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from app.storage.models import (
+    AuditRow,
     BatchRow,
     EventRow,
     ImportRow,
@@ -207,6 +208,19 @@ def one_of_each() -> list[list[Any]]:
                 cols=2,
                 summary={},
                 depths=pack(np.array([[3.0, np.nan]])),
+            ),
+            AuditRow(
+                time=TIME,
+                actor="Ana",
+                role="operator",
+                origin="192.0.2.7",
+                action="startMission",
+                target="/api/v1/missions/m1/start",
+                mission_id="m1",
+                result="done",
+                status=200,
+                detail="",
+                request_id="5e1f",
             ),
             TokenRow(
                 id="t1",

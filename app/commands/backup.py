@@ -1,0 +1,104 @@
+"""``bathyfleet backup``, ``restore`` and ``prune``: copies of the database, and room in it."""
+
+import asyncio
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from app.commands.common import CommandError, Database, command_settings, noted
+
+if TYPE_CHECKING:
+    from app.storage.backup import Contents
+
+
+def backup(
+    file: Annotated[
+        Path | None,
+        typer.Argument(help="File to write, or a folder to write one with date and time into [default: backups]"),
+    ] = None,
+    verify: Annotated[
+        Path | None,
+        typer.Option(exists=True, dir_okay=False, readable=True, help="Only check this backup; nothing is written."),
+    ] = None,
+    database: Database = None,
+) -> None:
+    """Copy the database to a file while the service goes on writing, and check the copy."""
+    from app.storage.backup import BackupError, back_up, contents_of
+
+    if verify is not None and file is not None:
+        raise typer.BadParameter("check a backup or write one, not both", param_hint="--verify")
+    try:
+        if verify is not None:
+            _tell(verify, contents_of(verify), "is sound")
+            return
+        settings = command_settings(database_url=database)
+        path, contents = back_up(settings.database_url, file or Path("backups"))
+    except BackupError as error:
+        raise CommandError(str(error), error.remedy) from None
+    # In the database, not in the copy: who has taken everything away with him is worth knowing.
+    asyncio.run(noted(settings, "backup", str(path)))
+    _tell(path, contents, "is written and checked")
+
+
+def restore(
+    file: Annotated[Path, typer.Argument(exists=True, dir_okay=False, readable=True, help="The backup.")],
+    replace: Annotated[
+        bool, typer.Option("--replace", help="Where there is a database: move it aside, beside the restored one.")
+    ] = False,
+    database: Database = None,
+) -> None:
+    """Put a backup in the database's place, after checking it. Stop the service first."""
+    from app.storage.backup import BackupError, restore_to
+
+    settings = command_settings(database_url=database)
+    try:
+        contents, aside = restore_to(settings.database_url, file, replace=replace)
+    except BackupError as error:
+        raise CommandError(str(error), error.remedy) from None
+    asyncio.run(noted(settings, "restore", str(file)))
+    if aside is not None:
+        typer.echo(f"what was there before is now {aside}")
+    _tell(file, contents, "is restored")
+
+
+def prune(
+    days: Annotated[int, typer.Option(min=1, max=36_500, help="Missions that ended longer ago than this go.")],
+    apply: Annotated[bool, typer.Option("--apply", help="Remove them; without it they are only listed.")] = False,
+    database: Database = None,
+) -> None:
+    """Remove missions that ended long ago, with everything measured in them, and give the space back."""
+    settings = command_settings(database_url=database)
+    from app.storage.database import Database as Store
+    from app.storage.prepare import prepare_database
+    from app.storage.retention import Ended, ended_before, give_space_back, remove
+
+    async def run() -> tuple[list[Ended], str]:
+        await prepare_database(settings.database_url, may_upgrade=settings.migrates_itself)
+        store = Store(settings.database_url)
+        try:
+            found = await ended_before(store, days)
+            if not apply:
+                return found, ""
+            removed = [mission for mission in found if await remove(store, mission.id, days)]
+            for mission in removed:
+                await noted(settings, "prune", f"{mission.name}, ended {mission.ended:%Y-%m-%d}", mission.id)
+            return removed, await give_space_back(settings.database_url)
+        finally:
+            await store.close()
+
+    missions, note = asyncio.run(run())
+    for mission in missions:
+        typer.echo(f"{mission.id}  ended {mission.ended:%Y-%m-%d}  {mission.soundings} soundings  {mission.name}")
+    number = f"{len(missions)} mission{'' if len(missions) == 1 else 's'}"
+    if not apply:
+        hint = "; --apply removes them: bathyfleet export and bathyfleet backup keep them" if missions else ""
+        typer.echo(f"{number} ended more than {days} days ago{hint}")
+        return
+    typer.echo(f"{number} removed{f'; {note}' if note else ''}")
+
+
+def _tell(file: Path, contents: "Contents", what: str) -> None:
+    counts = ", ".join(f"{count} {table}" for table, count in contents.rows.items() if count)
+    known = f": revision {contents.revision}, {counts or 'no rows'}" if contents.revision else ""
+    typer.echo(f"{file} {what} ({contents.size_bytes} bytes){known}")

@@ -1,0 +1,225 @@
+"""Copies of a database while others write to it, checked, and put back in its place."""
+
+import os
+import shutil
+import sqlite3
+import subprocess
+from contextlib import closing
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+
+from sqlalchemy import URL, make_url
+
+SQLITE_MAGIC = b"SQLite format 3\0"
+ARCHIVE_MAGIC = b"PGDMP"
+
+
+class BackupError(Exception):
+    """A backup cannot be made, is damaged, or cannot be restored; ``remedy`` says what to do."""
+
+    def __init__(self, message: str, remedy: str = "") -> None:
+        super().__init__(message)
+        self.remedy = remedy
+
+
+@dataclass(frozen=True)
+class Contents:
+    """What a backup holds: its schema's revision and the rows of every table; both empty for pg_dump's archives."""
+
+    size_bytes: int
+    revision: str
+    rows: dict[str, int]
+
+
+def back_up(url: str, target: Path) -> tuple[Path, Contents]:
+    """Copy the database to a file, or into a folder under a name with the time; returns the file and what it holds.
+
+    SQLite's is one consistent state, however much is written meanwhile. The file appears under its name only when it
+    was checked and is on the disk; only its owner may read it.
+
+    Raises
+    ------
+    BackupError
+    """
+    parsed = make_url(url)
+    suffix = "db" if parsed.get_backend_name() == "sqlite" else "dump"
+    if target.is_dir() or not target.suffix:
+        target /= f"bathyfleet-{datetime.now(UTC):%Y%m%dT%H%M%SZ}.{suffix}"
+    if target.exists():
+        raise BackupError(f"{target} exists", "Name another file: backups are not overwritten")
+    part = target.with_name(target.name + ".part")
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        os.close(os.open(part, os.O_CREAT | os.O_TRUNC | os.O_WRONLY, 0o600))
+        if suffix == "db":
+            expected = _copy_sqlite(parsed, part)
+            contents = contents_of(part)
+            if contents.rows != expected:
+                raise BackupError(f"the copy has other rows than the database: {contents.rows}, not {expected}")
+        else:
+            _run_postgres("pg_dump", parsed, "--format=custom", f"--file={part}")
+            contents = contents_of(part)
+        _to_disk(part)
+        part.rename(target)
+    except (OSError, sqlite3.Error) as error:
+        raise BackupError(f"{target} cannot be written: {error}", "Is there room on that disk?") from None
+    finally:
+        part.unlink(missing_ok=True)
+    return target, contents
+
+
+def contents_of(file: Path) -> Contents:
+    """Check a backup from end to end and return what it holds. Raises BackupError."""
+    with file.open("rb") as opened:
+        begin = opened.read(len(SQLITE_MAGIC))
+    if begin.startswith(ARCHIVE_MAGIC):
+        _run([_program("pg_restore"), "--file=/dev/null", str(file)])
+        return Contents(file.stat().st_size, "", {})
+    if begin != SQLITE_MAGIC:
+        raise BackupError(f"{file} is neither an SQLite database nor an archive of pg_dump")
+    try:
+        # Opened as something that does not change, so that nothing is left beside it.
+        with closing(sqlite3.connect(f"{file.resolve().as_uri()}?mode=ro&immutable=1", uri=True)) as connection:
+            faults = [row[0] for row in connection.execute("PRAGMA integrity_check(5)") if row[0] != "ok"]
+            orphans = connection.execute("PRAGMA foreign_key_check").fetchmany(5)
+            faults += [f"{table} row {row} belongs to no {parent}" for table, row, parent, _ in orphans]
+            if faults:
+                raise BackupError(f"{file} is damaged: {'; '.join(faults)}", "Use an older backup")
+            rows = _count(connection)
+            if "alembic_version" not in rows:
+                raise BackupError(f"{file} is an SQLite database, but not one of bathyfleet")
+            (revision,) = connection.execute("SELECT version_num FROM alembic_version").fetchone() or ("",)
+    except sqlite3.Error as error:
+        raise BackupError(f"{file} is damaged: {error}", "Use an older backup") from None
+    return Contents(file.stat().st_size, revision, rows)
+
+
+def restore_to(url: str, file: Path, *, replace: bool) -> tuple[Contents, Path | None]:
+    """Put a checked backup in the database's place; returns what it holds, and where what was there before is now.
+
+    Raises
+    ------
+    BackupError
+        When the backup is damaged or of another kind, or there is a database already and ``replace`` is False, or
+        somebody has it open.
+    """
+    contents = contents_of(file)
+    parsed = make_url(url)
+    if parsed.get_backend_name() != "sqlite":
+        if contents.revision:
+            raise BackupError(f"{file} is an SQLite database and cannot be restored to PostgreSQL")
+        options = ["--clean", "--if-exists"] if replace else []
+        arguments = ["--exit-on-error", "--single-transaction", "--no-owner", *options, str(file)]
+        _run_postgres("pg_restore", parsed, *arguments)
+        return contents, None
+    if not contents.revision:
+        raise BackupError(f"{file} is an archive of pg_dump: name a PostgreSQL database with --database")
+    path = _path(parsed)
+    aside = None
+    if path.exists():
+        if not replace:
+            raise BackupError(f"{path} exists", "--replace moves it aside")
+        _close_for_good(path)
+        aside = path.with_name(f"{path.name}.before-{datetime.now(UTC):%Y%m%dT%H%M%SZ}")
+        path.rename(aside)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    part = path.with_name(path.name + ".part")
+    try:
+        shutil.copyfile(file, part)
+        part.chmod(0o600)
+        _to_disk(part)
+        part.rename(path)
+    except OSError as error:
+        part.unlink(missing_ok=True)
+        if aside is not None:
+            aside.rename(path)
+        raise BackupError(f"{path} cannot be written: {error.strerror}", "Is there room on that disk?") from None
+    return contents, aside
+
+
+def _copy_sqlite(url: URL, target: Path) -> dict[str, int]:
+    """Copy what one reading transaction sees; returns the rows of every table in it."""
+    path = _path(url)
+    if not path.is_file():
+        raise BackupError(f"there is no database {path}", "Name it with --database")
+    with closing(sqlite3.connect(path, timeout=30)) as source, closing(sqlite3.connect(target)) as copy:
+        source.isolation_level = None
+        source.execute("BEGIN")
+        rows = _count(source)
+        source.backup(copy)
+        source.execute("ROLLBACK")
+        # One file, whole in itself: no journal has to go with it.
+        copy.execute("PRAGMA journal_mode=DELETE")
+    return rows
+
+
+def _count(connection: sqlite3.Connection) -> dict[str, int]:
+    names = "SELECT name FROM sqlite_master WHERE type = 'table' AND name NOT LIKE 'sqlite_%' ORDER BY name"
+    tables = [name for (name,) in connection.execute(names)]
+    counted = {}
+    for table in tables:
+        quoted = table.replace('"', '""')
+        ((counted[table],),) = connection.execute(f'SELECT count(*) FROM "{quoted}"')  # noqa: S608 - the names are its own
+    return counted
+
+
+def _close_for_good(path: Path) -> None:
+    """Bring what stands in the journals into the file and remove them. Raises BackupError when somebody has it open."""
+    try:
+        with closing(sqlite3.connect(path, timeout=1)) as connection:
+            connection.execute("PRAGMA locking_mode=EXCLUSIVE")
+            mode = connection.execute("PRAGMA journal_mode=DELETE").fetchone()[0]
+            connection.execute("BEGIN EXCLUSIVE")
+            connection.execute("COMMIT")
+        if mode != "delete":
+            raise BackupError(f"{path} is in use", "Stop the service first")
+    except sqlite3.OperationalError:
+        raise BackupError(f"{path} is in use", "Stop the service first") from None
+    except sqlite3.DatabaseError:
+        pass  # damaged, which is why it is replaced; its journals go aside with it
+    for suffix in ("-wal", "-shm"):
+        journal = path.with_name(path.name + suffix)
+        if journal.exists():
+            journal.rename(path.with_name(f"{path.name}.before{suffix}"))
+
+
+def _path(url: URL) -> Path:
+    if not url.database or url.database == ":memory:":
+        raise BackupError("a database in memory cannot be copied to a file")
+    return Path(url.database)
+
+
+def _to_disk(path: Path) -> None:
+    for place in (path, path.parent):
+        descriptor = os.open(place, os.O_RDONLY)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
+
+
+def _program(name: str) -> str:
+    found = shutil.which(name)
+    if found is None:
+        raise BackupError(
+            f"PostgreSQL's {name} is not installed here",
+            f"Install PostgreSQL's client programs (postgresql-client), or run {name} where the database is: "
+            "docker compose exec database pg_dump --username bathyfleet --format custom bathyfleet > FILE",
+        )
+    return found
+
+
+def _run_postgres(name: str, url: URL, *arguments: str) -> None:
+    """Run one of PostgreSQL's programs; the password goes by the environment, where no other user sees it."""
+    place = ["--host", url.host or "localhost", "--port", str(url.port or 5432), "--no-password"]
+    user = ["--username", url.username] if url.username else []
+    environment = os.environ | ({"PGPASSWORD": str(url.password)} if url.password else {})
+    _run([_program(name), *place, *user, "--dbname", url.database or "postgres", *arguments], environment)
+
+
+def _run(command: list[str], environment: dict[str, str] | None = None) -> None:
+    done = subprocess.run(command, capture_output=True, text=True, env=environment, check=False)  # noqa: S603 - no shell
+    if done.returncode != 0:
+        reason = (done.stderr.strip() or f"exit code {done.returncode}").splitlines()[0]
+        raise BackupError(f"{Path(command[0]).name} failed: {reason}")

@@ -1,0 +1,133 @@
+"""How often somebody may ask, and how long the service waits for him."""
+
+import asyncio
+from collections.abc import Callable
+
+import httpx
+import pytest
+import websockets
+from hypothesis import given
+from hypothesis import strategies as st
+
+from app.api import limits
+from app.api.limits import Buckets, Limits, network_of
+from app.api.tokens import Role, TokenStore
+from app.main import Server
+from app.settings import Settings
+from app.storage.database import Database
+from tests.api.conftest import make_client, running
+
+
+@given(st.lists(st.floats(0.0, 3.0), max_size=60), st.floats(0.5, 20.0), st.floats(1.0, 10.0))
+def test_nobody_gets_more_than_the_rate_and_one_bucket(pauses: list[float], per_s: float, size: float) -> None:
+    now, taken = 0.0, 0
+    bucket = Buckets(per_s, size, lambda: now)
+    for pause in pauses:
+        now += pause
+        wait_s = bucket.take("somebody")
+        taken += wait_s == 0.0
+        assert taken <= size + per_s * now + 1e-6
+        if wait_s:
+            now += wait_s + 1e-6
+            assert bucket.take("somebody") == 0.0
+            taken += 1
+
+
+def test_any_number_of_clients_is_remembered_in_bounded_memory(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(limits, "MAX_CLIENTS", 50)
+    held = Limits(1.0, 3)
+    for number in range(400):
+        held.wait_s(None, f"10.0.{number // 256}.{number % 256}")
+        held.log_in(f"bf_{number}", f"10.0.{number // 256}.{number % 256}", good=number % 2 == 0)
+    kept = (held._requests._filled, held._failures._filled, held._known)  # type: ignore[union-attr]
+    assert all(len(what) <= 50 for what in kept)
+
+
+@pytest.mark.parametrize(
+    ("address", "network"),
+    [
+        ("192.0.2.7", "192.0.2.7"),
+        ("::ffff:192.0.2.7", "192.0.2.7"),
+        ("2001:db8:1:2::5", "2001:db8:1:2::/64"),
+        ("2001:db8:1:2:ffff::1", "2001:db8:1:2::/64"),
+        ("", ""),
+    ],
+)
+def test_whoever_has_an_address_has_its_network(address: str, network: str) -> None:
+    assert network_of(address) == network
+
+
+async def test_who_asks_too_often_is_told_when_to_come_back(make_settings: Callable[..., Settings]) -> None:
+    async with running(make_settings(max_requests_per_s=0.5)) as server, make_client(server) as client:
+        assert (await client.get("/health/live")).status_code == 200
+        refused = await client.get("/missions")
+        assert (refused.status_code, refused.json()["type"]) == (429, "urn:bathyfleet:problem:too-many-requests")
+        assert 1 <= int(refused.headers["retry-after"]) <= 2
+        url = f"{server.url.replace('http', 'ws', 1)}/api/v1/missions/none/live"
+        with pytest.raises(websockets.InvalidStatus):
+            await websockets.connect(url)
+
+
+async def test_guessing_tokens_ends_soon_and_disturbs_nobody_who_has_one(
+    make_settings: Callable[..., Settings],
+) -> None:
+    settings = make_settings(max_failed_logins=3)
+    database = Database(settings.database_url)
+    _, good = await TokenStore(database).create("screen", Role.VIEWER)
+    _, other = await TokenStore(database).create("other", Role.VIEWER)
+    await database.close()
+
+    async def ask(client: httpx.AsyncClient, token: str | None) -> int:
+        headers = {} if token is None else {"Authorization": f"Bearer {token}"}
+        return (await client.get("/missions", headers=headers)).status_code
+
+    async with running(settings) as server, make_client(server) as client:
+        assert await ask(client, good) == 200
+        assert [await ask(client, f"bf_{guess}") for guess in range(5)] == [401, 401, 401, 429, 429]
+        assert await ask(client, good) == 200
+        assert await ask(client, None) == 401
+        assert await ask(client, other) == 429  # not known yet: it could be a guess
+        url = f"{server.url.replace('http', 'ws', 1)}/api/v1/missions/none/live"
+        with pytest.raises(websockets.InvalidStatus):
+            await websockets.connect(f"{url}?token=bf_guess")
+
+
+async def _answer(server: Server, sent: bytes) -> bytes:
+    """What the service says to somebody who sends this and no more, until it closes the connection."""
+    reader, writer = await asyncio.open_connection("127.0.0.1", int(server.url.rpartition(":")[2]))
+    try:
+        writer.write(sent)
+        return await reader.read()
+    finally:
+        writer.close()
+
+
+@pytest.mark.parametrize(
+    ("sent", "status"),
+    [
+        (b"", b"408"),
+        (b"GET /health/live HTTP/1.1\r\nHost: localhost\r\nX-Slow: ", b"408"),
+        (
+            b"POST /api/v1/missions HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\n"
+            b"Content-Length: 100\r\n\r\n{",
+            b"408",
+        ),
+    ],
+    ids=["nothing", "half a head", "half a body"],
+)
+async def test_a_client_that_stops_half_way_is_not_waited_for(
+    make_settings: Callable[..., Settings], sent: bytes, status: bytes
+) -> None:
+    async with running(make_settings(slow_client_s=1)) as server:
+        answer = await asyncio.wait_for(_answer(server, sent), 20)
+        assert answer.startswith(b"HTTP/1.1 " + status)
+
+
+async def test_connections_beyond_the_limit_are_told_so(make_settings: Callable[..., Settings]) -> None:
+    async with running(make_settings(max_connections=16)) as server, make_client(server) as client:
+        port = int(server.url.rpartition(":")[2])
+        idle = [await asyncio.open_connection("127.0.0.1", port) for _ in range(16)]
+        assert (await client.get("/health/live")).status_code == 503
+        for _, writer in idle:
+            writer.close()
+            await writer.wait_closed()

@@ -1,0 +1,143 @@
+"""HTTPS, proxies, other users of the machine, and what browsers are told."""
+
+import asyncio
+import os
+import shutil
+import socket
+import ssl
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+
+from app.api.peers import is_another_user
+from app.main import create_app, serve
+from app.settings import Settings, SettingsError, StartupError, load_settings
+from tests.api.conftest import make_client, running
+
+HTTPS_ONLY = "strict-transport-security"
+
+
+@pytest.fixture(scope="session")
+def certificate(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    """A certificate for localhost, signed by itself, and its key."""
+    openssl = shutil.which("openssl")
+    if openssl is None:
+        pytest.skip("openssl is not installed: no certificate can be made")
+    folder = tmp_path_factory.mktemp("tls")
+    cert, key = folder / "cert.pem", folder / "key.pem"
+    name = ["-subj", "/CN=localhost", "-addext", "subjectAltName=DNS:localhost,IP:127.0.0.1"]
+    new = [openssl, "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1", "-nodes", "-days", "2"]
+    subprocess.run([*new, *name, "-keyout", str(key), "-out", str(cert)], check=True, capture_output=True)
+    return cert, key
+
+
+async def test_https_is_served_with_the_certificate_and_asked_for_from_then_on(
+    make_settings: Callable[..., Settings], certificate: tuple[Path, Path]
+) -> None:
+    cert, key = certificate
+    async with running(make_settings(tls_certificate=cert, tls_key=key)) as server:
+        assert server.url.startswith("https://")
+        trusting = ssl.create_default_context(cafile=str(cert))
+        async with httpx.AsyncClient(base_url=server.url, verify=trusting) as client:
+            answer = await client.get("/api/v1/missions", headers={"Origin": server.url})
+            assert answer.status_code == 200
+            assert "max-age" in answer.headers[HTTPS_ONLY]
+            with pytest.raises(httpx.TransportError):
+                await client.get(server.url.replace("https", "http"))
+        old = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
+        old.check_hostname, old.verify_mode = False, ssl.CERT_NONE
+        with pytest.warns(DeprecationWarning, match="TLSv1_1"):
+            old.minimum_version = old.maximum_version = ssl.TLSVersion.TLSv1_1
+        async with httpx.AsyncClient(base_url=server.url, verify=old) as client:
+            with pytest.raises(httpx.TransportError):
+                await client.get("/health/live")
+
+
+async def test_files_that_make_no_certificate_are_named(
+    make_settings: Callable[..., Settings], certificate: tuple[Path, Path], tmp_path: Path
+) -> None:
+    cert, _ = certificate
+    other = tmp_path / "other.pem"
+    other.write_text("no key")
+    for given, said in (
+        ({"tls_certificate": cert}, "tls_certificate"),
+        ({"tls_certificate": cert, "tls_key": other}, "tls_key"),
+        ({"tls_certificate": tmp_path / "absent.pem"}, "absent.pem"),
+    ):
+        with pytest.raises(StartupError, match=said):
+            await serve(make_settings(**given))
+    with pytest.raises(SettingsError, match="tls_certificate"):
+        load_settings(tls_key=other)
+    with pytest.raises(SettingsError, match=r"trusted_proxies.*neither an address nor a network"):
+        load_settings(trusted_proxies=("proxy.example",))
+
+
+async def _ask(settings: Settings, headers: dict[str, str], client: str = "127.0.0.1") -> httpx.Response:
+    async with running(settings) as server, make_client(server) as asking:
+        return await asking.get("/missions", headers=headers)
+
+
+@pytest.mark.parametrize("name", ["X-Forwarded-For", "Forwarded", "X-Real-IP", "Via"])
+async def test_what_a_proxy_passes_on_is_not_the_local_users_word(
+    make_settings: Callable[..., Settings], name: str
+) -> None:
+    """A proxy on the same machine speaks from loopback for whoever reaches it."""
+    assert (await _ask(make_settings(), {name: "127.0.0.1"})).status_code == 403
+
+
+async def test_nobody_but_a_trusted_proxy_says_for_whom_it_speaks(make_settings: Callable[..., Settings]) -> None:
+    claimed = {"X-Forwarded-For": "192.0.2.7", "X-Forwarded-Proto": "https"}
+    assert HTTPS_ONLY not in (await _ask(make_settings(), claimed)).headers
+    trusted = make_settings(trusted_proxies=("127.0.0.0/8",), insecure=True)
+    assert HTTPS_ONLY in (await _ask(trusted, claimed)).headers
+    bare = await _ask(make_settings(trusted_proxies=("127.0.0.1",)), {})
+    assert bare.status_code == 403  # a proxy that tells nothing is still not the local user
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can speak as another user")
+async def test_another_user_of_this_machine_is_not_the_local_operator(make_settings: Callable[..., Settings]) -> None:
+    async with running(make_settings()) as server:
+        port = server.url.rpartition(":")[2]
+        request = "GET /api/v1/missions HTTP/1.1\\r\\nHost: localhost\\r\\nConnection: close\\r\\n\\r\\n"
+        script = f"exec 3<>/dev/tcp/127.0.0.1/{port}; printf '{request}' >&3; read -r line <&3; echo \"$line\""
+        done = await asyncio.to_thread(
+            subprocess.run, ["/bin/bash", "-c", script], user=65534, capture_output=True, text=True, cwd="/"
+        )
+        assert " 403 " in done.stdout, done
+
+
+def test_where_the_kernel_does_not_tell_nobody_is_taken_for_another_user() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as listening:
+        address = listening.getsockname()
+        with socket.create_connection(address) as mine:
+            assert not is_another_user(mine.getsockname(), address)
+    assert not is_another_user(("nowhere", 1), ("127.0.0.1", 2))
+    assert not is_another_user(None, None)
+
+
+async def test_every_answer_tells_browsers_to_be_careful(make_settings: Callable[..., Settings]) -> None:
+    app = create_app(make_settings())
+    wanted: dict[str, Any] = {
+        "x-content-type-options": "nosniff",
+        "x-frame-options": "DENY",
+        "referrer-policy": "no-referrer",
+        "cross-origin-opener-policy": "same-origin",
+        "cross-origin-resource-policy": "same-origin",
+    }
+    async with (
+        app.router.lifespan_context(app),
+        httpx.AsyncClient(transport=httpx.ASGITransport(app), base_url="http://localhost") as client,
+    ):
+        for path in ("/", "/api/docs", "/api/openapi.json", "/api/v1/missions", "/health", "/assets/none.js", "/none"):
+            answer = await client.get(path)
+            assert wanted.items() <= dict(answer.headers).items(), path
+            policy = answer.headers["content-security-policy"]
+            assert "default-src 'none'" in policy, path
+            assert "frame-ancestors 'none'" in policy, path
+            assert ("'unsafe-inline'" in policy) == (path == "/api/docs"), path
+            assert "access-control-allow-origin" not in answer.headers
+            assert HTTPS_ONLY not in answer.headers
