@@ -20,6 +20,7 @@ from app.missions import metrics
 from app.missions.broadcast import Broadcaster
 from app.missions.clock import now
 from app.missions.corrections import NO_LEVEL
+from app.missions.errors import MissionElsewhereError
 from app.missions.fleet import ScanReport, SoundingReport, VehicleReport, WaypointReport
 from app.missions.gate import Gate, GatedSounding
 from app.missions.outlasting import RETRY_S, Outlasting
@@ -296,6 +297,8 @@ class Journal:
             await asyncio.sleep(FLUSH_PERIOD_S)
             try:
                 await self.storage.done(self.flush)
+            except MissionElsewhereError:
+                return  # nothing more is ours to write
             except Exception:
                 log.exception("could not write to the database, trying again", mission=self._mission_id)
                 await asyncio.sleep(RETRY_S)

@@ -4,6 +4,8 @@ import asyncio
 from collections.abc import Awaitable, Callable, Iterator
 from concurrent.futures import Executor
 
+import structlog
+
 from app.missions.errors import MissionElsewhereError, MissionNotFoundError
 from app.missions.hub import FleetHub
 from app.missions.live import LiveMission
@@ -15,6 +17,8 @@ from app.storage.database import Database
 from app.storage.models import MissionRow
 
 ENDED_MISSIONS_IN_MEMORY = 8
+
+log = structlog.get_logger(__name__)
 
 
 class Memory:
@@ -109,7 +113,10 @@ class Memory:
     async def close(self) -> None:
         """Write down what is left."""
         for live in self:
-            await live.close()
+            try:
+                await live.close()
+            except MissionElsewhereError as error:
+                log.warning("the last words of a mission are not written", mission=live.id, error=str(error))
 
     def drop(self) -> None:
         """Forget everything unwritten: other processes have it now."""

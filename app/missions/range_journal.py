@@ -12,6 +12,7 @@ import structlog
 from sqlalchemy.ext.asyncio import AsyncSession
 
 from app.missions.clock import now
+from app.missions.errors import MissionElsewhereError
 from app.missions.fleet import Position, RangeReport
 from app.missions.journal import Journal
 from app.missions.outlasting import RETRY_S
@@ -187,6 +188,8 @@ class RangeJournal:
             await asyncio.sleep(GATHER_S)
             try:
                 await self._journal.storage.done(self.flush)
+            except MissionElsewhereError:
+                return  # nothing more is ours to write
             except Exception:
                 log.exception("could not write ranges to the database, trying again", mission=self._mission_id)
                 await asyncio.sleep(RETRY_S)

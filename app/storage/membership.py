@@ -65,6 +65,9 @@ class FileMembership:
 
     async def enter(self, number: int) -> None:
         """Hold the lock of this number."""
+        if self._lock is not None and self._number == number:
+            return
+        await self.leave()
         lock = FileLock(self._path(number))
         try:
             # A process that looks whether we live holds it for a moment.

@@ -26,6 +26,8 @@ class Service:
         Where it runs and writes its log.
     database
         Its SQLite file; without one a file in ``folder``.
+    database_url
+        Any database, in place of a file.
     settings
         Environment variables without their prefix, for example ``IMC__ENABLED``.
     world
@@ -41,6 +43,7 @@ class Service:
         folder: Path,
         *,
         database: Path | None = None,
+        database_url: str | None = None,
         settings: dict[str, str] | None = None,
         world: dict[str, str] | None = None,
         prefix: Sequence[str] = (),
@@ -48,6 +51,7 @@ class Service:
     ) -> None:
         self.folder = folder
         self.database = database or folder / "fleet.db"
+        self.database_url = database_url or f"sqlite+aiosqlite:///{self.database}"
         self.host, self.port = host, free_ports(1)[0]
         self.process: asyncio.subprocess.Process | None = None
         self._settings = {"IMC__ENABLED": "false"} | (settings or {})
@@ -67,7 +71,7 @@ class Service:
     async def start(self) -> None:
         """Begin a process; it is not ready yet."""
         serve = ["serve", "--host", self.host, "--port", str(self.port), "--log-format", "json"]
-        serve += ["--database", f"sqlite+aiosqlite:///{self.database}"]
+        serve += ["--database", self.database_url]
         program = [str(LAUNCHER)] if self._world is not None else ["-c", "from app.cli import main; main()"]
         ours = {f"BATHYFLEET_{name}": value for name, value in self._settings.items()}
         rest = {key: value for key, value in os.environ.items() if not key.startswith("BATHYFLEET_")}
