@@ -4,7 +4,7 @@ import shutil
 import socket
 import subprocess
 import tempfile
-from collections.abc import AsyncIterator, Iterator
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -95,10 +95,25 @@ async def empty_url(request: pytest.FixtureRequest, tmp_path: Path) -> AsyncIter
     if request.param == "sqlite":
         yield f"sqlite+aiosqlite:///{tmp_path / 'fleet.db'}"
         return
-    cluster = request.getfixturevalue("postgres_cluster")
-    await _on_postgres(cluster, "DROP DATABASE IF EXISTS trial WITH (FORCE)")
-    await _on_postgres(cluster, "CREATE DATABASE trial")
-    yield f"{cluster}/trial"
+    yield await _empty_on(request.getfixturevalue("postgres_cluster"), "trial")
+
+
+async def _empty_on(cluster: str, name: str) -> str:
+    await _on_postgres(cluster, f"DROP DATABASE IF EXISTS {name} WITH (FORCE)")
+    await _on_postgres(cluster, f"CREATE DATABASE {name}")
+    return f"{cluster}/{name}"
+
+
+@pytest.fixture
+def make_postgres(postgres_cluster: str) -> Callable[[str], Awaitable[str]]:
+    """Makes a migrated PostgreSQL database of a name and returns its URL."""
+
+    async def make(name: str) -> str:
+        url = await _empty_on(postgres_cluster, name)
+        await migrate.upgrade(url)
+        return url
+
+    return make
 
 
 @pytest.fixture
