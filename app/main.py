@@ -83,13 +83,17 @@ def create_app(settings: Settings | None = None) -> FastAPI:
                     f"neptus.host is {settings.neptus.host}, which other machines reach, but there is no access token: "
                     "make one with 'bathyfleet token create NAME --role operator'; it is the panel's password"
                 )
-            service = MissionService(
-                settings.service(),
-                database,
-                lambda password, host: console_log_in(tokens, limits, password, host, insecure=settings.insecure),
-            )
-            app.state.edge = EdgeState(settings, service, tokens, limits, AuditLog(database))
-            await app.state.edge.audit.forget(settings.audit_days)
+            audit = AuditLog(database)
+            await audit.forget(settings.audit_days)
+
+            async def log_in(password: str, host: str) -> str | None:
+                name = await console_log_in(tokens, limits, password, host, insecure=settings.insecure)
+                if name is None:  # who is let in is in the log of his session's mission
+                    await audit.write(Command("", "", host, "log in", "Neptus gateway", "refused"))
+                return name
+
+            service = MissionService(settings.service(), database, log_in)
+            app.state.edge = EdgeState(settings, service, tokens, limits, audit)
             await service.startup()
             try:
                 yield
