@@ -83,8 +83,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
                     f"neptus.host is {settings.neptus.host}, which other machines reach, but there is no access token: "
                     "make one with 'bathyfleet token create NAME --role operator'; it is the panel's password"
                 )
-            audit = AuditLog(database)
-            await audit.forget(settings.audit_days)
+            audit = AuditLog(database, settings.audit_days)
 
             async def log_in(password: str, host: str) -> str | None:
                 name = await console_log_in(tokens, limits, password, host, insecure=settings.insecure)
