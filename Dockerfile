@@ -28,7 +28,8 @@ USER bathyfleet
 WORKDIR /var/lib/bathyfleet
 VOLUME /var/lib/bathyfleet
 EXPOSE 8080/tcp 6101/udp 30100-30104/udp
+# With HTTPS the certificate is another name's than localhost.
 HEALTHCHECK --interval=15s --timeout=5s --start-period=60s --retries=3 \
-    CMD ["python", "-c", "import os, urllib.request; urllib.request.urlopen(f\"http://127.0.0.1:{os.environ['BATHYFLEET_PORT']}/health/live\", timeout=4)"]
+    CMD ["python", "-c", "import os, ssl, urllib.request as r; s = 'https' if os.environ.get('BATHYFLEET_TLS_CERTIFICATE') else 'http'; r.urlopen(f\"{s}://127.0.0.1:{os.environ['BATHYFLEET_PORT']}/health/live\", timeout=4, context=ssl._create_unverified_context())"]
 ENTRYPOINT ["bathyfleet"]
 CMD ["serve"]

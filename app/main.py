@@ -88,15 +88,22 @@ def create_app(settings: Settings | None = None, *, port: int | None = None) -> 
                     f"neptus.host is {settings.neptus.host}, which other machines reach, but there is no access token: "
                     "make one with 'bathyfleet token create NAME --role operator'; it is the panel's password"
                 )
+            audit = AuditLog(database, settings.audit_days)
+
+            async def log_in(password: str, host: str) -> str | None:
+                name = await console_log_in(tokens, limits, password, host, insecure=settings.insecure)
+                if name is None:  # who is let in is in the log of his session's mission
+                    await audit.write(Command("", "", host, "log in", "Neptus gateway", "refused"))
+                return name
+
             service = MissionService(
                 settings.service(),
                 database,
-                lambda password, host: console_log_in(tokens, limits, password, host, insecure=settings.insecure),
+                log_in,
                 url=settings.peer_url or _own_url(settings, port or settings.port),
                 certificate=settings.tls_certificate.read_text() if settings.tls_certificate else None,
             )
-            app.state.edge = EdgeState(settings, service, tokens, limits, AuditLog(database))
-            await app.state.edge.audit.forget(settings.audit_days)
+            app.state.edge = EdgeState(settings, service, tokens, limits, audit)
             await service.startup()
             try:
                 yield

@@ -103,6 +103,10 @@ def test_help_lists_every_command_without_loading_the_service(bathyfleet: Run) -
         "doctor",
         "migrate",
         "token",
+        "audit",
+        "backup",
+        "restore",
+        "prune",
     ):
         assert command in shown.stdout
     imported = subprocess.run(
@@ -131,6 +135,10 @@ def test_help_lists_every_command_without_loading_the_service(bathyfleet: Run) -
         "migrate",
         "token",
         "token create",
+        "audit",
+        "backup",
+        "restore",
+        "prune",
     ],
 )
 def test_every_command_explains_its_options(bathyfleet: Run, command: str) -> None:
@@ -200,6 +208,27 @@ def test_tokens_are_made_listed_and_revoked(bathyfleet: Run) -> None:
     assert bathyfleet("token", "revoke", listed["id"][:8]).code == 0
     (revoked,) = json.loads(bathyfleet("token", "list", "--json").stdout)
     assert revoked["revoked_at"]
+
+
+def test_commands_are_written_down_and_the_whole_is_backed_up_and_restored(bathyfleet: Run, tmp_path: Path) -> None:
+    bathyfleet("token", "create", "Maria", "--role", "viewer")
+    assert bathyfleet("token", "revoke", "none").code == 2
+    made = bathyfleet("backup", "copies")
+    assert (made.code, "1 tokens" in made.stdout) == (0, True)
+    (copy,) = tmp_path.rglob("copies/bathyfleet-*.db")
+    assert bathyfleet("backup", "--verify", str(copy)).code == 0
+    assert bathyfleet("restore", str(copy)).code == 1
+    assert bathyfleet("restore", str(copy), "--replace").code == 0
+    assert bathyfleet("prune", "--days", "30", "--apply").stdout.startswith("0 missions removed")
+    lines = [json.loads(line) for line in bathyfleet("audit", "--format", "json").stdout.splitlines()]
+    assert [(line["action"], line["result"]) for line in lines] == [
+        ("restore", "done"),
+        ("token revoke", "refused"),
+        ("token create", "done"),
+    ]
+    assert {line["origin"] for line in lines} == {"command line"}
+    assert "Maria" in bathyfleet("audit").stdout
+    assert bathyfleet("audit", "--format", "csv").stdout.startswith("id,time,actor,role,origin,action")
 
 
 def test_a_mission_is_served_exported_and_found_again(

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Sequence
+from datetime import UTC, date, datetime
 from typing import Annotated, Any
 
 import structlog
@@ -30,10 +31,15 @@ log = structlog.get_logger(__name__)
 
 
 class AuditLog:
-    """Writes commands down. A command that was carried out is answered even when that fails; the log says so."""
+    """Writes commands down, and once a day removes those older than ``days``.
 
-    def __init__(self, database: Database) -> None:
+    A command that was carried out is answered even when it cannot be written down; the service's log says so.
+    """
+
+    def __init__(self, database: Database, days: float) -> None:
         self._database = database
+        self._days = days
+        self._tidied: date | None = None
         # Nobody who has no token may fill the disk with refusals.
         self._strangers = Buckets(STRANGERS_PER_MINUTE / 60, STRANGERS_PER_MINUTE)
         self._unwritten = 0
@@ -51,6 +57,9 @@ class AuditLog:
         try:
             async with self._database.writing() as session:
                 audit.add(session, command)
+                if self._tidied != (today := datetime.now(UTC).date()):
+                    self._tidied = today
+                    await audit.forget(session, self._days)
         except (OSError, SQLAlchemyError):
             log.exception("the audit log cannot be written", **vars(command))
 
@@ -58,11 +67,6 @@ class AuditLog:
         """Return commands, newest first; see :func:`app.storage.audit.newest`."""
         async with self._database.reading() as session:
             return await audit.newest(session, **choice)
-
-    async def forget(self, days: float) -> int:
-        """Remove what is older than ``days``; returns how many."""
-        async with self._database.writing() as session:
-            return await audit.forget(session, days)
 
 
 class AuditMiddleware:

@@ -1,5 +1,6 @@
 """Who may ask for what: access tokens, roles, and the local operator while there are no tokens."""
 
+import asyncio
 import ipaddress
 from collections.abc import Awaitable, Callable
 from typing import Annotated
@@ -15,6 +16,9 @@ from app.api.problems import ProblemError
 from app.api.state import EdgeState, State
 from app.api.tokens import Principal, Role, TokenStore
 from app.settings import is_loopback
+
+RECHECK_S = 15.0
+"""How long a live view may outlast its token."""
 
 LOCAL_OPERATOR = Principal("local operator", Role.ADMIN)
 
@@ -59,7 +63,8 @@ async def authenticate(connection: HTTPConnection, state: EdgeState, *, query_to
     raise ProblemError(
         "forbidden",
         "without access tokens only the user of this machine who runs the service may use it, and not by a proxy",
-        remedy="Make one on the machine of the service: bathyfleet token create NAME --role operator",
+        remedy="Use the token in operator.token beside the database, or make one on the machine of the service: "
+        "bathyfleet token create NAME --role operator",
     )
 
 
@@ -67,6 +72,16 @@ def _remember(connection: HTTPConnection, principal: Principal) -> Principal:
     """Keep with the request who asks, for the audit log."""
     connection.scope.setdefault("state", {})["principal"] = principal
     return principal
+
+
+async def until_unwelcome(connection: HTTPConnection, state: EdgeState, *, query_token: bool = False) -> None:
+    """Return when whoever listens may not any more: the token was revoked or has run out."""
+    while True:
+        await asyncio.sleep(RECHECK_S)
+        try:
+            await authenticate(connection, state, query_token=query_token)
+        except ProblemError:
+            return
 
 
 async def console_log_in(

@@ -7,11 +7,14 @@ from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 
 from app.settings import Settings, is_loopback
 
-_TOO_SLOW = b"HTTP/1.1 408 Request Timeout\r\nconnection: close\r\ncontent-length: 0\r\n\r\n"
+MAX_HEAD_BYTES = 65_536
+_END = b"\r\nconnection: close\r\ncontent-length: 0\r\n\r\n"
+_TOO_SLOW = b"HTTP/1.1 408 Request Timeout" + _END
+_TOO_LARGE = b"HTTP/1.1 431 Request Header Fields Too Large" + _END
 
 
 def patient_http(settings: Settings) -> type[asyncio.Protocol]:
-    """Return uvicorn's HTTP protocol that waits for a request's head only so long, and bounds connections per address.
+    """Return uvicorn's HTTP protocol that bounds a request's head, in time and size, and connections per address.
 
     Between requests uvicorn itself closes idle connections; the body's time is the business of the middleware.
     """
@@ -23,6 +26,8 @@ def patient_http(settings: Settings) -> type[asyncio.Protocol]:
 
         _timer: asyncio.TimerHandle | None = None
         _counted = ""
+        _head_bytes = 0
+        _in_head = False
 
         def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
             """Count it; refuse one too many."""
@@ -38,8 +43,23 @@ def patient_http(settings: Settings) -> type[asyncio.Protocol]:
 
         def data_received(self, data: bytes) -> None:
             """Take data in; a head that is not complete yet has as long as the first byte had."""
+            went_on = self._in_head
             super().data_received(data)
             self._watch()
+            # The parser itself would gather a head of any size.
+            self._head_bytes = self._head_bytes + len(data) if went_on and self._in_head else 0
+            if self._head_bytes > MAX_HEAD_BYTES:
+                self._refuse(_TOO_LARGE)
+
+        def on_message_begin(self) -> None:
+            """Begin a head."""
+            self._in_head = True
+            super().on_message_begin()
+
+        def on_headers_complete(self) -> None:
+            """End it."""
+            self._in_head = False
+            super().on_headers_complete()
 
         def handle_websocket_upgrade(self) -> None:
             """Leave the connection to the other protocol, whose number has a limit of its own."""
@@ -60,8 +80,11 @@ def patient_http(settings: Settings) -> type[asyncio.Protocol]:
                 self._timer = self.loop.call_later(settings.slow_client_s, self._too_slow)
 
         def _too_slow(self) -> None:
-            self._timer = None
-            self.transport.write(_TOO_SLOW)
+            self._refuse(_TOO_SLOW)
+
+        def _refuse(self, answer: bytes) -> None:
+            self._stop_timer()
+            self.transport.write(answer)
             self.transport.close()
 
         def _stop_timer(self) -> None:

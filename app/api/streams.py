@@ -11,7 +11,7 @@ from fastapi import APIRouter, Header, Query, Request, Response, WebSocket, WebS
 from pydantic import TypeAdapter
 from sse_starlette import EventSourceResponse, ServerSentEvent
 
-from app.api.auth import Reader, authenticate
+from app.api.auth import Reader, authenticate, until_unwelcome
 from app.api.problems import ProblemError, describe_mission_error, problems
 from app.api.racing import first_of
 from app.api.schemas import API, MissionId
@@ -91,7 +91,7 @@ async def get_events(
         with state.stream("sse"):
             pass  # raises: the limit is reached
     return EventSourceResponse(
-        _stream(service, state, mission_id, start),
+        _stream(service, state, mission_id, start, request),
         ping=KEEP_ALIVE_S,
         headers={"Cache-Control": "no-store", "X-Accel-Buffering": "no"},
     )
@@ -128,9 +128,9 @@ def _wants_list(accept: str) -> bool:
 
 
 async def _stream(
-    service: MissionService, state: EdgeState, mission_id: str, start: int
+    service: MissionService, state: EdgeState, mission_id: str, start: int, request: Request
 ) -> AsyncIterator[ServerSentEvent]:
-    """Yield the log after ``start``, first what is stored, then what happens."""
+    """Yield the log after ``start``, first what is stored, then what happens, as long as the client may see it."""
     with state.stream("sse"):
         async with service.subscribe(mission_id) as messages:
             snapshot = await anext(messages)
@@ -143,28 +143,33 @@ async def _stream(
                 for event in page:
                     yield _sse(event)
                     sent = event.id
+            unwelcome = asyncio.create_task(until_unwelcome(request, state))
             try:
-                async for message in _until_stopping(messages, state.stopping):
+                async for message in _until_either(messages, state.stopping, unwelcome):
                     if isinstance(message, EventMessage) and message.event.id > sent:
                         yield _sse(message.event)
                         sent = message.event.id
             except WatchEndedError:
                 return  # the client reconnects with its Last-Event-ID and misses nothing
+            finally:
+                unwelcome.cancel()
 
 
 def _sse(event: EventView) -> ServerSentEvent:
     return ServerSentEvent(event.model_dump_json(), id=str(event.id), event=event.kind, retry=RECONNECT_MS)
 
 
-async def _until_stopping(messages: AsyncIterator[LiveMessage], stopping: asyncio.Event) -> AsyncIterator[LiveMessage]:
-    """Yield messages until the process is asked to end."""
+async def _until_either(
+    messages: AsyncIterator[LiveMessage], stopping: asyncio.Event, unwelcome: asyncio.Task[None]
+) -> AsyncIterator[LiveMessage]:
+    """Yield messages until the process is asked to end, or the client may not see them any more."""
     newest: LiveMessage | None = None
 
     async def take() -> None:
         nonlocal newest
         newest = await anext(messages, None)
 
-    while await first_of(take(), stopping.wait()) == 0 and newest is not None:
+    while await first_of(take(), stopping.wait(), asyncio.wait([unwelcome])) == 0 and newest is not None:
         yield newest
 
 
@@ -198,9 +203,16 @@ async def live(websocket: WebSocket, mission_id: str) -> None:
 
 async def _serve(websocket: WebSocket, state: EdgeState, mission_id: str) -> None:
     async with state.service.subscribe(mission_id) as messages:
-        ended = await first_of(_send_all(websocket, messages), _until_left(websocket), state.stopping.wait())
+        ended = await first_of(
+            _send_all(websocket, messages),
+            _until_left(websocket),
+            state.stopping.wait(),
+            until_unwelcome(websocket, state, query_token=True),
+        )
         if ended == 2:
             await _close(websocket, CLOSE_GOING_AWAY, "the service ends")
+        if ended == 3:
+            await _close(websocket, CLOSE_UNAUTHENTICATED, "the access token was revoked or has run out")
 
 
 async def _send_all(websocket: WebSocket, messages: AsyncIterator[LiveMessage]) -> None:

@@ -9,6 +9,7 @@ from alembic.config import Config
 from alembic.runtime.migration import MigrationContext
 from alembic.script import ScriptDirectory
 from sqlalchemy import Connection
+from sqlalchemy.exc import IntegrityError
 
 from app.storage.database import make_engine
 
@@ -56,10 +57,23 @@ async def _run(url: str, action: Callable[[Config], None]) -> None:
     try:
         async with engine.connect() as connection:
             await connection.execution_options(bathyfleet_writes=True)
+            if engine.dialect.name == "sqlite":
+                # Some changes of a table replace it: when the old one is dropped, what refers to it must not go along.
+                raw = (await connection.get_raw_connection()).driver_connection
+                assert raw is not None  # noqa: S101 - a connection that was opened has one
+                await raw.execute("PRAGMA foreign_keys=OFF")
             async with connection.begin():
                 await connection.run_sync(lambda sync: action(_config(sync)))
+                if engine.dialect.name == "sqlite":
+                    await connection.run_sync(_check_references)
     finally:
         await engine.dispose()
+
+
+def _check_references(connection: Connection) -> None:
+    orphans = connection.exec_driver_sql("PRAGMA foreign_key_check").fetchmany(3)
+    if orphans:
+        raise IntegrityError("PRAGMA foreign_key_check", None, ValueError(f"rows that belong to nothing: {orphans}"))
 
 
 def upgrade_now(url: str) -> None:

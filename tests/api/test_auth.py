@@ -9,6 +9,7 @@ import httpx
 import pytest
 import websockets
 
+from app.api import auth
 from app.api.tokens import Role, TokenStore
 from app.main import Server, create_app
 from app.settings import Settings, StartupError
@@ -139,6 +140,20 @@ async def test_the_socket_takes_the_token_from_header_or_query(guarded: Guarded,
                 await socket.recv()
         assert closed.value.rcvd is not None
         assert closed.value.rcvd.code == 4401
+
+
+async def test_live_views_end_with_their_token(guarded: Guarded, path: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(auth, "RECHECK_S", 0.05)
+    url = f"{guarded.server.url.replace('http', 'ws', 1)}/api/v1{path}/live"
+    events = guarded.client.stream("GET", f"{path}/events", headers=guarded.as_("viewer"))
+    async with websockets.connect(f"{url}?token={guarded.tokens['viewer']}") as socket, events as stream:
+        await socket.recv()
+        viewer = next(row for row in await guarded.store.all() if row.role == "viewer")
+        await guarded.store.revoke(viewer.id)
+        await socket.wait_closed()
+        assert socket.close_code == 4401
+        async for _ in stream.aiter_lines():
+            pass  # until it ends
 
 
 async def test_the_log_names_the_token_that_commanded(guarded: Guarded, path: str) -> None:

@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 
 from app.api.auth import console_log_in
+from app.api.limits import Limits
 from app.api.tokens import Role, TokenStore
 from app.missions.links.neptus import GATHER_S, gateway_settings
 from app.missions.service import MissionService
@@ -161,7 +162,7 @@ class Gateway:
         self.database = Database(self.settings.database_url)
         store = TokenStore(self.database)
         self.service = MissionService(
-            self.settings, self.database, lambda word, host: console_log_in(store, word, host)
+            self.settings, self.database, lambda word, host: console_log_in(store, Limits(0, 1000), word, host)
         )
         await self.service.startup()
 

@@ -16,7 +16,8 @@ import asyncio, sys
 from app.storage.membership import make_membership
 
 async def hold(url, number):
-    await make_membership(url, lambda: None).enter(number)
+    membership = make_membership(url, lambda: None)
+    await membership.enter(number)
     print("held", flush=True)
     await asyncio.sleep(3600)
 

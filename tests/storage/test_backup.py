@@ -1,0 +1,210 @@
+"""Copies of a database that is in use, checked, damaged and put back; and room for new missions."""
+
+import asyncio
+import os
+import re
+import shutil
+import sqlite3
+import subprocess
+import sys
+from collections.abc import Awaitable, Callable
+from contextlib import closing
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+import pytest
+from sqlalchemy import func, select
+
+from app.storage import backup as module
+from app.storage.backup import BackupError, back_up, contents_of, restore_to
+from app.storage.database import Database
+from app.storage.models import Base, MissionRow, SoundingRow
+from app.storage.retention import ended_before, give_space_back, remove
+from tests.storage.rows import mission, one_of_each, sounding
+
+WRITER = """
+import sqlite3, sys
+connection = sqlite3.connect(sys.argv[1], timeout=30, isolation_level=None)
+print("writing", flush=True)
+while True:
+    connection.execute("BEGIN IMMEDIATE")
+    for half in "ab":  # both or none
+        connection.execute(
+            "INSERT INTO events (mission_id, time, level, kind, message, data) VALUES (?, ?, 'info', ?, '', '{}')",
+            ("m1", "2026-06-01", half),
+        )
+    connection.execute("COMMIT")
+"""
+
+
+def path_of(url: str) -> Path:
+    return Path(url.removeprefix("sqlite+aiosqlite:///"))
+
+
+async def fill(database: Database) -> None:
+    async with database.writing() as session:
+        for rows in one_of_each():
+            session.add_all(rows)
+            await session.flush()
+
+
+async def counts(url: str) -> dict[str, int]:
+    database = Database(url)
+    async with database.reading() as session:
+        found = {
+            table.name: int(await session.scalar(select(func.count()).select_from(table)) or 0)
+            for table in Base.metadata.sorted_tables
+        }
+    await database.close()
+    return found
+
+
+def copies_beside_a_writer(url: str, folder: Path) -> list[Path]:
+    """Copies that were made one after the other while another process wrote."""
+    with subprocess.Popen([sys.executable, "-c", WRITER, str(path_of(url))], stdout=subprocess.PIPE) as writer:
+        assert writer.stdout is not None
+        writer.stdout.readline()
+        try:
+            return [back_up(url, folder / f"{number}.db")[0] for number in range(5)]
+        finally:
+            writer.kill()
+
+
+async def test_copy_of_a_database_that_is_written_to_is_one_moment_of_it(sqlite: Database, tmp_path: Path) -> None:
+    await fill(sqlite)
+    sizes = []
+    for copy in await asyncio.to_thread(copies_beside_a_writer, sqlite.url, tmp_path):
+        assert copy.stat().st_mode & 0o777 == 0o600
+        with closing(sqlite3.connect(copy)) as connection:
+            halves = [
+                connection.execute("SELECT count(*) FROM events WHERE kind = ?", half).fetchone()[0] for half in "ab"
+            ]
+            (journal,) = connection.execute("PRAGMA journal_mode").fetchone()
+        assert halves[0] == halves[1]
+        assert journal == "delete"
+        sizes.append(halves[0])
+    assert sizes == sorted(sizes)
+    assert sizes[-1] > 0
+    assert not any(f"{number}.db.part" in files for *_, files in os.walk(tmp_path) for number in range(5))
+
+
+async def test_what_was_backed_up_is_there_again_after_the_disk_was_lost(sqlite: Database, tmp_path: Path) -> None:
+    await fill(sqlite)
+    await sqlite.close()
+    before = await counts(sqlite.url)
+    copy, contents = back_up(sqlite.url, tmp_path / "backups")
+    assert {table: contents.rows[table] for table in before} == before
+    os.unlink(path_of(sqlite.url))  # noqa: PTH108 - a moment's work
+    assert restore_to(sqlite.url, copy, replace=False) == (contents, None)
+    assert await counts(sqlite.url) == before
+
+
+async def test_restoring_over_a_database_moves_it_aside_and_never_one_that_is_in_use(
+    sqlite: Database, tmp_path: Path
+) -> None:
+    copy, _ = back_up(sqlite.url, tmp_path / "empty.db")
+    await fill(sqlite)
+    with pytest.raises(BackupError, match="exists"):
+        restore_to(sqlite.url, copy, replace=False)
+    async with sqlite.reading() as session:
+        await session.scalars(select(MissionRow))
+        with pytest.raises(BackupError, match="in use"):
+            restore_to(sqlite.url, copy, replace=True)
+    await sqlite.close()
+    _, aside = restore_to(sqlite.url, copy, replace=True)
+    assert (await counts(sqlite.url))["missions"] == 0
+    assert aside is not None
+    assert (await counts(f"sqlite+aiosqlite:///{aside}"))["missions"] == 1
+
+
+@pytest.mark.parametrize("page", [0, 1, 2, 3])
+async def test_damage_is_noticed_and_nothing_is_restored_from_it(sqlite: Database, tmp_path: Path, page: int) -> None:
+    await fill(sqlite)
+    copy, _ = back_up(sqlite.url, tmp_path / "copy.db")
+    whole = copy.read_bytes()
+    damaged = whole[: page * 4096] + b"\xff" * 1200 + whole[page * 4096 + 1200 :]
+    for content in (damaged, whole[: len(whole) // 2]):
+        copy.write_bytes(content)
+        with pytest.raises(BackupError, match=re.escape(str(copy))):
+            contents_of(copy)
+        with pytest.raises(BackupError):
+            restore_to(f"sqlite+aiosqlite:///{tmp_path / 'new.db'}", copy, replace=False)
+        assert not (tmp_path / "new.db").exists()
+
+
+async def test_what_is_no_backup_of_ours_is_named(sqlite: Database, tmp_path: Path) -> None:
+    (tmp_path / "notes.txt").write_text("nothing")
+    with closing(sqlite3.connect(tmp_path / "other.db")) as connection:
+        connection.execute("CREATE TABLE cats (name TEXT)")
+    for name, said in (("notes.txt", "neither an SQLite"), ("other.db", "not one of bathyfleet")):
+        with pytest.raises(BackupError, match=said):
+            contents_of(tmp_path / name)
+    with pytest.raises(BackupError, match="exists"):
+        back_up(sqlite.url, tmp_path / "other.db")
+    with pytest.raises(BackupError, match="there is no database"):
+        back_up(f"sqlite+aiosqlite:///{tmp_path / 'absent.db'}", tmp_path / "x.db")
+
+
+async def test_postgresql_is_copied_by_its_own_programs(
+    postgres_cluster: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    make_postgres: Callable[[str], Awaitable[str]],
+) -> None:
+    if shutil.which("pg_dump") is None:
+        pytest.skip("pg_dump is not installed")
+    url = await make_postgres("trial")
+    database = Database(url)
+    await fill(database)
+    await database.close()
+    before = await counts(url)
+    copy, _ = await asyncio.to_thread(back_up, url, tmp_path / "fleet.dump")
+    assert contents_of(copy).size_bytes == copy.stat().st_size
+    other = await make_postgres("second")
+    await asyncio.to_thread(restore_to, other, copy, replace=True)
+    assert await counts(other) == before
+    half = tmp_path / "half.dump"
+    half.write_bytes(copy.read_bytes()[:-2000])
+    with pytest.raises(BackupError, match="pg_restore"):
+        contents_of(half)
+
+    monkeypatch.setattr(module.shutil, "which", lambda name: None)
+    with pytest.raises(BackupError, match="pg_dump is not installed") as refused:
+        back_up(url, tmp_path / "again.dump")
+    assert "docker compose exec database pg_dump" in refused.value.remedy
+
+
+async def test_a_password_is_given_to_no_command_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    fake = tmp_path / "pg_dump"
+    fake.write_text(f'#!/bin/sh\necho "$@" > {tmp_path}/arguments\necho "$PGPASSWORD" > {tmp_path}/word\nexit 1\n')
+    fake.chmod(0o755)
+    monkeypatch.setenv("PATH", f"{tmp_path}:{os.environ['PATH']}")
+    with pytest.raises(BackupError, match="pg_dump failed"):
+        back_up("postgresql+asyncpg://fleet:hunter2@db:5433/fleet", tmp_path / "x.dump")
+    assert "hunter2" not in (tmp_path / "arguments").read_text()
+    assert "--host db --port 5433" in (tmp_path / "arguments").read_text()
+    assert (tmp_path / "word").read_text() == "hunter2\n"
+
+
+async def test_missions_that_ended_long_ago_go_and_give_their_space_back(database: Database) -> None:
+    now = datetime.now(UTC)
+    ages = {"old": 100.0, "younger": 10.0, "running": 100.0, "paused": 100.0, "ready": 100.0}
+    async with database.writing() as session:
+        for name, days in ages.items():
+            state = name if name in ("running", "paused", "ready") else "finished"
+            session.add(mission(name, state=state, updated_at=now - timedelta(days=days)))
+        await session.flush()
+        for name in ages:
+            many = 2000 if name == "old" else 3
+            session.add_all(SoundingRow(**sounding(name, time_s=float(k))) for k in range(many))
+    found = await ended_before(database, 30)
+    assert [(ended.id, ended.soundings) for ended in found] == [("old", 2000)]
+    assert not await remove(database, "running", 30)
+    assert not await remove(database, "younger", 30)
+    assert await remove(database, "old", 30)
+    assert not await remove(database, "old", 30)
+    after = await counts(database.url)
+    assert (after["missions"], after["soundings"]) == (4, 12)
+    note = await give_space_back(database.url)
+    if database.url.startswith("sqlite"):
+        assert int(note.split()[3]) > 100_000

@@ -1,0 +1,82 @@
+"""The image and the compose file say what the program understands. Building them takes a container engine."""
+
+import json
+import os
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from app.main import Server
+from app.settings import PREFIX, Settings, _variable_names, load_settings
+from tests.api.conftest import (
+    empty_database,  # noqa: F401
+    shared_server,  # noqa: F401 - a fixture
+)
+
+ROOT = Path(__file__).resolve().parents[1]
+IMAGE = (ROOT / "Dockerfile").read_text().replace("\\\n", " ")
+COMPOSE = yaml.safe_load((ROOT / "compose.yaml").read_text())
+KNOWN = _variable_names(Settings, PREFIX)
+
+
+def environment_of_the_image() -> dict[str, str]:
+    (line,) = re.findall(r"^ENV (PATH=.*)$", IMAGE, re.MULTILINE)
+    return dict(word.split("=", 1) for word in shlex.split(line))
+
+
+def filled_in(value: str, given: dict[str, str]) -> str:
+    """Fill in variables as compose does."""
+    return re.sub(r"\$\{(\w+)(?::[-?]([^}]*))?\}", lambda m: given.get(m[1], m[2] or ""), value)
+
+
+def test_every_variable_is_a_setting_with_a_value_that_is_taken(monkeypatch: pytest.MonkeyPatch) -> None:
+    service = COMPOSE["services"]["bathyfleet"]["environment"]
+    image = {name: value for name, value in environment_of_the_image().items() if name.startswith(PREFIX)}
+    together = image | {name: filled_in(value, {"POSTGRES_PASSWORD": "x"}) for name, value in service.items()}
+    assert set(together) <= KNOWN
+    for name in list(os.environ):
+        if name.startswith(PREFIX):
+            monkeypatch.delenv(name)
+    for name, value in together.items():
+        monkeypatch.setenv(name, value)
+    settings = load_settings()
+    assert settings.loopback
+    assert settings.migrates_itself
+    assert settings.database_url == "postgresql+asyncpg://bathyfleet:x@127.0.0.1:5432/bathyfleet"
+    assert (settings.port, settings.log_format) == (8080, "json")
+
+
+def test_ports_of_the_image_are_those_of_the_settings() -> None:
+    (line,) = re.findall(r"^EXPOSE (.*)$", IMAGE, re.MULTILINE)
+    imc = Settings().imc
+    announces = f"{imc.announce_ports[0]}-{imc.announce_ports[-1]}/udp"
+    assert line.split() == [f"{Settings().port}/tcp", f"{imc.port}/udp", announces]
+
+
+def test_the_health_check_asks_what_there_is(shared_server: Server) -> None:  # noqa: F811
+    (line,) = re.findall(r"^HEALTHCHECK .* CMD (\[.*\])$", IMAGE, re.MULTILINE)
+    command = [sys.executable, *json.loads(line)[1:]]
+    for port, code in ((shared_server.url.rpartition(":")[2], 0), ("9", 1)):
+        variables = {"BATHYFLEET_PORT": port, "PATH": os.environ["PATH"]}
+        assert subprocess.run(command, env=variables, capture_output=True, check=False).returncode == code
+
+
+def test_what_the_image_copies_is_what_the_package_is_made_of() -> None:
+    allowed = {line[1:] for line in (ROOT / ".dockerignore").read_text().splitlines() if line.startswith("!")}
+    assert {"app", "imc_bridge", "simulator", "migrations", "hatch_build.py", "pyproject.toml"} <= allowed
+    assert all((ROOT / name).exists() for name in allowed)
+    assert "operator.token" not in allowed
+
+
+def test_the_service_has_no_rights_that_it_does_not_need() -> None:
+    service: dict[str, Any] = COMPOSE["services"]["bathyfleet"]
+    assert service["cap_drop"] == ["ALL"]
+    assert service["read_only"] is True
+    assert re.search(r"^USER bathyfleet$", IMAGE, re.MULTILINE)
+    assert COMPOSE["services"]["database"]["ports"][0].startswith("127.0.0.1:")
