@@ -42,12 +42,12 @@ async def killed(folder: Path, seed: int) -> dict[str, Any]:
 async def full(folder: Path, _seed: int) -> dict[str, Any]:
     """A disk that is full ten times."""
     with small_disk(folder / "disk") as disk:
-        return await scenes.disk_full(folder, disk, steps=100, fills=10)
+        return await scenes.disk_full(folder, disk, steps=250, fills=10)
 
 
 async def locked(folder: Path, _seed: int) -> dict[str, Any]:
     """A lock that is held longer than a writer waits by default."""
-    return await scenes.locked(folder, steps=40, locks=2, busy_ms=30_000)
+    return await scenes.locked(folder, steps=120, locks=2, busy_ms=30_000)
 
 
 async def aborted(folder: Path, _seed: int) -> dict[str, Any]:
