@@ -1,6 +1,7 @@
 """Whatever the OpenAPI document allows, and much that it does not, is answered as it says."""
 
 import asyncio
+import contextlib
 import json
 import os
 import shutil
@@ -14,8 +15,10 @@ import httpx
 import pytest
 import schemathesis
 from hypothesis import HealthCheck, Phase, given, settings
+from hypothesis.errors import Flaky
 from schemathesis import Case
 from schemathesis.checks import CheckFunction, load_all_checks, not_a_server_error
+from schemathesis.core.failures import Failure, FailureGroup
 from schemathesis.specs.openapi.checks import (
     positive_data_acceptance,
     response_headers_conformance,
@@ -129,6 +132,7 @@ def test_missions_are_dealt_with_in_any_order(service: Service) -> None:
     """Walks from answer to request: what one returned is asked about, changed, started, ended and taken back."""
     machine = service.document.as_state_machine()
     seen: Counter[str] = Counter()
+    faults: list[Exception] = []
 
     class Walk(machine):  # type: ignore[misc, valid-type]
         def before_call(self, case: Case) -> None:
@@ -142,18 +146,24 @@ def test_missions_are_dealt_with_in_any_order(service: Service) -> None:
         def validate_response(self, response: Any, case: Case, **_: Any) -> None:
             operation_id = case.operation.definition.raw["operationId"]
             seen[operation_id] += response.status_code < httpx.codes.BAD_REQUEST
-            case.validate_response(response, checks=[not_a_server_error, response_headers_conformance])
+            try:
+                case.validate_response(response, checks=[not_a_server_error, response_headers_conformance])
+            except (Failure, FailureGroup) as fault:
+                faults.append(fault)
 
-    Walk.run(
-        settings=settings(
-            max_examples=EXAMPLES,
-            stateful_step_count=12,
-            deadline=None,
-            derandomize=True,
-            database=None,
-            phases=[Phase.generate],
-            suppress_health_check=list(HealthCheck),
+    # The service remembers earlier walks, which hypothesis takes for inconsistent data and stops at, sooner or later.
+    with contextlib.suppress(Flaky):
+        Walk.run(
+            settings=settings(
+                max_examples=EXAMPLES,
+                stateful_step_count=12,
+                deadline=None,
+                derandomize=True,
+                database=None,
+                phases=[Phase.generate],
+                suppress_health_check=list(HealthCheck),
+            )
         )
-    )
+    assert not faults
     assert seen["createMission"] > 0
     assert len([operation for operation, count in seen.items() if count]) > 5, seen

@@ -19,11 +19,14 @@ def _file(database: Database) -> Path:
 
 
 async def _failing(database: Database, *, pages: int | None = None) -> DBAPIError:
-    with pytest.raises(DBAPIError) as caught:
+    async def write() -> None:
         async with database.writing() as session:
             if pages is not None:
                 await session.execute(text(f"PRAGMA max_page_count={pages}"))
             session.add(mission(reason="x" * 100_000))
+
+    with pytest.raises(DBAPIError) as caught:
+        await write()
     return caught.value
 
 
