@@ -20,7 +20,7 @@ from typing import Any
 
 from imc_report import write_section
 
-from tests.faults import scenes
+from tests.faults import imc_scenes, scenes
 from tests.faults.disks import small_disk
 
 HEAD = """# Faults: what was tried
@@ -42,12 +42,12 @@ async def killed(folder: Path, seed: int) -> dict[str, Any]:
 async def full(folder: Path, _seed: int) -> dict[str, Any]:
     """A disk that is full ten times."""
     with small_disk(folder / "disk") as disk:
-        return await scenes.disk_full(folder, disk, steps=100, fills=10)
+        return await scenes.disk_full(folder, disk, steps=250, fills=10)
 
 
 async def locked(folder: Path, _seed: int) -> dict[str, Any]:
     """A lock that is held longer than a writer waits by default."""
-    return await scenes.locked(folder, steps=40, locks=2, busy_ms=30_000)
+    return await scenes.locked(folder, steps=120, locks=2, busy_ms=30_000)
 
 
 async def aborted(folder: Path, _seed: int) -> dict[str, Any]:
@@ -56,11 +56,53 @@ async def aborted(folder: Path, _seed: int) -> dict[str, Any]:
         return await scenes.aborted_without_a_disk(folder, disk)
 
 
+async def clock(folder: Path, _seed: int) -> dict[str, Any]:
+    """A clock that is set by seconds and by years."""
+    return await scenes.clock_jumps(folder, [5.0, -5.0, 3600.0, -86_400.0, 1e9, -1e9, 0.0])
+
+
+async def lies(folder: Path, _seed: int) -> dict[str, Any]:
+    """A polling vehicle that lies."""
+    return await scenes.lied_to(folder, steps=60)
+
+
+async def radio(folder: Path, _seed: int) -> dict[str, Any]:
+    """A bad radio, in the vehicles' own time: 2 s are 2 s."""
+    return await imc_scenes.bad_radio(folder, steps=10, speed=1.0)
+
+
+async def imc_lies(folder: Path, _seed: int) -> dict[str, Any]:
+    """An IMC vehicle that lies."""
+    return await imc_scenes.lied_to_over_imc(folder, steps=40, speed=10.0)
+
+
+async def vanished(folder: Path, _seed: int) -> dict[str, Any]:
+    """A vehicle that is gone for a while."""
+    return await imc_scenes.vanished(folder, steps=40, speed=10.0)
+
+
+async def two(folder: Path, _seed: int) -> dict[str, Any]:
+    """Two services on one network."""
+    return await imc_scenes.two_services(folder, steps=20, speed=10.0)
+
+
+async def cut(folder: Path, _seed: int) -> dict[str, Any]:
+    """A network that is cut three times."""
+    return await imc_scenes.cut_in_two(folder, steps=20, cuts=3, speed=10.0)
+
+
 SCENES: dict[str, tuple[str, Scene]] = {
     "kill": ("Killed 50 times in 500 steps", killed),
     "full": ("The disk is full, ten times", full),
     "locked": ("Another program holds the database locked", locked),
     "abort": ("Aborted while nothing can be written", aborted),
+    "clock": ("The clock jumps", clock),
+    "lies": ("A polling vehicle posts what cannot be", lies),
+    "radio": ("UDP with 30 % loss, doubled and reordered packets and 2 s of delay", radio),
+    "imc-lies": ("An IMC vehicle reports what cannot be", imc_lies),
+    "vanish": ("A vehicle vanishes and returns", vanished),
+    "two": ("Two services on one network", two),
+    "cut": ("The network is cut in two, three times", cut),
 }
 
 

@@ -332,6 +332,8 @@ async def fuzz(packets: int, seed: int, captures: Path | None = None, keep: Path
         if corpus is not None:
             corpus.offer(packet, address, announce=announce)
         if number % 200 == 0:
+            target.bridge.pass_time()
+        if number % 1000 == 0:
             await target.live(number // 5000)
         if (number + 1) % max(packets // MARKS, 1) == 0:
             marks_mb.append(round(memory_mb(), 1))

@@ -22,6 +22,9 @@ Vertical = Literal["down", "up"]
 MAX_CELLS = 25_000_000
 """Above this a file is refused: it would not fit into a small machine's memory once worked with."""
 
+MAX_TEXT_BYTES = 256 * 2**20
+MIN_EXTENT_M, MAX_EXTENT_M = 0.01, 1e7
+
 _FORMATS = ".npz, .asc, .tif, .tiff, .xyz, .csv (the text formats also with .gz)"
 
 _EAST_NAMES = frozenset({"east_m", "east", "easting", "x", "x_m"})
@@ -68,6 +71,8 @@ def load_terrain(path: str | Path, *, vertical: Vertical = "down", cell_m: float
             raise TerrainError(f"{file}: the ending {kind or name!r} is not a terrain format; use {_FORMATS}")
     except (OSError, EOFError, zlib.error) as error:
         raise TerrainError(f"{file}: cannot be read: {error}") from error
+    except MemoryError as error:
+        raise TerrainError(f"{file}: reading it takes more memory than there is; crop or coarsen it") from error
     if vertical == "up":
         return Terrain(-terrain.z_m, terrain.cell_m, terrain.origin_lat_deg, terrain.origin_lon_deg, terrain.name)
     return terrain
@@ -132,10 +137,13 @@ def _read_npz(file: Path) -> Terrain:
                     f"{file}: field {missing[0]!r} is missing (found: {', '.join(archive.files)})"
                     "; a terrain needs z (2-D depths) and cell_m (metres)"
                 )
-            fields = {key: archive[key] for key in ("z", "cell_m", "origin_lat", "origin_lon") if key in archive.files}
+            present = [key for key in ("z", "cell_m", "origin_lat", "origin_lon") if key in archive.files]
+            for key in present:
+                _check_claim(file, archive, key)
+            fields = {key: archive[key] for key in present}
     except TerrainError:
         raise
-    except (ValueError, zipfile.BadZipFile, KeyError) as error:
+    except (ValueError, zipfile.BadZipFile, KeyError, RuntimeError, TypeError) as error:  # also NotImplementedError
         raise TerrainError(
             f"{file}: not a readable .npz archive of plain arrays ({error}); write it with numpy.savez_compressed"
         ) from error
@@ -154,6 +162,18 @@ def _read_npz(file: Path) -> Terrain:
     )
 
 
+def _check_claim(file: Path, archive: Any, key: str) -> None:
+    """Refuse an array that claims more cells than are read, before room is made for them."""
+    with archive.zip.open(f"{key}.npy") as member:
+        version = np.lib.format.read_magic(member)
+        read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+        shape, _, _ = read(member)
+    if math.prod(shape) > MAX_CELLS:
+        raise TerrainError(
+            f"{file}: {key} has {math.prod(shape)} cells; at most {MAX_CELLS} are read, crop or coarsen it"
+        )
+
+
 def _scalar(file: Path, key: str, value: NDArray[Any]) -> float:
     if value.size != 1 or value.dtype.kind not in "fiu":
         raise TerrainError(f"{file}: {key} has shape {value.shape} and type {value.dtype}; it must be one number")
@@ -168,9 +188,11 @@ def _read_text(file: Path) -> str:
     if file.name.lower().endswith(".gz"):
         try:
             with gzip.open(io.BytesIO(raw)) as stream:
-                raw = stream.read(1 << 30)
+                raw = stream.read(MAX_TEXT_BYTES + 1)
         except gzip.BadGzipFile as error:
             raise TerrainError(f"{file}: ends in .gz but is not gzip ({error})") from error
+    if len(raw) > MAX_TEXT_BYTES:
+        raise TerrainError(f"{file}: more than {MAX_TEXT_BYTES >> 20} MiB of text; crop or thin it, or make it a .npz")
     try:
         return raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -202,7 +224,7 @@ def _read_esri_ascii(file: Path) -> Terrain:
             )
     cols, rows = header["ncols"], header["nrows"]
     for key, value in (("ncols", cols), ("nrows", rows)):
-        if value != int(value) or value < 2:
+        if not value.is_integer() or value < 2:
             raise TerrainError(f"{file}: {key} is {value:g}; it must be a whole number of at least 2")
     if rows * cols > MAX_CELLS:
         raise TerrainError(f"{file}: {rows:g} x {cols:g} cells; at most {MAX_CELLS} are read")
@@ -226,7 +248,8 @@ def _read_geotiff(file: Path) -> Terrain:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", NotGeoreferencedWarning)
-            with rasterio.open(file) as source:
+            # No other format by this name: some name further files, or places on the internet, to be read.
+            with rasterio.open(file, driver="GTiff") as source:
                 if source.width * source.height > MAX_CELLS:
                     raise TerrainError(f"{file}: {source.height} x {source.width} cells; at most {MAX_CELLS} are read")
                 z = source.read(1, masked=True).astype(np.float64).filled(np.nan)
@@ -327,7 +350,14 @@ def _read_soundings(file: Path, cell_m: float | None) -> Terrain:
         # Meridians converge: the corner of the bounding box need not be the least easting.
         east, north = np.maximum(east, 0.0), np.maximum(north, 0.0)
     else:
-        east, north = table[:, 0] - table[:, 0].min(), table[:, 1] - table[:, 1].min()
+        with np.errstate(over="ignore"):
+            east, north = table[:, 0] - table[:, 0].min(), table[:, 1] - table[:, 1].min()
+    extent_m = max(float(east.max()), float(north.max()))
+    if not MIN_EXTENT_M <= extent_m <= MAX_EXTENT_M:
+        raise TerrainError(
+            f"{file}: its soundings lie within {extent_m:g} m; {MIN_EXTENT_M:g} to {MAX_EXTENT_M:g} m can be gridded, "
+            "see that positions are metres, or named lat and lon"
+        )
     cell = default_cell_m(east, north) if cell_m is None else cell_m
     try:
         z = grid_soundings(east, north, table[:, 2], cell)

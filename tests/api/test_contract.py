@@ -1,6 +1,10 @@
 """Whatever the OpenAPI document allows, and much that it does not, is answered as it says."""
 
 import asyncio
+import contextlib
+import json
+import os
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -9,9 +13,15 @@ import httpx
 import pytest
 import schemathesis
 from hypothesis import HealthCheck, Phase, given, settings
+from hypothesis.errors import Flaky
 from schemathesis import Case
-from schemathesis.checks import CheckFunction, load_all_checks
-from schemathesis.specs.openapi.checks import positive_data_acceptance, response_schema_conformance
+from schemathesis.checks import CheckFunction, load_all_checks, not_a_server_error
+from schemathesis.core.failures import Failure, FailureGroup
+from schemathesis.specs.openapi.checks import (
+    positive_data_acceptance,
+    response_headers_conformance,
+    response_schema_conformance,
+)
 
 from app.api.tokens import Role, TokenStore
 from app.missions.settings import ImcSettings
@@ -40,6 +50,10 @@ BEYOND_THE_SCHEMA = {
 }
 
 
+EXAMPLES = int(os.environ.get("BATHYFLEET_EXAMPLES", "20"))
+"""Requests for each operation; more of them than in every run are asked for with the variable."""
+
+
 @dataclass
 class Service:
     """A service that asks for tokens, with a mission that has a map."""
@@ -47,6 +61,7 @@ class Service:
     operations: dict[str, Any]
     headers: dict[str, str]
     mission_id: str
+    document: Any
 
 
 async def _admin_token(url: str) -> str:
@@ -75,7 +90,7 @@ def service(databases: Databases) -> Iterator[Service]:
         document = schemathesis.openapi.from_url(f"{server.url}/api/openapi.json")
         found = [result.ok() for result in document.get_all_operations()]
         operations = {operation.definition.raw["operationId"]: operation for operation in found}
-        yield Service(operations, headers, mission["id"])
+        yield Service(operations, headers, mission["id"], document)
 
 
 @pytest.mark.parametrize("operation_id", sorted(CONTRACT.values()))
@@ -87,7 +102,7 @@ def test_the_service_keeps_its_contract(service: Service, operation_id: str) -> 
 
     @given(case=service.operations[operation_id].as_strategy())
     @settings(
-        max_examples=20,
+        max_examples=EXAMPLES,
         deadline=None,
         derandomize=True,
         database=None,
@@ -97,10 +112,57 @@ def test_the_service_keeps_its_contract(service: Service, operation_id: str) -> 
     def check(case: Case) -> None:
         if "mission_id" in case.path_parameters and len(case.path_parameters["mission_id"]) % 2:
             case.path_parameters["mission_id"] = service.mission_id
-        if operation_id == "getEvents":
-            case.headers["Accept"] = "application/json"  # the stream would not end
-        if isinstance(case.query.get("timeout_s"), float | int):
-            case.query["timeout_s"] = 0
-        case.call_and_validate(headers=service.headers, excluded_checks=excluded)
+        _without_waiting(case)
+        # No database stores a NUL, which the schema of a text cannot say once and for all.
+        unstorable = [positive_data_acceptance] if "\\u0000" in json.dumps(case.body, default=str) else []
+        case.call_and_validate(headers=service.headers, excluded_checks=[*excluded, *unstorable])
 
     check()
+
+
+def _without_waiting(case: Case) -> None:
+    if case.operation.definition.raw["operationId"] == "getEvents":
+        case.headers["Accept"] = "application/json"  # the stream would not end
+    if isinstance(case.query.get("timeout_s"), float | int):
+        case.query["timeout_s"] = 0
+
+
+def test_missions_are_dealt_with_in_any_order(service: Service) -> None:
+    """Walks from answer to request: what one returned is asked about, changed, started, ended and taken back."""
+    machine = service.document.as_state_machine()
+    seen: Counter[str] = Counter()
+    faults: list[Exception] = []
+
+    class Walk(machine):  # type: ignore[misc, valid-type]
+        def before_call(self, case: Case) -> None:
+            if case.operation.definition.raw["operationId"] == "createMission":
+                case.body = mission_spec()
+            _without_waiting(case)
+
+        def get_call_kwargs(self, case: Case) -> dict[str, Any]:
+            return {"headers": service.headers}
+
+        def validate_response(self, response: Any, case: Case, **_: Any) -> None:
+            operation_id = case.operation.definition.raw["operationId"]
+            seen[operation_id] += response.status_code < httpx.codes.BAD_REQUEST
+            try:
+                case.validate_response(response, checks=[not_a_server_error, response_headers_conformance])
+            except (Failure, FailureGroup) as fault:
+                faults.append(fault)
+
+    # The service remembers earlier walks, which hypothesis takes for inconsistent data and stops at, sooner or later.
+    with contextlib.suppress(Flaky):
+        Walk.run(
+            settings=settings(
+                max_examples=EXAMPLES,
+                stateful_step_count=12,
+                deadline=None,
+                derandomize=True,
+                database=None,
+                phases=[Phase.generate],
+                suppress_health_check=list(HealthCheck),
+            )
+        )
+    assert not faults
+    assert seen["createMission"] > 0
+    assert len([operation for operation, count in seen.items() if count]) > 5, seen

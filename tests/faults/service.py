@@ -13,7 +13,7 @@ import httpx
 
 from tests.ports import free_ports
 
-PATIENCE_S = 120.0
+PATIENCE_S = 300.0
 LAUNCHER = Path(__file__).with_name("launch.py")
 
 

@@ -42,15 +42,26 @@ def read_file(path: Path) -> Points | Raster:
 def _text(path: Path, *, packed: bool) -> str:
     content = path.read_bytes()
     if packed:
-        unpacker = zlib.decompressobj(wbits=31)
-        try:
-            content = unpacker.decompress(content, MAX_TEXT_BYTES)
-        except zlib.error as error:
-            raise ReadError("file", f"it cannot be unpacked: {error}", "send it without .gz") from None
-        if unpacker.unconsumed_tail or not unpacker.eof:
-            raise ReadError("file", "it is cut off, or larger than 512 MiB unpacked", "send it whole, or in parts")
+        content = _unpacked(content)
     try:
         return content.decode()
     except UnicodeDecodeError as error:
         line = content[: error.start].count(b"\n") + 1
         raise ReadError(f"line {line}", "it is not text in UTF-8", "send numbers as plain text") from None
+
+
+def _unpacked(packed: bytes) -> bytes:
+    """Return what is in a gzip file, also one of several parts."""
+    parts: list[bytes] = []
+    room = MAX_TEXT_BYTES
+    while packed:
+        unpacker = zlib.decompressobj(wbits=31)
+        try:
+            parts.append(unpacker.decompress(packed, room + 1))
+        except zlib.error as error:
+            raise ReadError("file", f"it cannot be unpacked: {error}", "send it without .gz") from None
+        room -= len(parts[-1])
+        if room < 0 or not unpacker.eof:
+            raise ReadError("file", "it is cut off, or larger than 512 MiB unpacked", "send it whole, or in parts")
+        packed = unpacker.unused_data.lstrip(b"\0")  # some programs pad
+    return b"".join(parts)
