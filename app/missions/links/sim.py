@@ -31,6 +31,7 @@ from app.missions.settings import SimulationSettings
 from app.missions.spec import Sensor
 from app.missions.target_spec import TargetSpec
 from simulator.obstacles import ObstacleWorld
+from simulator.raycasting import warm_up
 from simulator.scanning import Scan, Scanning
 from simulator.seafloors import generate
 from simulator.sensors import SensorKind, SonarNoise
@@ -171,6 +172,7 @@ class SimFleetLink:
     async def start(self, sink: EventSink) -> None:
         """Let time pass from now on."""
         self._sink = sink
+        await asyncio.to_thread(warm_up)
         self._task = asyncio.create_task(self._live())
 
     async def close(self) -> None:
