@@ -85,6 +85,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
             finally:
                 app.state.edge.stopping.set()
                 await service.shutdown()
+                tokens.close()
         finally:
             await database.close()
 

@@ -3,21 +3,26 @@
 from collections.abc import Sequence
 from datetime import datetime
 
-from sqlalchemy import func, select, update
+from sqlalchemy import bindparam, or_, select, update
 from sqlalchemy.ext.asyncio import AsyncSession
 
 from app.storage.models import TokenRow
 
+ANY = select(select(TokenRow.id).where(TokenRow.revoked_at.is_(None)).exists())
+"""Whether there is a token that was not revoked."""
 
-async def by_hash(session: AsyncSession, token_hash: str) -> TokenRow | None:
-    """Return the token with this hash, revoked or not."""
-    return (await session.scalars(select(TokenRow).where(TokenRow.token_hash == token_hash))).first()
+
+VALID = select(TokenRow.name, TokenRow.role, TokenRow.vehicle).where(
+    TokenRow.token_hash == bindparam("hash"),
+    TokenRow.revoked_at.is_(None),
+    or_(TokenRow.expires_at.is_(None), TokenRow.expires_at > bindparam("now")),
+)
+"""Name, role and vehicle of the token with a ``hash``, unless it was revoked or has run out ``now``."""
 
 
 async def any_token(session: AsyncSession) -> bool:
     """Tell whether a token that was not revoked exists; then requests must carry one."""
-    query = select(func.count()).select_from(TokenRow).where(TokenRow.revoked_at.is_(None))
-    return bool(await session.scalar(query))
+    return bool(await session.scalar(ANY))
 
 
 async def all_tokens(session: AsyncSession) -> Sequence[TokenRow]:

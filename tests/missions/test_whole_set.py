@@ -166,4 +166,6 @@ async def test_a_stored_map_that_is_damaged_is_made_anew(harbour: Harbour, datab
         row = await session.get_one(StoredMapRow, mission)
         row.content = row.content[:-100]
     await harbour.open()
-    assert (await harbour.service.map(mission)).built.digest == before.built.digest
+    after = await harbour.service.map(mission)
+    assert after.built.soundings == before.built.soundings
+    np.testing.assert_allclose(after.built.map.depth_m, before.built.map.depth_m, atol=0.1)

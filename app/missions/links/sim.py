@@ -292,7 +292,7 @@ class SimFleetLink:
             now_s = loop.time()
             # What this machine cannot simulate in time is left out: vehicles live slower then, and hold nobody up.
             late_s = now_s - then_s - MOST_AT_ONCE_S
-            if late_s > 0 and not self._told_of_pace:
+            if late_s > 0 and self._swimmers and not self._told_of_pace:
                 self._told_of_pace = True
                 log.warning("simulated vehicles live slower than asked for", late_s=round(late_s, 2))
             left_s = min(now_s - then_s, MOST_AT_ONCE_S) * self._time_scale
