@@ -38,6 +38,7 @@ from app.api.schemas import API
 from app.api.state import EdgeState
 from app.api.tokens import TokenStore
 from app.dashboard.serve import mount_dashboard
+from app.memory import keep_memory_together
 from app.missions.service import MissionService
 from app.settings import Settings, StartupError, is_loopback, load_settings
 from app.storage.database import Database
@@ -217,6 +218,7 @@ async def serve(settings: Settings, *, started: Callable[[Server], None] | None 
     StartupError, DatabaseNotReadyError
         When the service cannot start as it is set up.
     """
+    keep_memory_together()
     listening = listen(settings)
     try:
         app = create_app(settings)

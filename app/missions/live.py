@@ -68,6 +68,7 @@ from app.storage import scans as scan_queries
 from app.storage import soundings as sounding_queries
 from app.storage import stored_maps
 from app.storage.database import Database
+from app.storage.grouping import Grouped
 from app.storage.models import MissionRow, PositionRow, TideTableRow, WaypointRow
 from app.storage.sharing import Shared
 
@@ -142,6 +143,10 @@ class LiveMission:
         """All its soundings, and its map as it is stored."""
         self.ranges = RangeJournal(database, row.id, Tracking(spec, self.frame), self.journal, time_scale)
         """Ranges to moving targets, and what they tell."""
+        self.intake: Grouped[Any, Any] | None = None
+        """Batches of measurements that wait to be stored together."""
+        self.keys_looked_at_s = -math.inf
+        """When old idempotency keys were last forgotten, by the loop's clock."""
         self.correcting = asyncio.Lock()
         """Held while corrections change, one after the other."""
         self.halted = False
