@@ -56,6 +56,7 @@ REPORT_PERIOD_S = 0.5
 """Time between position reports on the vehicle's clock, as often as DUNE sends EstimatedState."""
 
 LAUNCH_MARGIN_M = 2.0
+KEPT_TERRAINS = 32
 AGROUND = "ran into an obstacle and lies there"
 SENSORS = {
     Sensor.SINGLE_BEAM: SensorKind.SINGLE,
@@ -165,6 +166,7 @@ class SimFleetLink:
         self._settings = settings
         self._time_scale = time_scale
         self._told_of_pace = False
+        self._terrains: dict[tuple[float, float, float, float], Terrain] = {}
         self._swimmers: dict[str, _Swimmer] = {}
         self._sink: EventSink = lambda _event: None
         self._task: asyncio.Task[None] | None = None
@@ -223,18 +225,13 @@ class SimFleetLink:
         self._swimmers[launch.vehicle] = swimmer
 
     def _terrain(self, launch: Launch) -> Terrain:
-        settings = self._settings
-        if settings.terrain is not None:
-            terrain = load_terrain(settings.terrain)
-            return terrain if terrain.origin_lat_deg is not None else terrain.placed_at(*launch.south_west)
-        # Whole cells that cover the area to its border and a little more.
-        return generate(
-            settings.family,
-            settings.seed,
-            width_m=math.ceil(launch.width_m + 1e-3),
-            height_m=math.ceil(launch.height_m + 1e-3),
-            origin=launch.south_west,
-        )
+        """Return the sea floor of a mission's area; its vehicles share one, which takes a while to lay."""
+        key = (*launch.south_west, launch.width_m, launch.height_m)
+        if key not in self._terrains:
+            while len(self._terrains) >= KEPT_TERRAINS:
+                del self._terrains[next(iter(self._terrains))]
+            self._terrains[key] = _lay(self._settings, launch)
+        return self._terrains[key]
 
     def _start(self, launch: Launch, terrain: Terrain) -> tuple[float, float]:
         if launch.start is not None:
@@ -336,6 +333,20 @@ class SimFleetLink:
         if too_low and not swimmer.raised and not swimmer.body.arrived:
             swimmer.raised = True
             swimmer.head_for(order, max(0.0, swimmer.body.bottom_m - order.min_altitude_m))
+
+
+def _lay(settings: SimulationSettings, launch: Launch) -> Terrain:
+    if settings.terrain is not None:
+        terrain = load_terrain(settings.terrain)
+        return terrain if terrain.origin_lat_deg is not None else terrain.placed_at(*launch.south_west)
+    # Whole cells that cover the area to its border and a little more.
+    return generate(
+        settings.family,
+        settings.seed,
+        width_m=math.ceil(launch.width_m + 1e-3),
+        height_m=math.ceil(launch.height_m + 1e-3),
+        origin=launch.south_west,
+    )
 
 
 def _simulated(target: TargetSpec, terrain: Terrain) -> SimulatedTarget:
