@@ -46,6 +46,7 @@ from app.api.schemas import API
 from app.api.state import EdgeState
 from app.api.tokens import Role, TokenStore
 from app.dashboard.serve import mount_dashboard
+from app.memory import keep_memory_together
 from app.missions.service import MissionService
 from app.settings import Settings, StartupError, is_loopback, load_settings
 from app.storage.audit import Command
@@ -111,6 +112,7 @@ def create_app(settings: Settings | None = None, *, port: int | None = None) -> 
                 app.state.edge.stopping.set()
                 await service.shutdown()
                 await app.state.edge.peers.close()
+                tokens.close()
         finally:
             await database.close()
 
@@ -307,6 +309,7 @@ async def serve(
         When the service cannot start as it is set up.
     """
     check_certificate(settings)
+    keep_memory_together()
     listening = listen(settings)
     try:
         app = create_app(settings, port=listening.getsockname()[1])

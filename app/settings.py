@@ -23,7 +23,10 @@ CONFIG_VARIABLE = "BATHYFLEET_CONFIG"
 DEFAULT_CONFIG = Path("bathyfleet.toml")
 
 # Carry the prefix without being settings: the file's place, where the tests find real sea floors, the build's switch.
-_OTHER_VARIABLES = {CONFIG_VARIABLE, "BATHYFLEET_TOKEN", "BATHYFLEET_TERRAINS", "BATHYFLEET_CAPTURES", "BATHYFLEET_SKIP_DASHBOARD"}
+_OTHER_VARIABLES = {
+    CONFIG_VARIABLE,
+    *(PREFIX + name for name in ("TOKEN", "TERRAINS", "CAPTURES", "SKIP_DASHBOARD")),
+}
 
 _DRIVERS = {"sqlite": "sqlite+aiosqlite", "postgresql": "postgresql+asyncpg", "postgres": "postgresql+asyncpg"}
 

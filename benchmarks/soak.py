@@ -44,9 +44,9 @@ def create_soak(service: Service, vehicles: int) -> str:
     return service.create(
         name="A day",
         area={"type": "Polygon", "coordinates": [ring]},
-        vehicles=[{"name": f"sim-{v}", "kind": "sim", "sensor": "dvl"} for v in range(vehicles)],
+        vehicles=[{"name": f"sim-{v}", "kind": "sim", "sensor": "single_beam"} for v in range(vehicles)],
         cell_m=2.0,
-        steps=8000,
+        steps=4500,
         planner={"name": "cao"},
         limits={"max_step_m": 30, "max_depth_m": 8, "min_vertical_separation_m": 1, "min_separation_m": 0},
     )
@@ -189,7 +189,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--hours", type=float, default=24.0, help="of the mission's time")
     parser.add_argument("--pace", type=float, default=60.0, help="how much faster than the wall clock vehicles live")
-    parser.add_argument("--vehicles", type=int, default=3)
+    parser.add_argument("--vehicles", type=int, default=2)
     parser.add_argument("--write", action="store_true", help=f"write a section of docs/results/{LOAD.name}")
     options = parser.parse_args()
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # so that the service is ended, too

@@ -9,6 +9,7 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
+from simulator.raycasting import march
 from simulator.terrain import Terrain
 from simulator.vehicle import Motion
 
@@ -120,40 +121,14 @@ def cast_rays(
     -------
     Ranges in metres, shape (n,), NaN where nothing is hit within the range or the floor is unknown.
     """
-    ranges = np.full(len(directions), np.nan)
     down = directions[:, 2]
     with np.errstate(divide="ignore"):
         # A ray that goes down cannot pass the deepest point of the floor.
         reach = np.where(down > 0.0, (terrain.max_depth_m - depth_m) / np.maximum(down, 1e-9), np.inf)
     limit = min(max_range_m, float(np.max(np.minimum(reach, max_range_m))) + terrain.cell_m)
     if limit <= 0.0:
-        return ranges
-    step = 0.5 * terrain.cell_m
-    at = np.arange(0.0, limit + step, step)
-    de, dn, dd = (directions[:, k, None] for k in range(3))
-    gap = terrain.depth_at(east_m + at * de, north_m + at * dn) - (depth_m + at * dd)
-    below = gap <= 0.0
-    hit = below.any(axis=1)
-    if not hit.any():
-        return ranges
-    first = np.argmax(below, axis=1)
-    # The sample before must be known and above the floor, or the ray came up from an unknown place.
-    valid = hit & (first > 0) & np.isfinite(gap[np.arange(len(gap)), np.maximum(first - 1, 0)])
-    index = np.flatnonzero(valid)
-    if index.size == 0:
-        return ranges
-    far = at[first[index]]
-    near = at[first[index] - 1]
-    d = directions[index]
-    for _ in range(max(1, math.ceil(math.log2(step / 1e-3)))):
-        middle = 0.5 * (near + far)
-        floor = terrain.depth_at(east_m + middle * d[:, 0], north_m + middle * d[:, 1])
-        deeper = floor <= depth_m + middle * d[:, 2]
-        far = np.where(deeper, middle, far)
-        near = np.where(deeper, near, middle)
-    found = 0.5 * (near + far)
-    ranges[index] = np.where(found <= max_range_m, found, np.nan)
-    return ranges
+        return np.full(len(directions), np.nan)
+    return march(terrain.z_m, terrain.cell_m, east_m, north_m, depth_m, directions, limit, max_range_m)
 
 
 class Sonar:

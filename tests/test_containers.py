@@ -14,10 +14,7 @@ import yaml
 
 from app.main import Server
 from app.settings import PREFIX, Settings, _variable_names, load_settings
-from tests.api.conftest import (
-    empty_database,  # noqa: F401
-    shared_server,  # noqa: F401 - a fixture
-)
+from tests.api.conftest import shared_server  # noqa: F401 - a fixture
 
 ROOT = Path(__file__).resolve().parents[1]
 IMAGE = (ROOT / "Dockerfile").read_text().replace("\\\n", " ")

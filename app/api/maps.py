@@ -42,7 +42,7 @@ def _by_extension(resource: str) -> dict[str, str]:
     }
 
 
-def _file_options(
+async def _file_options(
     order: _Order = Order.ORDER_1A,
     interval_m: Annotated[
         float | None, Query(gt=0, le=1000, allow_inf_nan=False, description="Between contours; default: about ten")

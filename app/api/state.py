@@ -69,9 +69,14 @@ def edge_state(connection: HTTPConnection) -> EdgeState:
     return state
 
 
-def _service(connection: HTTPConnection) -> MissionService:
+# As coroutines: what is no coroutine is called in a thread, with every request.
+async def _state(connection: HTTPConnection) -> EdgeState:
+    return edge_state(connection)
+
+
+async def _service(connection: HTTPConnection) -> MissionService:
     return edge_state(connection).service
 
 
-State = Annotated[EdgeState, Depends(edge_state)]
+State = Annotated[EdgeState, Depends(_state)]
 Service = Annotated[MissionService, Depends(_service)]

@@ -9,6 +9,7 @@ from enum import StrEnum
 from pathlib import Path
 
 from app.storage import tokens
+from app.storage.at_once import AtOnce
 from app.storage.database import Database
 from app.storage.models import TokenRow
 from app.storage.sharing import Shared
@@ -51,6 +52,7 @@ class TokenStore:
         self._database = database
         # Asked with every request: pages that ask for a new map at the same moment are answered by one query.
         self._any = Shared(self._any_stored)
+        self._at_once = AtOnce(database)
 
     async def create(
         self, name: str, role: Role, *, vehicle: str | None = None, expires_at: datetime | None = None
@@ -84,7 +86,8 @@ class TokenStore:
 
     async def any(self) -> bool:
         """Tell whether a token exists that was not revoked; then every request must carry one."""
-        return await self._any()
+        found = self._at_once.rows(tokens.ANY)
+        return bool(found[0][0]) if found is not None else await self._any()
 
     async def _any_stored(self) -> bool:
         async with self._database.reading() as session:
@@ -97,13 +100,19 @@ class TokenStore:
 
     async def principal(self, token: str) -> Principal | None:
         """Return who holds ``token``; None when it is unknown, revoked or has run out."""
-        async with self._database.reading() as session:
-            row = await tokens.by_hash(session, token_hash(token))
-        if row is None or row.revoked_at is not None:
+        values = {"hash": token_hash(token), "now": datetime.now(UTC)}
+        found = self._at_once.rows(tokens.VALID, values)
+        if found is None:
+            async with self._database.reading() as session:
+                found = [tuple(row) for row in await session.execute(tokens.VALID, values)]
+        if not found:
             return None
-        if row.expires_at is not None and _aware(row.expires_at) <= datetime.now(UTC):
-            return None
-        return Principal(row.name, Role(row.role), row.vehicle)
+        name, role, vehicle = found[0]
+        return Principal(name, Role(role), vehicle)
+
+    def close(self) -> None:
+        """Let go of the database."""
+        self._at_once.close()
 
 
 def _made(
@@ -121,7 +130,3 @@ def _made(
         revoked_at=None,
     )
     return token, row
-
-
-def _aware(moment: datetime) -> datetime:
-    return moment if moment.tzinfo else moment.replace(tzinfo=UTC)

@@ -55,6 +55,10 @@ class FleetHub:
             for info in link.vehicles()
         ]
 
+    def infos(self) -> dict[VehicleKey, VehicleInfo]:
+        """Return what is known of every vehicle that was heard."""
+        return {(kind, info.name): info for kind, link in self._links.items() for info in link.vehicles()}
+
     def info(self, key: VehicleKey) -> VehicleInfo:
         """Return what is known of a vehicle; state ``unknown`` when it was never heard."""
         kind, name = key

@@ -27,6 +27,7 @@ from app.missions.fleet import (
     RangeReport,
     ScanReport,
     SoundingReport,
+    VehicleInfo,
     VehicleReport,
     WaypointReport,
 )
@@ -67,6 +68,7 @@ from app.storage import scans as scan_queries
 from app.storage import soundings as sounding_queries
 from app.storage import stored_maps
 from app.storage.database import Database
+from app.storage.grouping import Grouped
 from app.storage.models import MissionRow, PositionRow, TideTableRow, WaypointRow
 from app.storage.sharing import Shared
 
@@ -142,6 +144,10 @@ class LiveMission:
         """All its soundings, and its map as it is stored."""
         self.ranges = RangeJournal(database, row.id, Tracking(spec, self.frame), self.journal, time_scale)
         """Ranges to moving targets, and what they tell."""
+        self.intake: Grouped[Any, Any] | None = None
+        """Batches of measurements that wait to be stored together."""
+        self.keys_looked_at_s = -math.inf
+        """When old idempotency keys were last forgotten, by the loop's clock."""
         self.correcting = asyncio.Lock()
         """Held while corrections change, one after the other."""
         self.halted = False
@@ -154,6 +160,7 @@ class LiveMission:
         self._time_scale = time_scale
         self._executor = executor
         self._waypoints: dict[str, WaypointView] = {}
+        self._places: dict[str, tuple[Position, tuple[float, float] | None]] = {}
         self._ticker: asyncio.Task[None] | None = None
         self._map_news: MapMessage | None = None
         self._map_told_s = -math.inf
@@ -402,7 +409,7 @@ class LiveMission:
             "remaining_pct": self.builder.remaining_pct(),
             "distance_m": self.journal.travelled_m,
         }
-        return found | ({} if built is None else {"mean_sd_m": float(np.nanmean(built.map.sd_m))})
+        return found | ({} if built is None else {"mean_sd_m": built.mean_sd_m})
 
     def progress(self) -> Progress:
         """Return how far the mission has come."""
@@ -418,7 +425,7 @@ class LiveMission:
             distance_m=self.journal.travelled_m,
             coverage_pct=self.builder.coverage_pct(),
             remaining_pct=self.builder.remaining_pct(),
-            mean_sd_m=float(np.nanmean(built.map.sd_m)) if built is not None else None,
+            mean_sd_m=built.mean_sd_m if built is not None else None,
             objective=header.objective,
             terms=header.terms or {},
             elapsed_s=header.elapsed_s + running_s,
@@ -460,15 +467,21 @@ class LiveMission:
 
     def vehicle_views(self) -> list[VehicleView]:
         """Return the vehicles that take part."""
-        return [self._vehicle_view(member) for member in self.team]
+        infos = self._hub.infos()
+        return [self._vehicle_view(member, infos.get(member.key)) for member in self.team]
+
+    def vehicle_view(self, info: VehicleInfo) -> VehicleView | None:
+        """Return a vehicle of this name and kind, if it takes part."""
+        member = self.team.get(info.name)
+        return None if member is None or member.key != (info.kind, info.name) else self._vehicle_view(member, info)
 
     def target_views(self) -> list[TargetView]:
         """Return the moving targets, foretold for now."""
         pursuers = {member.pursuing: member.name for member in self.team if member.pursuing is not None}
         return target_views(self.ranges.tracking, self.frame, self.area, self.ranges.times.now_s(), pursuers)
 
-    def _vehicle_view(self, member: Member) -> VehicleView:
-        info = self._hub.info(member.key)
+    def _vehicle_view(self, member: Member, info: VehicleInfo | None) -> VehicleView:
+        info = info or self._hub.info(member.key)
         report = member.report or info.report
         view = VehicleView(
             name=member.name,
@@ -487,7 +500,11 @@ class LiveMission:
         if report is None:
             return view
         position = report.position
-        place = self.local_place(position)
+        known = self._places.get(member.name)
+        if known is None or known[0] is not position:
+            # It is shown far more often than it moves.
+            known = self._places[member.name] = position, self.local_place(position)
+        place = known[1]
         return view.model_copy(
             update={
                 # No more digits than mean anything: this goes to every viewer several times a second.

@@ -25,13 +25,13 @@ from app.missions.views import Level, LogImportView, Verdict
 from app.storage import missions as mission_queries
 from app.storage import soundings as sounding_queries
 from app.storage.models import BatchRow
+from app.storage.soundings import LOG_KEY
 from imc_bridge import Sounding, StateReport
 from imc_bridge.logs import LogError, VehicleLog
 
 BATCH = 1000
 """Soundings and positions of one transaction. Batches already written are known by their number: never change it."""
 HASH_BLOCK_BYTES = 1 << 20
-KEY = "log-1"
 """Begin of the batches' keys; counts up when the same log gives other batches than before."""
 
 NAME: TypeAdapter[str] = TypeAdapter(Name)
@@ -98,7 +98,7 @@ class LogImport:
                 "give one of letters, digits, '.', '_' and '-', at most 64, with --vehicle",
             ) from None
         self._path = path
-        self._key = f"{KEY}-{self._digest[:32]}-{settings.imc.altimeter}-{self._log.vehicle}"
+        self._key = f"{LOG_KEY}-{self._digest[:32]}-{settings.imc.altimeter}-{self._log.vehicle}"
         # A gate of its own: the log may lie hours before or after what the vehicle sends now.
         self._gate = live.make_gate()
         self._zone = Polygon(live.area).buffer(live.margin_m)

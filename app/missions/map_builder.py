@@ -4,6 +4,7 @@ import copy
 import hashlib
 import threading
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 import shapely
@@ -57,6 +58,11 @@ class BuiltMap:
     digest: str
     thorough: bool = False
 
+    @cached_property
+    def mean_sd_m(self) -> float:
+        """Mean standard deviation over the area."""
+        return float(np.nanmean(self.map.sd_m))
+
 
 def make_grid(area: FloatArray, cell_m: float) -> tuple[Grid, BoolArray]:
     """Return the grid over a polygon (n, 2), and which of its cells (rows, cols) have their centre in it."""
@@ -99,6 +105,7 @@ class MapBuilder:
         # What ``arrivals.replaced`` was when the newest map's soundings were taken in.
         self._replaced_mapped = 0
         self._version = 0
+        self._coverage: tuple[BuiltMap | None, float] = (None, 0.0)
         # Counts how often all soundings were replaced: what is learned meanwhile of the old ones is void.
         self._generation = 0
 
@@ -251,10 +258,13 @@ class MapBuilder:
 
     def coverage_pct(self) -> float:
         """Return the share of the area's cells that are known to the asked accuracy."""
-        if self._newest is None:
+        built = self._newest
+        if built is None:
             return 0.0
-        sd = self._newest.map.sd_m[self.mask]
-        return float(100.0 * np.mean(sd <= self._accuracy_m))
+        # Asked for with every look at the mission.
+        if self._coverage[0] is not built:
+            self._coverage = built, float(100.0 * np.mean(built.map.sd_m[self.mask] <= self._accuracy_m))
+        return self._coverage[1]
 
     def remaining_pct(self) -> float:
         """Return the share of the landmarks that were never known to the asked accuracy, in a belief or now."""

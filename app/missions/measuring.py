@@ -1,10 +1,15 @@
 """Measurements that vehicles post: judged one by one, stored together, each batch once."""
 
+import asyncio
 import hashlib
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from datetime import timedelta
+from functools import partial
 
 import orjson
+from sqlalchemy.ext.asyncio import AsyncSession
 
 from app.mapping.georeference import LocalFrame
 from app.missions.clock import now
@@ -20,10 +25,16 @@ from app.missions.tracking import Arrived
 from app.missions.verdicts import batch_verdict
 from app.missions.views import BatchVerdict, ItemVerdict, Verdict
 from app.storage import soundings as sounding_queries
+from app.storage.grouping import Grouped
 from app.storage.models import BatchRow
+from app.storage.soundings import LOG_KEY
 from imc_bridge.soundings import Beam, StateSample, footprint
 
 MAX_BATCH = 10_000
+
+KEYS_KEPT = timedelta(days=1)
+"""For so long the answer to an idempotency key is given again."""
+LOOK_AT_KEYS_S = 3600.0
 
 
 async def measure(
@@ -49,38 +60,94 @@ async def measure(
     strangers = {i: _stranger(live, item) for i, item in enumerate(items)}
     reports = {i: report for i, item in enumerate(items) if not strangers[i] and (report := _sounding(item))}
     ranges = _ranges(live, items, strangers)
+    batch = _Batch(items, idempotency_key, digest, strangers, reports, ranges)
+    if live.intake is None:
+        live.intake = Grouped(partial(_take, live, hub, rest), lambda batch: bool(batch.ranges))
+    answer: BatchVerdict = await live.intake(batch)
+    return answer
+
+
+@dataclass(frozen=True)
+class _Batch:
+    """A batch that was looked through: by item why it is refused, its sounding, its range to a target."""
+
+    items: Sequence[Measurement]
+    key: str | None
+    digest: str
+    strangers: Mapping[int, str]
+    reports: Mapping[int, SoundingReport]
+    ranges: Mapping[int, Arrived]
+
+    @property
+    def known(self) -> list[Measurement]:
+        return [item for i, item in enumerate(self.items) if not self.strangers[i]]
+
+
+@dataclass
+class _Taken:
+    """What a batch came to, and what is done once that is committed."""
+
+    answer: BatchVerdict | ConflictError
+    then: list[Callable[[], None]]
+
+
+async def _take(
+    live: LiveMission, hub: FleetHub, rest: RestFleetLink, batches: Sequence[_Batch]
+) -> list[BatchVerdict | Exception]:
+    """Store batches in one transaction: many vehicles that post at the same time wait for the disk once."""
     async with live.journal.writing, live.ranges.writing, live.database.writing() as session:
-        if idempotency_key is not None:
-            known = await sounding_queries.answer_to(session, live.id, idempotency_key)
-            if known is not None:
-                if known.digest != digest:
-                    raise ConflictError(
-                        f"idempotency key {idempotency_key!r} was used before with other measurements",
-                        "use a new key for every new batch",
-                    )
-                # The first answer may have got lost together with the process that knew where the vehicle is.
-                _hear(hub, rest, [item for i, item in enumerate(items) if not strangers[i]], only_unknown=True)
-                return BatchVerdict.model_validate(known.answer | {"replayed": True})
-        verdicts, committed = await live.journal.take(list(reports.values()), session)
-        on_ranges, used = await live.ranges.take(list(ranges.values()), session)
-        taken = dict(zip(reports, verdicts, strict=True)) | dict(zip(ranges, on_ranges, strict=True))
-        answer = _batch_verdict(len(items), taken, strangers)
-        if idempotency_key is not None:
-            session.add(
-                BatchRow(
-                    mission_id=live.id,
-                    key=idempotency_key,
-                    digest=digest,
-                    answer=answer.model_dump(mode="json"),
-                    created_at=now(),
-                )
-            )
-    committed()
-    used()
-    _hear(hub, rest, [item for i, item in enumerate(items) if not strangers[i]])
+        taken = [await _take_one(live, hub, rest, batch, session) for batch in batches]
+        await _forget_old_keys(live, session)
+    for one in taken:
+        for work in one.then:
+            work()
     # Where the vehicle is, and whether it arrived, is on disk as well before it is answered.
     await live.journal.flush()
-    return answer
+    return [one.answer for one in taken]
+
+
+async def _forget_old_keys(live: LiveMission, session: AsyncSession) -> None:
+    """Once an hour forget keys that nobody sends again; a sounding is known without them, too."""
+    moment = asyncio.get_running_loop().time()
+    if moment - live.keys_looked_at_s >= LOOK_AT_KEYS_S:
+        live.keys_looked_at_s = moment
+        await sounding_queries.forget_answers(session, live.id, now() - KEYS_KEPT, LOG_KEY)
+
+
+async def _take_one(
+    live: LiveMission, hub: FleetHub, rest: RestFleetLink, batch: _Batch, session: AsyncSession
+) -> _Taken:
+    if batch.key is not None:
+        known = await sounding_queries.answer_to(session, live.id, batch.key)
+        if known is not None and known.digest != batch.digest:
+            error = ConflictError(
+                f"idempotency key {batch.key!r} was used before with other measurements",
+                "use a new key for every new batch",
+            )
+            return _Taken(error, [])
+        if known is not None:
+            # The first answer may have got lost together with the process that knew where the vehicle is.
+            hear = partial(_hear, hub, rest, batch.known, only_unknown=True)
+            return _Taken(BatchVerdict.model_validate(known.answer | {"replayed": True}), [hear])
+    verdicts, committed = await live.journal.take(list(batch.reports.values()), session)
+    then = [committed]
+    taken = dict(zip(batch.reports, verdicts, strict=True))
+    if batch.ranges:
+        on_ranges, used = await live.ranges.take(list(batch.ranges.values()), session)
+        taken |= dict(zip(batch.ranges, on_ranges, strict=True))
+        then.append(used)
+    answer = _batch_verdict(len(batch.items), taken, batch.strangers)
+    if batch.key is not None:
+        session.add(
+            BatchRow(
+                mission_id=live.id,
+                key=batch.key,
+                digest=batch.digest,
+                answer=answer.model_dump(mode="json"),
+                created_at=now(),
+            )
+        )
+    return _Taken(answer, [*then, partial(_hear, hub, rest, batch.known)])
 
 
 def _hear(hub: FleetHub, rest: RestFleetLink, items: Sequence[Measurement], *, only_unknown: bool = False) -> None:

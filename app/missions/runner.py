@@ -7,6 +7,7 @@ after it. So a crash between any two moments loses nothing and repeats nothing b
 
 import asyncio
 import math
+import threading
 from collections.abc import Callable
 from concurrent.futures import Executor, Future
 
@@ -32,6 +33,7 @@ from app.missions.fleet import (
 )
 from app.missions.hub import FleetHub
 from app.missions.live import RISES, LiveMission
+from app.missions.map_builder import MapBuilder
 from app.missions.members import SETTLED, Member
 from app.missions.sampling import keep_telemetry
 from app.missions.search.lookout import Lookout
@@ -64,6 +66,8 @@ REPORT_DELAY_S = 0.1
 """How old a vehicle's last report is at most, on the wall clock."""
 
 FloatArray = NDArray[np.float64]
+
+_LEARNING = threading.Lock()
 
 log = structlog.get_logger(__name__)
 
@@ -114,7 +118,7 @@ class Runner:
                 taken = decision
                 # The map is made and its model refined while the vehicles travel.
                 self._begin_map()
-                self._executor.submit(live.builder.learn).add_done_callback(_log_failure)
+                self._executor.submit(_learn, live.builder).add_done_callback(_log_failure)
                 decision = await self._travel(planner)
                 step_s = asyncio.get_running_loop().time() - started_s
                 self._keep_pace(step_s)
@@ -536,6 +540,15 @@ class Runner:
             return
         live.running_since_s += seconds
         live.header.elapsed_s += seconds
+
+
+def _learn(builder: MapBuilder) -> None:
+    """Learn the map's model, unless another mission does: decisions must not wait until all threads have learned."""
+    if _LEARNING.acquire(blocking=False):
+        try:
+            builder.learn()
+        finally:
+            _LEARNING.release()
 
 
 def _log_failure(done: Future[None]) -> None:

@@ -609,7 +609,7 @@ class MissionService:
             member_view = None
             if mission_id is not None:
                 live = await self._get(mission_id)
-                member_view = next((v for v in live.vehicle_views() if v.name == info.name), None)
+                member_view = live.vehicle_view(info)
             report = info.report
             views.append(
                 member_view
@@ -643,8 +643,9 @@ class MissionService:
 
     def _view(self, live: LiveMission) -> MissionView:
         frame = live.frame
-        return MissionView(
-            **live.summary().model_dump(),
+        # All of it was checked when it was made.
+        return MissionView.model_construct(
+            **dict(live.summary()),
             spec=live.spec,
             origin=(frame.origin_lon_deg, frame.origin_lat_deg),
             vehicles=live.vehicle_views(),

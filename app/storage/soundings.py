@@ -2,15 +2,19 @@
 
 import zlib
 from collections.abc import Sequence
+from datetime import datetime
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from sqlalchemy import Select, func, select, tuple_
+from sqlalchemy import Select, delete, func, select, tuple_
 from sqlalchemy.dialects import postgresql, sqlite
 from sqlalchemy.ext.asyncio import AsyncSession
 
 from app.storage.models import BatchRow, ImportRow, MissionRow, ReferenceRow, SoundingRow
+
+LOG_KEY = "log-1"
+"""What the keys of batches of vehicles' logs begin with."""
 
 Identity = tuple[str, float, int]
 """What makes a sounding the same sounding within a mission: vehicle, vehicle's time, beam."""
@@ -89,6 +93,12 @@ async def answer_to(session: AsyncSession, mission_id: str, key: str) -> BatchRo
     """Return the answer once given to an idempotency key; waits for a transaction that is about to answer."""
     await session.execute(select(MissionRow.id).where(MissionRow.id == mission_id).with_for_update(key_share=True))
     return await session.get(BatchRow, (mission_id, key))
+
+
+async def forget_answers(session: AsyncSession, mission_id: str, before: datetime, spare: str) -> None:
+    """Drop the answers to keys that came before a moment, but for keys that begin with ``spare``."""
+    old = (BatchRow.mission_id == mission_id, BatchRow.created_at < before)
+    await session.execute(delete(BatchRow).where(*old, BatchRow.key.not_like(f"{spare}%")))
 
 
 def pack(values: NDArray[np.float64]) -> bytes:

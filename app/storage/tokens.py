@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from datetime import datetime
 
-from sqlalchemy import func, select, update
+from sqlalchemy import bindparam, or_, select, update
 from sqlalchemy.ext.asyncio import AsyncSession
 
 from app.storage.models import TokenRow
@@ -11,16 +11,21 @@ from app.storage.models import TokenRow
 FIRST_START = "first-start"
 """Id of the token that the service makes by itself. Nobody decided that requests need one from now on."""
 
+ANY = select(select(TokenRow.id).where(TokenRow.revoked_at.is_(None), TokenRow.id != FIRST_START).exists())
+"""Whether there is a token that was made on purpose and not revoked."""
 
-async def by_hash(session: AsyncSession, token_hash: str) -> TokenRow | None:
-    """Return the token with this hash, revoked or not."""
-    return (await session.scalars(select(TokenRow).where(TokenRow.token_hash == token_hash))).first()
+
+VALID = select(TokenRow.name, TokenRow.role, TokenRow.vehicle).where(
+    TokenRow.token_hash == bindparam("hash"),
+    TokenRow.revoked_at.is_(None),
+    or_(TokenRow.expires_at.is_(None), TokenRow.expires_at > bindparam("now")),
+)
+"""Name, role and vehicle of the token with a ``hash``, unless it was revoked or has run out ``now``."""
 
 
 async def any_token(session: AsyncSession) -> bool:
     """Tell whether a token exists that was not revoked, made on purpose; then requests must carry one."""
-    chosen = (TokenRow.revoked_at.is_(None), TokenRow.id != FIRST_START)
-    return bool(await session.scalar(select(func.count()).select_from(TokenRow).where(*chosen)))
+    return bool(await session.scalar(ANY))
 
 
 async def all_tokens(session: AsyncSession) -> Sequence[TokenRow]:

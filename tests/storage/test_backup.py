@@ -7,7 +7,6 @@ import shutil
 import sqlite3
 import subprocess
 import sys
-from collections.abc import Awaitable, Callable
 from contextlib import closing
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -20,6 +19,7 @@ from app.storage.backup import BackupError, back_up, contents_of, restore_to
 from app.storage.database import Database
 from app.storage.models import Base, MissionRow, SoundingRow
 from app.storage.retention import ended_before, give_space_back, remove
+from tests.databases import Databases
 from tests.storage.rows import mission, one_of_each, sounding
 
 WRITER = """
@@ -146,21 +146,20 @@ async def test_what_is_no_backup_of_ours_is_named(sqlite: Database, tmp_path: Pa
 
 
 async def test_postgresql_is_copied_by_its_own_programs(
-    postgres_cluster: str,
+    databases: Databases,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
-    make_postgres: Callable[[str], Awaitable[str]],
 ) -> None:
     if shutil.which("pg_dump") is None:
         pytest.skip("pg_dump is not installed")
-    url = await make_postgres("trial")
+    url = databases.fresh("postgresql")
     database = Database(url)
     await fill(database)
     await database.close()
     before = await counts(url)
     copy, _ = await asyncio.to_thread(back_up, url, tmp_path / "fleet.dump")
     assert contents_of(copy).size_bytes == copy.stat().st_size
-    other = await make_postgres("second")
+    other = databases.fresh("postgresql")
     await asyncio.to_thread(restore_to, other, copy, replace=True)
     assert await counts(other) == before
     half = tmp_path / "half.dump"

@@ -31,6 +31,7 @@ from app.missions.settings import SimulationSettings
 from app.missions.spec import Sensor
 from app.missions.target_spec import TargetSpec
 from simulator.obstacles import ObstacleWorld
+from simulator.raycasting import warm_up
 from simulator.scanning import Scan, Scanning
 from simulator.seafloors import generate
 from simulator.sensors import SensorKind, SonarNoise
@@ -55,6 +56,7 @@ REPORT_PERIOD_S = 0.5
 """Time between position reports on the vehicle's clock, as often as DUNE sends EstimatedState."""
 
 LAUNCH_MARGIN_M = 2.0
+KEPT_TERRAINS = 32
 AGROUND = "ran into an obstacle and lies there"
 SENSORS = {
     Sensor.SINGLE_BEAM: SensorKind.SINGLE,
@@ -164,6 +166,7 @@ class SimFleetLink:
         self._settings = settings
         self._time_scale = time_scale
         self._told_of_pace = False
+        self._terrains: dict[tuple[float, float, float, float], Terrain] = {}
         self._swimmers: dict[str, _Swimmer] = {}
         self._sink: EventSink = lambda _event: None
         self._task: asyncio.Task[None] | None = None
@@ -171,6 +174,7 @@ class SimFleetLink:
     async def start(self, sink: EventSink) -> None:
         """Let time pass from now on."""
         self._sink = sink
+        await asyncio.to_thread(warm_up)
         self._task = asyncio.create_task(self._live())
 
     async def close(self) -> None:
@@ -221,18 +225,13 @@ class SimFleetLink:
         self._swimmers[launch.vehicle] = swimmer
 
     def _terrain(self, launch: Launch) -> Terrain:
-        settings = self._settings
-        if settings.terrain is not None:
-            terrain = load_terrain(settings.terrain)
-            return terrain if terrain.origin_lat_deg is not None else terrain.placed_at(*launch.south_west)
-        # Whole cells that cover the area to its border and a little more.
-        return generate(
-            settings.family,
-            settings.seed,
-            width_m=math.ceil(launch.width_m + 1e-3),
-            height_m=math.ceil(launch.height_m + 1e-3),
-            origin=launch.south_west,
-        )
+        """Return the sea floor of a mission's area; its vehicles share one, which takes a while to lay."""
+        key = (*launch.south_west, launch.width_m, launch.height_m)
+        if key not in self._terrains:
+            while len(self._terrains) >= KEPT_TERRAINS:
+                del self._terrains[next(iter(self._terrains))]
+            self._terrains[key] = _lay(self._settings, launch)
+        return self._terrains[key]
 
     def _start(self, launch: Launch, terrain: Terrain) -> tuple[float, float]:
         if launch.start is not None:
@@ -290,7 +289,7 @@ class SimFleetLink:
             now_s = loop.time()
             # What this machine cannot simulate in time is left out: vehicles live slower then, and hold nobody up.
             late_s = now_s - then_s - MOST_AT_ONCE_S
-            if late_s > 0 and not self._told_of_pace:
+            if late_s > 0 and self._swimmers and not self._told_of_pace:
                 self._told_of_pace = True
                 log.warning("simulated vehicles live slower than asked for", late_s=round(late_s, 2))
             left_s = min(now_s - then_s, MOST_AT_ONCE_S) * self._time_scale
@@ -334,6 +333,20 @@ class SimFleetLink:
         if too_low and not swimmer.raised and not swimmer.body.arrived:
             swimmer.raised = True
             swimmer.head_for(order, max(0.0, swimmer.body.bottom_m - order.min_altitude_m))
+
+
+def _lay(settings: SimulationSettings, launch: Launch) -> Terrain:
+    if settings.terrain is not None:
+        terrain = load_terrain(settings.terrain)
+        return terrain if terrain.origin_lat_deg is not None else terrain.placed_at(*launch.south_west)
+    # Whole cells that cover the area to its border and a little more.
+    return generate(
+        settings.family,
+        settings.seed,
+        width_m=math.ceil(launch.width_m + 1e-3),
+        height_m=math.ceil(launch.height_m + 1e-3),
+        origin=launch.south_west,
+    )
 
 
 def _simulated(target: TargetSpec, terrain: Terrain) -> SimulatedTarget:
