@@ -6,6 +6,7 @@ import math
 import time
 from collections import OrderedDict
 from collections.abc import Callable
+from functools import lru_cache
 from urllib.parse import parse_qs
 
 from starlette.datastructures import Headers
@@ -45,13 +46,14 @@ class Buckets:
 
     def take(self, client: str) -> float:
         """Take one out of the client's bucket; where there is none return how long until there is, else 0."""
-        wait_s = self.wait_s(client)
-        if wait_s == 0.0:
-            self._filled[client] = (self._level(client) - 1.0, self._clock())
-            self._filled.move_to_end(client)
-            if len(self._filled) > MAX_CLIENTS:
-                self._filled.popitem(last=False)
-        return wait_s
+        level = self._level(client)
+        if level < 1.0:
+            return (1.0 - level) / self._per_s
+        self._filled[client] = (level - 1.0, self._clock())
+        self._filled.move_to_end(client)
+        if len(self._filled) > MAX_CLIENTS:
+            self._filled.popitem(last=False)
+        return 0.0
 
     def _level(self, client: str) -> float:
         level, at = self._filled.get(client, (self._size, self._clock()))
@@ -107,6 +109,7 @@ class Limits:
         return self._failures.wait_s(network_of(host)) > 0.0
 
 
+@lru_cache(maxsize=4096)
 def network_of(host: str) -> str:
     """Return whom an address stands for: whoever has an IPv6 address has all those that begin with the same 64 bits."""
     try:

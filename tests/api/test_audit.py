@@ -124,6 +124,7 @@ async def test_no_secret_is_ever_logged(
         assert secret not in kept
 
 
+@pytest.mark.usefixtures("no_settings_around")
 async def test_the_databases_password_is_never_shown(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     from app.settings import SettingsError, load_settings
     from app.storage.prepare import DatabaseNotReadyError, prepare_database

@@ -57,6 +57,7 @@ async def test_https_is_served_with_the_certificate_and_asked_for_from_then_on(
                 await client.get("/health/live")
 
 
+@pytest.mark.usefixtures("no_settings_around")
 async def test_files_that_make_no_certificate_are_named(
     make_settings: Callable[..., Settings], certificate: tuple[Path, Path], tmp_path: Path
 ) -> None:

@@ -26,22 +26,18 @@ async def _age(database: Database, days: float) -> None:
         session.add(AuditRow(time=datetime.now(UTC) - timedelta(days=days), detail="", request_id="", **values))
 
 
-@pytest.mark.parametrize(
-    "statement",
-    [
+async def test_what_was_written_down_can_neither_be_changed_nor_removed(database: Database) -> None:
+    async with database.writing() as session:
+        audit.add(session, COMMAND)
+    for statement in (
         update(AuditRow).values(actor="somebody else"),
         delete(AuditRow),
         text("UPDATE audit SET result = 'refused'"),
         text("DELETE FROM audit WHERE id > 0"),
-    ],
-    ids=str,
-)
-async def test_what_was_written_down_can_neither_be_changed_nor_removed(database: Database, statement: object) -> None:
-    async with database.writing() as session:
-        audit.add(session, COMMAND)
-    with pytest.raises(DBAPIError, match=r"can only grow|is kept for 30 days"):
-        async with database.writing() as session:
-            await session.execute(statement)  # type: ignore[call-overload]
+    ):
+        with pytest.raises(DBAPIError, match=r"can only grow|is kept for 30 days"):
+            async with database.writing() as session:
+                await session.execute(statement)
     (row,) = await _rows(database)
     assert (row.actor, row.result) == ("Ana", "done")
 

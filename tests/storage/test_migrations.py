@@ -101,6 +101,8 @@ def _fill_as_it_is(connection: Connection) -> dict[str, list[str]]:
 @pytest.mark.parametrize("revision", EARLIER)
 async def test_database_of_every_earlier_revision_keeps_its_rows(empty_url: str, revision: str) -> None:
     """As the release of that time left it: up to this one, in use, and down again."""
+    if empty_url.startswith("postgresql") and revision not in (EARLIER[0], EARLIER[-1]):
+        pytest.skip("on PostgreSQL the oldest and the newest are enough: no table is replaced there")
     await migrate.upgrade(empty_url, revision)
     columns = await _on(empty_url, _fill_as_it_is)
     before = await _on(empty_url, lambda connection: _kept(connection, columns))

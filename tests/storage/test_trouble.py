@@ -61,7 +61,7 @@ async def test_what_is_wrong_with_a_request_is_no_trouble(sqlite: Database) -> N
     assert trouble_of(ValueError("x")) == ""
 
 
-@pytest.mark.parametrize("empty_url", ["postgresql"], indirect=True)
+@pytest.mark.parametrize("either_url", ["postgresql"], indirect=True)
 async def test_a_server_that_ends_the_connection_is_told_of(database: Database) -> None:
     async def cut_off() -> None:
         async with database.writing() as session:
