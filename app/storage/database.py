@@ -15,6 +15,8 @@ from app.storage.trouble import trouble_of
 
 BUSY_TIMEOUT_MS = 30_000
 """How long a writer waits for one of another process."""
+TROUBLED_TIMEOUT_MS = 1_000
+"""How long one waits once another one has waited in vain."""
 RECENT_S = 60.0
 """A trouble that did not show for so long is taken to be over."""
 
@@ -49,8 +51,10 @@ def make_engine(url: str) -> AsyncEngine:
     @event.listens_for(engine.sync_engine, "begin")
     def _begin(connection: Connection) -> None:
         # A reader that becomes a writer half-way fails when another writer was faster: writers say so at once.
-        writes = connection.get_execution_options().get("bathyfleet_writes", False)
-        connection.exec_driver_sql("BEGIN IMMEDIATE" if writes else "BEGIN")
+        options = connection.get_execution_options()
+        if "bathyfleet_patience_ms" in options:
+            connection.exec_driver_sql(f"PRAGMA busy_timeout={options['bathyfleet_patience_ms']}")
+        connection.exec_driver_sql("BEGIN IMMEDIATE" if options.get("bathyfleet_writes", False) else "BEGIN")
 
     return engine
 
@@ -105,7 +109,9 @@ class Database:
         """Yield a session whose changes are committed together, or not at all when the block raises."""
         try:
             async with self._turn or nullcontext(), self._connected() as connection:
-                await connection.execution_options(bathyfleet_writes=True)
+                # Where one waited in vain the others in line do not each wait as long.
+                patience_ms = min(TROUBLED_TIMEOUT_MS, BUSY_TIMEOUT_MS) if self.trouble else BUSY_TIMEOUT_MS
+                await connection.execution_options(bathyfleet_writes=True, bathyfleet_patience_ms=patience_ms)
                 async with connection.begin(), _session_on(connection) as session:
                     if self._guard is not None:
                         await self._guard(session)

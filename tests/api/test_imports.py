@@ -1,6 +1,7 @@
 """Files from elsewhere: all of one or nothing, once, and apart from the mission's own soundings."""
 
 import asyncio
+import gzip
 import io
 from typing import Any
 
@@ -13,6 +14,7 @@ from affine import Affine
 from app.mapping.georeference import LocalFrame
 from app.settings import Settings
 from tests.api.conftest import AREA, make_client, mission_spec, running, soundings
+from tests.faults.hostile import sparse_tif
 
 FRAME = LocalFrame(AREA["coordinates"][0][0][1], AREA["coordinates"][0][0][0])  # type: ignore[index]
 
@@ -115,6 +117,16 @@ async def test_a_wrong_file_is_refused_by_what_is_wrong_and_nothing_is_stored(
     assert answer.json()["errors"][0]["field"] == field
     assert (await client.get(f"{path}/imports")).json() == []
     assert (await client.get(f"{path}/map")).status_code == 404
+
+
+async def test_a_bomb_and_a_grid_of_a_million_millions_of_cells_are_refused(
+    client: httpx.AsyncClient, path: str
+) -> None:
+    for name, content in (("bomb.xyz.gz", gzip.compress(bytes(2**20)) * 600), ("huge.tif", sparse_tif())):
+        refused = await send(client, path, content, filename=name, crs="local")
+        assert refused.status_code == 422, refused.text
+        assert refused.json()["errors"][0]["expected"]
+    assert (await client.get(f"{path}/imports")).json() == []
 
 
 async def test_a_file_that_is_too_large_is_refused(make_settings: Any) -> None:

@@ -90,6 +90,39 @@ async def lied_to_over_imc(folder: Path, *, steps: int, speed: float) -> dict[st
     return _figures(service, mission_id) | {"speed": speed, "refused": refused, "said": _warnings(lines)}
 
 
+async def bad_day_at_sea(folder: Path, *, speed: float) -> dict[str, Any]:
+    """Fly over a bad radio with one vehicle that lies and another that vanishes and returns."""
+    liar, gone = NAMES
+    faults = NetworkFaults(loss=0.3, duplicate=0.2, reorder=0.2, hold_s=1.0 / speed, delay_s=2.0 / speed)
+    async with Sea(speed=speed, faults=faults) as sea, _service(folder, sea) as (service, api):
+        mission_id = await _begun(api, NAMES, steps=500)
+        lying = asyncio.create_task(_lie(sea, liar))
+        await steps_more(service, mission_id, 1)
+        await sea.vanish(gone)
+
+        async def lost() -> bool:
+            return any(f"{gone} is lost" in line for line in await log_of(api, mission_id))
+
+        await until(lost, "the log says that it is lost")
+        await steps_more(service, mission_id, 1)
+        await sea.launch(gone)
+
+        async def follows() -> bool:
+            return any(
+                v["name"] == gone and v["link"] == "engaged" for v in (await state_of(api, mission_id))["vehicles"]
+            )
+
+        await until(follows, "it follows again")
+        await steps_more(service, mission_id, 1)
+        assert not lying.done()
+        lying.cancel()
+        await asyncio.gather(lying, return_exceptions=True)
+        stopped = (await api.post(f"/missions/{mission_id}/abort")).json()
+        assert len(stopped["stops"]) == 2
+        _check(service, sea, mission_id)
+        return _figures(service, mission_id)
+
+
 async def two_services(folder: Path, *, steps: int, speed: float) -> dict[str, Any]:
     """Run two services on one network; each leads its vehicle, and neither gets the other's."""
     folders = [folder / "ours", folder / "theirs"]

@@ -7,7 +7,6 @@ import subprocess
 import sys
 from pathlib import Path
 
-import httpx
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -19,9 +18,7 @@ from app.mapping.readers.types import ReadError
 from app.missions.views import ImportOptions
 from simulator.terrain import Terrain, TerrainError
 from simulator.terrain_files import load_terrain, save_npz
-from tests.faults.hostile import npy, npz, soundings, sparse_tif
-from tests.faults.missions import mission_of
-from tests.faults.service import service_in
+from tests.faults.hostile import npy, npz
 
 ROOT = Path(__file__).parents[2]
 
@@ -104,16 +101,3 @@ def test_a_damaged_terrain_is_read_or_refused(
 def test_names_that_lead_elsewhere_are_refused(name: str) -> None:
     with pytest.raises(ValidationError):
         ImportOptions(filename=name)
-
-
-async def test_a_service_refuses_a_bomb_and_goes_on(tmp_path: Path) -> None:
-    bombs = {"bomb.xyz.gz": soundings()["bomb.xyz.gz"], "huge.tif": sparse_tif()}
-    async with service_in(tmp_path) as (_, api):
-        mission = (await api.post("/missions", json=mission_of([{"name": "one", "kind": "rest"}]))).json()
-        path = f"/missions/{mission['id']}/imports"
-        for name, content in bombs.items():
-            refused = await api.post(path, content=content, params={"filename": name, "crs": "local"})
-            assert refused.status_code == httpx.codes.UNPROCESSABLE_ENTITY, refused.text
-            assert refused.json()["errors"][0]["expected"]
-        assert (await api.get(path)).json() == []
-        assert (await api.get("/health/ready")).status_code == httpx.codes.OK

@@ -6,7 +6,7 @@ import pytest
 
 from tests.faults.scenes import killed_again_and_again
 
-KILLS, STEPS = 5, 60
+KILLS, STEPS = 3, 30
 """The long version is ``benchmarks/faults.py``."""
 
 

@@ -30,6 +30,11 @@ async def _failing(database: Database, *, pages: int | None = None) -> DBAPIErro
     return caught.value
 
 
+async def _patience_ms(database: Database) -> int:
+    async with database.writing() as session:
+        return int(await session.scalar(text("PRAGMA busy_timeout")) or 0)
+
+
 async def test_a_full_disk_is_told_of_until_something_could_be_written(sqlite: Database) -> None:
     error = await _failing(sqlite, pages=1)
     assert trouble_of(error) == "the disk with the database is full: free some space on it"
@@ -42,12 +47,15 @@ async def test_a_full_disk_is_told_of_until_something_could_be_written(sqlite: D
 
 async def test_a_lock_of_another_program_is_told_of(sqlite: Database, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(database_module, "BUSY_TIMEOUT_MS", 10)
+    monkeypatch.setattr(database_module, "TROUBLED_TIMEOUT_MS", 5)
     other = Database(sqlite.url)
     try:
         with closing(sqlite3.connect(_file(sqlite), isolation_level=None)) as holder:
             holder.execute("BEGIN IMMEDIATE")
             error = await _failing(other)
         assert trouble_of(error) == "another program holds the database locked: end it"
+        # The next one in line does not wait as long; once one could write all have time again.
+        assert [await _patience_ms(other) for _ in range(2)] == [5, 10]
     finally:
         await other.close()
 
