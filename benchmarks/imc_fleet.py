@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import imcpy
+import psutil
 from imc_report import write_section
 
 from imc_bridge import Bridge, BridgeSettings, NodeState, StateReport, Waypoint
@@ -29,6 +30,8 @@ WANTED_HZ = {
     "EstimatedState": 10, "Distance": 10, "PlanControlState": 3, "VehicleState": 2, "GpsFix": 1, "VehicleMedium": 1,
     "NavigationUncertainty": 1, "Heartbeat": 1, "Rpm": 1, "EulerAngles": 94, "AngularVelocity": 94,
 }  # fmt: skip
+FEW_HZ = {"EstimatedState": 10, "Distance": 5, "PlanControlState": 2, "VehicleState": 1, "Heartbeat": 1}
+"""What remains of it at a low rate: positions and depths."""
 FILL = "ServoPosition"
 SLOTS = 100
 """Moments within a second at which packets leave."""
@@ -49,7 +52,10 @@ class Vehicle:
         state.lat, state.lon, state.depth = math.radians(41.0 + 0.01 * number), math.radians(-8.0), 2.0
         distance = self.messages["Distance"]
         distance.validity, distance.value, distance.src_ent = imcpy.Distance.ValidityEnum.VALID, 20.0, 58
-        rates = {**WANTED_HZ, FILL: rate_hz - sum(WANTED_HZ.values())}
+        wanted = WANTED_HZ if rate_hz >= sum(WANTED_HZ.values()) else FEW_HZ
+        if rate_hz < sum(wanted.values()):
+            raise SystemExit(f"--rate {rate_hz} is too low: at least {sum(FEW_HZ.values())}")
+        rates = {**wanted, FILL: rate_hz - sum(wanted.values())}
         self.slots: list[list[str]] = [[] for _ in range(SLOTS)]
         for name, rate in rates.items():
             for k in range(rate):
@@ -97,6 +103,12 @@ class Vehicle:
                 self.send(names, to)
 
 
+def dropped(port: int) -> int:
+    """Packets that the kernel threw away because the socket was full."""
+    lines = [line.split() for line in Path("/proc/net/udp").read_text().splitlines()[1:]]
+    return sum(int(fields[-1]) for fields in lines if fields[1].endswith(f":{port:04X}"))
+
+
 def play(vehicles: int, rate_hz: int, done: Any, sent: Any) -> None:
     """Be the vehicles until ``done``."""
     fleet = [Vehicle(k, rate_hz) for k in range(vehicles)]
@@ -138,7 +150,10 @@ async def measure(vehicles: int, seconds: float, sent: Any) -> dict[str, Any]:
         await asyncio.sleep(2.0)
         received = bridge.decoder.decoded.total() + bridge.decoder.unwanted.total()
         packets, cpu, wall = sent.value, time.process_time(), time.monotonic()
-        await asyncio.sleep(seconds)
+        lost, memory_mb = dropped(BRIDGE_PORT), [round(psutil.Process().memory_info().rss / 1e6, 1)]
+        for _ in range(10):
+            await asyncio.sleep(seconds / 10)
+            memory_mb.append(round(psutil.Process().memory_info().rss / 1e6, 1))
         cpu, wall = time.process_time() - cpu, time.monotonic() - wall
         packets = sent.value - packets
         received = bridge.decoder.decoded.total() + bridge.decoder.unwanted.total() - received
@@ -149,6 +164,9 @@ async def measure(vehicles: int, seconds: float, sent: Any) -> dict[str, Any]:
             "seconds": round(wall, 2),
             "packets_per_s": round(received / wall),
             "sent_per_s": round(packets / wall),
+            "dropped_by_the_kernel": dropped(BRIDGE_PORT) - lost,
+            "received_of_sent": round(received / max(packets, 1), 5),
+            "memory_mb": memory_mb,
             "cpu_share": round(cpu / wall, 3),
             "us_per_packet": round(1e6 * cpu / max(received, 1), 2),
         }
