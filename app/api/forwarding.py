@@ -167,9 +167,9 @@ async def _relay(answer: httpx.Response, send: Send) -> None:
     try:
         async for part in answer.aiter_raw():
             await send({"type": "http.response.body", "body": part, "more_body": True})
-    except httpx.TransportError:
+    except httpx.TransportError as error:
         if length is not None:
-            raise
+            raise ConnectionResetError("the process that has the mission broke off within its answer") from error
         # A stream: its reader connects anew and goes on after the last event it has.
     await send({"type": "http.response.body", "body": b"", "more_body": False})
 
