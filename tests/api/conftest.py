@@ -81,7 +81,7 @@ def running_in_thread(settings: Settings) -> Iterator[Server]:
 
     thread = threading.Thread(target=lambda: asyncio.run(serve(settings, started=note)))
     thread.start()
-    assert answers.wait(30)
+    assert answers.wait(120)
     try:
         yield started["server"]
     finally:

@@ -1,6 +1,7 @@
 """What happens, as it happens: server-sent events and the WebSocket."""
 
 import asyncio
+import contextlib
 import json
 from collections.abc import AsyncIterator, Callable
 from typing import Any
@@ -144,7 +145,8 @@ async def test_a_stopping_service_ends_streams_and_sockets(make_settings: Callab
             stream = source.aiter_sse()
             await take(stream, 1)
             server.stop()
-            async for _ in socket:  # ends without an error when the server says that it goes away
-                pass
-            assert socket.close_code == 1001
+            with contextlib.suppress(websockets.ConnectionClosedError):  # what 1012 is to this client
+                async for _ in socket:
+                    pass
+            assert socket.close_code in (1001, 1012), "it goes away, or starts again: whoever was faster to say so"
             assert [event async for event in stream] == []
