@@ -14,7 +14,8 @@ LOAD_HEAD = """# Load and endurance: what was measured
 
 Every section is written by the command that stands in it (`--write`). Service, vehicles and clients share the cores of
 one machine, on which other programs may run beside: processor time and ratios say more than seconds by the clock. A
-machine that was busy is told by `load_of_the_machine`, the mean number of programs that wanted a core.
+machine that was busy is told by `load_of_the_machine`, the mean number of programs that wanted a core: where that is
+well above the number of cores, paces and times say nothing, and `service_cores` says what the service got.
 """
 
 HEAD = """# The IMC bridge: what was measured
