@@ -296,10 +296,14 @@ def _add_files(resource: str, operation_id: str, summary: str, description: str)
         | {
             200: {
                 "description": "; ".join(f"`.{ext}`: {PRODUCTS[name].title}" for ext, name in kinds.items()),
-                "content": {kind: {"schema": {"type": "string", "format": "binary"}} for kind in sorted(media)},
+                "content": {kind: {"schema": _schema_of(kind)} for kind in sorted(media)},
             }
         },
     )
+
+
+def _schema_of(media_type: str) -> dict[str, str]:
+    return {"type": "object"} if media_type.endswith("json") else {"type": "string", "format": "binary"}
 
 
 _add_files(MAP, "getMapFile", "Download the map", "Return the map as a file.")
