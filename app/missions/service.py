@@ -275,8 +275,9 @@ class MissionService:
                 self._claims.claim_team(live)
                 try:
                     await self._conductor.set_state(live, target, note, actor, check=free_elsewhere(live))
-                except ConflictError:
-                    self._claims.release_team(live)
+                except BaseException:
+                    if action == "start":
+                        self._claims.release_team(live)
                     raise
                 self._conductor.run(live)
             else:

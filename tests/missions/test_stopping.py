@@ -13,6 +13,7 @@ from app.missions.map_builder import MapBuilder
 from app.missions.service import WORKERS, MissionService
 from app.missions.states import MissionState, MoveRefusedError
 from app.missions.views import Ruling, TideCorrection
+from app.storage import missions as mission_queries
 from tests.missions.builders import make_spec
 from tests.missions.fleet import Harbour, Rover, sim_spec, state_of, until, until_state, until_step
 from tests.missions.test_reviewing import NOT_USED, measured
@@ -160,3 +161,20 @@ async def test_a_vehicle_that_did_not_acknowledge_is_told_again_after_the_end(se
         await service.abort_vehicle(mission, "a")
     assert other in refused.value.remedy
     await service.act(other, "abort", actor="Ana")
+
+
+async def test_a_start_that_cannot_be_written_leaves_the_vehicles_free(
+    harbour: Harbour, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    service = harbour.service
+    one, other = [(await service.create(sim_spec("a"))).id for _ in range(2)]
+
+    async def fail(*_: object) -> None:
+        raise OSError("disk full")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(mission_queries, "set_state", fail)
+        with pytest.raises(OSError, match="disk full"):
+            await service.act(one, "start", actor="Ana")
+    assert (await service.mission(one)).state is MissionState.READY
+    assert (await service.act(other, "start", actor="Ana")).mission.state is MissionState.RUNNING
