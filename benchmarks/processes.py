@@ -125,7 +125,7 @@ def main() -> None:
     parser.add_argument("--counts", type=lambda text: [int(n) for n in text.split(",")], default=[1, 2])
     parser.add_argument("--missions", type=int, default=8)
     parser.add_argument("--seconds", type=float, default=60.0, help="for which steps are counted")
-    parser.add_argument("--pace", type=float, default=1000.0, help="how much faster than the wall clock vehicles live")
+    parser.add_argument("--pace", type=float, default=60.0, help="how much faster than the wall clock vehicles live")
     parser.add_argument("--kills", type=int, default=5)
     parser.add_argument("--write", action="store_true", help=f"write a section of docs/results/{LOAD.name}")
     options = parser.parse_args()
