@@ -136,4 +136,5 @@ def test_a_plane_is_found_through_a_fifth_of_gross_errors(
     z[wrong] += rng.choice([-1, 1], len(wrong)) * 20.0 * scale_m
     centre, east, north = robust_plane(dx, dy, z, np.empty(n))
     misses = np.abs(centre + east * dx + north * dy - truth)
-    assert np.median(misses) < 3.0 * scale_m, "far less than the errors of 20"
+    # Eight points of which one is wrong and lies far out: one in 300 is off by more than 3, the worst of 60 000 by 6.1.
+    assert np.median(misses) < 10.0 * scale_m, "less than half of the errors of 20 at the very worst"
