@@ -5,6 +5,7 @@ import signal
 import socket
 import ssl
 import threading
+import warnings
 from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import asynccontextmanager, contextmanager
 from pathlib import Path
@@ -58,6 +59,9 @@ GRACE_S = 5
 MAX_VIEWER_MESSAGE_BYTES = 4096
 
 log = structlog.get_logger(__name__)
+
+# FastAPI hands pydantic aliases where they mean nothing; whoever runs the service can do nothing about it.
+warnings.filterwarnings("ignore", message=r"The 'alias' attribute with value .* was provided to the `Field")
 
 
 def create_app(settings: Settings | None = None, *, port: int | None = None) -> FastAPI:
