@@ -1,6 +1,5 @@
 """Running the migrations from code, on whatever database a URL names."""
 
-import asyncio
 from collections.abc import Callable
 from pathlib import Path
 
@@ -74,8 +73,3 @@ def _check_references(connection: Connection) -> None:
     orphans = connection.exec_driver_sql("PRAGMA foreign_key_check").fetchmany(3)
     if orphans:
         raise IntegrityError("PRAGMA foreign_key_check", None, ValueError(f"rows that belong to nothing: {orphans}"))
-
-
-def upgrade_now(url: str) -> None:
-    """Bring a database up to date from code that has no event loop."""
-    asyncio.run(upgrade(url))

@@ -16,12 +16,6 @@ async def all_missions(session: AsyncSession) -> Sequence[MissionRow]:
     return (await session.scalars(select(MissionRow).order_by(MissionRow.created_at.desc(), MissionRow.id))).all()
 
 
-async def missions_in(session: AsyncSession, states: Sequence[str]) -> Sequence[MissionRow]:
-    """Return the missions in any of ``states``, oldest first."""
-    query = select(MissionRow).where(MissionRow.state.in_(states)).order_by(MissionRow.created_at)
-    return (await session.scalars(query)).all()
-
-
 async def newest_named(session: AsyncSession, name: str) -> MissionRow | None:
     """Return the newest mission of this name."""
     query = select(MissionRow).where(MissionRow.name == name).order_by(MissionRow.created_at.desc()).limit(1)

@@ -96,7 +96,7 @@ async def test_newest_waypoints_are_one_for_each_vehicle(database: Database) -> 
         assert [w.vehicle for w in await mission_queries.waypoints_of_step(session, "m1", 1)] == ["a", "b"]
 
 
-async def test_missions_by_state_and_age(database: Database) -> None:
+async def test_missions_come_newest_first_in_the_state_they_are_in(database: Database) -> None:
     async with database.writing() as session:
         session.add_all(
             [mission("old", state="running"), mission("new", state="paused", created_at=TIME.replace(year=2027))]
@@ -105,8 +105,8 @@ async def test_missions_by_state_and_age(database: Database) -> None:
         await mission_queries.set_state(session, "old", "failed", "no power", TIME.replace(year=2028))
         await mission_queries.add_elapsed(session, "old", 2.5, TIME)
     async with database.reading() as session:
-        assert [row.id for row in await mission_queries.all_missions(session)] == ["new", "old"]
-        (failed,) = await mission_queries.missions_in(session, ["failed", "running"])
+        newest, failed = await mission_queries.all_missions(session)
+    assert newest.id == "new"
     assert (failed.id, failed.reason, failed.elapsed_s) == ("old", "no power", 4.0)
 
 
