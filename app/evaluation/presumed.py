@@ -16,6 +16,9 @@ FEWEST_CELLS = 4
 MISSED, MISSED_BESIDE = 0.1, 0.02
 """How likely a cell that was looked at was hidden all the same, and how likely where something was found in it."""
 
+PASS = 10
+"""So many further looks, about those of a vehicle that passes, find as large a part of what is left as the first."""
+
 WITHIN = 0.9
 """A cell counts as looked at when its middle was this close, of the distance of sight."""
 
@@ -69,8 +72,10 @@ class Presumed:
             inside = ((index >= 0) & (index < self._counts)).all(axis=1)
             found[np.ravel_multi_index(tuple(index[inside].T), tuple(self._counts))] = True
         expected = (count + len(seen_m)) / len(self.middles)
-        hidden = MISSED / (MISSED + (1.0 - MISSED) * np.exp(-expected))
-        weight = np.where(self.looks == 0, 1.0, np.where(found, MISSED_BESIDE, hidden))
+        again = MISSED ** (np.maximum(self.looks - 1, 0) / PASS)
+        missed = MISSED * again
+        hidden = missed / (missed + (1.0 - missed) * np.exp(-expected))
+        weight = np.where(self.looks == 0, 1.0, np.where(found, MISSED_BESIDE * again, hidden))
         share = np.cumsum(weight) / weight.sum()
         cell = np.searchsorted(share, (np.arange(count) + 0.5) / max(count, 1))
         # Several in a cell lie along its diagonals, evenly and without any randomness.

@@ -68,6 +68,18 @@ def test_presumed_places_keep_to_what_nobody_looked_at():
     assert presumed.places(0, np.zeros((0, 3))).shape == (0, 3)
 
 
+def test_where_several_vehicles_looked_in_vain_less_is_presumed_than_where_one_did():
+    presumed = Presumed(np.array([[-1.0, -1.0, 0.0], [1.0, 1.0, 1.0]]), 0.4, flat=True)
+    floor = np.full((1, len(presumed.middles)), 0.5)
+    for east in np.linspace(-1.0, 1.0, 41):
+        for north in np.linspace(-1.0, 1.0, 11):
+            for _ in range(4 if east < 0.0 else 1):
+                presumed.look(np.array([[east, north, 0.3]]), floor)
+    assert (presumed.looks > 0).all()
+    places = presumed.places(100, np.zeros((0, 3)))
+    assert np.mean(places[:, 0] > 0.0) > 0.95
+
+
 def test_a_vehicle_surfaces_when_needed_and_localization_becomes_good_again():
     run = run_track(FADING, "cao", OPTIONS)
     assert run.resurfacings >= 1

@@ -15,6 +15,7 @@ from app.exploration.options import PlannerOptions
 from app.exploration.planners import create_planner
 from app.exploration.problem import Belief, Situation
 from app.exploration.rollout.apart import fly_alone, improve_apart, judge, no_paths, no_routes, route_of, trace
+from app.exploration.rollout.apart_mission import apart_mission
 from app.exploration.rollout.flight import Rules
 from app.exploration.rollout.floor import estimate_floor, let_stay, sample
 from app.exploration.rollout.free_space import free_space
@@ -170,6 +171,46 @@ def test_nobody_climbs_because_an_estimate_calls_it_too_low():
     low = np.array([[0.3, 0.1, sample(floor.deepest_m, floor.west_m, floor.south_m, floor.cell_m, 0.3, 0.1) + 0.1]])
     let_stay(floor, low, HELD, 0.1)
     assert sample(floor.deepest_m, floor.west_m, floor.south_m, floor.cell_m, 0.3, 0.1) >= low[0, 2] - 0.03
+
+
+@given(seed=st.integers(0, 1000))
+@settings(max_examples=20, deadline=None)
+def test_every_step_that_a_vehicle_may_try_is_short_enough_and_leads_somewhere(seed):
+    team = replace(situation(1, START), belief=hilly(seed))
+    bottom = Bottom.from_landmarks(team.belief.xy_m, team.belief.depth_m)
+    mission = apart_mission(
+        team, FREE, bottom, np.zeros((0, 3)), free_space(LIMITS), RangeSensor(0.4),
+        PlannerOptions(accuracy_sd_m=ACCURACY), np.random.default_rng(seed),
+    )  # fmt: skip
+    best = mission.plan(list(np.random.default_rng(seed).uniform(-0.9, 0.9, (3, 4, 2))))
+    for i, here in enumerate(START):
+        wishes, passed = mission.steps(best, i)
+        assert len(wishes) == len(passed)
+        moves = wishes - here
+        assert (np.linalg.norm(moves, axis=1) <= LIMITS.max_step_m).all()
+        assert ((np.hypot(*moves[1:, :2].T) > 0.0) | (moves[1:, 2] < 0.0)).all(), "down on the spot an altimeter undoes"
+        assert moves[-1] == pytest.approx([0.0, 0.0, -LIMITS.max_step_m])
+        assert passed[-1] == 0
+
+
+def test_no_vehicle_stands_before_a_step_that_only_the_estimate_of_the_floor_has():
+    rng = np.random.default_rng(3)
+    xy = np.vstack([rng.uniform([-1.0, 0.25], [1.0, 1.0], (60, 2)), rng.uniform([-1.0, -1.0], [1.0, 0.2], (200, 2))])
+    known = np.arange(260) >= 60
+    depth = np.where(known, 0.6, np.nan)
+    depth[known & (np.abs(xy[:, 1]) < 0.1)] -= 0.25  # nothing of it is true
+    shape = np.where(known[:, None, None], 1e-4 * np.eye(3), np.diag([np.inf] * 3))
+    belief = Belief(xy, depth, np.where(known, 0.01, np.inf), known, np.ones(260), 0.2, shape)
+    planner = create_planner("rollout", PlannerOptions(rollouts=5, accuracy_sd_m=ACCURACY), RangeSensor(0.4))
+    track = [np.array([[-0.6, -0.3, 0.3], [0.0, -0.3, 0.3], [0.6, -0.3, 0.3]])]
+    for step in range(1, 41):
+        asked = replace(situation(step, track[-1]), belief=belief)
+        after = planner.propose(asked, np.random.default_rng(step)).positions
+        # Altimeters hold the clearance above the true floor.
+        track.append(np.column_stack([after[:, :2], np.minimum(after[:, 2], 0.6 - HELD)]))
+    way = np.array(track)
+    assert (way[-1, :, 1] > 0.1).all()
+    assert np.linalg.norm(way[6:] - way[:-6], axis=2).min() > 0.5 * LIMITS.max_step_m
 
 
 def situation(step, positions, targets=None):

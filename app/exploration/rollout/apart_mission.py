@@ -52,6 +52,9 @@ anyway, in visibilities."""
 PARTS = (1.0, 0.8, 0.5, 0.2)
 """Parts of a step to try when the whole one is not feasible."""
 
+AHEAD = 0.05
+"""Part of a step below which a shorter one leads nowhere."""
+
 
 @dataclass
 class Best:
@@ -129,24 +132,27 @@ class ApartMission:
     def steps(self, best: Best, i: int) -> tuple[FloatArray, list[int]]:
         """Return where vehicle ``i`` may go now, (k, 3), best first, and how many waypoints each of these passes.
 
-        The first is the route's; the others go less far and higher, for when the sea floor that the constraints hold
-        to has steps that the plan's estimate smooths.
+        The first is the route's; the others go less far, as they are and as high as the step allows, for when the sea
+        floor that the constraints hold to has steps that the plan's estimate smooths. The last is straight up.
         """
-        wishes, passed, here = [], [], self._start[i : i + 1]
+        wishes, passed, here = [], [], self._start[i]
         route, count, step = route_of(best.routes, i), int(best.routes.counts[i]), self._rules.step_m
+        if not count:
+            return here[None].copy(), [0]
         for part in PARTS:
-            wish = here.copy()
-            if count:
-                part_of_step = self._rules._replace(step_m=part * step)
-                passed.append(int(fly_alone(here, route, 0, count, self._floor, part_of_step, wish)))
-            else:
-                passed.append(0)
-            spare = np.sqrt(max(0.0, (part * step) ** 2 - ((wish - here)[0, :2] ** 2).sum()))
-            deeper = min(wish[0, 2] + self._lower, max(wish[0, 2], here[0, 2] + (1.0 - 1e-9) * spare))
-            wishes.append(np.array([*wish[0, :2], min(deeper, self._rules.max_depth_m)]))
+            wish = here[None].copy()
+            rules = self._rules._replace(step_m=part * step)
+            after = int(fly_alone(here[None], route, 0, count, self._floor, rules, wish))
+            (x, y, z), ahead = wish[0], float(np.hypot(*(wish[0] - here)[:2]))
+            if part == 1.0 or ahead > AHEAD * step:
+                deeper = min(z + self._lower, max(z, here[2] + _left_of(part * step, ahead)))
+                wishes.append([x, y, min(deeper, self._rules.max_depth_m)])
+                passed.append(after)
             if part < 1.0:
-                wishes.append(wish[0] - [0.0, 0.0, 0.99 * np.sqrt(1.0 - part**2) * step])
-                passed.append(passed[-1])
+                wishes.append([x, y, max(here[2] - _left_of(step, ahead), self._rules.min_depth_m)])
+                passed.append(after)
+        wishes.append([*here[:2], max(here[2] - _left_of(step, 0.0), self._rules.min_depth_m)])
+        passed.append(0)
         return np.array(wishes), passed
 
 
@@ -179,6 +185,11 @@ def apart_mission(
         sensor.relative_noise, free.everywhere, directed=True,
     )  # fmt: skip
     return ApartMission(team, free_part, floor, free, rules, height, lower, options.accuracy_sd_m, rng)
+
+
+def _left_of(step_m: float, ahead_m: float) -> float:
+    """Return how far up or down a step may go that goes so far ahead."""
+    return float((1.0 - 1e-9) * np.sqrt(max(0.0, step_m**2 - ahead_m**2)))
 
 
 def _sample(xy: FloatArray) -> NDArray[np.int64]:
