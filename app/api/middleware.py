@@ -13,6 +13,7 @@ import structlog
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from app.api.auditing import DATA
 from app.api.headers import add_security_headers
 from app.api.metrics import observe_request
 from app.api.problems import FieldProblem, instance_of, invalid, make_problem, problem_response
@@ -70,7 +71,7 @@ class RequestMiddleware:
                 seconds = time.perf_counter() - began
                 route = getattr(scope.get("route"), "path", "") or "unmatched"
                 observe_request(scope["method"], route, status, seconds)
-                emit = log.debug if route.endswith(("/health/live", "/health/ready", "/metrics")) else log.info
+                emit = log.debug if _is_routine(scope, status) else log.info
                 emit(
                     "request",
                     method=scope["method"],
@@ -78,6 +79,12 @@ class RequestMiddleware:
                     status=status,
                     ms=round(seconds * 1000, 1),
                 )
+
+
+def _is_routine(scope: Scope, status: int) -> bool:
+    """Tell whether a request changed nothing, or is one of the very many by which vehicles report."""
+    reads = scope["method"] in ("GET", "HEAD")
+    return status < 400 and (reads or getattr(scope.get("route"), "operation_id", None) in DATA)
 
 
 class BodyMiddleware:

@@ -101,10 +101,7 @@ class TokenStore:
     async def principal(self, token: str) -> Principal | None:
         """Return who holds ``token``; None when it is unknown, revoked or has run out."""
         values = {"hash": token_hash(token), "now": datetime.now(UTC)}
-        found = self._at_once.rows(tokens.VALID, values)
-        if found is None:
-            async with self._database.reading() as session:
-                found = [tuple(row) for row in await session.execute(tokens.VALID, values)]
+        found = await self._at_once(tokens.VALID, values)
         if not found:
             return None
         name, role, vehicle = found[0]

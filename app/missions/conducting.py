@@ -79,12 +79,16 @@ class Conductor:
         runner = Runner(live, self._hub, self._executor, self._time_scale)
         self.runs[live.id] = asyncio.create_task(self._supervise(live, runner.run), name=f"mission {live.id}")
 
+    async def warmed(self) -> None:
+        """Return when what planning needs is compiled."""
+        if self.warm is not None:
+            await asyncio.wait([self.warm])
+
     async def _supervise(self, live: LiveMission, run: Callable[[], Awaitable[str]]) -> None:
         """Run a mission to its end; whatever happens, its vehicles are stopped."""
         try:
-            if self.warm is not None:
-                # Compiling what planning needs takes seconds on a new machine; vehicles must not wait for it.
-                await asyncio.wait([self.warm])
+            # Compiling what planning needs takes seconds on a new machine; vehicles must not wait for it.
+            await self.warmed()
             if live.search is not None:
                 await live.in_thread(warm_up, live.search.site.scanner)
             reason = await run()

@@ -36,11 +36,11 @@ class _Learned:
     soundings: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 4)))
     reasons: tuple[str, ...] = ()
 
-    @property
+    @cached_property
     def rejected(self) -> BoolArray:
         return np.array([bool(reason) for reason in self.reasons], dtype=bool)
 
-    @property
+    @cached_property
     def doubted(self) -> list[tuple[NDArray[np.float64], str]]:
         return [(row, reason) for row, reason in zip(self.soundings, self.reasons, strict=True) if reason]
 
@@ -105,7 +105,7 @@ class MapBuilder:
         # What ``arrivals.replaced`` was when the newest map's soundings were taken in.
         self._replaced_mapped = 0
         self._version = 0
-        self._coverage: tuple[BuiltMap | None, float] = (None, 0.0)
+        self._shares: tuple[BuiltMap | None, float, float] = (None, 0.0, 100.0)
         # Counts how often all soundings were replaced: what is learned meanwhile of the old ones is void.
         self._generation = 0
 
@@ -258,20 +258,20 @@ class MapBuilder:
 
     def coverage_pct(self) -> float:
         """Return the share of the area's cells that are known to the asked accuracy."""
-        built = self._newest
-        if built is None:
-            return 0.0
-        # Asked for with every look at the mission.
-        if self._coverage[0] is not built:
-            self._coverage = built, float(100.0 * np.mean(built.map.sd_m[self.mask] <= self._accuracy_m))
-        return self._coverage[1]
+        return self._counted()[1]
 
     def remaining_pct(self) -> float:
         """Return the share of the landmarks that were never known to the asked accuracy, in a belief or now."""
-        known = self._accurate
-        if self._newest is not None:
-            known = known | (self._newest.map.sd_m[self._nodes] <= self._accuracy_m)
-        return float(100.0 * np.mean(~known))
+        return self._counted()[2]
+
+    def _counted(self) -> tuple[BuiltMap | None, float, float]:
+        """Return both shares of the newest map: they are asked for with every look at the mission."""
+        built = self._newest
+        if built is not None and built is not self._shares[0]:
+            accurate = built.map.sd_m <= self._accuracy_m
+            remaining = ~(self._accurate | accurate[self._nodes])
+            self._shares = built, float(100.0 * accurate[self.mask].mean()), float(100.0 * remaining.mean())
+        return (None, 0.0, float(100.0 * (~self._accurate).mean())) if built is None else self._shares
 
     def belief(self) -> Belief:
         """Return what is known at the landmarks (a lattice of the grid's cells)."""

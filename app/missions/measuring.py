@@ -3,7 +3,7 @@
 import asyncio
 import hashlib
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import timedelta
 from functools import partial
@@ -83,27 +83,53 @@ class _Batch:
         return [item for i, item in enumerate(self.items) if not self.strangers[i]]
 
 
-@dataclass
-class _Taken:
-    """What a batch came to, and what is done once that is committed."""
-
-    answer: BatchVerdict | ConflictError
-    then: list[Callable[[], None]]
-
-
 async def _take(
     live: LiveMission, hub: FleetHub, rest: RestFleetLink, batches: Sequence[_Batch]
 ) -> list[BatchVerdict | Exception]:
     """Store batches in one transaction: many vehicles that post at the same time wait for the disk once."""
+    keys = {batch.key for batch in batches if batch.key is not None}
     async with live.journal.writing, live.ranges.writing, live.database.writing() as session:
-        taken = [await _take_one(live, hub, rest, batch, session) for batch in batches]
+        rows = await sounding_queries.answers_to(session, live.id, keys)
+        known = {row.key: (row.digest, BatchVerdict.model_validate(row.answer)) for row in rows}
+        fresh = _first_of_each(batches, known)
+        stored, committed = await _store(live, [batches[i] for i in fresh], session)
         await _forget_old_keys(live, session)
-    for one in taken:
-        for work in one.then:
-            work()
+    for work in committed:
+        work()
+    answers = dict(zip(fresh, stored, strict=True))
+    known |= {key: (batches[i].digest, answers[i]) for i in fresh if (key := batches[i].key) is not None}
+    results: list[BatchVerdict | Exception] = [
+        answers.get(i) or _again(batch, known) for i, batch in enumerate(batches)
+    ]
+    for batch, result in zip(batches, results, strict=True):
+        if isinstance(result, BatchVerdict):
+            # The first answer may have got lost together with the process that knew where the vehicle is.
+            _hear(hub, rest, batch.known, only_unknown=result.replayed)
     # Where the vehicle is, and whether it arrived, is on disk as well before it is answered.
     await live.journal.flush()
-    return [one.answer for one in taken]
+    return results
+
+
+def _first_of_each(batches: Sequence[_Batch], known: Collection[str]) -> list[int]:
+    """Return which batches are to be stored: those without a key, and the first of every key that is not known."""
+    seen = set(known)
+    found = []
+    for i, batch in enumerate(batches):
+        if batch.key is None or batch.key not in seen:
+            found.append(i)
+        if batch.key is not None:
+            seen.add(batch.key)
+    return found
+
+
+def _again(batch: _Batch, known: Mapping[str, tuple[str, BatchVerdict]]) -> BatchVerdict | ConflictError:
+    """Return the answer to a batch whose key came before: the first one's, if it is the same batch."""
+    digest, first = known[batch.key or ""]
+    if digest == batch.digest:
+        return first.model_copy(update={"replayed": True})
+    return ConflictError(
+        f"idempotency key {batch.key!r} was used before with other measurements", "use a new key for every new batch"
+    )
 
 
 async def _forget_old_keys(live: LiveMission, session: AsyncSession) -> None:
@@ -114,47 +140,43 @@ async def _forget_old_keys(live: LiveMission, session: AsyncSession) -> None:
         await sounding_queries.forget_answers(session, live.id, now() - KEYS_KEPT, LOG_KEY)
 
 
-async def _take_one(
-    live: LiveMission, hub: FleetHub, rest: RestFleetLink, batch: _Batch, session: AsyncSession
-) -> _Taken:
-    if batch.key is not None:
-        known = await sounding_queries.answer_to(session, live.id, batch.key)
-        if known is not None and known.digest != batch.digest:
-            error = ConflictError(
-                f"idempotency key {batch.key!r} was used before with other measurements",
-                "use a new key for every new batch",
-            )
-            return _Taken(error, [])
-        if known is not None:
-            # The first answer may have got lost together with the process that knew where the vehicle is.
-            hear = partial(_hear, hub, rest, batch.known, only_unknown=True)
-            return _Taken(BatchVerdict.model_validate(known.answer | {"replayed": True}), [hear])
-    verdicts, committed = await live.journal.take(list(batch.reports.values()), session)
-    then = [committed]
-    taken = dict(zip(batch.reports, verdicts, strict=True))
-    if batch.ranges:
-        on_ranges, used = await live.ranges.take(list(batch.ranges.values()), session)
-        taken |= dict(zip(batch.ranges, on_ranges, strict=True))
-        then.append(used)
-    answer = _batch_verdict(len(batch.items), taken, batch.strangers)
-    if batch.key is not None:
-        session.add(
-            BatchRow(
-                mission_id=live.id,
-                key=batch.key,
-                digest=batch.digest,
-                answer=answer.model_dump(mode="json"),
-                created_at=now(),
-            )
+async def _store(
+    live: LiveMission, batches: Sequence[_Batch], session: AsyncSession
+) -> tuple[list[BatchVerdict], list[Callable[[], None]]]:
+    """Store batches that are new; returns their answers, and what is done once they are committed."""
+    reports = [report for batch in batches for report in batch.reports.values()]
+    on_reports, counted = await live.journal.take(reports, session)
+    verdicts, then, answers = iter(on_reports), [counted], []
+    for batch in batches:
+        taken = {i: next(verdicts) for i in batch.reports}
+        if batch.ranges:
+            on_ranges, used = await live.ranges.take(list(batch.ranges.values()), session)
+            taken |= dict(zip(batch.ranges, on_ranges, strict=True))
+            then.append(used)
+        answers.append(_batch_verdict(len(batch.items), taken, batch.strangers))
+    moment = now()
+    session.add_all(
+        BatchRow(
+            mission_id=live.id,
+            key=batch.key,
+            digest=batch.digest,
+            answer=answer.model_dump(mode="json"),
+            created_at=moment,
         )
-    return _Taken(answer, [*then, partial(_hear, hub, rest, batch.known)])
+        for batch, answer in zip(batches, answers, strict=True)
+        if batch.key is not None
+    )
+    return answers, then
 
 
 def _hear(hub: FleetHub, rest: RestFleetLink, items: Sequence[Measurement], *, only_unknown: bool = False) -> None:
     """Tell the link where vehicles are; ``only_unknown``: of those only whose place it does not know."""
-    places = {name: hub.info((VehicleKind.REST, name)).report for name in {item.vehicle for item in items}}
+    known: set[str] = set()
+    if only_unknown:
+        names = {item.vehicle for item in items}
+        known = {name for name in names if hub.info((VehicleKind.REST, name)).report is not None}
     for item in items:
-        if not only_unknown or places[item.vehicle] is None:
+        if item.vehicle not in known:
             rest.heard(_vehicle_report(item))
 
 

@@ -106,6 +106,7 @@ from app.storage import events as event_queries
 from app.storage import missions as mission_queries
 from app.storage import soundings as sounding_queries
 from app.storage import telemetry as telemetry_queries
+from app.storage.at_once import AtOnce
 from app.storage.database import Database
 from app.storage.models import MissionRow, SoundingRow
 
@@ -143,6 +144,7 @@ class MissionService:
     ) -> None:
         self._settings = settings
         self._database = database
+        self._at_once = AtOnce(database)
         self._rest = RestFleetLink()
         self._sim = SimFleetLink(settings.simulation, settings.time_scale)
         links: list[FleetLink] = [self._rest, self._sim]
@@ -202,6 +204,7 @@ class MissionService:
         await self.process.leave()
         self._executor.shutdown(wait=True, cancel_futures=True)
         self._forecaster.close()
+        self._at_once.close()
 
     async def ready(self) -> tuple[bool, dict[str, str]]:
         """Tell whether requests can be served, and how each component is."""
@@ -239,10 +242,10 @@ class MissionService:
 
     async def missions(self) -> list[MissionSummary]:
         """Return every mission that no other process has, newest first."""
-        async with self._database.reading() as session:
-            rows = await mission_queries.all_missions(session)
         # One that ended and left memory is as it was then: taking it up again for every list would be slow.
-        found = [self._memory.left(row.id) or await self._summary(row.id) for row in rows]
+        found = [
+            self._memory.left(one) or await self._summary(one) for (one,) in await self._at_once(mission_queries.ALL)
+        ]
         return [summary for summary in found if summary is not None]
 
     async def _summary(self, mission_id: str) -> MissionSummary | None:
@@ -317,6 +320,8 @@ class MissionService:
         check_spec(spec, self._hub.kinds)
         if spec.kind is MissionKind.SEARCH:
             raise InvalidRequestError("kind", NO_FORECAST, "forecast missions of kind survey")
+        # The time that a forecast may take is for steps, not for compiling.
+        await self._conductor.warmed()
         return await self._forecaster.make(spec, floor_depth_m=floor_depth_m)
 
     async def forecast_of(self, mission_id: str, *, floor_depth_m: float | None = None) -> ForecastView:
@@ -327,6 +332,7 @@ class MissionService:
             raise ConflictError(NO_FORECAST, "see its time window, search.window_s")
         async with self._database.reading() as session:
             prior = await sounding_queries.imported_arrays(session, mission_id)
+        await self._conductor.warmed()
         team = [replace(member, report=member.report or self._hub.info(member.key).report) for member in live.team]
         return await self._forecaster.make(
             live.spec,

@@ -23,6 +23,8 @@ def target_views(
     tracking: Tracking, frame: LocalFrame, area: FloatArray, now_s: float, pursuers: dict[str, str]
 ) -> list[TargetView]:
     """Return every target foretold for now; ``pursuers`` are the vehicles that went after targets, by target."""
+    if not tracking.known:
+        return []
     polygon = Polygon(area)
     return [
         _view(name, known, tracking, tracking.at(name, now_s), frame, polygon, now_s, pursuers.get(name))

@@ -20,11 +20,22 @@ class AtOnce:
     """Reads what is committed now, by any process; for queries on indexes of small tables only."""
 
     def __init__(self, database: Database) -> None:
+        self._database = database
         url = make_url(database.url)
         is_file = url.get_backend_name() == "sqlite" and url.database and url.database != ":memory:"
         self._file = url.database if is_file else None
         self._connection: sqlite3.Connection | None = None
         self._known: dict[int, tuple[Select[*tuple[Any, ...]], _Known]] = {}
+
+    async def __call__(
+        self, query: Select[*tuple[Any, ...]], values: Mapping[str, Any] = MappingProxyType({})
+    ) -> list[tuple[Any, ...]]:
+        """Return all rows as the driver has them, read on the spot or where that is not possible the usual way."""
+        found = self.rows(query, values)
+        if found is not None:
+            return found
+        async with self._database.reading() as session:
+            return [tuple(row) for row in await session.execute(query, values)]
 
     def rows(
         self, query: Select[*tuple[Any, ...]], values: Mapping[str, Any] = MappingProxyType({})

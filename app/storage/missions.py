@@ -10,10 +10,8 @@ from sqlalchemy.orm import defer
 
 from app.storage.models import MissionRow, MissionVehicleRow, PositionRow, StepRow, WaypointRow
 
-
-async def all_missions(session: AsyncSession) -> Sequence[MissionRow]:
-    """Return every mission, newest first."""
-    return (await session.scalars(select(MissionRow).order_by(MissionRow.created_at.desc(), MissionRow.id))).all()
+ALL = select(MissionRow.id).order_by(MissionRow.created_at.desc(), MissionRow.id)
+"""The ids of all missions, newest first."""
 
 
 async def newest_named(session: AsyncSession, name: str) -> MissionRow | None:

@@ -1,7 +1,7 @@
 """Queries on soundings and on the answers given to batches of them."""
 
 import zlib
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from datetime import datetime
 from typing import Any
 
@@ -91,8 +91,17 @@ async def all_soundings(session: AsyncSession, mission_id: str) -> Sequence[Soun
 
 async def answer_to(session: AsyncSession, mission_id: str, key: str) -> BatchRow | None:
     """Return the answer once given to an idempotency key; waits for a transaction that is about to answer."""
-    await session.execute(select(MissionRow.id).where(MissionRow.id == mission_id).with_for_update(key_share=True))
-    return await session.get(BatchRow, (mission_id, key))
+    return next(iter(await answers_to(session, mission_id, {key})), None)
+
+
+async def answers_to(session: AsyncSession, mission_id: str, keys: Collection[str]) -> Sequence[BatchRow]:
+    """Return the answers once given to idempotency keys; waits for a transaction that is about to answer."""
+    if session.get_bind().dialect.name != "sqlite":  # it has one writer at a time
+        await session.execute(select(MissionRow.id).where(MissionRow.id == mission_id).with_for_update(key_share=True))
+    if not keys:
+        return []
+    query = select(BatchRow).where(BatchRow.mission_id == mission_id, BatchRow.key.in_(keys))
+    return (await session.scalars(query)).all()
 
 
 async def forget_answers(session: AsyncSession, mission_id: str, before: datetime, spare: str) -> None:

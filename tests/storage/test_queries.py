@@ -11,7 +11,7 @@ from app.storage import soundings as sounding_queries
 from app.storage import telemetry as telemetry_queries
 from app.storage.bulk import read_in_pieces
 from app.storage.database import Database
-from app.storage.models import EventRow, ImportRow, ReferenceRow
+from app.storage.models import EventRow, ImportRow, MissionRow, ReferenceRow
 from tests.storage.rows import TIME, mission, one_of_each, position, sounding, step, vehicle, waypoint
 
 
@@ -105,8 +105,9 @@ async def test_missions_come_newest_first_in_the_state_they_are_in(database: Dat
         await mission_queries.set_state(session, "old", "failed", "no power", TIME.replace(year=2028))
         await mission_queries.add_elapsed(session, "old", 2.5, TIME)
     async with database.reading() as session:
-        newest, failed = await mission_queries.all_missions(session)
-    assert newest.id == "new"
+        newest, oldest = await session.scalars(mission_queries.ALL)
+        failed = await session.get_one(MissionRow, oldest)
+    assert newest == "new"
     assert (failed.id, failed.reason, failed.elapsed_s) == ("old", "no power", 4.0)
 
 
