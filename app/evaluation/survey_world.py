@@ -169,13 +169,17 @@ class Log:
         return Soundings(*(np.concatenate(x) for x in (self.east_m, self.north_m, self.depth_m, self.sd_m)))
 
 
-def along(start: FloatArray, end: FloatArray, sampling: Sampling) -> FloatArray:
-    """Return the positions (n, 3) at which a vehicle sounds on the leg, its start left out."""
+def along(start: FloatArray, end: FloatArray, sampling: Sampling, since_m: float = 0.0) -> tuple[FloatArray, float]:
+    """Return the positions (n, 3) at which a vehicle sounds on the leg, its start left out, and the way since the last.
+
+    ``since_m`` is that way at the start: a sounder does not begin anew with each leg.
+    """
     if sampling == "step":
-        return end[None]
-    gap = SPEED_MPS / SOUNDING_RATE_HZ
-    n = max(1, int(np.linalg.norm(end - start) / gap))
-    return start + np.linspace(0.0, 1.0, n + 1)[1:, None] * (end - start)
+        return end[None], 0.0
+    gap, length = SPEED_MPS / SOUNDING_RATE_HZ, float(np.linalg.norm(end - start))
+    at = np.arange(gap - since_m, length + 1e-9, gap)
+    points = start + (at / max(length, 1e-12))[:, None] * (end - start)
+    return points, length - float(at[-1]) if len(at) else since_m + length
 
 
 def default_map(soundings: Soundings, grid: Grid) -> BathymetricMap:
@@ -229,7 +233,7 @@ def fly_planner(
     grid, gp = scenario.belief_grid, GaussianProcessMap()
     learn_at = {max(2, round(part * scenario.steps)) for part in LEARN_AT}
     names = tuple(f"auv-{k + 1}" for k in range(scenario.vehicles))
-    headings = np.full(scenario.vehicles, np.nan)
+    headings, since = np.full(scenario.vehicles, np.nan), np.zeros(scenario.vehicles)
     history, times = [positions], []
     belief = unknown_belief(grid) if known is None else known
     verdict: OutlierReport | None = None
@@ -260,8 +264,8 @@ def fly_planner(
         leg = proposal.positions - positions
         moved = np.hypot(leg[:, 0], leg[:, 1]) > 1e-6
         headings = np.where(moved, np.arctan2(leg[:, 0], leg[:, 1]), headings)
-        for start, end, heading in zip(positions, proposal.positions, headings, strict=True):
-            points = along(start, end, scenario.sampling)
+        for i, heading in enumerate(headings):
+            points, since[i] = along(positions[i], proposal.positions[i], scenario.sampling, since[i])
             log.sound(points, np.full(len(points), heading))
         positions = proposal.positions
         history.append(positions)

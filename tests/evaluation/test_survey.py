@@ -1,5 +1,9 @@
+from itertools import pairwise
+
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
 from app.evaluation.baselines import lawnmower_baseline, lawnmower_baselines
@@ -19,12 +23,24 @@ def harbour():
 
 def test_continuous_soundings_cover_the_leg_and_steps_only_its_end():
     start, end = np.array([0.0, 0.0, 2.0]), np.array([3.0, 4.0, 2.0])
-    assert along(start, end, "step").tolist() == [end.tolist()]
-    points = along(start, end, "continuous")
+    points, since = along(start, end, "step")
+    assert (points.tolist(), since) == ([end.tolist()], 0.0)
+    points, since = along(start, end, "continuous")
     gaps = np.linalg.norm(np.diff(np.vstack([start, points]), axis=0), axis=1)
-    assert gaps == pytest.approx(np.full(len(points), gaps[0]))
-    assert 0.26 <= gaps[0] < 0.29
-    np.testing.assert_allclose(points[-1], end)
+    assert gaps == pytest.approx(np.full(len(points), 0.26))
+    assert since == pytest.approx(5.0 - 0.26 * len(points))
+    assert np.linalg.norm(end - points[-1]) == pytest.approx(since)
+
+
+@given(legs=st.lists(st.floats(0.0, 3.0), min_size=1, max_size=20))
+def test_a_sounder_does_not_begin_anew_with_each_leg(legs):
+    ends = np.cumsum([0.0, *legs])
+    since, found = 0.0, []
+    for start, end in pairwise(ends):
+        points, since = along(np.array([start, 0.0, 2.0]), np.array([end, 0.0, 2.0]), "continuous", since)
+        found += points[:, 0].tolist()
+    assert abs(len(found) - ends[-1] / 0.26) < 1.0 + 1e-6
+    assert found == pytest.approx(0.26 * np.arange(1, len(found) + 1), abs=1e-6)
 
 
 def test_a_run_is_reproducible_and_obeys_its_constraints(harbour):
