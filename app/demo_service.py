@@ -41,7 +41,8 @@ async def serve_during(
     working = asyncio.ensure_future(work(server.url))
     await asyncio.wait([serving, working], return_when=asyncio.FIRST_COMPLETED)
     try:
-        if not working.done():
+        # A request that was under way when the service was told to end fails: that is no trouble of the work's.
+        if not working.done() or (server.should_exit and working.exception() is not None):
             working.cancel()
             await asyncio.gather(working, return_exceptions=True)
             return False

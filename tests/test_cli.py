@@ -274,12 +274,13 @@ def test_a_mission_is_served_exported_and_found_again(
 
 def test_logs_are_json_lines_with_the_requests_id(tmp_path: Path, environment: dict[str, str]) -> None:
     with serving(tmp_path, environment, "--log-format", "json") as (process, url):
-        httpx.get(f"{url}/api/v1/missions", headers={"X-Request-Id": "abc-1"})
+        httpx.get(f"{url}/api/v1/missions")  # nothing to tell of
+        httpx.get(f"{url}/api/v1/mission", headers={"X-Request-Id": "abc-1"})
         process.send_signal(signal.SIGINT)
         assert process.stderr is not None
         lines = [json.loads(line) for line in process.stderr.read().splitlines()]
     (request,) = [line for line in lines if line["event"] == "request"]
-    assert (request["request_id"], request["path"], request["status"]) == ("abc-1", "/api/v1/missions", 200)
+    assert (request["request_id"], request["path"], request["status"]) == ("abc-1", "/api/v1/mission", 404)
 
 
 def test_the_doctor_says_what_is_missing(bathyfleet: Run) -> None:

@@ -546,6 +546,25 @@ async def test_batches_at_the_same_time_are_all_stored(service: MissionService, 
     assert (await service.mission(mission_id)).progress.soundings == 200
 
 
+async def test_what_waits_together_is_answered_as_if_it_had_come_one_by_one(
+    service: MissionService, database: Database
+) -> None:
+    mission_id, rover = await rest_mission(service)
+    first, second, third = rover.item(), rover.item(), rover.item()
+    unreadable = third.model_copy(update={"lat_deg": 91.0})
+    orders = [("k1", [first]), ("k2", [first, second]), ("k1", [first]), ("k1", [third]), (None, [unreadable, third])]
+    found = await asyncio.gather(
+        *(service.measure(mission_id, items, idempotency_key=key) for key, items in orders), return_exceptions=True
+    )
+    one, two, again, other, last = found
+    assert isinstance(other, ConflictError)
+    verdicts = [[str(item.verdict) for item in getattr(answer, "items", [])] for answer in (one, two, again, last)]
+    assert verdicts == [["accepted"], ["duplicate", "accepted"], ["accepted"], ["rejected", "accepted"]]
+    assert [getattr(answer, "replayed", None) for answer in (one, two, again, last)] == [False, False, True, False]
+    assert [item.index for item in getattr(last, "items", [])] == [0, 1]
+    assert len(await stored(database)) == 3
+
+
 async def test_a_draft_takes_no_measurements_and_too_many_are_refused(service: MissionService) -> None:
     draft = await service.create(make_spec(vehicles=[]))
     with pytest.raises(ConflictError, match="draft"):

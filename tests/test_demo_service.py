@@ -1,0 +1,41 @@
+"""The service that runs while a demonstration uses it."""
+
+import os
+import signal
+from pathlib import Path
+
+import httpx
+import pytest
+from rich.console import Console
+
+from app.demo_service import serve_during
+from app.missions.settings import ImcSettings
+from app.settings import Settings
+
+
+def settings(folder: Path) -> Settings:
+    return Settings(port=0, database_url=f"sqlite+aiosqlite:///{folder / 'demo.db'}", imc=ImcSettings(enabled=False))
+
+
+async def test_a_signal_ends_the_work_without_a_complaint_about_the_request_under_way(tmp_path: Path) -> None:
+    answered = 0
+
+    async def work(url: str) -> None:
+        nonlocal answered
+        async with httpx.AsyncClient(base_url=url) as api:
+            while True:
+                (await api.get("/health/live")).raise_for_status()
+                answered += 1
+                if answered == 3:
+                    os.kill(os.getpid(), signal.SIGTERM)
+
+    assert await serve_during(settings(tmp_path), work, keep_serving=True, console=Console(quiet=True)) is False
+    assert answered >= 3
+
+
+async def test_what_goes_wrong_with_the_work_is_told(tmp_path: Path) -> None:
+    async def work(url: str) -> None:
+        raise ValueError(url)
+
+    with pytest.raises(ValueError, match="http://127"):
+        await serve_during(settings(tmp_path), work, keep_serving=True, console=Console(quiet=True))
