@@ -23,7 +23,7 @@ from rich.progress import BarColumn, Progress, ProgressColumn, Task, TextColumn,
 from rich.table import Table
 from rich.text import Text
 
-from app.demo_service import DemoError, check, get, post, serve_during
+from app.demo_service import DemoError, check, client, get, post, serve_during
 from app.evaluation.baselines import Baseline, lawnmower_baselines
 from app.exploration.constraints import Constraints
 from app.mapping.compare import difference
@@ -189,7 +189,7 @@ class _Demo:
 
     async def _fly(self, url: str) -> None:
         console = self._console
-        async with httpx.AsyncClient(base_url=f"{url}/api/v1", timeout=60.0) as api:
+        async with client(url) as api:
             mission = await post(api, "/missions", self._mission())
             self._outcome.mission_id = mission["id"]
             console.print(f"Dashboard: [bold]{url}/#/missions/{mission['id']}[/]", soft_wrap=True)

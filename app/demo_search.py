@@ -10,7 +10,7 @@ import httpx
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-from app.demo_service import DemoError, check, get, post, serve_during
+from app.demo_service import DemoError, check, client, get, post, serve_during
 from app.missions.search.examples import example
 from app.settings import Settings
 
@@ -69,7 +69,7 @@ class _SearchDemo:
         options, folder = self._options, self._options.output
         spec = example(options.site, seed=options.seed, vehicles=options.vehicles, window_s=options.window_s)
         (folder / "mission.json").write_text(json.dumps(spec, indent=1))
-        async with httpx.AsyncClient(base_url=f"{url}/api/v1", timeout=60.0) as api:
+        async with client(url) as api:
             mission = await post(api, "/missions", spec)
             path = f"/missions/{mission['id']}"
             self._console.print(f"Dashboard: [bold]{url}/#{path}[/]", soft_wrap=True)

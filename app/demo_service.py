@@ -56,6 +56,16 @@ async def serve_during(
     return True
 
 
+def client(url: str) -> httpx.AsyncClient:
+    """Return a client of the service's API.
+
+    It keeps no connection: where compiling holds up the loop that both share, the service would close an idle one in
+    the moment in which it is used again.
+    """
+    limits = httpx.Limits(max_keepalive_connections=0)
+    return httpx.AsyncClient(base_url=f"{url}/api/v1", timeout=60.0, limits=limits)
+
+
 async def get(api: httpx.AsyncClient, path: str) -> Any:
     """Return what the service answers."""
     answer = await api.get(path)

@@ -8,7 +8,7 @@ import httpx
 import pytest
 from rich.console import Console
 
-from app.demo_service import serve_during
+from app.demo_service import client, get, serve_during
 from app.missions.settings import ImcSettings
 from app.settings import Settings
 
@@ -39,3 +39,16 @@ async def test_what_goes_wrong_with_the_work_is_told(tmp_path: Path) -> None:
 
     with pytest.raises(ValueError, match="http://127"):
         await serve_during(settings(tmp_path), work, keep_serving=True, console=Console(quiet=True))
+
+
+async def test_no_request_goes_over_a_connection_that_the_service_may_be_closing(tmp_path: Path) -> None:
+    kept: list[int] = []
+
+    async def work(url: str) -> None:
+        async with client(url) as api:
+            for _ in range(3):
+                assert (await get(api, "/health/ready"))["status"] == "ok"
+                kept.append(len(api._transport._pool.connections))  # type: ignore[attr-defined]
+
+    assert await serve_during(settings(tmp_path), work, keep_serving=False, console=Console(quiet=True)) is True
+    assert kept == [0, 0, 0]
