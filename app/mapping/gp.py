@@ -161,8 +161,10 @@ class GaussianProcessMap:
         learn = learn or not hasattr(self, "hyperparameters_")
         subset = spread_subset(self._levels.fine_tree, self.learning_points)
         uniform = uniform_scales(len(self._levels.soundings))
-        if learn:
-            self.kernel_ = choose_kernel(self._levels) if self.kernel == "auto" else self.kernel
+        if learn and self.kernel == "auto":
+            self.kernel_, start = choose_kernel(self._levels)
+        elif learn:
+            self.kernel_ = self.kernel
         likelihood = likelihood_of(self._levels, self.kernel_, subset, uniform)
         if learn:
             self.stationary_hyperparameters_, least = likelihood.maximise(start)
@@ -182,7 +184,7 @@ class GaussianProcessMap:
             scales = _scales(self._scale_fields.at(self._levels.points))
             likelihood = likelihood_of(self._levels, self.kernel_, subset, scales)
             if learn:
-                hyper, value = likelihood.maximise(getattr(self, "_refined_hyperparameters", start))
+                hyper, value = likelihood.maximise(self.stationary_hyperparameters_)
                 self._refined_hyperparameters = lengthen(
                     self._levels, self.kernel_, hyper, likelihood, scales, REACH_UNITS * self._unit_m
                 )
@@ -216,7 +218,7 @@ class GaussianProcessMap:
         uniform = uniform_scales(len(self._levels.soundings))
         likelihood = likelihood_of(self._levels, ROUGHEST, subset, uniform)
         if learn or self._rough_hyperparameters is None:
-            self._rough_hyperparameters, _ = likelihood.maximise(None)
+            self._rough_hyperparameters, _ = likelihood.maximise(self.stationary_hyperparameters_)
         return conditioned(self._levels, ROUGHEST, self._rough_hyperparameters, likelihood, uniform)
 
     def _coarse_relief(self, extent: float) -> tuple[Grid, FloatArray]:

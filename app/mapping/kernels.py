@@ -21,7 +21,7 @@ KERNEL_CODES: dict[str, int] = {
 SQRT3 = math.sqrt(3.0)
 SQRT5 = math.sqrt(5.0)
 
-_FAST = {"reassoc", "contract", "arcp", "nsz"}
+FAST = {"reassoc", "contract", "arcp", "nsz"}
 
 LARGEST_EXPONENT = 60.0  # beyond it a correlation is zero for every purpose
 
@@ -46,7 +46,7 @@ def exp_minus(t: float) -> float:
     return p
 
 
-@njit(cache=True, nogil=True, fastmath=_FAST)
+@njit(cache=True, nogil=True, fastmath=FAST)
 def covariance_row(kind: int, uniform: bool, place: FloatArray, others: FloatArray, n: int, out: FloatArray) -> None:
     """Covariance between one place and the first ``n`` of ``others``, written to ``out``.
 
@@ -149,7 +149,7 @@ def paciorek(kind: int, dx: float, dy: float, a: FloatArray, b: FloatArray) -> f
     return value
 
 
-@njit(cache=True, nogil=True, fastmath=_FAST)
+@njit(cache=True, nogil=True, fastmath=FAST)
 def cholesky_in_place(a: FloatArray, n: int) -> bool:
     """Replace the lower triangle of the leading ``n`` rows by its Cholesky factor; False if impossible."""
     for i in range(n):
@@ -166,7 +166,7 @@ def cholesky_in_place(a: FloatArray, n: int) -> bool:
     return True
 
 
-@njit(cache=True, nogil=True, fastmath=_FAST)
+@njit(cache=True, nogil=True, fastmath=FAST)
 def solve_lower_in_place(a: FloatArray, n: int, b: FloatArray) -> None:
     """Replace ``b`` by ``L^-1 b`` for the factor in the lower triangle of ``a``."""
     for i in range(n):
@@ -176,7 +176,7 @@ def solve_lower_in_place(a: FloatArray, n: int, b: FloatArray) -> None:
         b[i] = s / a[i, i]
 
 
-@njit(cache=True, nogil=True, fastmath=_FAST)
+@njit(cache=True, nogil=True, fastmath=FAST)
 def solve_lower_columns_in_place(a: FloatArray, n: int, b: FloatArray, columns: int) -> None:
     """Replace the first ``columns`` columns of ``b`` (n or more rows) by ``L^-1 b``, all of them at once."""
     for i in range(n):

@@ -1,10 +1,9 @@
 """What the process learns from the soundings: its kernel, and its length by what the map is for."""
 
-import math
-
 import numpy as np
 
 from app.mapping.calibration import gaps
+from app.mapping.conditionals import families
 from app.mapping.kernels import KERNEL_CODES, KernelName
 from app.mapping.kriging import Conditioned, krige_holes
 from app.mapping.levels import TwoLevels
@@ -17,6 +16,8 @@ ROUGHEST: KernelName = "matern32"
 KERNEL_LADDER: tuple[KernelName, ...] = (ROUGHEST, "matern52", "gaussian")
 KERNEL_GAIN = 0.05  # of log likelihood per sounding, to prefer a smoother kernel
 CHOICE_OF_KERNEL_POINTS = 200
+FAMILIES = 600
+"""Soundings whose likelihood given their neighbours is added to that of the subset."""
 
 LENGTH_FACTORS = (1.0, 1.5, 2.2, 3.3)
 LENGTHEN_FROM = 30  # soundings; fewer cannot choose
@@ -27,10 +28,14 @@ GAP_FACTOR = 1.5  # radius of the holes over the median distance of places to th
 
 def likelihood_of(levels: TwoLevels, kernel: KernelName, subset: IntArray, scales: LocalScales) -> RestrictedLikelihood:
     """Return the likelihood of the fine soundings ``subset``; ``scales`` are those of all soundings."""
-    fine = levels.fine
-    return RestrictedLikelihood(
+    fine, n = levels.fine, levels.n_fine
+    likelihood = RestrictedLikelihood(
         kernel, levels.points[subset], fine.depth_m[subset], fine.sd_m[subset] ** 2, scales.take(subset)
     )
+    chosen = families(levels.fine_tree, FAMILIES) if n > len(subset) else None
+    if chosen is None:
+        return likelihood
+    return likelihood.also(chosen, levels.points[:n], fine.depth_m, fine.sd_m**2, scales.take(np.arange(n)))
 
 
 def conditioned(
@@ -45,19 +50,21 @@ def conditioned(
     return Conditioned(kernel, levels, noise, hyper.length_m, hyper.amplitude_m, likelihood.trend(hyper), scales)
 
 
-def choose_kernel(levels: TwoLevels) -> KernelName:
-    """Climb from the roughest kernel to smoother ones while the likelihood gains enough by it."""
+def choose_kernel(levels: TwoLevels) -> tuple[KernelName, Hyperparameters]:
+    """Climb from the roughest kernel to smoother ones while the likelihood gains enough by it.
+
+    Returns the kernel and a beginning for its hyperparameters.
+    """
     subset = spread_subset(levels.fine_tree, CHOICE_OF_KERNEL_POINTS)
     uniform = uniform_scales(len(levels.soundings))
-    best = ROUGHEST
-    least = math.inf
-    hyper: Hyperparameters | None = None
-    for kernel in KERNEL_LADDER:
+    hyper, least = likelihood_of(levels, ROUGHEST, subset, uniform).maximise(None)
+    best, kept = ROUGHEST, hyper
+    for kernel in KERNEL_LADDER[1:]:
         hyper, value = likelihood_of(levels, kernel, subset, uniform).maximise(hyper)
         if not value < least - KERNEL_GAIN * len(subset):
             break
-        best, least = kernel, value
-    return best
+        best, least, kept = kernel, value, hyper
+    return best, kept
 
 
 def lengthen(

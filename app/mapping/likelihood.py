@@ -2,11 +2,13 @@
 
 import math
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 from scipy import linalg, optimize
 from scipy.spatial import cKDTree
 
+from app.mapping.conditionals import Families, conditional_terms
 from app.mapping.kernels import KERNEL_CODES, KernelName, correlation_matrices
 from app.mapping.neighbours import nearest
 from app.mapping.scales import LocalScales
@@ -59,19 +61,22 @@ class Trend:
 def scaled_distances(points: FloatArray, metric: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Split the Paciorek kernel of the length matrices ``l^2 * metric`` into parts that do not depend on ``l``.
 
+    ``points`` is (..., n, 2), ``metric`` (..., n, 4).
+
     Returns
     -------
-    distance : (n, n)
+    distance : (..., n, n)
         To be divided by ``l``.
-    prefactor : (n, n)
+    prefactor : (..., n, n)
         ``|A|^(1/4) |B|^(1/4) |(A + B) / 2|^(-1/2)``.
     """
-    dx = points[:, None, 0] - points[None, :, 0]
-    dy = points[:, None, 1] - points[None, :, 1]
-    xx, xy, yy = (0.5 * (metric[:, None, i] + metric[None, :, i]) for i in range(3))
+    one, other = points[..., :, None, :], points[..., None, :, :]
+    a, b = metric[..., :, None, :], metric[..., None, :, :]
+    dx, dy = one[..., 0] - other[..., 0], one[..., 1] - other[..., 1]
+    xx, xy, yy = (0.5 * (a[..., i] + b[..., i]) for i in range(3))
     det = xx * yy - xy * xy
     squared = (yy * dx * dx - 2.0 * xy * dx * dy + xx * dy * dy) / det
-    return np.sqrt(squared), metric[:, None, 3] * metric[None, :, 3] / np.sqrt(det)
+    return np.sqrt(squared), a[..., 3] * b[..., 3] / np.sqrt(det)
 
 
 class RestrictedLikelihood:
@@ -114,6 +119,22 @@ class RestrictedLikelihood:
             ]
         )
         self._prior_sd = np.array([LN_LENGTH_SD, LN_AMPLITUDE_SD, LN_NOISE_SCALE_SD])
+        self._near: tuple[FloatArray, FloatArray, FloatArray, FloatArray] | None = None
+
+    def also(
+        self, chosen: Families, points: FloatArray, depth_m: FloatArray, noise_variance: FloatArray, scales: LocalScales
+    ) -> Self:
+        """Let single soundings given their neighbours count too; the arrays (n, ...) are those of all soundings."""
+        members = chosen.members
+        metric, amplitude = scales.metric[members], scales.amplitude[members]
+        distance, prefactor = scaled_distances(points[members], metric)
+        prefactor *= amplitude[:, :, None] * amplitude[:, None, :]
+        normal = self._basis.T @ self._basis + self._prior_precision * float(np.median(self._noise))
+        plane = np.linalg.solve(normal, self._basis.T @ self._depth)
+        trend = plane[0] + (points[members] - self._centre) @ plane[1:]
+        residual = depth_m[members] - self._reference - trend
+        self._near = distance, prefactor, noise_variance[members], residual
+        return self
 
     @property
     def prior_mean(self) -> FloatArray:
@@ -157,9 +178,14 @@ class RestrictedLikelihood:
             whole = 2.0 * float(np.vdot(inverse, s)) - float(np.diag(inverse) @ np.diag(s))
             return whole - float(np.vdot(s @ ki_f, trend_part)) - float(alpha @ (s @ alpha))
 
+        if self._near is not None:
+            more, more_gradient = conditional_terms(self._kind, *self._near, theta)
+            nll += more
         noise = math.exp(theta[2]) * self._noise
         diagonal = np.diag(inverse) - (ki_f * trend_part).sum(axis=1) - alpha**2
         gradient = 0.5 * np.array([trace(slope), 2.0 * trace(value), float(diagonal @ noise)])
+        if self._near is not None:
+            gradient += more_gradient
         z = (theta - self._prior_mean) / self._prior_sd
         return nll + 0.5 * float(z @ z), gradient + z / self._prior_sd
 
