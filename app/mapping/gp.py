@@ -161,10 +161,11 @@ class GaussianProcessMap:
         learn = learn or not hasattr(self, "hyperparameters_")
         subset = spread_subset(self._levels.fine_tree, self.learning_points)
         uniform = uniform_scales(len(self._levels.soundings))
-        if learn and self.kernel == "auto":
-            self.kernel_, start = choose_kernel(self._levels)
-        elif learn:
-            self.kernel_ = self.kernel
+        if learn:
+            if self.kernel == "auto":
+                self.kernel_, start = choose_kernel(self._levels)
+            else:
+                self.kernel_ = self.kernel
         likelihood = likelihood_of(self._levels, self.kernel_, subset, uniform)
         if learn:
             self.stationary_hyperparameters_, least = likelihood.maximise(start)
