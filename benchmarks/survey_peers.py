@@ -20,7 +20,7 @@ SGP-Tools has a Python of its own because it needs numpy < 2 and this project nu
 
 The maps of both are judged like those of the patterns: the better of the default map and the stationary one. Runs are
 kept in ``survey-peers.jsonl`` as soon as they are done, so that the comparison can be interrupted and goes on where it
-was; ``survey-peers.md`` reports those that are there.
+was (with other ``--iterations`` those of SGP-Tools are made anew); ``survey-peers.md`` reports those that are there.
 """
 
 import argparse
@@ -274,6 +274,12 @@ def _table(runs: Sequence[Run], method: str) -> list[str]:
     return rows
 
 
+def is_kept(job: OursJob | PeerJob, runs: Mapping[str, Run]) -> bool:
+    """Return whether the run is there; one of SGP-Tools with another number of iterations is made anew."""
+    run = runs.get(job.key)
+    return run is not None and (isinstance(job, OursJob) or run["iterations"] == job.iterations)
+
+
 def taken(file: Path | None, jobs: Iterable[OursJob]) -> list[dict[str, Any]]:
     """Return our runs that the study has kept already."""
     if file is None:
@@ -332,7 +338,7 @@ def main() -> None:
     results = Results(given.out / "survey-peers.jsonl")
     for run in taken(given.ours, (job for job in ours if job.key not in results.runs)):
         results.add(run)
-    open_ = [] if given.no_run else [job for job in jobs if job.key not in results.runs]
+    open_ = [] if given.no_run else [job for job in jobs if not is_kept(job, results.runs)]
     with ProgressBar(disable=not open_) as bar:
         task = bar.add_task("surveys", total=len(open_))
         for run in run_jobs(open_, given.jobs, lambda job, step: bar.update(task, description=job.title)):
