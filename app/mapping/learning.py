@@ -27,15 +27,25 @@ GAP_FACTOR = 1.5  # radius of the holes over the median distance of places to th
 
 
 def likelihood_of(levels: TwoLevels, kernel: KernelName, subset: IntArray, scales: LocalScales) -> RestrictedLikelihood:
-    """Return the likelihood of the fine soundings ``subset``; ``scales`` are those of all soundings."""
+    """Return the likelihood of the fine soundings ``subset`` and, where there are more, of some given their neighbours.
+
+    ``scales`` are those of all soundings.
+    """
     fine, n = levels.fine, levels.n_fine
-    likelihood = RestrictedLikelihood(
-        kernel, levels.points[subset], fine.depth_m[subset], fine.sd_m[subset] ** 2, scales.take(subset)
-    )
+    likelihood = _likelihood_of_subset(levels, kernel, subset, scales)
     chosen = families(levels.fine_tree, FAMILIES) if n > len(subset) else None
     if chosen is None:
         return likelihood
     return likelihood.also(chosen, levels.points[:n], fine.depth_m, fine.sd_m**2, scales.take(np.arange(n)))
+
+
+def _likelihood_of_subset(
+    levels: TwoLevels, kernel: KernelName, subset: IntArray, scales: LocalScales
+) -> RestrictedLikelihood:
+    fine = levels.fine
+    return RestrictedLikelihood(
+        kernel, levels.points[subset], fine.depth_m[subset], fine.sd_m[subset] ** 2, scales.take(subset)
+    )
 
 
 def conditioned(
@@ -53,14 +63,15 @@ def conditioned(
 def choose_kernel(levels: TwoLevels) -> tuple[KernelName, Hyperparameters]:
     """Climb from the roughest kernel to smoother ones while the likelihood gains enough by it.
 
-    Returns the kernel and a beginning for its hyperparameters.
+    Only spread soundings have a say: close ones tell how smooth the sea floor is over a metre, and by them a kernel may
+    be chosen that overshoots between survey lines. Returns the kernel and a beginning for its hyperparameters.
     """
     subset = spread_subset(levels.fine_tree, CHOICE_OF_KERNEL_POINTS)
     uniform = uniform_scales(len(levels.soundings))
-    hyper, least = likelihood_of(levels, ROUGHEST, subset, uniform).maximise(None)
+    hyper, least = _likelihood_of_subset(levels, ROUGHEST, subset, uniform).maximise(None)
     best, kept = ROUGHEST, hyper
     for kernel in KERNEL_LADDER[1:]:
-        hyper, value = likelihood_of(levels, kernel, subset, uniform).maximise(hyper)
+        hyper, value = _likelihood_of_subset(levels, kernel, subset, uniform).maximise(hyper)
         if not value < least - KERNEL_GAIN * len(subset):
             break
         best, least, kept = kernel, value, hyper
