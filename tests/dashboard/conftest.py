@@ -1,3 +1,6 @@
+import os
+import shutil
+import subprocess
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -11,6 +14,9 @@ from .service import Service
 CHROMIUM = Path("/usr/bin/chromium")
 # WebGL by SwiftShader, the page itself put together by the processor: three times quicker than all by SwiftShader.
 FLAGS = ["--no-sandbox", "--disable-gpu", "--enable-unsafe-swiftshader", "--disable-background-networking"]
+FONT = "DejaVu Sans"
+"""The only one that the browser is shown, where it is installed: in others lines break elsewhere."""
+ALIASES = {"sans-serif": FONT, "system-ui": FONT, "monospace": f"{FONT} Mono"}
 PATIENCE_MS = 90_000
 """Only how long a missing thing is waited for: the first map waits for numba to compile."""
 
@@ -31,14 +37,37 @@ def service(built: None, tmp_path_factory: pytest.TempPathFactory) -> Iterator[S
     running.kill()
 
 
+@pytest.fixture(scope="session")
+def one_font(tmp_path_factory: pytest.TempPathFactory) -> Path | None:
+    """A font configuration with ``FONT`` alone; None where it is not installed."""
+    if shutil.which("fc-match") is None:
+        return None
+    asked = ["fc-match", "--format=%{family[0]}\n%{file}", FONT]
+    family, _, file = subprocess.run(asked, capture_output=True, text=True, check=True).stdout.partition("\n")
+    if family != FONT:
+        return None
+    folder = tmp_path_factory.mktemp("fonts")
+    configuration = folder / "fonts.conf"
+    aliases = "".join(
+        f"<alias><family>{generic}</family><prefer><family>{font}</family></prefer></alias>"
+        for generic, font in ALIASES.items()
+    )
+    configuration.write_text(
+        f"<fontconfig><dir>{Path(file).parent}</dir><cachedir>{folder / 'cache'}</cachedir>{aliases}</fontconfig>",
+        encoding="utf-8",
+    )
+    return configuration
+
+
 # One browser per module, not per session: Playwright's own event loop would be in the way of asynchronous tests.
 @pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
+def browser(one_font: Path | None) -> Iterator[Browser]:
     if not CHROMIUM.is_file():
         pytest.skip(f"{CHROMIUM} is missing: apt-get install chromium")
     expect.set_options(timeout=PATIENCE_MS)
     with sync_playwright() as playwright:
-        chromium = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
+        fonts = {} if one_font is None else {"FONTCONFIG_FILE": str(one_font)}
+        chromium = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS, env={**os.environ, **fonts})
         yield chromium
         chromium.close()
 
