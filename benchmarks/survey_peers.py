@@ -36,12 +36,10 @@ from typing import Any
 import numpy as np
 import orjson
 from rich.progress import Progress as ProgressBar
-from survey_study import PATCHY, STEPS, VEHICLES, sea_floors, study_jobs
+from survey_study import PATCHY, STEPS, VEHICLES, StudyJob, chosen_floors, numbers, study_jobs
 
-from app.estimation import Sensor
 from app.evaluation.jobs import Progress, run_jobs
 from app.evaluation.survey import judge
-from app.evaluation.survey_job import SurveyJob
 from app.evaluation.survey_world import SOUNDING_RATE_HZ, SPEED_MPS, FloatArray, SurveyScenario, fly_routes
 from app.evaluation.tables.facts import made
 from app.evaluation.tables.store import Results
@@ -89,23 +87,12 @@ def the_peer(python: str) -> Peer:
 
 
 @dataclass(frozen=True)
-class OursJob:
+class OursJob(StudyJob):
     """``cao`` and the patterns."""
-
-    key: str
-    job: SurveyJob
 
     @property
     def title(self) -> str:
         return f"{self.job.scenario.terrain.name}, ours"
-
-    @property
-    def steps(self) -> int:
-        return self.job.steps
-
-    @property
-    def sensor(self) -> Sensor:
-        return self.job.sensor
 
     def run(self, progress: Progress) -> dict[str, Any]:
         return {**what(self.key, "ours", self.job.scenario), **of_ours(self.job.run(progress)), "taken_from": None}
@@ -315,13 +302,7 @@ def main() -> None:
         there = subprocess.run([given.peer_python, "-c", VERSION], capture_output=True, text=True, check=False)
         if there.returncode or int(there.stdout.partition(".")[0]) < 2:
             parser.error(f"--peer-python has no sgptools 2: {HOW_TO}")
-    floors = sea_floors(given.terrains)
-    if given.only:
-        wanted = given.only.split(",")
-        lacking = set(wanted) - {floor.name for floor in floors}
-        if lacking:
-            parser.error(f"--only: there is no {', '.join(sorted(lacking))}")
-        floors = [floor for floor in floors if floor.name in wanted]
+    floors = chosen_floors(parser, given.terrains, given.only)
     budgets = [float(part) for part in given.budgets.split(",")]
     ours: list[OursJob] = []
     jobs: list[OursJob | PeerJob] = []
@@ -350,12 +331,6 @@ def main() -> None:
     facts = made(command, given.jobs)
     (given.out / "survey-peers.md").write_text(report(list(results.runs.values()), facts), encoding="utf-8")
     print(f"{given.out / 'survey-peers.md'}: {len(open_)} runs made, {len(results.runs)} kept")
-
-
-def numbers(text: str) -> list[int]:
-    """Return ``1:4`` or ``1,2,3`` as a list."""
-    first, colon, end = text.partition(":")
-    return list(range(int(first), int(end))) if colon else [int(part) for part in text.split(",")]
 
 
 if __name__ == "__main__":

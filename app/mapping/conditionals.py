@@ -6,22 +6,12 @@ given a few neighbours only; a sample of such terms is cheap however many soundi
 """
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
 from scipy.spatial import cKDTree
 
-from app.mapping.kernels import (
-    EXPONENTIAL,
-    FAST,
-    MATERN32,
-    MATERN52,
-    SQRT3,
-    SQRT5,
-    cholesky_in_place,
-    solve_lower_in_place,
-)
+from app.mapping.kernels import FAST, cholesky_in_place, correlation_and_slope, solve_lower_in_place
 from app.mapping.neighbours import nearest
 from app.mapping.types import FloatArray, IntArray
 
@@ -29,21 +19,11 @@ RANKS = (1, 2, 3, 4, 5, 6, 7, 8, 10, 13, 17, 23, 31, 42, 57, 76)
 """Which of its neighbours, counted by distance, a sounding is predicted from: mostly near ones, some farther off."""
 
 
-@dataclass(frozen=True)
-class Families:
-    """Soundings with the neighbours that each is predicted from.
+def families(tree: cKDTree, count: int) -> IntArray | None:
+    """Choose at most ``count`` soundings, every so-manieth, each with the neighbours that it is predicted from.
 
-    Attributes
-    ----------
-    members : (k, m + 1)
-        Rows of the soundings, the predicted one first.
+    Returns their rows (k, m + 1), the predicted one first; None where there are too few.
     """
-
-    members: IntArray
-
-
-def families(tree: cKDTree, count: int) -> Families | None:
-    """Choose at most ``count`` soundings, every so-manieth, with their neighbours; None where there are too few."""
     n = tree.n
     ranks = [rank for rank in RANKS if rank < n]
     if len(ranks) < 3:
@@ -51,7 +31,7 @@ def families(tree: cKDTree, count: int) -> Families | None:
     first = np.unique(((np.arange(count) + 0.5) * (n / count)).astype(np.int64))
     _, near = nearest(tree, tree.data[first], ranks[-1] + 1)
     near = np.where(near == first[:, None], near[:, :1], near)  # of two at one place either may be found first
-    return Families(np.column_stack([first, near[:, ranks]]))
+    return np.column_stack([first, near[:, ranks]])
 
 
 @njit(cache=True, nogil=True, fastmath=FAST)
@@ -91,20 +71,7 @@ def conditional_terms(
             for j in range(i + 1):
                 r = distance[f, i, j] * shrink
                 s = variance * prefactor[f, i, j]
-                if kind == MATERN32:
-                    t = SQRT3 * r
-                    e = math.exp(-t)
-                    value, change = (1.0 + t) * e, t * t * e
-                elif kind == MATERN52:
-                    t = SQRT5 * r
-                    e = math.exp(-t)
-                    value, change = (1.0 + t + t * t / 3.0) * e, t * t * (1.0 + t) * e / 3.0
-                elif kind == EXPONENTIAL:
-                    e = math.exp(-r)
-                    value, change = e, r * e
-                else:
-                    e = math.exp(-0.5 * r * r)
-                    value, change = e, r * r * e
+                value, change = correlation_and_slope(kind, r)
                 signal[i, j] = signal[j, i] = s * value
                 slope[i, j] = slope[j, i] = s * change
         for i in range(m):

@@ -135,8 +135,7 @@ class GaussianProcessMap:
         ----------
         learn
             False keeps the hyperparameters of an earlier fit (they are learned when there was none) and only
-            takes in the soundings: much cheaper, right for most steps of a mission. With True an earlier
-            fit's values are the starting point.
+            takes in the soundings: much cheaper, right for most steps of a mission.
 
         Raises
         ------

@@ -105,6 +105,24 @@ def correlation(kind: int, r: float) -> float:
     return math.exp(-0.5 * r * r)
 
 
+@njit(cache=True, nogil=True, inline="always")
+def correlation_and_slope(kind: int, r: float) -> tuple[float, float]:
+    """Correlation at the scaled distance ``r = d / length`` and its derivative with respect to ln(length)."""
+    if kind == MATERN32:
+        t = SQRT3 * r
+        e = math.exp(-t)
+        return (1.0 + t) * e, t * t * e
+    if kind == MATERN52:
+        t = SQRT5 * r
+        e = math.exp(-t)
+        return (1.0 + t + t * t / 3.0) * e, t * t * (1.0 + t) * e / 3.0
+    if kind == EXPONENTIAL:
+        e = math.exp(-r)
+        return e, r * e
+    e = math.exp(-0.5 * r * r)
+    return e, r * r * e
+
+
 @njit(cache=True, nogil=True)
 def correlation_matrices(kind: int, r: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Correlation and its derivative with respect to ln(length), elementwise; ``r`` is symmetric, (n, n)."""
@@ -113,21 +131,7 @@ def correlation_matrices(kind: int, r: FloatArray) -> tuple[FloatArray, FloatArr
     slope = np.empty((n, n))
     for i in range(n):
         for j in range(i + 1):
-            x = r[i, j]
-            if kind == MATERN32:
-                t = SQRT3 * x
-                e = math.exp(-t)
-                v, s = (1.0 + t) * e, t * t * e
-            elif kind == MATERN52:
-                t = SQRT5 * x
-                e = math.exp(-t)
-                v, s = (1.0 + t + t * t / 3.0) * e, t * t * (1.0 + t) * e / 3.0
-            elif kind == EXPONENTIAL:
-                e = math.exp(-x)
-                v, s = e, x * e
-            else:
-                e = math.exp(-0.5 * x * x)
-                v, s = e, x * x * e
+            v, s = correlation_and_slope(kind, r[i, j])
             value[i, j] = value[j, i] = v
             slope[i, j] = slope[j, i] = s
     return value, slope

@@ -8,7 +8,7 @@ import numpy as np
 from scipy import linalg, optimize
 from scipy.spatial import cKDTree
 
-from app.mapping.conditionals import Families, conditional_terms
+from app.mapping.conditionals import conditional_terms
 from app.mapping.kernels import KERNEL_CODES, KernelName, correlation_matrices
 from app.mapping.neighbours import nearest
 from app.mapping.scales import LocalScales
@@ -122,10 +122,17 @@ class RestrictedLikelihood:
         self._near: tuple[FloatArray, FloatArray, FloatArray, FloatArray] | None = None
 
     def also(
-        self, chosen: Families, points: FloatArray, depth_m: FloatArray, noise_variance: FloatArray, scales: LocalScales
+        self,
+        members: IntArray,
+        points: FloatArray,
+        depth_m: FloatArray,
+        noise_variance: FloatArray,
+        scales: LocalScales,
     ) -> Self:
-        """Let single soundings given their neighbours count too; the arrays (n, ...) are those of all soundings."""
-        members = chosen.members
+        """Let single soundings given their neighbours count too.
+
+        ``members`` (k, m + 1) are rows of the arrays (n, ...), which hold all soundings.
+        """
         metric, amplitude = scales.metric[members], scales.amplitude[members]
         distance, prefactor = scaled_distances(points[members], metric)
         prefactor *= amplitude[:, :, None] * amplitude[:, None, :]

@@ -23,9 +23,8 @@ THETA = np.array([1.6, -0.3, 0.4])
 
 
 def terms(kernel: KernelName, theta: FloatArray) -> tuple[float, FloatArray]:
-    chosen = families(cKDTree(POINTS), 30)
-    assert chosen is not None
-    members = chosen.members
+    members = families(cKDTree(POINTS), 30)
+    assert members is not None
     distance, prefactor = scaled_distances(POINTS[members], SCALES.metric[members])
     return conditional_terms(KERNEL_CODES[kernel], distance, prefactor, NOISE[members], DEPTH[members], theta)
 
@@ -35,7 +34,7 @@ def test_each_term_is_the_joint_density_over_that_of_the_neighbours() -> None:
     chosen = families(cKDTree(POINTS), 30)
     assert chosen is not None
     plain = 0.0
-    for members in chosen.members:
+    for members in chosen:
         distance, prefactor = scaled_distances(POINTS[members], SCALES.metric[members])
         t = np.sqrt(3) * distance / np.exp(THETA[0])
         k = np.exp(2 * THETA[1]) * prefactor * (1 + t) * np.exp(-t) + np.exp(THETA[2]) * np.diag(NOISE[members])
@@ -61,9 +60,9 @@ def test_a_family_is_a_sounding_with_others_and_never_with_itself(n: int, count:
         assert chosen is None
         return
     assert chosen is not None
-    assert 1 <= len(chosen.members) <= count
-    assert chosen.members.shape[1] == 1 + sum(rank < n for rank in RANKS)
-    for members in chosen.members:
+    assert 1 <= len(chosen) <= count
+    assert chosen.shape[1] == 1 + sum(rank < n for rank in RANKS)
+    for members in chosen:
         assert len(set(members.tolist())) == len(members)
 
 
