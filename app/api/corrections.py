@@ -6,8 +6,8 @@ from app.api.auth import Operator, Reader
 from app.api.problems import problems
 from app.api.schemas import API, MissionId
 from app.api.state import Service
+from app.missions.import_views import CorrectionsView, TideCorrection
 from app.missions.spec import SoundSpeed
-from app.missions.views import CorrectionsView, TideCorrection
 
 router = APIRouter(
     prefix=f"{API}/missions/{{mission_id}}", tags=["maps"], responses=problems("unauthenticated", "forbidden")

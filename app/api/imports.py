@@ -8,7 +8,7 @@ from app.api.auth import Operator, Reader
 from app.api.problems import problems
 from app.api.schemas import API, MissionId
 from app.api.state import Service
-from app.missions.views import ImportOptions, ImportView, ReferenceView
+from app.missions.import_views import ImportOptions, ImportView, ReferenceView
 
 router = APIRouter(
     prefix=f"{API}/missions/{{mission_id}}", tags=["imports"], responses=problems("unauthenticated", "forbidden")

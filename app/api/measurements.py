@@ -10,7 +10,8 @@ from app.api.racing import first_of
 from app.api.schemas import API, MeasurementBatch, MissionId, VehicleName
 from app.api.state import Service, State
 from app.missions.measurement import Measurement
-from app.missions.views import BatchVerdict, ItemVerdict, Verdict, WaypointView
+from app.missions.sounding_views import BatchVerdict, ItemVerdict, Verdict
+from app.missions.views import WaypointView
 
 router = APIRouter(
     prefix=f"{API}/missions/{{mission_id}}", tags=["vehicles"], responses=problems("unauthenticated", "forbidden")

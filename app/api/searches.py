@@ -9,7 +9,7 @@ from app.api.problems import problems
 from app.api.schemas import API, MissionId, ScanBatch
 from app.api.state import Service
 from app.missions.search.views import SearchGridView
-from app.missions.views import BatchVerdict
+from app.missions.sounding_views import BatchVerdict
 
 router = APIRouter(
     prefix=f"{API}/missions/{{mission_id}}",

@@ -8,8 +8,8 @@ from app.api.auth import Operator, Reader
 from app.api.problems import problems
 from app.api.schemas import API, ActionRequest, MissionId
 from app.api.state import Service
+from app.missions.sounding_views import Ruling, SoundingPage, SoundingState, SoundingView
 from app.missions.spec_base import Name
-from app.missions.views import Ruling, SoundingPage, SoundingState, SoundingView
 
 router = APIRouter(
     prefix=f"{API}/missions/{{mission_id}}/soundings",

@@ -18,8 +18,9 @@ from app.api.schemas import API, MissionId
 from app.api.state import EdgeState, Service, State, edge_state
 from app.missions.broadcast import WatchEndedError
 from app.missions.errors import MissionError
+from app.missions.messages import EventMessage, LiveMessage, SnapshotMessage
 from app.missions.service import MissionService
-from app.missions.views import EventMessage, EventView, LiveMessage, SnapshotMessage
+from app.missions.views import EventView
 
 router = APIRouter(prefix=f"{API}/missions/{{mission_id}}", tags=["live"])
 

@@ -114,7 +114,7 @@ def import_file(
     database: Database = None,
 ) -> None:
     """Begin a mission with soundings or a map from elsewhere. The same file again changes nothing."""
-    from app.missions.views import ImportOptions, ImportView, ReferenceView
+    from app.missions.import_views import ImportOptions, ImportView, ReferenceView
 
     given = {
         "filename": file.name,
@@ -183,7 +183,7 @@ def tide(
     database: Database = None,
 ) -> None:
     """Correct a mission's tide, also afterwards: every sounding is corrected anew from its raw depth."""
-    from app.missions.views import CorrectionsView, TideCorrection
+    from app.missions.import_views import CorrectionsView, TideCorrection
 
     try:
         text = None if table is None else table.read_text(encoding="utf-8")

@@ -5,7 +5,7 @@ from collections import deque
 from collections.abc import AsyncIterator, Iterator
 from contextlib import contextmanager
 
-from app.missions.views import EventMessage, LiveMessage, WaypointsMessage
+from app.missions.messages import EventMessage, LiveMessage, WaypointsMessage
 
 MAX_BACKLOG = 5000
 """A watcher that is this far behind is cut off; it reconnects and gets a fresh snapshot."""

@@ -15,10 +15,12 @@ from app.missions.corrections import NO_LEVEL, Corrections
 from app.missions.errors import ConflictError, InvalidRequestError
 from app.missions.fleet import BeamGeometry, Position, SoundingReport
 from app.missions.gate import Gate
+from app.missions.import_views import CorrectionsView, TideCorrection, TideTableView
 from app.missions.journal import Counts
 from app.missions.live import LiveMission
+from app.missions.sounding_views import Ruling, Verdict
 from app.missions.spec import MissionSpec, SoundSpeed, Tide
-from app.missions.views import CorrectionsView, Level, Ruling, TideCorrection, TideTableView, Verdict
+from app.missions.views import Level
 from app.storage import soundings as sounding_queries
 from app.storage import stored_maps
 from app.storage.models import MissionRow, SoundingRow, TideTableRow

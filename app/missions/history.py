@@ -18,7 +18,7 @@ async def steps_after(live: LiveMission, after: int, limit: int) -> list[StepVie
         rows = await mission_queries.waypoints_between(session, live.id, steps[0].number, steps[-1].number)
     waypoints: dict[int, list[WaypointView]] = {}
     for row in rows:
-        waypoints.setdefault(row.step, []).append(live.waypoint_view(row))
+        waypoints.setdefault(row.step, []).append(live.waypoints.view(row))
     return [
         StepView(
             number=step.number,

@@ -25,9 +25,10 @@ from app.mapping.supersoundings import merge_soundings
 from app.mapping.types import Soundings
 from app.missions.clock import now
 from app.missions.errors import ConflictError, ImportNotFoundError, InvalidRequestError
+from app.missions.import_views import ImportOptions, ImportView, ReferenceView
 from app.missions.live import LiveMission
 from app.missions.states import ENDED
-from app.missions.views import ImportOptions, ImportView, Level, ReferenceView
+from app.missions.views import Level
 from app.storage import soundings as sounding_queries
 from app.storage import stored_maps
 from app.storage.models import ImportRow, ReferenceRow

@@ -23,9 +23,11 @@ from app.missions.corrections import NO_LEVEL
 from app.missions.errors import MissionElsewhereError
 from app.missions.fleet import ScanReport, SoundingReport, VehicleReport, WaypointReport
 from app.missions.gate import Gate, GatedSounding
+from app.missions.messages import EventMessage
 from app.missions.outlasting import RETRY_S, Outlasting
+from app.missions.sounding_views import ItemVerdict, Verdict
 from app.missions.telemetry import VehicleSample
-from app.missions.views import EventMessage, EventView, ItemVerdict, Level, Verdict
+from app.missions.views import EventView, Level
 from app.storage import missions as mission_queries
 from app.storage import soundings as sounding_queries
 from app.storage import telemetry as telemetry_queries

@@ -2,32 +2,27 @@
 
 import asyncio
 import math
-import time
 from collections.abc import Callable
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, TypeVar
 
-import numpy as np
 import structlog
 from shapely.geometry import Polygon
 
 from app.mapping.georeference import LocalFrame
-from app.mapping.tides import TideTable, parse_tid
+from app.mapping.tides import TideTable
 from app.mapping.types import FloatArray
 from app.missions.broadcast import Broadcaster
-from app.missions.clock import now
 from app.missions.corrections import Corrections
 from app.missions.fleet import (
     FleetEvent,
     LinkReport,
     LinkState,
-    Position,
     RangeReport,
     ScanReport,
     SoundingReport,
-    VehicleInfo,
     VehicleReport,
     WaypointReport,
 )
@@ -38,45 +33,29 @@ from app.missions.map_builder import BuiltMap, MapBuilder
 from app.missions.map_tiles import TileCache
 from app.missions.maps import MapSnapshot, MissionFacts
 from app.missions.members import Member, Team
-from app.missions.position_quality import position_quality
+from app.missions.messages import StateMessage
 from app.missions.range_journal import RangeJournal
-from app.missions.search.scans import report_of, take
+from app.missions.search.scans import take
 from app.missions.search.state import Search
-from app.missions.search.views import SearchMessage, progress_of
-from app.missions.spec import MissionSpec, VehicleSpec
+from app.missions.search.views import SearchProgress, progress_of
+from app.missions.spec import MissionSpec
 from app.missions.states import ENDED, MissionState
 from app.missions.target_showing import target_views
 from app.missions.target_views import TargetView
+from app.missions.telling import Telling
 from app.missions.tracking import Tracking
-from app.missions.tracking import warm_up as tracking_warm_up
 from app.missions.trails import Trails
-from app.missions.views import (
-    MapMessage,
-    MissionSummary,
-    Progress,
-    StateMessage,
-    TargetsMessage,
-    VehiclesMessage,
-    VehicleView,
-    WaypointsMessage,
-    WaypointView,
-)
+from app.missions.vehicle_showing import VehicleShowing, local_place
+from app.missions.views import MissionSummary, Progress
+from app.missions.waypoint_board import WaypointBoard
 from app.missions.whole_set import WholeSet
 from app.storage import events as event_queries
-from app.storage import missions as mission_queries
-from app.storage import scans as scan_queries
 from app.storage import soundings as sounding_queries
-from app.storage import stored_maps
 from app.storage.database import Database
 from app.storage.grouping import Grouped
-from app.storage.models import MissionRow, PositionRow, TideTableRow, WaypointRow
+from app.storage.models import MissionRow
 from app.storage.sharing import Shared
 
-LIVE_PERIOD_S = 0.2
-CROWD, MOST_PERIODS = 20, 5
-"""For so many viewers more the period grows by itself once, so many times at most."""
-CROWD_MAP_S = 4.0
-"""Least time between two maps that a crowd is told of."""
 RISES = "rises"
 """Marks events that tell of a vehicle sent up for a fix."""
 
@@ -100,7 +79,7 @@ class Header:
 
 
 class LiveMission:
-    """One mission in memory. Made by ``load``; the step loop, the service and the watchers share it."""
+    """One mission in memory. Made by ``take_up``; the step loop, the service and the watchers share it."""
 
     def __init__(
         self,
@@ -156,75 +135,14 @@ class LiveMission:
         self.running_since_s: float | None = None
         self.database = database
         """What is written through it is refused once another process has the mission."""
-        self._hub = hub
+        self.waypoints = WaypointBoard(spec, self.broadcaster)
+        self.vehicles = VehicleShowing(row.id, spec, self.frame, hub, self.team)
+        targets = self.target_views if spec.targets else None
+        self.telling = Telling(self.broadcaster, self.vehicles.all, targets, self.search_progress)
         self._time_scale = time_scale
         self._executor = executor
-        self._waypoints: dict[str, WaypointView] = {}
-        self._places: dict[str, tuple[Position, tuple[float, float] | None]] = {}
-        self._ticker: asyncio.Task[None] | None = None
-        self._map_news: MapMessage | None = None
-        self._map_told_s = -math.inf
-        self._search_told = 0
         self.notice_imports = Shared(self._notice_imports)
         """Take up the soundings of logs that the command line imported while this process had the mission."""
-
-    @classmethod
-    async def load(
-        cls, database: Database, hub: FleetHub, executor: Executor, row: MissionRow, time_scale: float = 1.0
-    ) -> "LiveMission":
-        """Take a mission up from the database, as it was last committed."""
-        async with database.reading() as session:
-            imported = await event_queries.last_event_id(session, row.id, kind="import")
-            stored = await stored_maps.stored_map(session, row.id, imported)
-            prior = await sounding_queries.any_imported(session, row.id)
-            vehicles = await mission_queries.vehicles_of(session, row.id)
-            waypoints = await mission_queries.newest_waypoints(session, row.id)
-            step = await mission_queries.last_step(session, row.id)
-            positions = await mission_queries.last_positions(session, row.id)
-            reference = await sounding_queries.reference_grid(session, row.id)
-            tide = await session.get(TideTableRow, row.id)
-            risings = await event_queries.count_by_vehicle(session, row.id, "surface", RISES)
-        # Building the spec checks geometry, which takes milliseconds: not on the event loop.
-        loop = asyncio.get_running_loop()
-        spec = await loop.run_in_executor(executor, MissionSpec.model_validate, row.spec)
-        table = None
-        if tide is not None:
-            table = await loop.run_in_executor(executor, partial(parse_tid, tide.text, name=tide.name))
-        search = None
-        if spec.search is not None:
-            search = await loop.run_in_executor(executor, Search, spec, spec.search, spec.frame(), time_scale)
-        counts = Counts(stored.accepted, stored.rejected)
-        # Which cells lie in the area is quick to tell of hundreds, and holds everyone up of millions.
-        builder = await asyncio.to_thread(builder_of, spec)
-        live = cls(database, hub, executor, row, spec, counts, table, time_scale, search, builder)
-        if spec.targets:
-            await loop.run_in_executor(executor, tracking_warm_up)
-            async with database.reading() as session:
-                await live.ranges.load(session, step)
-        await live.whole.show(stored, imported=prior, ended=live.header.state in ENDED)
-        await live._take_up_search()
-        live.reference_m = reference
-        live.whole.imports_noticed = imported
-        await live.trails.newest()
-        live.journal.travelled_m = live.trails.length_m
-        if step is not None:
-            live.set_step(step.number, step.objective, step.terms)
-        for vehicle in vehicles:
-            if vehicle.left_at is None:
-                member = live.team.join(VehicleSpec.model_validate(vehicle.spec), vehicle.slot)
-                member.report = _last_report(positions.get(member.name))
-                member.risings = risings.get(member.name, 0)
-        live.show_waypoints([live.waypoint_view(waypoint) for waypoint in waypoints])
-        return live
-
-    async def _take_up_search(self) -> None:
-        """Make the site's grid of every scan that was accepted."""
-        if self.search is None:
-            return
-        async with self.database.reading() as session:
-            scans = await scan_queries.accepted_scans(session, self.id)
-            self.search.began_at = await mission_queries.first_step_at(session, self.id)
-        await self.in_thread(self.search.see, [report_of(row) for row in scans])
 
     def make_gate(self) -> Gate:
         """Return a gate with the mission's corrections, which has seen no sounding yet."""
@@ -271,7 +189,7 @@ class LiveMission:
             return
         match event:
             case VehicleReport():
-                if self.local_place(event.position) is None:
+                if local_place(self.frame, event.position) is None:
                     log.warning("position is not near the mission, ignored", vehicle=event.vehicle)
                     return
                 member.report = event
@@ -302,44 +220,7 @@ class LiveMission:
         member.status = event.status
         member.reason = event.reason
         self.journal.waypoint(event)
-        shown = self._waypoints.get(member.name)
-        if shown is not None and shown.step == event.step:
-            update = {"status": event.status, "reason": event.reason}
-            self.show_waypoints([shown.model_copy(update=update)])
-
-    def show_waypoints(self, waypoints: list[WaypointView]) -> None:
-        """Make these the vehicles' newest waypoints and tell everyone who watches."""
-        if waypoints:
-            self._waypoints |= {waypoint.vehicle: waypoint for waypoint in waypoints}
-            self.broadcaster.publish(WaypointsMessage(waypoints=waypoints))
-
-    @property
-    def waypoints(self) -> list[WaypointView]:
-        """The newest waypoint of each vehicle."""
-        return list(self._waypoints.values())
-
-    def waypoint_of(self, vehicle: str) -> WaypointView | None:
-        """Return a vehicle's newest waypoint."""
-        return self._waypoints.get(vehicle)
-
-    def waypoint_view(self, row: WaypointRow) -> WaypointView:
-        """Return a stored waypoint as it is shown."""
-        return WaypointView.model_validate(
-            {
-                "vehicle": row.vehicle,
-                "step": row.step,
-                "lat_deg": row.lat_deg,
-                "lon_deg": row.lon_deg,
-                "east_m": row.east_m,
-                "north_m": row.north_m,
-                "depth_m": row.depth_m,
-                "speed_mps": self.spec.speed_mps,
-                "arrival_radius_m": self.spec.arrival_radius_m,
-                "min_altitude_m": self.spec.limits.min_altitude_m,
-                "status": row.status,
-                "reason": row.reason,
-            }
-        )
+        self.waypoints.take(event)
 
     async def build_map(self) -> BuiltMap | None:
         """Make the map of everything accepted so far as thoroughly as for a product, in a worker thread."""
@@ -378,28 +259,7 @@ class LiveMission:
 
     def publish_map(self, built: BuiltMap) -> None:
         """Tell everyone who watches that there is a new map."""
-        depth = built.map.depth_m[np.isfinite(built.map.depth_m)]
-        self._map_news = MapMessage(
-            version=built.version,
-            step=self.header.step,
-            min_depth_m=float(depth.min()) if depth.size else None,
-            max_depth_m=float(depth.max()) if depth.size else None,
-        )
-        self._tell_of_map()
-
-    def _tell_of_map(self) -> None:
-        """Publish what is new of the map; to a crowd, who would all fetch it, not before it is time again."""
-        wait_s = 0.0 if self.broadcaster.viewers < CROWD else CROWD_MAP_S
-        if self._map_news is not None and time.monotonic() - self._map_told_s >= wait_s:
-            self.broadcaster.publish(self._map_news)
-            self._map_news, self._map_told_s = None, time.monotonic()
-
-    def _tell_of_search(self) -> None:
-        """Publish how a search stands when a scan changed that."""
-        found = progress_of(self.search, self.team, self.frame)
-        if found is not None and found.version != self._search_told:
-            self._search_told = found.version
-            self.broadcaster.publish(SearchMessage(search=found))
+        self.telling.of_map(built, self.header.step)
 
     def figures(self) -> dict[str, float]:
         """Return how far the mission has come, as each step keeps it."""
@@ -430,8 +290,12 @@ class LiveMission:
             terms=header.terms or {},
             elapsed_s=header.elapsed_s + running_s,
             eta_s=self._eta_s(),
-            search=progress_of(self.search, self.team, self.frame),
+            search=self.search_progress(),
         )
+
+    def search_progress(self) -> SearchProgress | None:
+        """Return how a search stands; None in a survey."""
+        return progress_of(self.search, self.team, self.frame)
 
     def _eta_s(self) -> float | None:
         """Return how long the mission still takes, wall-clock seconds; a search as long as its time window lasts."""
@@ -465,98 +329,21 @@ class LiveMission:
         """Tell everyone who watches about state and progress."""
         self.broadcaster.publish(StateMessage(mission=self.summary()))
 
-    def vehicle_views(self) -> list[VehicleView]:
-        """Return the vehicles that take part."""
-        infos = self._hub.infos()
-        return [self._vehicle_view(member, infos.get(member.key)) for member in self.team]
-
-    def vehicle_view(self, info: VehicleInfo) -> VehicleView | None:
-        """Return a vehicle of this name and kind, if it takes part."""
-        member = self.team.get(info.name)
-        return None if member is None or member.key != (info.kind, info.name) else self._vehicle_view(member, info)
-
     def target_views(self) -> list[TargetView]:
         """Return the moving targets, foretold for now."""
         pursuers = {member.pursuing: member.name for member in self.team if member.pursuing is not None}
         return target_views(self.ranges.tracking, self.frame, self.area, self.ranges.times.now_s(), pursuers)
 
-    def _vehicle_view(self, member: Member, info: VehicleInfo | None) -> VehicleView:
-        info = info or self._hub.info(member.key)
-        report = member.report or info.report
-        view = VehicleView(
-            name=member.name,
-            kind=member.spec.kind,
-            sensor=member.spec.sensor,
-            mission_id=self.id,
-            link=info.state,
-            reason=member.refusal or info.reason,
-            age_s=rounded(info.age_s, 2),
-            address=info.address,
-            imc_id=info.imc_id,
-            surfacing=member.surfacing,
-            risings=member.risings,
-            pursuing=member.pursuing,
-        )
-        if report is None:
-            return view
-        position = report.position
-        known = self._places.get(member.name)
-        if known is None or known[0] is not position:
-            # It is shown far more often than it moves.
-            known = self._places[member.name] = position, self.local_place(position)
-        place = known[1]
-        return view.model_copy(
-            update={
-                # No more digits than mean anything: this goes to every viewer several times a second.
-                "lat_deg": round(position.lat_deg, 8),
-                "lon_deg": round(position.lon_deg, 8),
-                "east_m": place and round(place[0], 3),
-                "north_m": place and round(place[1], 3),
-                "depth_m": round(position.depth_m, 3),
-                "altitude_m": rounded(report.altitude_m, 3),
-                "heading_deg": rounded(report.heading_rad and math.degrees(report.heading_rad) % 360, 2),
-                "speed_mps": rounded(report.speed_mps, 3),
-                "battery_pct": rounded(report.battery_pct, 2),
-                "position_sd_m": rounded(report.position_sd_m, 3),
-                "localization": position_quality(report.position_sd_m, self.spec.surface_policy),
-            }
-        )
-
-    def local_place(self, position: Position) -> tuple[float, float] | None:
-        """Return east and north of a position; None when it is not near enough to be on the mission's frame."""
-        try:
-            east, north = self.frame.to_local(position.lat_deg, position.lon_deg)
-        except ValueError:
-            return None
-        return float(east), float(north)
-
-    def start_ticker(self) -> None:
-        """Send the vehicles' positions at a steady rate while anyone watches."""
-        if self._ticker is None or self._ticker.done():
-            self._ticker = asyncio.create_task(self._tick())
-
-    async def _tick(self) -> None:
-        while self.broadcaster.watched:
-            self.broadcaster.publish(VehiclesMessage(time=now(), vehicles=self.vehicle_views()))
-            if self.spec.targets:
-                self.broadcaster.publish(TargetsMessage(time=now(), targets=self.target_views()))
-            self._tell_of_search()
-            self._tell_of_map()
-            await asyncio.sleep(live_period_s(self.broadcaster.viewers))
-
     def abandon(self) -> None:
         """Write nothing any more, and send everyone who watches to the process that has the mission now."""
-        if self._ticker is not None:
-            self._ticker.cancel()
+        self.telling.stop()
         self.ranges.abandon()
         self.journal.abandon()
         self.broadcaster.end("another process has the mission now")
 
     async def close(self) -> None:
         """Write what is left."""
-        if self._ticker is not None:
-            self._ticker.cancel()
-            await asyncio.gather(self._ticker, return_exceptions=True)
+        await self.telling.close()
         await self.ranges.close()
         await self.journal.close()
         await self.whole.close(self.header.step)
@@ -565,20 +352,3 @@ class LiveMission:
 def builder_of(spec: MissionSpec) -> MapBuilder:
     """Return the builder of a mission's map, which knows of no sounding yet."""
     return MapBuilder(spec.local_area(), spec.cell_m, spec.accuracy_m)
-
-
-def live_period_s(viewers: int) -> float:
-    """Return how often positions are sent: a crowd of viewers sees them less often, so that it costs hardly more."""
-    return LIVE_PERIOD_S * min(MOST_PERIODS, 1.0 + viewers // CROWD)
-
-
-def rounded(value: float | None, digits: int) -> float | None:
-    """Return a value with so many decimals; None stays."""
-    return None if value is None else round(value, digits)
-
-
-def _last_report(row: PositionRow | None) -> VehicleReport | None:
-    """Return where a vehicle was last: one that holds there and only polls has nothing new to tell."""
-    if row is None:
-        return None
-    return VehicleReport(row.vehicle, row.time_s, Position(row.lat_deg, row.lon_deg, row.depth_m))

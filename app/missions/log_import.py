@@ -20,8 +20,10 @@ from app.missions.journal import TRACK_SPACING_M, position_row, track_length_m
 from app.missions.links.imc import bridge_settings, sounding_report, vehicle_report
 from app.missions.live import LiveMission
 from app.missions.settings import ServiceSettings
+from app.missions.sounding_views import LogImportView, Verdict
 from app.missions.spec_base import Name
-from app.missions.views import Level, LogImportView, Verdict
+from app.missions.vehicle_showing import local_place
+from app.missions.views import Level
 from app.storage import missions as mission_queries
 from app.storage import soundings as sounding_queries
 from app.storage.models import BatchRow
@@ -146,7 +148,7 @@ class LogImport:
                 if last is None or track_length_m([last, end]) >= TRACK_SPACING_M:
                     last = end
                     report = vehicle_report(event)
-                    place = self._live.local_place(report.position)
+                    place = local_place(self._live.frame, report.position)
                     if place is not None and shapely.contains_xy(self._zone, *place):
                         yield report
 

@@ -12,8 +12,8 @@ from app.mapping.products.overlay import overlay_corners
 from app.mapping.types import FloatArray
 from app.mapping.vertical import VerticalDatum
 from app.missions.map_builder import BuiltMap
+from app.missions.map_views import MapView
 from app.missions.spec import MissionSpec
-from app.missions.views import MapView
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ from app.missions.live import LiveMission
 from app.missions.map_keeping import MapKeeper
 from app.missions.ownership import Ownership
 from app.missions.states import ENDED
+from app.missions.taking_up import take_up
 from app.missions.views import MissionSummary
 from app.storage.database import Database
 from app.storage.models import MissionRow
@@ -89,7 +90,7 @@ class Memory:
                 # Its last owner may have written until the moment it was taken.
                 async with database.reading() as session:
                     row = await session.get_one(MissionRow, mission_id)
-            live = await LiveMission.load(database, self._hub, self._executor, row, self._time_scale)
+            live = await take_up(database, self._hub, self._executor, row, self._time_scale)
             await self._make_room()
             self._live[mission_id] = live
             self._left.pop(mission_id, None)

@@ -29,7 +29,7 @@ async def waypoint(
     after = -1 if after_step is None else after_step
 
     def newer() -> WaypointView | None:
-        shown = live.waypoint_of(vehicle)
+        shown = live.waypoints.of(vehicle)
         ready = shown is not None and shown.step > after and shown.status is not WaypointStatus.PLANNED
         return shown if ready and member.order is not None else None
 
@@ -54,7 +54,7 @@ async def waypoint(
     found = newer()
     if found is not None and polls:
         rest.has_waypoint(vehicle, found.step)
-        return live.waypoint_of(vehicle)
+        return live.waypoints.of(vehicle)
     return found
 
 

@@ -13,6 +13,7 @@ from app.missions.live import LiveMission
 from app.missions.members import Member
 from app.missions.search.checks import search_checks
 from app.missions.spec import VehicleKind
+from app.missions.vehicle_showing import local_place
 from app.missions.views import CheckStatus, CheckView, PreflightView
 
 LOW_BATTERY_PCT, EMPTY_BATTERY_PCT = 40.0, 15.0
@@ -136,7 +137,7 @@ def _place(live: LiveMission, hub: FleetHub, member: Member) -> Point | None:
     report = member.report or hub.info(member.key).report
     if report is None:
         return None
-    place = live.local_place(report.position)
+    place = local_place(live.frame, report.position)
     return Point(place) if place is not None else Point(1e7, 1e7)
 
 

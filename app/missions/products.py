@@ -26,7 +26,7 @@ from app.mapping.s44 import Order
 from app.mapping.types import Soundings
 from app.missions.errors import InvalidRequestError, MapNotReadyError
 from app.missions.maps import MapSnapshot, MissionFacts
-from app.missions.views import Verdict
+from app.missions.sounding_views import Verdict
 from app.storage.models import SoundingRow
 
 CONTOURS_PER_MAP = 10

@@ -4,8 +4,8 @@ from dataclasses import asdict
 
 from app.mapping.compare import difference
 from app.mapping.s44 import Order, conformity
+from app.missions.map_views import ConformityView, DifferenceView, QualityView
 from app.missions.maps import MapSnapshot
-from app.missions.views import ConformityView, DifferenceView, QualityView
 
 
 def quality_of(snapshot: MapSnapshot) -> QualityView:

@@ -16,9 +16,10 @@ from app.missions.errors import MissionElsewhereError
 from app.missions.fleet import Position, RangeReport
 from app.missions.journal import Journal
 from app.missions.outlasting import RETRY_S
+from app.missions.sounding_views import ItemVerdict, Verdict
 from app.missions.tracking import Arrived, Judged, Tracking
 from app.missions.vehicle_times import VehicleTimes
-from app.missions.views import ItemVerdict, Level, Verdict
+from app.missions.views import Level
 from app.storage import target_ranges as range_queries
 from app.storage.database import Database
 from app.storage.models import StepRow

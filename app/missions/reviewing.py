@@ -10,7 +10,8 @@ from app.missions.errors import ConflictError, SoundingNotFoundError
 from app.missions.gate import implausible_value
 from app.missions.journal import Counts
 from app.missions.live import LiveMission
-from app.missions.views import Level, Ruling, SoundingPage, SoundingState, SoundingView, Verdict
+from app.missions.sounding_views import Ruling, SoundingPage, SoundingState, SoundingView, Verdict
+from app.missions.views import Level
 from app.storage import soundings as sounding_queries
 from app.storage import stored_maps
 from app.storage.models import EventRow, SoundingRow

@@ -7,46 +7,39 @@ after it. So a crash between any two moments loses nothing and repeats nothing b
 
 import asyncio
 import math
-import threading
 from collections.abc import Callable
-from concurrent.futures import Executor, Future
+from concurrent.futures import Executor
 
 import numpy as np
-import structlog
 from numpy.typing import NDArray
-from sqlalchemy.orm import make_transient
 
 from app.estimation import SingleBeam
-from app.exploration.bottom import Bottom
 from app.exploration.planners import create_planner
 from app.exploration.problem import Planner
-from app.missions import metrics, safety
+from app.missions import metrics
 from app.missions.clock import now
+from app.missions.committing import Committing
 from app.missions.decision import Decision, Place, decide, make_constraints
 from app.missions.engaging import Engaging
 from app.missions.fleet import (
-    Position,
     VehicleRefusedError,
     WaypointOrder,
     WaypointReport,
     WaypointStatus,
 )
 from app.missions.hub import FleetHub
-from app.missions.live import RISES, LiveMission
-from app.missions.map_builder import MapBuilder
+from app.missions.live import LiveMission
 from app.missions.members import SETTLED, Member
 from app.missions.sampling import keep_telemetry
 from app.missions.search.lookout import Lookout
 from app.missions.spec import Guidance
+from app.missions.step_maps import StepMaps
+from app.missions.timekeeping import keep_time, save_elapsed
 from app.missions.views import Level
 from app.storage import missions as mission_queries
-from app.storage.models import StepRow, WaypointRow
 from app.storage.shielding import to_the_end
 from imc_bridge.plans import leg_time_s
 
-ELAPSED_PERIOD_S = 5.0
-CLOCK_SET_S = 2.0
-"""A wall clock that gained or lost more than this between two looks was set."""
 PACE_MEMORY = 0.9
 """Weight of the past in the running mean of a step's duration."""
 
@@ -56,20 +49,10 @@ EXPECTED_DECISION_S = 0.3
 SOUND_S = 60.0
 """What commands and reports take by sound, at the most."""
 
-LEAD_M = 25.0
-"""How far beyond a waypoint a vehicle may be sent to pass it straight; more than the 15 m from which DUNE circles."""
-
-PATIENCE_S = 2.0
-"""How much of the vehicles' time a decision may wait for a newer map."""
-
 REPORT_DELAY_S = 0.1
 """How old a vehicle's last report is at most, on the wall clock."""
 
 FloatArray = NDArray[np.float64]
-
-_LEARNING = threading.Lock()
-
-log = structlog.get_logger(__name__)
 
 
 class Runner:
@@ -89,10 +72,9 @@ class Runner:
         self._spec = live.spec
         self._constraints = make_constraints(live.spec)
         self._decision_s = EXPECTED_DECISION_S
-        self._mapping_s = 0.0
-        self._mapping: asyncio.Task[None] | None = None
-        self._bottom = Bottom.unknown()
+        self._maps = StepMaps(live, executor, time_scale)
         self._lookout = Lookout(live, time_scale, self._wait)
+        self._committing = Committing(live, self._constraints, leads=not self._lookout.needed)
 
     async def run(self) -> str:
         """Fly all remaining steps. Returns why there are no more; raises whatever went wrong."""
@@ -101,7 +83,7 @@ class Runner:
         metrics.RUNNING.inc()
         keepers = [
             asyncio.create_task(Engaging(live, self._hub, self._time_scale, self._send_to).keep()),
-            asyncio.create_task(self._keep_time()),
+            asyncio.create_task(keep_time(live)),
             asyncio.create_task(keep_telemetry(live, self._time_scale)),
         ]
         try:
@@ -113,12 +95,11 @@ class Runner:
                     await self._gather_team(patient=live.header.step == 0)
                     await self._lookout.look_round()
                     decision = await self._decide(planner, self._places())
-                await self._commit(decision)
+                await self._committing.commit(decision)
                 await self._send()
                 taken = decision
                 # The map is made and its model refined while the vehicles travel.
-                self._begin_map()
-                self._executor.submit(_learn, live.builder).add_done_callback(_log_failure)
+                self._maps.begin()
                 decision = await self._travel(planner)
                 step_s = asyncio.get_running_loop().time() - started_s
                 self._keep_pace(step_s)
@@ -127,11 +108,11 @@ class Runner:
             return "every step is done"
         finally:
             metrics.RUNNING.dec()
-            helpers = [*keepers, *([self._mapping] if self._mapping else [])]
-            for helper in helpers:
-                helper.cancel()
-            await asyncio.gather(*helpers, return_exceptions=True)
-            await to_the_end(self._save_elapsed())
+            for keeper in keepers:
+                keeper.cancel()
+            await asyncio.gather(*keepers, return_exceptions=True)
+            await self._maps.end()
+            await to_the_end(save_elapsed(live))
             live.running_since_s = None
 
     async def _recover(self) -> Planner:
@@ -149,10 +130,9 @@ class Runner:
         for row in rows:
             member = self._live.team.get(row.vehicle)
             if member is not None and WaypointStatus(row.status) not in SETTLED:
-                member.order = self._order(row, member)
-                member.status = WaypointStatus.PLANNED
-                again.append(self._live.waypoint_view(row).model_copy(update={"status": WaypointStatus.PLANNED}))
-        self._live.show_waypoints(again)
+                self._committing.order(row, member)
+                again.append(row)
+        self._live.waypoints.show_rows(again, WaypointStatus.PLANNED)
         await self._live.journal.log(
             Level.INFO, "resumed", f"going on after step {step.number} of {self._spec.steps}", step=step.number
         )
@@ -242,44 +222,11 @@ class Runner:
             np.linalg.norm(there[place.vehicle] - place.en_m) <= tolerance_m for place in expected
         )
 
-    def _begin_map(self) -> None:
-        """Make a map of what has been sounded so far, unless one is being made."""
-        if self._mapping is None:
-            self._mapping = asyncio.create_task(self._make_map())
-
-    async def _make_map(self) -> None:
-        live, loop = self._live, asyncio.get_running_loop()
-        started_s = loop.time()
-        await live.journal.flush()
-        await live.whole.complete()
-        before = live.builder.newest
-        built = await loop.run_in_executor(self._executor, live.builder.build)
-        if built is not None and built is not before:
-            live.publish_map(built)
-        self._mapping_s = loop.time() - started_s
-        await live.whole.keep_when_grown(live.header.step)
-
-    async def _renew_map(self) -> None:
-        """Bring the map up to date, unless vehicles would circle for long meanwhile: then the newest has to do.
-
-        That is so where many soundings are mapped, or time runs fast. A failure to make the map comes out here.
-        """
-        live = self._live
-        patient = live.builder.newest is None or self._mapping_s * self._time_scale <= PATIENCE_S
-        if self._mapping is not None and (patient or self._mapping.done()):
-            mapping, self._mapping = self._mapping, None
-            await mapping
-        await live.journal.flush()
-        await live.notice_imports()
-        await live.whole.complete()
-        if patient and live.builder.stale:
-            await self._make_map()
-
     async def _decide(self, planner: Planner, places: list[Place]) -> Decision:
         """Bring the map up to date, then make the decision, in a worker thread."""
         live = self._live
         started_s = asyncio.get_running_loop().time()
-        await live.journal.storage.done(self._renew_map)
+        await live.journal.storage.done(self._maps.renew)
 
         step_s = self._spec.limits.max_step_m / self._spec.speed_mps
         await live.journal.storage.done(live.ranges.flush)
@@ -308,124 +255,6 @@ class Runner:
         # Some decisions take longer than most. Vehicles would circle for them if the usual one were allowed for.
         self._decision_s = max(took_s, PACE_MEMORY * self._decision_s + (1 - PACE_MEMORY) * took_s)
         return decision
-
-    async def _commit(self, decision: Decision) -> None:
-        """Make the step durable: decision, waypoints and memory together."""
-        live = self._live
-        number = live.header.step + 1
-        built = live.builder.newest
-        rows = [self._waypoint_row(number, leg.vehicle, leg.target_m, leg.refusal) for leg in decision.legs]
-        step = StepRow(
-            mission_id=live.id,
-            number=number,
-            committed_at=now(),
-            objective=decision.objective,
-            terms=dict(decision.terms),
-            figures=live.figures(),
-            soundings=built.soundings if built else 0,
-            map_digest=built.digest if built else "",
-            memory=decision.memory,
-            targets=live.ranges.memory(),
-        )
-        # The step is not flown before it is on disk, however long that takes; the vehicles wait where they are.
-        await live.journal.storage.done(lambda: to_the_end(self._store(step, rows)))
-        if live.search is not None and live.search.began_at is None:
-            live.search.began_at = step.committed_at
-        metrics.STEPS.inc()
-        live.set_step(number, decision.objective, decision.terms)
-        self._bottom = decision.bottom
-        for member in live.team:
-            member.order = None
-            member.status = None
-        for row in rows:
-            member_of_row = live.team.get(row.vehicle)
-            if member_of_row is not None and row.status != WaypointStatus.REFUSED:
-                member_of_row.order = self._order(row, member_of_row)
-                member_of_row.status = WaypointStatus.PLANNED
-        live.show_waypoints([live.waypoint_view(row) for row in rows])
-        live.publish_summary()
-        for leg in decision.legs:
-            going = live.team.get(leg.vehicle)
-            if going is not None:
-                going.risings += leg.surfacing and not going.surfacing
-                going.surfacing = leg.surfacing
-        for vehicle, fix in decision.fixes.items():
-            rises = any(leg.surfacing for leg in decision.legs if leg.vehicle == vehicle)
-            await live.journal.log(Level.INFO, "surface", fix, step=number, vehicle=vehicle, **{RISES: rises})
-        await self._tell_of_pursuits(decision, number)
-        for note in decision.notes:
-            await live.journal.log(Level.WARNING, "safety", note, step=number)
-
-    async def _tell_of_pursuits(self, decision: Decision, number: int) -> None:
-        """Say which vehicles left the mapping for a target, and which came back."""
-        for member in self._live.team:
-            target, before = decision.pursuits.get(member.name), member.pursuing
-            member.pursuing = target
-            if target == before:
-                continue
-            words = f"{member.name} goes on with the mapping" if target is None else f"{member.name} goes for {target}"
-            await self._live.journal.log(Level.INFO, "target", words, step=number, vehicle=member.name)
-
-    async def _store(self, step: StepRow, waypoints: list[WaypointRow]) -> None:
-        async with self._live.database.writing() as session:
-            known = await session.get(StepRow, (step.mission_id, step.number))
-            if known is not None and known.committed_at == step.committed_at:
-                return  # written before the connection broke
-            for row in (step, *waypoints):
-                make_transient(row)  # of a transaction that failed
-            session.add(step)
-            await session.flush()
-            session.add_all(waypoints)
-            # Only the last one's is ever needed; on a day's mission all of them would fill the disk.
-            await mission_queries.forget_memory(session, self._live.id, step.number - 1)
-
-    def _waypoint_row(
-        self,
-        step: int,
-        vehicle: str,
-        target_m: np.ndarray,
-        refusal: str,
-    ) -> WaypointRow:
-        lat, lon = self._live.frame.to_geographic(np.array(target_m[0]), np.array(target_m[1]))
-        return WaypointRow(
-            mission_id=self._live.id,
-            step=step,
-            vehicle=vehicle,
-            lat_deg=float(lat),
-            lon_deg=float(lon),
-            east_m=float(target_m[0]),
-            north_m=float(target_m[1]),
-            depth_m=float(target_m[2]),
-            status=WaypointStatus.REFUSED if refusal else WaypointStatus.PLANNED,
-            reason=refusal,
-            changed_at=now(),
-        )
-
-    def _order(self, row: WaypointRow, member: Member) -> WaypointOrder:
-        lead: Position | None = None
-        bottom: tuple[Position, ...] = ()
-        if member.report is not None and not self._lookout.needed:
-            start, target = member.place_m(self._live.frame), np.array([row.east_m, row.north_m])
-            beyond = safety.lead_point(self._constraints, start, target, LEAD_M)
-            lead = self._position(beyond[0], beyond[1], row.depth_m)
-            tide_m = self._spec.tide.level_m
-            known = safety.bottom_on_way(np.array([start, target, beyond]), self._bottom)
-            bottom = tuple(self._position(east, north, depth + tide_m) for east, north, depth in known)
-        return WaypointOrder(
-            mission_id=self._live.id,
-            step=row.step,
-            vehicle=row.vehicle,
-            position=Position(row.lat_deg, row.lon_deg, row.depth_m),
-            speed_mps=self._spec.speed_mps,
-            arrival_radius_m=self._spec.arrival_radius_m,
-            min_altitude_m=self._spec.limits.min_altitude_m,
-            lead=lead,
-            bottom=bottom,
-        )
-
-    def _position(self, east_m: float, north_m: float, depth_m: float) -> Position:
-        lat, lon = self._live.frame.to_geographic(np.array(east_m), np.array(north_m))
-        return Position(float(lat), float(lon), float(depth_m))
 
     async def _send(self) -> None:
         await asyncio.gather(*(self._send_to(member) for member in self._live.team if member.engaged and member.busy))
@@ -506,52 +335,3 @@ class Runner:
     def _keep_pace(self, seconds: float) -> None:
         before = self._live.seconds_per_step
         self._live.seconds_per_step = seconds if before is None else PACE_MEMORY * before + (1 - PACE_MEMORY) * seconds
-
-    async def _keep_time(self) -> None:
-        loop = asyncio.get_running_loop()
-        ahead_s = now().timestamp() - loop.time()
-        while True:
-            await asyncio.sleep(ELAPSED_PERIOD_S)
-            await to_the_end(self._save_elapsed())
-            before_s, ahead_s = ahead_s, now().timestamp() - loop.time()
-            await self._tell_of_clock(ahead_s - before_s)
-
-    async def _tell_of_clock(self, by_s: float) -> None:
-        """Say that the wall clock was set; nothing that moves vehicles depends on it."""
-        if abs(by_s) < CLOCK_SET_S:
-            return
-        message = (
-            f"this machine's clock was set {'forward' if by_s > 0 else 'back'} by {abs(by_s):.0f} s: times in the log, "
-            "and the water level that a tide table gives for now, follow it. See that it is right"
-        )
-        await self._live.journal.log(Level.WARNING, "clock", message, seconds=round(by_s))
-
-    async def _save_elapsed(self) -> None:
-        live = self._live
-        loop_time = asyncio.get_running_loop().time()
-        if live.running_since_s is None:
-            return
-        seconds = loop_time - live.running_since_s
-        try:
-            async with live.database.writing() as session:
-                await mission_queries.add_elapsed(session, live.id, seconds, now())
-        except Exception as error:
-            live.journal.storage.note(error)  # the next time counts these seconds, too
-            return
-        live.running_since_s += seconds
-        live.header.elapsed_s += seconds
-
-
-def _learn(builder: MapBuilder) -> None:
-    """Learn the map's model, unless another mission does: decisions must not wait until all threads have learned."""
-    if _LEARNING.acquire(blocking=False):
-        try:
-            builder.learn()
-        finally:
-            _LEARNING.release()
-
-
-def _log_failure(done: Future[None]) -> None:
-    error = None if done.cancelled() else done.exception()
-    if error is not None:
-        log.error("learning the map's model failed; the last one stays in use", exc_info=error)

@@ -24,6 +24,6 @@ def samples_of(live: LiveMission) -> list[VehicleSample]:
     at_s = now().timestamp()
     return [
         VehicleSample(view.name, at_s, view.depth_m, view.altitude_m, view.battery_pct, view.age_s)
-        for view in live.vehicle_views()
+        for view in live.vehicles.all()
         if view.age_s is not None
     ]

@@ -21,10 +21,9 @@ from app.mapping.gp import warm_up as mapping_warm_up
 from app.mapping.products.tracks import Track, TrackPoint
 from app.missions import importing, states
 from app.missions.admission import check_spec
-from app.missions.broadcast import Subscription
 from app.missions.claims import Claims, Lead, ShowArea, free_elsewhere
 from app.missions.clock import now
-from app.missions.conducting import Conductor, receipt
+from app.missions.conducting import Conductor
 from app.missions.correcting import check_level_is_known, corrections_view, set_sound_speed, set_tide
 from app.missions.crews import Crews, refuse_ended, vehicle_row
 from app.missions.doctoring import DoctorView, Examine, doctor_view, switched_off
@@ -41,6 +40,7 @@ from app.missions.fleet import (
 from app.missions.forecasts import Forecaster, ForecastView
 from app.missions.history import map_at_step, steps_after
 from app.missions.hub import FleetHub
+from app.missions.import_views import CorrectionsView, ImportOptions, ImportView, ReferenceView, TideCorrection
 from app.missions.journal import event_view
 from app.missions.links.rest import RestFleetLink
 from app.missions.links.sim import SimFleetLink
@@ -50,6 +50,8 @@ from app.missions.maps import MapSnapshot
 from app.missions.measurement import Measurement
 from app.missions.measuring import measure
 from app.missions.memory import Memory
+from app.missions.messages import LiveMessage
+from app.missions.mission_showing import action_view, beginning_with, idle_vehicle_view, mission_view, snapshot_message
 from app.missions.ownership import Ownership
 from app.missions.polling import waypoint
 from app.missions.preflight import preflight
@@ -69,7 +71,8 @@ from app.missions.search.posted import Scan
 from app.missions.search.scanning import scan, search_of
 from app.missions.search.views import SearchGridView, grid_view
 from app.missions.settings import ServiceSettings
-from app.missions.spec import MissionKind, MissionSpec, SoundSpeed, VehicleKind, VehicleSpec
+from app.missions.sounding_views import BatchVerdict, LogImportView, Ruling, SoundingPage, SoundingState, SoundingView
+from app.missions.spec import MissionKind, MissionSpec, SoundSpeed, VehicleSpec
 from app.missions.states import ENDED, MissionState
 from app.missions.target_pages import target_ranges_page
 from app.missions.target_views import TargetRangePage, TargetView
@@ -77,27 +80,13 @@ from app.missions.telemetry import TelemetryView, telemetry_view
 from app.missions.trails import Trail
 from app.missions.views import (
     ActionView,
-    BatchVerdict,
-    CorrectionsView,
     EventView,
-    ImportOptions,
-    ImportView,
     Level,
-    LiveMessage,
-    LogImportView,
     MissionSummary,
     MissionView,
     PlannerView,
     PreflightView,
-    ReferenceView,
-    Ruling,
-    SnapshotMessage,
-    SoundingPage,
-    SoundingState,
-    SoundingView,
     StepView,
-    StopView,
-    TideCorrection,
     VehicleView,
     WaypointView,
 )
@@ -238,7 +227,7 @@ class MissionService:
             session.add_all(vehicle_row(row.id, vehicle, slot) for slot, vehicle in enumerate(spec.vehicles))
         live = await self._get(row.id)
         await live.journal.log(Level.INFO, "state", f"created by {actor}", state=row.state, actor=actor)
-        return self._view(live)
+        return mission_view(live)
 
     async def missions(self) -> list[MissionSummary]:
         """Return every mission that no other process has, newest first."""
@@ -256,7 +245,7 @@ class MissionService:
 
     async def mission(self, mission_id: str) -> MissionView:
         """Return one mission. Raises MissionNotFoundError."""
-        return self._view(await self._get(mission_id))
+        return mission_view(await self._get(mission_id))
 
     async def act(self, mission_id: str, action: Action, *, actor: str, note: str = "") -> ActionView:
         """Start, pause, resume, abort or finish a mission.
@@ -288,20 +277,20 @@ class MissionService:
                 if target in ENDED:
                     self._conductor.dismiss(live)
                 live.publish_summary()
-        return _action_view(live, stops)
+        return action_view(live, stops)
 
     async def add_vehicle(self, mission_id: str, vehicle: VehicleSpec, *, actor: str = "operator") -> MissionView:
         """Let a vehicle join, while the mission runs too. Raises ConflictError, InvalidRequestError."""
         live = await self._get(mission_id)
         await self._crews.join(live, vehicle, actor)
-        return self._view(live)
+        return mission_view(live)
 
     async def remove_vehicle(self, mission_id: str, name: str, *, actor: str = "operator") -> MissionView:
         """Stop a vehicle and take it out of the mission. Raises VehicleNotFoundError, ConflictError."""
         live = await self._get(mission_id)
         refuse_ended(live, "keeps its vehicles")
         await self._crews.stop_one(live, name, actor)
-        return self._view(live)
+        return mission_view(live)
 
     async def abort_vehicle(self, mission_id: str, name: str, *, actor: str = "operator") -> ActionView:
         """Stop a vehicle and take it out of the mission; returns whether it acknowledged that.
@@ -309,7 +298,7 @@ class MissionService:
         When the mission has ended the vehicle stays in it and is told once more.
         """
         live = await self._get(mission_id)
-        return _action_view(live, await self._crews.stop_one(live, name, actor))
+        return action_view(live, await self._crews.stop_one(live, name, actor))
 
     async def preflight(self, mission_id: str) -> PreflightView:
         """Return what stands before a mission's start."""
@@ -601,9 +590,8 @@ class MissionService:
         """Yield live messages, the first of them a snapshot. A watcher that is too slow loses only positions."""
         live = await self._get(mission_id)
         with live.broadcaster.subscribe() as subscription:
-            live.start_ticker()
-            snapshot = await self._snapshot(live)
-            yield _after(snapshot, subscription)
+            live.telling.start()
+            yield beginning_with(await snapshot_message(live), subscription)
 
     def doctor(self) -> DoctorView:
         """Return what keeps IMC vehicles from working with us, as far as listening tells."""
@@ -613,29 +601,8 @@ class MissionService:
         """Return every vehicle that is known, whether it takes part in a mission or not."""
         views = []
         for info, mission_id in self._hub.vehicles():
-            member_view = None
-            if mission_id is not None:
-                live = await self._get(mission_id)
-                member_view = live.vehicle_view(info)
-            report = info.report
-            views.append(
-                member_view
-                or VehicleView(
-                    name=info.name,
-                    kind=VehicleKind(info.kind),
-                    link=info.state,
-                    reason=info.reason,
-                    age_s=info.age_s,
-                    address=info.address,
-                    imc_id=info.imc_id,
-                    lat_deg=report.position.lat_deg if report else None,
-                    lon_deg=report.position.lon_deg if report else None,
-                    depth_m=report.position.depth_m if report else None,
-                    altitude_m=report.altitude_m if report else None,
-                    speed_mps=report.speed_mps if report else None,
-                    battery_pct=report.battery_pct if report else None,
-                )
-            )
+            member = None if mission_id is None else (await self._get(mission_id)).vehicles.of(info)
+            views.append(member or idle_vehicle_view(info))
         return views
 
     def planners(self) -> list[PlannerView]:
@@ -647,34 +614,6 @@ class MissionService:
 
     async def _get(self, mission_id: str) -> LiveMission:
         return await self._memory.get(mission_id)
-
-    def _view(self, live: LiveMission) -> MissionView:
-        frame = live.frame
-        # All of it was checked when it was made.
-        return MissionView.model_construct(
-            **dict(live.summary()),
-            spec=live.spec,
-            origin=(frame.origin_lon_deg, frame.origin_lat_deg),
-            vehicles=live.vehicle_views(),
-            waypoints=live.waypoints,
-            targets=live.target_views(),
-        )
-
-    async def _snapshot(self, live: LiveMission) -> SnapshotMessage:
-        tracks = await live.trails.newest()
-        async with self._database.reading() as session:
-            last_event_id = await event_queries.last_event_id(session, live.id)
-        built = live.builder.newest
-        return SnapshotMessage(
-            mission=self._view(live),
-            tracks=tracks,
-            map_version=built.version if built else 0,
-            last_event_id=last_event_id,
-        )
-
-
-def _action_view(live: LiveMission, stops: Sequence[StopReceipt]) -> ActionView:
-    return ActionView(mission=live.summary(), stops=[StopView(**receipt(stop)) for stop in stops])
 
 
 async def _nobody(_password: str, _host: str) -> str | None:
@@ -694,9 +633,3 @@ def _warm_up() -> None:
 
 def _summary(kind: type[object]) -> str:
     return (inspect.getdoc(kind) or "").partition("\n\n")[0].replace("\n", " ")
-
-
-async def _after(first: LiveMessage, rest: Subscription) -> AsyncIterator[LiveMessage]:
-    yield first
-    async for message in rest:
-        yield message

@@ -2,8 +2,8 @@
 
 from app.missions.errors import TargetNotFoundError
 from app.missions.live import LiveMission
+from app.missions.sounding_views import Verdict
 from app.missions.target_views import TargetRangePage, TargetRangeView
-from app.missions.views import Verdict
 from app.storage import target_ranges as range_queries
 
 

@@ -1,6 +1,6 @@
 """The answer to a batch of measurements or scans."""
 
-from app.missions.views import BatchVerdict, ItemVerdict, Verdict
+from app.missions.sounding_views import BatchVerdict, ItemVerdict, Verdict
 
 
 def batch_verdict(items: list[ItemVerdict]) -> BatchVerdict:

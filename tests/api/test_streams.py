@@ -13,7 +13,7 @@ from httpx_sse import ServerSentEvent, aconnect_sse
 from pydantic import TypeAdapter
 
 from app.main import Server
-from app.missions.views import LiveMessage
+from app.missions.messages import LiveMessage
 from app.settings import Settings
 from tests.api.conftest import make_client, mission_spec, running, soundings
 

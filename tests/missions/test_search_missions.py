@@ -17,9 +17,10 @@ from app.missions.search.scanning import report_of_posted
 from app.missions.search.site import simulated_world
 from app.missions.search.state import Search
 from app.missions.service import MissionService
+from app.missions.sounding_views import Verdict
 from app.missions.spec import MissionKind, MissionSpec
 from app.missions.states import MissionState
-from app.missions.views import CheckStatus, Verdict
+from app.missions.views import CheckStatus
 from simulator.car_parks import car_park, harbour_basin
 from tests.missions.builders import lon_lat, rectangle
 from tests.missions.fleet import Harbour, Rover, until, until_state

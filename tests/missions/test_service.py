@@ -20,7 +20,7 @@ from app.exploration.bottom import Bottom
 from app.exploration.planners import PLANNERS
 from app.exploration.planners.random_walk import RandomPlanner
 from app.exploration.problem import Proposal, Situation
-from app.missions import live
+from app.missions import telling
 from app.missions.errors import (
     ConflictError,
     InvalidRequestError,
@@ -30,12 +30,14 @@ from app.missions.errors import (
 )
 from app.missions.fleet import LinkState, WaypointStatus
 from app.missions.measurement import Measurement
+from app.missions.messages import EventMessage, MapMessage, SnapshotMessage, StateMessage
 from app.missions.products import PRODUCTS
 from app.missions.service import MissionService
 from app.missions.settings import ServiceSettings
+from app.missions.sounding_views import Verdict
 from app.missions.spec import MissionSpec, VehicleKind, VehicleSpec
 from app.missions.states import MissionState, MoveRefusedError
-from app.missions.views import EventMessage, Level, MapMessage, SnapshotMessage, StateMessage, Verdict
+from app.missions.views import Level
 from app.storage.database import Database
 from app.storage.models import MissionRow, MissionVehicleRow, SoundingRow, StepRow, WaypointRow
 from tests.missions.builders import lon_lat, make_spec, rectangle
@@ -726,10 +728,10 @@ async def test_a_watcher_gets_a_snapshot_first_and_then_every_event_in_order(ser
 async def test_a_crowd_is_told_of_a_new_map_less_often_but_always_of_the_last(
     service: MissionService, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(live, "CROWD_MAP_S", math.inf)
+    monkeypatch.setattr(telling, "CROWD_MAP_S", math.inf)
     mission = await service.create(sim_spec(steps=3))
     async with AsyncExitStack() as crowd, asyncio.timeout(90):
-        for _ in range(live.CROWD - 1):
+        for _ in range(telling.CROWD - 1):
             await crowd.enter_async_context(service.subscribe(mission.id))
         messages = await crowd.enter_async_context(service.subscribe(mission.id))
         await service.act(mission.id, "start", actor="Ana")
@@ -738,7 +740,7 @@ async def test_a_crowd_is_told_of_a_new_map_less_often_but_always_of_the_last(
         async for message in messages:
             if isinstance(message, EventMessage) and message.event.data.get("state") == "finished":
                 while_running = len(told)
-                monkeypatch.setattr(live, "CROWD_MAP_S", 0.0)
+                monkeypatch.setattr(telling, "CROWD_MAP_S", 0.0)
             if isinstance(message, MapMessage):
                 told.append(message.version)
                 if while_running is not None:

@@ -8,8 +8,8 @@ import pytest
 from app.missions import whole_set
 from app.missions.map_builder import MapBuilder
 from app.missions.service import MissionService
+from app.missions.sounding_views import Ruling, SoundingState
 from app.missions.stored_map import pack, unpack
-from app.missions.views import Ruling, SoundingState
 from app.storage.database import Database
 from app.storage.models import StoredMapRow
 from tests.missions.builders import make_spec

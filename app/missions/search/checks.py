@@ -10,6 +10,7 @@ from app.missions.live import LiveMission
 from app.missions.search.course import FIRST_PACE
 from app.missions.search.state import Search
 from app.missions.spec import MissionSpec, VehicleKind
+from app.missions.vehicle_showing import local_place
 from app.missions.views import CheckStatus, CheckView
 
 OK, NOTE, WARNING, PROBLEM = CheckStatus.OK, CheckStatus.NOTE, CheckStatus.WARNING, CheckStatus.PROBLEM
@@ -26,7 +27,7 @@ def search_checks(live: LiveMission, hub: FleetHub) -> Iterator[CheckView]:
     yield _ways(search, live.spec)
     for member in live.team:
         report = member.report or hub.info(member.key).report
-        place = None if report is None else live.local_place(report.position)
+        place = None if report is None else local_place(live.frame, report.position)
         if place is not None:
             away_m = search.way_to_entry_m(np.array(place))
             far = away_m > search.home_radius_m(len(list(live.team)))

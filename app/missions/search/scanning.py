@@ -7,10 +7,10 @@ from app.missions.fleet import Position, ScanReport
 from app.missions.live import LiveMission
 from app.missions.search.posted import Scan
 from app.missions.search.state import Search
+from app.missions.sounding_views import BatchVerdict, ItemVerdict, Verdict
 from app.missions.spec import VehicleKind
 from app.missions.states import MissionState
 from app.missions.verdicts import batch_verdict
-from app.missions.views import BatchVerdict, ItemVerdict, Verdict
 
 MAX_SCANS = 1000
 

@@ -8,7 +8,7 @@ from sqlalchemy.ext.asyncio import AsyncSession
 from app.missions.clock import now
 from app.missions.fleet import Position, ScanReport
 from app.missions.search.state import Search
-from app.missions.views import ItemVerdict, Verdict
+from app.missions.sounding_views import ItemVerdict, Verdict
 from app.storage import scans as scan_queries
 from app.storage.models import ScanRow
 
