@@ -7,8 +7,8 @@ import pytest
 
 from app.missions import broadcast
 from app.missions.broadcast import Broadcaster, Subscription, WatchEndedError
-from app.missions.live import live_period_s
 from app.missions.messages import EventMessage, LiveMessage, VehiclesMessage, WaypointsMessage
+from app.missions.telling import live_period_s
 from app.missions.views import EventView, Level
 
 TIME = datetime(2026, 6, 1, tzinfo=UTC)
