@@ -36,7 +36,7 @@ from app.api import (
     streams,
     targets,
 )
-from app.api.auditing import AuditLog, AuditMiddleware
+from app.api.audit_log import AuditLog, AuditMiddleware
 from app.api.auth import console_log_in
 from app.api.connections import patient_http
 from app.api.forwarding import ForwardingMiddleware, PeerMiddleware

@@ -5,9 +5,9 @@ from pydantic import TypeAdapter
 
 from app.api.auth import Reader
 from app.api.problems import problems
-from app.api.processes import from_peers
 from app.api.schemas import API
 from app.api.state import Service, State
+from app.api.whole_lists import from_peers
 from app.missions.doctoring import DoctorView
 from app.missions.views import PlannerView, VehicleView
 

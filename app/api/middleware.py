@@ -13,7 +13,7 @@ import structlog
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from app.api.auditing import DATA
+from app.api.audit_log import DATA
 from app.api.headers import add_security_headers
 from app.api.metrics import observe_request
 from app.api.problems import FieldProblem, instance_of, invalid, make_problem, problem_response

@@ -8,9 +8,9 @@ from pydantic import TypeAdapter
 
 from app.api.auth import Operator, Reader
 from app.api.problems import problems
-from app.api.processes import from_peers
 from app.api.schemas import API, ActionRequest, MissionId, NoteRequest, VehicleName
 from app.api.state import Service, State
+from app.api.whole_lists import from_peers
 from app.missions.spec import MissionSpec, VehicleSpec
 from app.missions.telemetry import TelemetryView
 from app.missions.views import ActionView, EventView, MissionSummary, MissionView, PreflightView, StepView

@@ -4,19 +4,13 @@ import asyncio
 import secrets
 import ssl
 from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any
 
 import httpx
-import structlog
-from pydantic import TypeAdapter
 from starlette.datastructures import Headers, MutableHeaders
-from starlette.requests import Request
 from starlette.types import Scope
 
 from app.missions.ownership import Peer
-
-if TYPE_CHECKING:
-    from app.api.state import EdgeState
 
 PEER = "x-bathyfleet-peer"
 """Header with the secret of the process that is asked: then the two below count."""
@@ -30,11 +24,6 @@ _OF_ONE_CONNECTION = frozenset(
 """Headers that are not sent on."""
 
 CONNECT_S = 2.0
-LISTS_S = 5.0
-
-T = TypeVar("T")
-
-log = structlog.get_logger(__name__)
 
 
 def recognise(scope: Scope, secret: str) -> None:
@@ -103,23 +92,3 @@ class PeerClients:
         """Close every connection."""
         await asyncio.gather(*(client.aclose() for client in self._clients.values()))
         self._clients.clear()
-
-
-async def from_peers(request: Request, edge: "EdgeState", kind: TypeAdapter[list[T]]) -> list[T]:
-    """Return what the other processes answer to the same request for a list; one that does not answer is left out."""
-    if comes_from_peer(request.scope):
-        return []
-
-    async def ask(peer: Peer) -> list[T]:
-        try:
-            answer = await edge.peers.to(peer).get(
-                request.url.path, headers=headers_for(peer, request.scope), timeout=LISTS_S
-            )
-            answer.raise_for_status()
-        except httpx.HTTPError as error:
-            log.warning("another process does not answer", url=peer.url, error=str(error) or type(error).__name__)
-            return []
-        return kind.validate_json(answer.content)
-
-    lists = await asyncio.gather(*(ask(peer) for peer in edge.service.process.peers))
-    return [item for found in lists for item in found]

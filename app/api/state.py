@@ -5,11 +5,12 @@ import secrets
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 from fastapi import Depends
 from starlette.requests import HTTPConnection
 
+from app.api.audit_log import AuditLog
 from app.api.limits import Limits
 from app.api.metrics import LIVE_VIEWERS
 from app.api.problems import ProblemError
@@ -17,9 +18,6 @@ from app.api.processes import PeerClients
 from app.api.tokens import TokenStore
 from app.missions.service import MissionService
 from app.settings import Settings
-
-if TYPE_CHECKING:
-    from app.api.auditing import AuditLog
 
 
 @dataclass
@@ -38,7 +36,7 @@ class EdgeState:
     service: MissionService
     tokens: TokenStore
     limits: Limits
-    audit: "AuditLog"
+    audit: AuditLog
     stopping: asyncio.Event = field(default_factory=asyncio.Event)
     run_id: str = field(default_factory=lambda: secrets.token_hex(4))
     streams: int = 0

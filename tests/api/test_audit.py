@@ -9,7 +9,7 @@ from typing import Any
 import httpx
 import pytest
 
-from app.api import auditing
+from app.api import audit_log
 from app.api.tokens import Role, TokenStore
 from app.settings import Settings
 from app.storage.database import Database
@@ -78,7 +78,7 @@ async def test_every_command_is_written_down_before_it_is_answered(
 async def test_strangers_cannot_fill_the_disk_with_refusals(
     make_settings: Callable[..., Settings], tokens: dict[str, dict[str, str]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(auditing, "STRANGERS_PER_MINUTE", 3)
+    monkeypatch.setattr(audit_log, "STRANGERS_PER_MINUTE", 3)
     async with running(make_settings()) as server, make_client(server) as client:
         for _ in range(10):
             assert (await client.post("/missions", json=mission_spec())).status_code == 401

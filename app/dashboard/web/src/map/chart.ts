@@ -13,22 +13,11 @@ import { type Look, PAPER } from "./paper";
 import type { PictureResult } from "./picture.worker";
 import { Sheets } from "./sheets";
 import { type SearchMark, type Site, sitePicture } from "./site";
+import type { Route, Spot, Track } from "./marks";
 import { imageOf, paintStill, type StillContent } from "./still";
 import type { TargetMark } from "./targets";
 
 setWorkerUrl(workerUrl);
-
-/** Line on the map: a vehicle's track or its route to a waypoint. */
-export interface Track {
-  points: readonly Place[];
-  colour: string;
-}
-
-export interface Route extends Track {
-  /** Only what the vehicle acknowledged is its route; anything before is drawn as a mere wish. */
-  acknowledged: boolean;
-  arrivalRadius_m: number;
-}
 
 /** Something with a shape of its own at a place, drawn by the page instead of the map. */
 export interface Pin {
@@ -36,13 +25,6 @@ export interface Pin {
   at: LngLat;
   draw: (element: HTMLElement) => void;
   layerIndex: number;
-}
-
-export interface Spot {
-  id: number;
-  at: LngLat;
-  state: string;
-  chosen: boolean;
 }
 
 /** Where the grid's lines meet the edges of the visible map, in its pixels. */

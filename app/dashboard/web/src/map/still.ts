@@ -1,7 +1,7 @@
 /** What lies still on the map: the sea floor with its contours, the grid, area and zones, where vehicles have been. */
 
 import type { LngLat, PolygonGeometry } from "../api/types";
-import type { Track } from "./chart";
+import type { Track } from "./marks";
 import type { Contour } from "./contours";
 import { graticule, graticuleStep } from "./geo";
 import { type Paper, striped } from "./paper";

@@ -3,7 +3,8 @@
 import { effect } from "@preact/signals";
 import { render } from "preact";
 import type { LngLat, Place, WaypointView } from "../api/types";
-import type { Chart, Padding, Pin, Route, Track } from "../map/chart";
+import type { Chart, Padding, Pin } from "../map/chart";
+import type { Route, Track } from "../map/marks";
 import { contourInterval } from "../map/contours";
 import { KINDS, paletteOf } from "../map/layers";
 import { Painter } from "../map/painter";
