@@ -6,14 +6,14 @@
 import "maplibre-gl/dist/maplibre-gl.css";
 import { Map as MapLibreMap, Marker, NavigationControl, ScaleControl, setWorkerUrl } from "maplibre-gl";
 import workerUrl from "maplibre-gl/dist/maplibre-gl-worker.mjs?url";
-import type { LngLat, Place, PolygonGeometry } from "../api/types";
+import type { LngLat, PolygonGeometry } from "../api/types";
 import { type Bounds, boundsOf, type Graticule, graticule, graticuleStep } from "./geo";
 import { type LivelyContent, NOTHING, paintLively, type Sketch } from "./lively";
+import type { Route, Spot, Track } from "./marks";
 import { type Look, PAPER } from "./paper";
 import type { PictureResult } from "./picture.worker";
 import { Sheets } from "./sheets";
 import { type SearchMark, type Site, sitePicture } from "./site";
-import type { Route, Spot, Track } from "./marks";
 import { imageOf, paintStill, type StillContent } from "./still";
 import type { TargetMark } from "./targets";
 

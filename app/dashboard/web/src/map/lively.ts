@@ -1,8 +1,8 @@
 /** What moves on the map, or is being pointed at: the newest ways, routes, ranges, soundings, what is being drawn. */
 
 import type { LngLat, PolygonGeometry } from "../api/types";
-import type { Route, Spot, Track } from "./marks";
 import { circle } from "./geo";
+import type { Route, Spot, Track } from "./marks";
 import type { Paper } from "./paper";
 import { dot, line, stroke, trace, way } from "./pen";
 import type { Projection } from "./projection";

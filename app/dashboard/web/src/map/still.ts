@@ -1,9 +1,9 @@
 /** What lies still on the map: the sea floor with its contours, the grid, area and zones, where vehicles have been. */
 
 import type { LngLat, PolygonGeometry } from "../api/types";
-import type { Track } from "./marks";
 import type { Contour } from "./contours";
 import { graticule, graticuleStep } from "./geo";
+import type { Track } from "./marks";
 import { type Paper, striped } from "./paper";
 import { line, stroke, trace, way } from "./pen";
 import type { PictureResult } from "./picture.worker";
