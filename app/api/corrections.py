@@ -6,7 +6,7 @@ from app.api.auth import Operator, Reader
 from app.api.problems import problems
 from app.api.schemas import API, MissionId
 from app.api.state import Service
-from app.missions.import_views import CorrectionsView, TideCorrection
+from app.missions.correction_views import CorrectionsView, TideCorrection
 from app.missions.spec import SoundSpeed
 
 router = APIRouter(

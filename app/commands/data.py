@@ -183,7 +183,7 @@ def tide(
     database: Database = None,
 ) -> None:
     """Correct a mission's tide, also afterwards: every sounding is corrected anew from its raw depth."""
-    from app.missions.import_views import CorrectionsView, TideCorrection
+    from app.missions.correction_views import CorrectionsView, TideCorrection
 
     try:
         text = None if table is None else table.read_text(encoding="utf-8")

@@ -11,11 +11,11 @@ from sqlalchemy.ext.asyncio import AsyncSession
 
 from app.mapping.tides import TideTable, TideTableError, parse_tid
 from app.missions.clock import now
+from app.missions.correction_views import CorrectionsView, TideCorrection, TideTableView
 from app.missions.corrections import NO_LEVEL, Corrections
 from app.missions.errors import ConflictError, InvalidRequestError
 from app.missions.fleet import BeamGeometry, Position, SoundingReport
 from app.missions.gate import Gate
-from app.missions.import_views import CorrectionsView, TideCorrection, TideTableView
 from app.missions.journal import Counts
 from app.missions.live import LiveMission
 from app.missions.sounding_views import Ruling, Verdict

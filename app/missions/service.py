@@ -25,6 +25,7 @@ from app.missions.claims import Claims, Lead, ShowArea, free_elsewhere
 from app.missions.clock import now
 from app.missions.conducting import Conductor
 from app.missions.correcting import check_level_is_known, corrections_view, set_sound_speed, set_tide
+from app.missions.correction_views import CorrectionsView, TideCorrection
 from app.missions.crews import Crews, refuse_ended, vehicle_row
 from app.missions.doctoring import DoctorView, Examine, doctor_view, switched_off
 from app.missions.errors import (
@@ -40,7 +41,7 @@ from app.missions.fleet import (
 from app.missions.forecasts import Forecaster, ForecastView
 from app.missions.history import map_at_step, steps_after
 from app.missions.hub import FleetHub
-from app.missions.import_views import CorrectionsView, ImportOptions, ImportView, ReferenceView, TideCorrection
+from app.missions.import_views import ImportOptions, ImportView, ReferenceView
 from app.missions.journal import event_view
 from app.missions.links.rest import RestFleetLink
 from app.missions.links.sim import SimFleetLink

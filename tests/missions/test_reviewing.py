@@ -96,7 +96,7 @@ async def test_a_restored_sounding_bends_the_map_at_once_and_after_a_restart(har
 async def test_a_sounding_that_the_gate_refused_counts_when_restored_and_stays_through_corrections(
     service: MissionService,
 ) -> None:
-    from app.missions.import_views import TideCorrection
+    from app.missions.correction_views import TideCorrection
 
     mission = (await service.create(make_spec())).id
     await service.measure(mission, measured(wrong=None))

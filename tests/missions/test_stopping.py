@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 
 import pytest
 
+from app.missions.correction_views import TideCorrection
 from app.missions.errors import ConflictError, MissionError
 from app.missions.fleet import LinkState
-from app.missions.import_views import TideCorrection
 from app.missions.map_builder import MapBuilder
 from app.missions.service import WORKERS, MissionService
 from app.missions.sounding_views import Ruling
