@@ -1,22 +1,19 @@
 """Sessions of Neptus' ConvCAO panel as missions: begun by its CONNECT, started by its START, fed by its steps."""
 
 from collections.abc import Awaitable, Callable
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 from app.missions.errors import MissionError
 from app.missions.links.neptus import NeptusFleetLink
 from app.missions.settings import NeptusSettings
 from app.missions.spec import Limits, MissionSpec, PlannerSpec, Tide, VehicleKind, VehicleSpec
 from app.missions.spec_base import PolygonGeometry
-from app.missions.states import ENDED, MissionState
-from app.missions.views import Level
+from app.missions.states import ENDED, Action, MissionState
+from app.missions.views import ActionView, Level, MissionView
 from app.storage import events as event_queries
 from app.storage import missions as mission_queries
 from app.storage.database import Database
 from imc_bridge.neptus import Area, Restored, SessionRefusedError, StepData
-
-if TYPE_CHECKING:
-    from app.missions.service import MissionService
 
 LogIn = Callable[[str, str], Awaitable[str | None]]
 """Who logs in with a password from a host; None: not let in."""
@@ -29,10 +26,26 @@ EVENT = "neptus"
 FLYING = (MissionState.RUNNING, MissionState.PAUSED)
 
 
+class Missions(Protocol):
+    """What sessions need of :class:`app.missions.service.MissionService`, which has them."""
+
+    async def create(self, spec: MissionSpec, *, actor: str) -> MissionView:
+        """Store a new mission."""
+
+    async def mission(self, mission_id: str) -> MissionView:
+        """Return one."""
+
+    async def act(self, mission_id: str, action: Action, *, actor: str, note: str) -> ActionView:
+        """Start, finish or abort one."""
+
+    async def note(self, mission_id: str, level: Level, kind: str, message: str, **data: str | float) -> None:
+        """Write a line of its log."""
+
+
 class NeptusSessions:
     """Turns what the panel uploads into missions' lives; see :class:`imc_bridge.neptus.SessionKeeper`."""
 
-    def __init__(self, service: "MissionService", database: Database, settings: NeptusSettings, log_in: LogIn) -> None:
+    def __init__(self, service: Missions, database: Database, settings: NeptusSettings, log_in: LogIn) -> None:
         self._service = service
         self._database = database
         self._settings = settings

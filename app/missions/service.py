@@ -9,7 +9,6 @@ from contextlib import asynccontextmanager
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
-from typing import Literal
 
 import structlog
 
@@ -74,7 +73,7 @@ from app.missions.search.views import SearchGridView, grid_view
 from app.missions.settings import ServiceSettings
 from app.missions.sounding_views import BatchVerdict, LogImportView, Ruling, SoundingPage, SoundingState, SoundingView
 from app.missions.spec import MissionKind, MissionSpec, SoundSpeed, VehicleSpec
-from app.missions.states import ENDED, MissionState
+from app.missions.states import ENDED, Action, MissionState
 from app.missions.target_pages import target_ranges_page
 from app.missions.target_views import TargetRangePage, TargetView
 from app.missions.telemetry import TelemetryView, telemetry_view
@@ -99,8 +98,6 @@ from app.storage import telemetry as telemetry_queries
 from app.storage.at_once import AtOnce
 from app.storage.database import Database
 from app.storage.models import MissionRow, SoundingRow
-
-Action = Literal["start", "pause", "resume", "abort", "finish"]
 
 NO_FORECAST = "what a search will find cannot be forecast: it depends on what stands there"
 WORKERS = 2

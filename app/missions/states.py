@@ -1,6 +1,7 @@
 """The states of a mission and the one table of moves between them."""
 
 from enum import StrEnum
+from typing import Literal
 
 
 class MissionState(StrEnum):
@@ -15,6 +16,9 @@ class MissionState(StrEnum):
     ABORTED = "aborted"
     FAILED = "failed"
 
+
+Action = Literal["start", "pause", "resume", "abort", "finish"]
+"""What operators and consoles may ask of a mission."""
 
 ENDED = frozenset({MissionState.FINISHED, MissionState.ABORTED, MissionState.FAILED})
 
