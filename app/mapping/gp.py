@@ -363,5 +363,6 @@ def warm_up() -> None:
     depth = 10.0 + 0.1 * east + np.sin(north)
     soundings = Soundings(east.ravel(), north.ravel(), depth.ravel(), np.full(16, 0.1))
     grid = Grid(0.0, 0.0, 1.0, 4, 4)
-    GaussianProcessMap().fit(soundings).predict(grid)
+    # With more soundings than it learns from at once, so that all that learning needs is compiled.
+    GaussianProcessMap(learning_points=8).fit(soundings).predict(grid)
     GaussianInterpolator(grid, 1.0).add(soundings)
