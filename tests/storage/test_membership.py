@@ -44,6 +44,14 @@ async def test_each_sees_who_lives(url: str) -> None:
         assert await one.alive([1, 2, 3]) == {1}
 
 
+async def test_who_left_does_not_live_from_then_on(url: str) -> None:
+    async with member(url, 1) as one:
+        for number in range(2, 42):
+            async with member(url, number):
+                pass
+            assert await one.alive(range(1, 42)) == {1}
+
+
 async def test_a_number_is_one_process_s(url: str) -> None:
     async with member(url, 1):
         with pytest.raises(MembershipLostError):
