@@ -261,6 +261,20 @@ def _table(runs: Sequence[Run], method: str) -> list[str]:
     return rows
 
 
+def command_for(runs: Sequence[Run]) -> str:
+    """Return the command that makes all of these runs."""
+    peers = [run for run in runs if run["method"] != "ours"]
+    choices = {
+        "--only": sorted({run["terrain"] for run in runs}),
+        "--symmetries": sorted({run["symmetry"] for run in runs}),
+        "--methods": [method for method in METHODS if any(run["method"] == method for run in runs)],
+        "--iterations": sorted({run["iterations"] for run in peers}),
+    }
+    given = [f"{option} {','.join(map(str, values))}" for option, values in choices.items() if values]
+    given += ["--ours docs/results/survey.jsonl"] if any(run.get("taken_from") for run in runs) else []
+    return " ".join(["python benchmarks/survey_peers.py --terrains FOLDER --peer-python PEER/bin/python", *given])
+
+
 def is_kept(job: OursJob | PeerJob, runs: Mapping[str, Run]) -> bool:
     """Return whether the run is there; one of SGP-Tools with another number of iterations is made anew."""
     run = runs.get(job.key)
@@ -325,10 +339,7 @@ def main() -> None:
         for run in run_jobs(open_, given.jobs, lambda job, step: bar.update(task, description=job.title)):
             results.add(run)
             bar.advance(task)
-    command = "python benchmarks/survey_peers.py --terrains FOLDER --peer-python PEER/bin/python"
-    if any(run.get("taken_from") for run in results.runs.values()):
-        command += " --ours docs/results/survey.jsonl"
-    facts = made(command, given.jobs)
+    facts = made(command_for(list(results.runs.values())), given.jobs)
     (given.out / "survey-peers.md").write_text(report(list(results.runs.values()), facts), encoding="utf-8")
     print(f"{given.out / 'survey-peers.md'}: {len(open_)} runs made, {len(results.runs)} kept")
 

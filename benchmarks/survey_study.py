@@ -177,6 +177,7 @@ def _table(runs: Sequence[Run]) -> list[str]:
     rows += ["", f"Mean ratio over all terrains {np.mean(list(means.values())):.3f}, worst {max(means.values()):.3f}"]
     rows[-1] += f"; over the patchy ones {np.mean(patchy):.3f}." if patchy else "."
     rows[-1] += f" Lasting: {np.mean(lasting):.3f}, worst {max(lasting):.3f}."
+    rows[-1] += f" Below both patterns: {sum(r['ratio'] < 1.0 for r in runs)} of {len(runs)} runs."
     rows[-1] += f" Default over stationary map: worst {max(maps.values()):.3f}"
     patchy = [value for name, value in maps.items() if name in PATCHY]
     rows[-1] += f", patchy {np.mean(patchy):.3f}." if patchy else "."
