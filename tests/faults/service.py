@@ -64,6 +64,12 @@ class Service:
         return f"http://{self.host}:{self.port}/api/v1"
 
     @property
+    def pid(self) -> int:
+        """Of the running process."""
+        assert self.process is not None
+        return self.process.pid
+
+    @property
     def said(self) -> str:
         """Its log so far, JSON lines."""
         return (self.folder / "service.log").read_text()
