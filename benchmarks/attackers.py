@@ -412,6 +412,7 @@ async def control_characters(attacked: Attacked) -> Found:
 
 def _intrude(said: Any, port: int, folder: Path, ftp_port: int, mission: str) -> None:
     """Become another user, try everything, and say what was gained."""
+    "".encode("idna")  # what sockets load when first used lies where another user may not read
     os.setgroups([])
     os.setgid(NOBODY)
     os.setuid(NOBODY)
@@ -432,7 +433,7 @@ def _intrude(said: Any, port: int, folder: Path, ftp_port: int, mission: str) ->
             head = f"POST {act} HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: 2\r\nContent-Type: application/json"
             hasty.sendall(f"{head}\r\n\r\n{{}}".encode())
             hasty.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
-    with contextlib.suppress(ftplib.Error, EOFError, OSError), ftplib.FTP() as ftp:
+    with contextlib.suppress(ftplib.Error, EOFError, OSError), ftplib.FTP() as ftp:  # noqa: S321
         ftp.connect("127.0.0.1", ftp_port, timeout=20)
         ftp.login("NEPTUS", "anything")
         gained.append("logs in by FTP")
