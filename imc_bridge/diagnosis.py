@@ -59,6 +59,8 @@ class Cause(StrEnum):
     REFUSED = "refused"
     """Packets that nobody who is trusted sent, or not now."""
     UNKNOWN_MESSAGES = "unknown_messages"
+    CROWDED = "crowded"
+    """More systems claim to be there than places for them: somebody makes them up."""
 
 
 @dataclass(frozen=True, slots=True)
