@@ -91,7 +91,7 @@ async def console_log_in(
 
     As with HTTP, without any token this machine's own user is an operator.
     """
-    if limits.locked_out(host):
+    if limits.locked_out(host) and not await tokens.exists(password.strip()):
         return None
     principal = await tokens.principal(password.strip())
     if principal is not None:

@@ -42,6 +42,10 @@ class EdgeState:
     streams: int = 0
     peers: PeerClients = field(default_factory=PeerClients)
 
+    async def is_good(self, token: str) -> bool:
+        """Tell whether a token that a request carries may be valid; see :meth:`TokenStore.exists`."""
+        return await self.tokens.exists(token)
+
     @contextmanager
     def stream(self, kind: str) -> Iterator[None]:
         """Count a live view (``websocket``) or event stream (``sse``). Raises ProblemError above the limit."""

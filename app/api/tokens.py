@@ -1,5 +1,6 @@
 """Access tokens: made once, shown once, kept as a hash."""
 
+import asyncio
 import hashlib
 import secrets
 import uuid
@@ -16,6 +17,8 @@ from app.storage.sharing import Shared
 
 TOKEN_PREFIX = "bf_"  # noqa: S105 - makes leaked tokens easy to search for
 FIRST_TOKEN_FILE = "operator.token"  # noqa: S105 - the file's name
+DIGESTS_READ_AGAIN_S = 0.1
+"""However many guesses come, the tokens are not read again sooner."""
 
 
 class Role(StrEnum):
@@ -42,7 +45,7 @@ class Principal:
 
 def token_hash(token: str) -> str:
     """Return what is stored of a token. Its 256 random bits need no slow hash."""
-    return hashlib.sha256(token.encode()).hexdigest()
+    return hashlib.sha256(token.encode(errors="surrogateescape")).hexdigest()
 
 
 class TokenStore:
@@ -53,6 +56,9 @@ class TokenStore:
         # Asked with every request: pages that ask for a new map at the same moment are answered by one query.
         self._any = Shared(self._any_stored)
         self._at_once = AtOnce(database)
+        self._digests: frozenset[str] = frozenset()
+        self._digests_read_s = -DIGESTS_READ_AGAIN_S
+        self._read_again = Shared(self._read_in_turn)
 
     async def create(
         self, name: str, role: Role, *, vehicle: str | None = None, expires_at: datetime | None = None
@@ -103,9 +109,31 @@ class TokenStore:
         values = {"hash": token_hash(token), "now": datetime.now(UTC)}
         found = await self._at_once(tokens.VALID, values)
         if not found:
+            self._digests -= {values["hash"]}
             return None
         name, role, vehicle = found[0]
         return Principal(name, Role(role), vehicle)
+
+    async def exists(self, token: str) -> bool:
+        """Tell whether a token may be valid, at a cost that has a bound however many are asked for.
+
+        For those who would else be refused unseen. What is revoked meanwhile may still be said to exist;
+        :meth:`principal` has the last word. A token that is not known yet waits for the tokens to be read again.
+        """
+        digest = token_hash(token)
+        if digest not in self._digests:
+            self._digests = await self._read_again()
+        return digest in self._digests
+
+    async def _read_in_turn(self) -> frozenset[str]:
+        loop = asyncio.get_running_loop()
+        await asyncio.sleep(max(self._digests_read_s + DIGESTS_READ_AGAIN_S - loop.time(), 0.0))
+        self._digests_read_s = loop.time()
+        return await self._read_digests()
+
+    async def _read_digests(self) -> frozenset[str]:
+        async with self._database.reading() as session:
+            return await tokens.valid_hashes(session, datetime.now(UTC))
 
     def close(self) -> None:
         """Let go of the database."""

@@ -23,6 +23,14 @@ VALID = select(TokenRow.name, TokenRow.role, TokenRow.vehicle).where(
 """Name, role and vehicle of the token with a ``hash``, unless it was revoked or has run out ``now``."""
 
 
+async def valid_hashes(session: AsyncSession, now: datetime) -> frozenset[str]:
+    """Return the hash of every token that was not revoked and has not run out."""
+    query = select(TokenRow.token_hash).where(
+        TokenRow.revoked_at.is_(None), or_(TokenRow.expires_at.is_(None), TokenRow.expires_at > now)
+    )
+    return frozenset(await session.scalars(query))
+
+
 async def any_token(session: AsyncSession) -> bool:
     """Tell whether a token exists that was not revoked, made on purpose; then requests must carry one."""
     return bool(await session.scalar(ANY))

@@ -43,7 +43,7 @@ def test_any_number_of_clients_is_remembered_in_bounded_memory(monkeypatch: pyte
     monkeypatch.setattr(limits, "MAX_CLIENTS", 50)
     held = Limits(1.0, 3)
     for number in range(400):
-        held.wait_s(None, False, f"10.0.{number // 256}.{number % 256}")
+        held.wait_s(None, f"10.0.{number // 256}.{number % 256}")
         held.log_in(f"bf_{number}", f"10.0.{number // 256}.{number % 256}", good=number % 2 == 0)
     kept = (held._requests._filled, held._failures._filled, held._known)  # type: ignore[union-attr]
     assert all(len(what) <= 50 for what in kept)
@@ -102,8 +102,8 @@ async def test_guessing_tokens_ends_soon_and_disturbs_nobody_who_has_one(
 async def test_a_right_token_is_never_refused_for_wrong_ones_from_its_address(
     make_settings: Callable[..., Settings],
 ) -> None:
-    """An abort, made by a token that this process sees for the first time, right after a hundred guesses."""
-    settings = make_settings(max_failed_logins=10)
+    """An abort, made by a token that this process sees for the first time, right after many guesses."""
+    settings = make_settings(max_failed_logins=1)
     database = Database(settings.database_url)
     store = TokenStore(database)
     _, operator = await store.create("operator", Role.OPERATOR)
@@ -111,9 +111,9 @@ async def test_a_right_token_is_never_refused_for_wrong_ones_from_its_address(
         created = await client.post("/missions", json=mission_spec(), headers=bearer(operator))
         path = f"/missions/{created.json()['id']}/abort"
     async with running(settings) as server, make_client(server) as client:
-        guesses = [(await client.get("/missions", headers=bearer(f"bf_{n}"))).status_code for n in range(100)]
-        assert guesses[:10] == [401] * 10
-        assert set(guesses[10:]) == {429}
+        guesses = [(await client.get("/missions", headers=bearer(f"bf_{n}"))).status_code for n in range(20)]
+        assert guesses[0] == 401
+        assert set(guesses[1:]) == {429}
         answer = await client.post(path, headers=bearer(operator))
         assert answer.status_code == 200, answer.text
         token_id, later = await store.create("made meanwhile", Role.OPERATOR)
