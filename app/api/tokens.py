@@ -56,7 +56,7 @@ class TokenStore:
         # Asked with every request: pages that ask for a new map at the same moment are answered by one query.
         self._any = Shared(self._any_stored)
         self._at_once = AtOnce(database)
-        self._digests: frozenset[str] = frozenset()
+        self._digests: dict[str, Principal] = {}
         self._digests_read_s = -DIGESTS_READ_AGAIN_S
         self._read_again = Shared(self._read_in_turn)
 
@@ -109,10 +109,9 @@ class TokenStore:
         values = {"hash": token_hash(token), "now": datetime.now(UTC)}
         found = await self._at_once(tokens.VALID, values)
         if not found:
-            self._digests -= {values["hash"]}
+            self._digests.pop(values["hash"], None)
             return None
-        name, role, vehicle = found[0]
-        return Principal(name, Role(role), vehicle)
+        return _principal(*found[0])
 
     async def exists(self, token: str) -> bool:
         """Tell whether a token may be valid, at a cost that has a bound however many are asked for.
@@ -125,19 +124,27 @@ class TokenStore:
             self._digests = await self._read_again()
         return digest in self._digests
 
-    async def _read_in_turn(self) -> frozenset[str]:
+    def known(self, token: str) -> Principal | None:
+        """Return who holds a token as far as that is known without asking the database, for counting only."""
+        return self._digests.get(token_hash(token))
+
+    async def _read_in_turn(self) -> dict[str, Principal]:
         loop = asyncio.get_running_loop()
         await asyncio.sleep(max(self._digests_read_s + DIGESTS_READ_AGAIN_S - loop.time(), 0.0))
         self._digests_read_s = loop.time()
         return await self._read_digests()
 
-    async def _read_digests(self) -> frozenset[str]:
+    async def _read_digests(self) -> dict[str, Principal]:
         async with self._database.reading() as session:
-            return await tokens.valid_hashes(session, datetime.now(UTC))
+            return {row[0]: _principal(*row[1:]) for row in await tokens.all_valid(session, datetime.now(UTC))}
 
     def close(self) -> None:
         """Let go of the database."""
         self._at_once.close()
+
+
+def _principal(name: str, role: str, vehicle: str | None) -> Principal:
+    return Principal(name, Role(role), vehicle)
 
 
 def _made(
