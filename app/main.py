@@ -44,8 +44,9 @@ from app.api.forwarding import ForwardingMiddleware, PeerMiddleware
 from app.api.health import health_router
 from app.api.limits import LimitMiddleware, Limits
 from app.api.middleware import BodyMiddleware, RequestMiddleware
+from app.api.quotas import Shares
 from app.api.schemas import API
-from app.api.shares import ShareMiddleware, Shares
+from app.api.shares import ShareMiddleware
 from app.api.state import EdgeState
 from app.api.tokens import Role, TokenStore
 from app.dashboard.serve import mount_dashboard

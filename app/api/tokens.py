@@ -43,6 +43,10 @@ class Principal:
     vehicle: str | None = None
 
 
+LOCAL_OPERATOR = Principal("local operator", Role.ADMIN)
+"""The user of this machine who runs the service, while nobody has made a token."""
+
+
 def token_hash(token: str) -> str:
     """Return what is stored of a token. Its 256 random bits need no slow hash."""
     return hashlib.sha256(token.encode(errors="surrogateescape")).hexdigest()
