@@ -42,6 +42,11 @@ class Principal:
     role: Role
     vehicle: str | None = None
 
+    @property
+    def identity(self) -> str:
+        """The same for every token of this name, role and vehicle, and for no other."""
+        return "\0".join((self.role, self.name, self.vehicle or ""))
+
 
 LOCAL_OPERATOR = Principal("local operator", Role.ADMIN)
 """The user of this machine who runs the service, while nobody has made a token."""
