@@ -7,6 +7,7 @@ import tomllib
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, Literal
+from urllib.parse import urlsplit
 
 from pydantic import BaseModel, Field, ValidationError, ValidationInfo, field_validator
 from pydantic_settings import (
@@ -168,6 +169,18 @@ class Settings(BaseSettings):
                 ) from None
         return proxies
 
+    @field_validator("allowed_origins")
+    @classmethod
+    def _are_origins(cls, origins: tuple[str, ...]) -> tuple[str, ...]:
+        for origin in origins:
+            wrong = _wrong_with_origin(origin)
+            if wrong:
+                raise ValueError(
+                    f"{origin!r} {wrong}; an origin is what browsers send: scheme and host, and a port that is not the "
+                    "usual one, such as https://console.example or http://10.0.0.5:8080"
+                )
+        return origins
+
     @field_validator("tls_key")
     @classmethod
     def _has_a_certificate(cls, key: Path | None, given: ValidationInfo) -> Path | None:
@@ -209,6 +222,27 @@ class Settings(BaseSettings):
             simulation=self.simulation,
             provider=self.provider,
         )
+
+
+def _wrong_with_origin(origin: str) -> str:
+    """Return what keeps a text from being an origin; empty for nothing."""
+    if "*" in origin:
+        return "stands for every page there is, which could then command vehicles through an operator's browser"
+    if origin == "null":
+        return "is what any page in a sandbox, and any file, sends"
+    try:
+        parts = urlsplit(origin)
+        port = parts.port
+    except ValueError as error:
+        return f"cannot be taken apart ({error})"
+    if parts.scheme not in ("http", "https") or "://" not in origin:
+        return "has no scheme, http or https"
+    if not parts.hostname:
+        return "names no host"
+    host = f"[{parts.hostname}]" if ":" in parts.hostname else parts.hostname
+    usual = port == {"http": 80, "https": 443}[parts.scheme]
+    sent = f"{parts.scheme}://{host}" + (f":{port}" if port is not None and not usual else "")
+    return "" if origin == sent else f"is not what browsers send, which would be {sent}"
 
 
 def is_loopback(host: str) -> bool:
