@@ -50,6 +50,7 @@ from app.api.shares import ShareMiddleware
 from app.api.state import EdgeState
 from app.api.tokens import Role, TokenStore
 from app.dashboard.serve import mount_dashboard
+from app.descriptors import allow_descriptors
 from app.memory import keep_memory_together
 from app.missions.service import MissionService
 from app.settings import Settings, StartupError, is_loopback, load_settings
@@ -323,6 +324,7 @@ async def serve(
     """
     check_certificate(settings)
     keep_memory_together()
+    allow_descriptors(settings.max_connections)
     listening = listen(settings)
     try:
         app = create_app(settings, port=listening.getsockname()[1])

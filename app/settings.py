@@ -66,7 +66,7 @@ class Settings(BaseSettings):
     )
     allowed_origins: tuple[str, ...] = Field(
         default=(),
-        description="Origins of other web pages that may use the API, for example https://console.example",
+        description="Origins of other web pages that may use the API, for example https://console.example; never *",
     )
     database_url: str = Field(
         default="sqlite+aiosqlite:///bathyfleet.db",
@@ -101,7 +101,8 @@ class Settings(BaseSettings):
         default=1000,
         ge=16,
         le=100_000,
-        description="Most open HTTP connections; another machine may hold a quarter of them",
+        description="Most open HTTP connections. One user, or one address without a token, has at most a quarter of "
+        "them busy, one operator half; an eighth is for operators alone. Idle ones of strangers are closed first",
     )
     slow_client_s: float = Field(
         default=30.0, ge=1, le=3600, description="A client that takes longer to send on is not waited for"
@@ -129,7 +130,10 @@ class Settings(BaseSettings):
         default=64 * 2**20, ge=1024, le=2**30, description="Largest file of soundings or of a map that is taken"
     )
     max_streams: int = Field(
-        default=200, ge=1, le=100_000, description="Most live views and event streams at the same time"
+        default=200,
+        ge=1,
+        le=100_000,
+        description="Most live views and event streams at the same time, shared out as max_connections is",
     )
     time_scale: float = Field(
         default=1.0, gt=0, le=1000, description="How much faster than wall time simulated vehicles live"

@@ -96,5 +96,5 @@ class Sockets(Generic[T]):
         for by_host in self._idle.values():
             if by_host:
                 # Who holds the most of them has come in the greatest haste.
-                return next(iter(max(by_host.values(), key=len)))
+                return next(iter(by_host[max(by_host, key=lambda host: len(by_host[host]))]))
         return None

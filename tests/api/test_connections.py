@@ -1,6 +1,7 @@
 """Connections are shared out: whatever strangers and viewers hold, an operator gets through."""
 
 import asyncio
+import resource
 from collections.abc import Awaitable, Callable
 from contextlib import AsyncExitStack
 
@@ -10,6 +11,7 @@ import websockets
 
 from app.api.connections import Sockets
 from app.api.tokens import Role, TokenStore
+from app.descriptors import allow_descriptors
 from app.main import Server
 from app.settings import Settings
 from app.storage.database import Database
@@ -204,6 +206,20 @@ async def until(condition: Callable[[], Awaitable[bool]]) -> None:
     async with asyncio.timeout(60):
         while not await condition():  # noqa: ASYNC110 - the condition is the service's
             await asyncio.sleep(0.01)
+
+
+def test_the_process_may_open_as_many_connections_as_are_set_up() -> None:
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    low = min(1024, hard)
+    try:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (low, hard))
+        allow_descriptors(1000)
+        allowed = resource.getrlimit(resource.RLIMIT_NOFILE)[0]
+        assert allowed == 2512 if hard == resource.RLIM_INFINITY or hard >= 2512 else allowed == hard
+        allow_descriptors(16)
+        assert resource.getrlimit(resource.RLIMIT_NOFILE)[0] == allowed, "never lowered"
+    finally:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
 
 
 class _Held:
