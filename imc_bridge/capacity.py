@@ -137,8 +137,8 @@ class Capacity:
         of_host = [node for node in alike if node.host == host]
         for group, limit in ((of_host, most_of_host), (alike, most)):
             if len(group) >= limit:
-                leaver = min(group, key=_last_sign)
-                return (True, leaver) if _is_silent(leaver, now) else (False, None)
+                longest = min(group, key=_last_sign)
+                return (True, longest) if _is_silent(longest, now) else (False, None)
         if len(self._nodes) < MAX_NODES:
             return True, None
         leaver = self._weakest(lambda node: standing_of(node) < standing or _is_silent(node, now))

@@ -115,10 +115,10 @@ class TokenStore:
 
     async def principal(self, token: str) -> Principal | None:
         """Return who holds ``token``; None when it is unknown, revoked or has run out."""
-        values = {"hash": token_hash(token), "now": datetime.now(UTC)}
-        found = await self._at_once(tokens.VALID, values)
+        digest = token_hash(token)
+        found = await self._at_once(tokens.VALID, {"hash": digest, "now": datetime.now(UTC)})
         if not found:
-            self._digests.pop(values["hash"], None)
+            self._digests.pop(digest, None)
             return None
         return _principal(*found[0])
 
@@ -145,7 +145,8 @@ class TokenStore:
 
     async def _read_digests(self) -> dict[str, Principal]:
         async with self._database.reading() as session:
-            return {row[0]: _principal(*row[1:]) for row in await tokens.all_valid(session, datetime.now(UTC))}
+            valid = await tokens.all_valid(session, datetime.now(UTC))
+        return {digest: _principal(name, role, vehicle) for digest, name, role, vehicle in valid}
 
     def close(self) -> None:
         """Let go of the database."""

@@ -144,10 +144,11 @@ def _answers(batches: Sequence[_Batch], rows: Mapping[str, _Answer]) -> dict[str
     for batch in batches:
         if batch.key is None:
             continue
-        if batch.key.stored in rows:
-            found[batch.key.stored] = rows[batch.key.stored]
-        elif batch.key.before in rows and rows[batch.key.before][0] == batch.digest:
-            found[batch.key.stored] = rows[batch.key.before]
+        own, before = rows.get(batch.key.stored), rows.get(batch.key.before or "")
+        if own is not None:
+            found[batch.key.stored] = own
+        elif before is not None and before[0] == batch.digest:
+            found[batch.key.stored] = before
     return found
 
 

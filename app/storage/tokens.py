@@ -23,7 +23,7 @@ VALID = select(TokenRow.name, TokenRow.role, TokenRow.vehicle).where(
 """Name, role and vehicle of the token with a ``hash``, unless it was revoked or has run out ``now``."""
 
 
-async def all_valid(session: AsyncSession, now: datetime) -> Sequence[Row[tuple[str, str, str, str | None]]]:
+async def all_valid(session: AsyncSession, now: datetime) -> Sequence[Row[str, str, str, str | None]]:
     """Return hash, name, role and vehicle of every token that was not revoked and has not run out."""
     query = select(TokenRow.token_hash, TokenRow.name, TokenRow.role, TokenRow.vehicle).where(
         TokenRow.revoked_at.is_(None), or_(TokenRow.expires_at.is_(None), TokenRow.expires_at > now)
