@@ -215,10 +215,13 @@ def list_tokens(
         return
     from rich.console import Console
     from rich.table import Column, Table
+    from rich.text import Text
+
+    from imc_bridge.printable import printable
 
     table = Table(Column("id", no_wrap=True), "name", "role", "vehicle", "made", "valid until", "revoked")
     for row in rows:
-        table.add_row(*(str(value) if value is not None else "–" for value in row.values()))
+        table.add_row(*(Text(printable(str(value))) if value is not None else "–" for value in row.values()))
     Console().print(table)
 
 
@@ -299,6 +302,11 @@ def _show_diagnosis(diagnosis: "Diagnosis") -> None:
     from rich.text import Text
 
     from imc_bridge.doctor import Severity
+    from imc_bridge.printable import printable
+
+    def plain(words: str) -> Text:
+        """Return words that strangers on the network may have sent, as they can do no harm."""
+        return Text(printable(words))
 
     marks = {Severity.OK: ("ok", "green"), Severity.NOTE: ("note", "yellow"), Severity.PROBLEM: ("problem", "bold red")}
     table = Table(
@@ -308,16 +316,16 @@ def _show_diagnosis(diagnosis: "Diagnosis") -> None:
     for name, findings in groups:
         for index, finding in enumerate(findings):
             words, style = marks[finding.severity]
-            table.add_row("" if index else Text(name), Text(words, style), Text(finding.text), Text(finding.remedy))
+            table.add_row("" if index else plain(name), Text(words, style), plain(finding.text), plain(finding.remedy))
         table.add_section()
     Console().print(table)
     for node in diagnosis.nodes:
         if len(node.history) > 1:
-            Console().print(Text(f"\n{node.name}'s link:", style="bold"))
+            Console().print(Text(f"\n{printable(node.name)}'s link:", style="bold"))
         for change in node.history if len(node.history) > 1 else ():
             at = datetime.fromtimestamp(change.at_s, UTC)
             words = f"{change.state.value}: {change.reason}" if change.reason else change.state.value
-            Console().print(Text(f"  {at:%H:%M:%S}Z {words}"))
+            Console().print(plain(f"  {at:%H:%M:%S}Z {words}"))
 
 
 @app.command()
@@ -435,8 +443,11 @@ def main() -> None:
         field = getattr(error, "field", "")
         lines = getattr(error, "problems", None) or [f"{field}: {error}" if field else str(error)]
         remedy = getattr(error, "remedy", "")
+        from imc_bridge.printable import printable
+
         for line in lines:
-            typer.echo(f"error: {line}" + (f". {remedy}" if remedy else ""), err=True)
+            said = f"error: {line}" + (f". {remedy}" if remedy else "")
+            typer.echo(printable(said, keep="\n"), err=True)
         sys.exit(code)
 
 

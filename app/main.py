@@ -8,6 +8,7 @@ import threading
 import warnings
 from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import asynccontextmanager, contextmanager
+from functools import lru_cache, partial
 from pathlib import Path
 from types import FrameType
 
@@ -38,15 +39,18 @@ from app.api import (
 )
 from app.api.audit_log import AuditLog, AuditMiddleware
 from app.api.auth import console_log_in
-from app.api.connections import patient_http
+from app.api.connections import Sockets, is_shared_host, patient_http
 from app.api.forwarding import ForwardingMiddleware, PeerMiddleware
 from app.api.health import health_router
 from app.api.limits import LimitMiddleware, Limits
 from app.api.middleware import BodyMiddleware, RequestMiddleware
+from app.api.quotas import Shares
 from app.api.schemas import API
+from app.api.shares import ShareMiddleware
 from app.api.state import EdgeState
 from app.api.tokens import Role, TokenStore
 from app.dashboard.serve import mount_dashboard
+from app.descriptors import allow_descriptors
 from app.memory import keep_memory_together
 from app.missions.service import MissionService
 from app.settings import Settings, StartupError, is_loopback, load_settings
@@ -109,6 +113,7 @@ def create_app(settings: Settings | None = None, *, port: int | None = None) -> 
                 certificate=settings.tls_certificate.read_text() if settings.tls_certificate else None,
             )
             app.state.edge = EdgeState(settings, service, tokens, limits, audit)
+            await tokens.exists("")  # so that they are known when it matters
             await service.startup()
             try:
                 yield
@@ -167,6 +172,8 @@ def create_app(settings: Settings | None = None, *, port: int | None = None) -> 
     )
     app.add_middleware(AuditMiddleware)
     app.add_middleware(LimitMiddleware, limits=limits)
+    app.state.shares = Shares(settings.max_connections)
+    app.add_middleware(ShareMiddleware, shares=app.state.shares)
     app.add_middleware(PeerMiddleware)
     app.add_middleware(RequestMiddleware)
     return app
@@ -198,16 +205,19 @@ class Server(uvicorn.Server):
         """Where an operator's token was written to, when this was the first start."""
         # The lifespan is entered by serve(), whose caller then sees why a start failed.
         settings: Settings = app.state.edge.settings
+        self.shares: Shares = app.state.shares
+        self.sockets: Sockets[asyncio.Protocol] = Sockets(
+            settings.max_connections, lru_cache(4096)(partial(is_shared_host, settings))
+        )
         super().__init__(
             uvicorn.Config(
                 app,
-                http=patient_http(settings),
+                http=patient_http(settings, self.sockets),
                 lifespan="off",
                 log_config=None,
                 access_log=False,
                 timeout_graceful_shutdown=GRACE_S,
                 server_header=False,
-                limit_concurrency=settings.max_connections,
                 # Believed of nobody but those who were named: else anyone could speak under another's address.
                 proxy_headers=bool(settings.trusted_proxies),
                 forwarded_allow_ips=list(settings.trusted_proxies),
@@ -314,6 +324,7 @@ async def serve(
     """
     check_certificate(settings)
     keep_memory_together()
+    allow_descriptors(settings.max_connections)
     listening = listen(settings)
     try:
         app = create_app(settings, port=listening.getsockname()[1])

@@ -7,6 +7,7 @@ import tomllib
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, Literal
+from urllib.parse import urlsplit
 
 from pydantic import BaseModel, Field, ValidationError, ValidationInfo, field_validator
 from pydantic_settings import (
@@ -65,7 +66,7 @@ class Settings(BaseSettings):
     )
     allowed_origins: tuple[str, ...] = Field(
         default=(),
-        description="Origins of other web pages that may use the API, for example https://console.example",
+        description="Origins of other web pages that may use the API, for example https://console.example; never *",
     )
     database_url: str = Field(
         default="sqlite+aiosqlite:///bathyfleet.db",
@@ -100,7 +101,8 @@ class Settings(BaseSettings):
         default=1000,
         ge=16,
         le=100_000,
-        description="Most open HTTP connections; another machine may hold a quarter of them",
+        description="Most open HTTP connections. One user, or one address without a token, has at most a quarter of "
+        "them busy, one operator half; an eighth is for operators alone. Idle ones of strangers are closed first",
     )
     slow_client_s: float = Field(
         default=30.0, ge=1, le=3600, description="A client that takes longer to send on is not waited for"
@@ -128,7 +130,10 @@ class Settings(BaseSettings):
         default=64 * 2**20, ge=1024, le=2**30, description="Largest file of soundings or of a map that is taken"
     )
     max_streams: int = Field(
-        default=200, ge=1, le=100_000, description="Most live views and event streams at the same time"
+        default=200,
+        ge=1,
+        le=100_000,
+        description="Most live views and event streams at the same time, shared out as max_connections is",
     )
     time_scale: float = Field(
         default=1.0, gt=0, le=1000, description="How much faster than wall time simulated vehicles live"
@@ -167,6 +172,18 @@ class Settings(BaseSettings):
                     f"{proxy!r} is neither an address nor a network such as 10.0.0.0/24, without host bits"
                 ) from None
         return proxies
+
+    @field_validator("allowed_origins")
+    @classmethod
+    def _are_origins(cls, origins: tuple[str, ...]) -> tuple[str, ...]:
+        for origin in origins:
+            wrong = _wrong_with_origin(origin)
+            if wrong:
+                raise ValueError(
+                    f"{origin!r} {wrong}; an origin is what browsers send: scheme and host, and a port that is not the "
+                    "usual one, such as https://console.example or http://10.0.0.5:8080"
+                )
+        return origins
 
     @field_validator("tls_key")
     @classmethod
@@ -209,6 +226,27 @@ class Settings(BaseSettings):
             simulation=self.simulation,
             provider=self.provider,
         )
+
+
+def _wrong_with_origin(origin: str) -> str:
+    """Return what keeps a text from being an origin; empty for nothing."""
+    if "*" in origin:
+        return "stands for every page there is, which could then command vehicles through an operator's browser"
+    if origin == "null":
+        return "is what any page in a sandbox, and any file, sends"
+    try:
+        parts = urlsplit(origin)
+        port = parts.port
+    except ValueError as error:
+        return f"cannot be taken apart ({error})"
+    if parts.scheme not in ("http", "https") or "://" not in origin:
+        return "has no scheme, http or https"
+    if not parts.hostname:
+        return "names no host"
+    host = f"[{parts.hostname}]" if ":" in parts.hostname else parts.hostname
+    usual = port == {"http": 80, "https": 443}[parts.scheme]
+    sent = f"{parts.scheme}://{host}" + (f":{port}" if port is not None and not usual else "")
+    return "" if origin == sent else f"is not what browsers send, which would be {sent}"
 
 
 def is_loopback(host: str) -> bool:

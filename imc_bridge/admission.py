@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ipaddress
+import math
 from collections import Counter
 from collections.abc import Callable
 from functools import lru_cache
@@ -17,6 +18,8 @@ STRANGERS_SHARE = 4
 """All who announced nothing, at one host together, get this part of what a vehicle may send."""
 MAX_SOURCES = 1024
 """Sources of one window that are counted one by one; the others share a count."""
+_TRAFFIC, _ANNOUNCES = 0, -1
+"""In place of a port: all ports of a host that are strangers'."""
 
 
 class Admission:
@@ -35,11 +38,14 @@ class Admission:
     refused : Counter[Refused]
     last : dict[Refused, str]
         Where the last one of them came from.
+    last_at : dict[Refused, float]
+        When that was, by ``clock``.
     """
 
     def __init__(self, settings: BridgeSettings, roster: Roster, clock: Callable[[], float]) -> None:
         self.refused: Counter[Refused] = Counter()
         self.last: dict[Refused, str] = {}
+        self.last_at: dict[Refused, float] = {}
         self._roster = roster
         self._clock = clock
         self._networks = tuple(map(ipaddress.IPv4Network, settings.allowed_addresses))
@@ -49,8 +55,11 @@ class Admission:
         self._window = 0.0
         self._allowed = lru_cache(maxsize=MAX_SOURCES)(self._in_networks)
 
-    def admits(self, address: Address) -> bool:
-        """Whether a packet from ``address`` is read."""
+    def admits(self, address: Address, *, announce: bool = False) -> bool:
+        """Whether a packet from ``address`` is read; ``announce``: one of the announce socket.
+
+        Strangers' announces are counted apart, so that their other packets keep no newcomer out.
+        """
         if self._networks and not self._allowed(address[0]):
             return self.refuse(Refused.ADDRESS, address)
         now = self._clock()
@@ -58,9 +67,9 @@ class Admission:
             self._counts.clear()
             self._window = now
         known = self._roster.at(address) is not None
-        source = address if known else (address[0], 0)
+        source = address if known else (address[0], _ANNOUNCES if announce else _TRAFFIC)
         if source not in self._counts and len(self._counts) >= MAX_SOURCES:
-            source = ("", 0)
+            source = ("", _TRAFFIC)
         self._counts[source] += 1
         if self._counts[source] > (self._most if known else self._most / STRANGERS_SHARE):
             return self.refuse(Refused.FLOOD, address)
@@ -74,7 +83,12 @@ class Admission:
         """Count a packet that is not taken in; always False."""
         self.refused[reason] += 1
         self.last[reason] = f"{address[0]}:{address[1]}"
+        self.last_at[reason] = self._clock()
         return False
+
+    def age_s(self, reason: Refused) -> float:
+        """Seconds of the wall clock since a packet was last refused for this reason; infinite when none was."""
+        return self._clock() - self.last_at.get(reason, -math.inf)
 
     def _in_networks(self, host: str) -> bool:
         return any(ipaddress.IPv4Address(host) in network for network in self._networks)

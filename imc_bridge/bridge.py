@@ -94,6 +94,8 @@ class Bridge:
             wall_clock,
             self._speaker,
         )
+        self._roster.capacity.in_use = self._crew.works_with
+        self._roster.left += [self._crew.forget, self._links.forget, self._hearing.forget]
         self.board = self._speaker.board
         """What other consoles are shown."""
         self.decoder, self.announces = self._hearing.decoder, self._hearing.announces
@@ -187,6 +189,10 @@ class Bridge:
             for node in self._roster
         )
 
+    def want(self, vehicle: str) -> None:
+        """Keep a place for a vehicle of this name, whoever else announces himself."""
+        self._roster.capacity.wanted.add(vehicle)
+
     def position_rad(self) -> tuple[float, float]:
         """The place that we announce as ours."""
         return self._speaker.position_rad()
@@ -212,6 +218,7 @@ class Bridge:
         if node is None:
             known = ", ".join(n.name for n in self._roster if n.is_vehicle) or "none"
             raise RefusedError(vehicle, f"never heard of (known: {known})", "Switch it on; see `bathyfleet doctor`")
+        self.want(vehicle)
         self._crew.guide(node, guidance)
         control = self._crew.of(node)
         if guidance is Guidance.ACOUSTIC:

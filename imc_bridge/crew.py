@@ -64,6 +64,17 @@ class Crew:
         control = self.get(node)
         return control is not None and control.engaged
 
+    def works_with(self, node: Node) -> bool:
+        """Whether a node is led, was told to stop, or has rates to get back."""
+        control, rates = self.get(node), self.asked_rates(node)
+        busy = control is not None and (control.engaged or control.phase is Phase.STOPPING)
+        return busy or (rates is not None and rates.restoring)
+
+    def forget(self, node: Node) -> None:
+        """Keep nothing of a node that has lost its place."""
+        for kept in (self._controls, self._guidance, self._rates):
+            kept.pop(node.imc_id, None)
+
     def asked_rates(self, node: Node) -> RateRequest | None:
         """What was asked of a vehicle's rates, None for nothing."""
         return self._rates.get(node.imc_id)

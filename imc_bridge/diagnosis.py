@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from imc_bridge.events import LinkChange, NodeState
+from imc_bridge.printable import printable
 
 
 class Severity(StrEnum):
@@ -59,6 +60,8 @@ class Cause(StrEnum):
     REFUSED = "refused"
     """Packets that nobody who is trusted sent, or not now."""
     UNKNOWN_MESSAGES = "unknown_messages"
+    CROWDED = "crowded"
+    """More systems claim to be there than places for them: somebody makes them up."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,7 +120,7 @@ class Diagnosis:
         for node in self.nodes:
             lines.append(f"{node.name} (0x{node.imc_id:04X}): {node.state.value}")
             lines += [f"  {_line(finding)}" for finding in node.findings]
-        return "\n".join(lines)
+        return "\n".join(map(printable, lines))
 
 
 def radio_gap_words(gaps: int) -> tuple[str, str]:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import imcpy
 
 from imc_bridge.codec import Message
+from imc_bridge.printable import printable
 from imc_bridge.settings import BridgeSettings
 from imc_bridge.texts import text
 from imc_bridge.transport import Address
@@ -18,6 +19,8 @@ from imc_bridge.transport import Address
 _SERVICE = re.compile(r"imc\+(udp|tcp)://([0-9.]+):(\d{1,5})/?")
 MAX_ADDRESSES = 16
 """A node has a handful; more would only fill our tables."""
+MAX_NAME = 64
+"""Characters kept of a name."""
 _VERSION_SERVICE = re.compile(r"imc\+info://[^/]*/version/([^/;]+)")
 _UID_SERVICE = re.compile(r"dune://[^/]*/uid/(\d+)")
 
@@ -66,12 +69,12 @@ def read_announce(message: Message) -> Announcement:
     uid = _UID_SERVICE.search(services)
     return Announcement(
         imc_id=int(message.src),
-        name=text(message, "sys_name"),
+        name=printable(text(message, "sys_name"), most=MAX_NAME),
         system_type=int(message.sys_type),
         addresses=tuple(found["udp"][:MAX_ADDRESSES]),
         streams=tuple(found["tcp"][:MAX_ADDRESSES]),
-        imc_version=version.group(1) if version else None,
-        uid=uid.group(1) if uid else None,
+        imc_version=printable(version.group(1), most=MAX_NAME) if version else None,
+        uid=uid.group(1)[:MAX_NAME] if uid else None,
         lat_rad=_finite(message.lat),
         lon_rad=_finite(message.lon),
     )

@@ -21,6 +21,7 @@ from imc_bridge.diagnosis import (
 from imc_bridge.events import NodeState, NodeView
 from imc_bridge.ports import holder_of_udp_port
 from imc_bridge.probe import Answer, probe
+from imc_bridge.refusals import Refused
 from imc_bridge.replay import replay
 from imc_bridge.settings import BridgeSettings
 from imc_bridge.transport import PortInUseError
@@ -35,6 +36,8 @@ SLOWEST_RATE, FASTEST_RATE = 0.5, 1.5
 """Relative to what is expected; a simulation that merely cannot keep up lies between."""
 MIN_STATE_RATE_HZ = 1.0
 SILENT_HEARTBEAT_S = 5.0
+CROWD_GONE_S = 60.0
+"""Wall clock: so long after the last one, made-up systems are history."""
 
 
 async def diagnose(settings: BridgeSettings, seconds: float = 15.0) -> Diagnosis:
@@ -189,6 +192,7 @@ def _packet_findings(bridge: Bridge) -> list[Finding]:
                 "Nothing of it can be read: use DUNE of the same IMC minor version",
             )
         )
+    findings += _crowd_findings(bridge)
     findings += [
         note(
             Cause.REFUSED,
@@ -196,6 +200,7 @@ def _packet_findings(bridge: Bridge) -> list[Finding]:
             "Somebody may pretend to be a vehicle, or settings that begin with allowed_ leave one out",
         )
         for reason, count in bridge.admission.refused.most_common()
+        if reason is not Refused.CROWDED
     ]
     findings += [
         note(
@@ -211,6 +216,22 @@ def _packet_findings(bridge: Bridge) -> list[Finding]:
         text = f"{faults[PacketFault.UNKNOWN]} packets of unknown ids skipped: {ids}"
         findings.append(note(Cause.UNKNOWN_MESSAGES, text))
     return findings
+
+
+def _crowd_findings(bridge: Bridge) -> list[Finding]:
+    """Whether more systems claim to be there than are kept; a problem while that goes on."""
+    admission = bridge.admission
+    count = admission.refused[Refused.CROWDED]
+    if not count:
+        return []
+    text = f"{count} packets were not taken in: {Refused.CROWDED}; the last one from {admission.last[Refused.CROWDED]}"
+    if admission.age_s(Refused.CROWDED) > CROWD_GONE_S:
+        return [note(Cause.CROWDED, text)]
+    remedy = (
+        "Somebody makes systems up: find who sends from there. Vehicles of missions and those that are heard keep "
+        "their places; with imc.allowed_ids or imc.allowed_addresses nobody else gets one"
+    )
+    return [problem(Cause.CROWDED, text, remedy)]
 
 
 def _node_findings(node: NodeView, bridge: Bridge, answers: Mapping[int, Answer], *, live: bool) -> list[Finding]:

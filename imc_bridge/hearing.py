@@ -99,7 +99,7 @@ class Hearing:
     def on_announce(self, packet: bytes, address: Address) -> None:
         """Take a packet of the announce socket; also the way to replay a recording."""
         try:
-            if self.admission.admits(address):
+            if self.admission.admits(address, announce=True):
                 self._take_announce(packet, address)
         except Exception as error:
             self._note_error(error)
@@ -118,8 +118,28 @@ class Hearing:
         now = self._now()
         if not self._counts(announcement.imc_id, message.timestamp, address, now):
             self._roster.note_rival(announcement, now)
+            if self._roster.may_be_another(announcement.imc_id):
+                self._greet(announcement, address, now)
             return
-        arrival = self._roster.announced(announcement, address[0], now)
+        if not self._roster.find_place(announcement, address[0], now):
+            self.admission.refuse(Refused.CROWDED, address)
+            self._greet(announcement, address, now)
+            return
+        self._take_up(announcement, address[0], now)
+
+    def _greet(self, announcement: Announcement, address: Address, now: float) -> None:
+        """Speak once to a system without a place: one that is there answers, and has shown thereby that it is."""
+        self._roster.newcomers.note(announcement, address[0])
+        self._speaker.greet(announcement, address[0])
+        self._answer(now)
+
+    def _answer(self, now: float) -> None:
+        """Announce ourselves, so that a newcomer need not wait for our next announce."""
+        if now - self._speaker.announced_at > ANNOUNCE_AGAIN_S:
+            self._speaker.announce(now)
+
+    def _take_up(self, announcement: Announcement, host: str, now: float) -> None:
+        arrival = self._roster.announced(announcement, host, now)
         if arrival is None:
             return
         node = arrival.node
@@ -133,9 +153,8 @@ class Hearing:
             streams.want(node.address)
         if arrival.rebooted:
             self._reboot(node, now)
-        if (arrival.first or arrival.rebooted) and now - self._speaker.announced_at > ANNOUNCE_AGAIN_S:
-            # So that a newcomer need not wait for our next announce.
-            self._speaker.announce(now)
+        if arrival.first or arrival.rebooted:
+            self._answer(now)
         self._links.check(node, self._crew.get(node), now)
 
     def _counts(self, imc_id: int, timestamp: float, address: Address, now: float) -> bool:
@@ -175,10 +194,15 @@ class Hearing:
         if header is None:
             return
         now = self._now()
-        sender = self._roster.speaker(header.src, address)
+        sender = self._roster.speaker(header.src, address) or self._newcomer(header.src, address, now)
         if sender is None:
             self._pass_on(header, packet, address, now)
             return
+        if sender.packets == 0:
+            if not self._roster.capacity.may_be_heard(sender, address[0]):
+                self.admission.refuse(Refused.CROWDED, address)
+                return
+            self._roster.first_heard(sender)
         if header.msg_id != SIMULATED_STATE and not sender.clock.is_old(header.timestamp):
             # DUNE's simulation lets that one through where radio would not reach.
             sender.heard(now, address)
@@ -187,6 +211,21 @@ class Hearing:
         message = self.decoder.message(without_argument(packet))
         if message is not None and 0.0 < message.timestamp < MAX_PLAUSIBLE_VEHICLE_TIME_S:
             self._take_message(sender, message, now, address)
+
+    def _newcomer(self, imc_id: int, address: Address, now: float) -> Node | None:
+        """The system that had no place when it announced itself and now speaks, if it gets one."""
+        announcement = self._roster.newcomers.answered(imc_id, address)
+        if announcement is None:
+            return None
+        if not self._roster.find_place(announcement, address[0], now, heard=True):
+            self.admission.refuse(Refused.CROWDED, address)
+            return None
+        self._take_up(announcement, address[0], now)
+        return self._roster.speaker(imc_id, address)
+
+    def forget(self, node: Node) -> None:
+        """Keep nothing of a node that has lost its place."""
+        self._state_reported.pop(node.imc_id, None)
 
     def _pass_on(self, header: Header, packet: bytes, address: Address, now: float) -> None:
         """Take a packet that is not its sender's own word: an echo of ours, one relayed by a node, a stranger's."""
@@ -204,12 +243,14 @@ class Hearing:
     def _from_unknown_address(self, imc_id: int, address: Address, now: float) -> None:
         if imc_id in (self._settings.imc_id, 0, BROADCAST_ID) or not self.admission.admits_id(imc_id, address):
             return
-        node = self._roster.take_up(imc_id, f"0x{imc_id:04X}", now)
-        if node is not None:
-            node.foreign_address += 1
-            node.last_foreign = address
-            if node.announcement is None:
-                node.heard_at = now
+        node = self._roster.stranger(imc_id, address[0], now)
+        if node is None:
+            self.admission.refuse(Refused.CROWDED, address)
+            return
+        node.foreign_address += 1
+        node.last_foreign = address
+        if node.announcement is None:
+            node.heard_at = now
 
     def _relayed(self, via: Node, packet: bytes, now: float) -> None:
         control = self._crew.get(via)

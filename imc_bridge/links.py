@@ -33,6 +33,10 @@ class Links:
         """The last changes, oldest first."""
         return tuple(self._past.get(node.imc_id, ()))
 
+    def forget(self, node: Node) -> None:
+        """Keep nothing of a node that has lost its place."""
+        self._past.pop(node.imc_id, None)
+
     def check(self, node: Node, control: Control | None, now: float) -> None:
         """Tell when a node's link is not as it was."""
         status = node.status(now)

@@ -15,9 +15,10 @@ from enum import IntEnum
 from imcpy.coordinates import toWGS84
 
 from imc_bridge.codec import Message
-from imc_bridge.discovery import Announcement
+from imc_bridge.discovery import MAX_NAME, Announcement
 from imc_bridge.events import NodeState, StateReport
 from imc_bridge.plausibility import PlaceGate, Step
+from imc_bridge.printable import printable
 from imc_bridge.ranges import RangeGate
 from imc_bridge.refusals import Refused
 from imc_bridge.settings import BridgeSettings
@@ -38,6 +39,8 @@ LONGEST_BOND_S = 3600.0
 """A vehicle that was under water for longer may come back under another address."""
 RATE_WINDOW_S = 10.0
 STATE_MESSAGES_FRESH_S = 3.0
+MAX_TEXT = 500
+"""Characters kept of what a vehicle says in words."""
 
 
 class OperationMode(IntEnum):
@@ -120,6 +123,8 @@ class Node:
         self.first_announced_at: float | None = None
         self.addresses: tuple[Address, ...] = ()
         self.address: Address | None = None
+        self.host = ""
+        """Where its last announce, or without one its first packet, came from."""
         self.hosts: frozenset[str] = frozenset()
         """Where its announces may come from: the host of the last one that counted, and those it announced."""
         self.conflict: str | None = None
@@ -307,13 +312,14 @@ class Node:
         """VehicleState: the operation mode and the errors that explain it."""
         self.operation_mode = int(message.op_mode)
         self.operation_mode_at = now
-        self.error_text = ", ".join(filter(None, (text(message, "error_ents"), text(message, "last_error"))))
+        errors = ", ".join(filter(None, (text(message, "error_ents"), text(message, "last_error"))))
+        self.error_text = printable(errors, most=MAX_TEXT)
 
     def take_plan_state(self, message: Message, now: float) -> None:
         """PlanControlState."""
         self.plan_state = int(message.state)
         self.plan_state_at = now
-        self.plan_id = text(message, "plan_id")
+        self.plan_id = printable(text(message, "plan_id"), most=MAX_TEXT)
         self.plan_outcome = int(message.last_outcome)
         self.plan_state_time_s = float(message.timestamp)
         if self.plan_state not in (PlanState.EXECUTING, PlanState.INITIALIZING):
@@ -466,7 +472,7 @@ def listed_entities(message: Message) -> dict[int, str]:
     for item in text(message, "list").split(";"):
         name, separator, number = item.rpartition("=")
         if separator and number.isdigit():
-            entities[int(number)] = name
+            entities[int(number)] = printable(name, most=MAX_NAME)
     return entities
 
 

@@ -14,3 +14,4 @@ class Refused(StrEnum):
     MOVED = "an announce of a vehicle from an address that is not its own"
     OLD = "older than what the vehicle sent before: a repetition or a recording"
     PLACE = "a position that the vehicle cannot have reached"
+    CROWDED = "of systems for which there is no place, as nothing shows that they exist"

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
+from imc_bridge.capacity import Capacity, Standing, standing_of
 from imc_bridge.discovery import Announcement, reachable_first
+from imc_bridge.newcomers import Newcomers
 from imc_bridge.nodes import ANNOUNCES_MISSED, Node
 from imc_bridge.settings import BridgeSettings
 from imc_bridge.transport import Address
 
-MAX_NODES = 256
-"""Nodes beyond this many are not taken up: no amount of forged packets may fill the memory."""
 MAX_CLAIMS = 8
 
 Claim = tuple[str, str]
@@ -37,11 +37,24 @@ class Roster:
     Parameters
     ----------
     settings
+
+    Attributes
+    ----------
+    capacity : Capacity
+        Says for whom there is a place.
+    newcomers : Newcomers
+        Those who announced themselves while there was none.
+    left : list[Callable[[Node], None]]
+        Called with every node that lost its place, so that nothing of it is kept elsewhere.
     """
 
     def __init__(self, settings: BridgeSettings) -> None:
         self._settings = settings
         self._nodes: dict[int, Node] = {}
+        self.capacity = Capacity(self._nodes)
+        self.capacity.wanted.update(settings.vehicles)
+        self.newcomers = Newcomers()
+        self.left: list[Callable[[Node], None]] = []
         self._by_address: dict[Address, Node] = {}
         self._claims: dict[int, dict[Claim, float]] = {}
         self._conflict_until: dict[int, float] = {}
@@ -57,13 +70,62 @@ class Roster:
         """The node of this name."""
         return next((node for node in self._nodes.values() if node.name == name), None)
 
-    def take_up(self, imc_id: int, name: str, now: float) -> Node | None:
-        """The node of this id, made when it is new; None when there are too many."""
+    def stranger(self, imc_id: int, host: str, now: float) -> Node | None:
+        """The node of this id, whose packets come from anywhere; None when there are too many who announced nothing."""
         node = self._nodes.get(imc_id)
-        if node is None and len(self._nodes) < MAX_NODES:
-            node = self._nodes[imc_id] = Node(imc_id, name, self._settings, now)
-            self._name(node, name)
+        if node is None and self._make_room(Standing.UNANNOUNCED, host, "", now):
+            node = self._add(imc_id, f"0x{imc_id:04X}", host, now)
         return node
+
+    def find_place(self, announcement: Announcement, host: str, now: float, *, heard: bool = False) -> bool:
+        """Whether a system that announced itself has a place or gets one.
+
+        With ``heard`` it was heard from where it announced itself: one that was not gives the id up to it.
+        """
+        node = self._nodes.get(announcement.imc_id)
+        if heard and node is not None and standing_of(node) is Standing.UNHEARD and not self.capacity.in_use(node):
+            self._drop(node)
+            node = None
+        if node is not None and node.announcement is not None:
+            return True
+        standing = Standing.HEARD if heard else Standing.UNHEARD
+        if not self._make_room(standing, host, announcement.name, now):
+            return False
+        if announcement.imc_id not in self._nodes:  # new, or the one that left
+            self._add(announcement.imc_id, announcement.name, host, now)
+        return True
+
+    def first_heard(self, node: Node) -> None:
+        """Give a node that begins to speak the name that it announced, unless another one speaks under it."""
+        if node.announcement is None or node.name == node.announcement.name:
+            return
+        holder = self.named(node.announcement.name)
+        if holder is not None and standing_of(holder) is not Standing.HEARD and not self.capacity.in_use(holder):
+            self._name(holder, "")
+            self._name(node, node.announcement.name)
+
+    def _make_room(self, standing: Standing, host: str, name: str, now: float) -> bool:
+        there_is, leaver = self.capacity.room(standing, host, name, now)
+        if leaver is not None:
+            self._drop(leaver)
+        return there_is
+
+    def _add(self, imc_id: int, name: str, host: str, now: float) -> Node:
+        node = self._nodes[imc_id] = Node(imc_id, name, self._settings, now)
+        node.host = host
+        self._name(node, name)
+        return node
+
+    def _drop(self, node: Node) -> None:
+        del self._nodes[node.imc_id]
+        self._claims.pop(node.imc_id, None)
+        self._conflict_until.pop(node.imc_id, None)
+        for address in node.addresses:
+            if self._by_address.get(address) is node:
+                del self._by_address[address]
+        self.capacity.look_again()
+        for tell in self.left:
+            tell(node)
 
     def speaker(self, imc_id: int, address: Address) -> Node | None:
         """The node of this id if it announced this address as its own: only then a packet is the node's own word."""
@@ -82,6 +144,11 @@ class Roster:
         node = self._nodes.get(imc_id)
         return node is not None and bool(node.hosts) and source_host not in node.hosts and not node.given_up(now)
 
+    def may_be_another(self, imc_id: int) -> bool:
+        """Whether the node of this id was never heard: who announces the id from elsewhere may be the real one."""
+        node = self._nodes.get(imc_id)
+        return node is not None and standing_of(node) is Standing.UNHEARD
+
     def is_old(self, imc_id: int, timestamp: float, now: float) -> bool:
         """Whether a node that is heard sent this long ago. While it restarts, maybe with another time, it is silent."""
         node = self._nodes.get(imc_id)
@@ -95,10 +162,8 @@ class Roster:
             self._contested(node, announcement, now)
 
     def announced(self, announcement: Announcement, source_host: str, now: float) -> Arrival | None:
-        """Take an announce in; None when it does not count: too many nodes, or a second node of the same id."""
-        node = self.take_up(announcement.imc_id, announcement.name, now)
-        if node is None:
-            return None
+        """Take in an announce of a system that has a place; None when it is a second node's of the same id."""
+        node = self._nodes[announcement.imc_id]
         first = node.announcement is None
         if self._contested(node, announcement, now):
             return None
@@ -106,6 +171,7 @@ class Roster:
             self._name(node, announcement.name)
         addresses = reachable_first(announcement, source_host, by_tcp=self._settings.transport == "tcp")
         stale = tuple(address for address in node.addresses if address not in addresses)
+        node.host = source_host
         node.hosts = frozenset({source_host, *(host for host, _ in addresses)})
         rebooted = node.announced(announcement, addresses, now)
         for address in stale:
@@ -118,7 +184,11 @@ class Roster:
         return Arrival(node, first, rebooted, stale)
 
     def pass_time(self, now: float) -> None:
-        """Forget conflicts that have not shown for a while."""
+        """Forget conflicts that have not shown for a while, and strangers who fell silent."""
+        self.capacity.look_again()
+        for node in list(self._nodes.values()):
+            if self.capacity.expired(node, now, self._settings.time_scale):
+                self._drop(node)
         for imc_id, until in list(self._conflict_until.items()):
             if now > until:
                 del self._conflict_until[imc_id]

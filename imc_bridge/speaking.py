@@ -9,11 +9,11 @@ import imcpy
 
 from imc_bridge.codec import Message, encode
 from imc_bridge.consoles import Board
-from imc_bridge.discovery import own_announce
+from imc_bridge.discovery import Announcement, own_announce
 from imc_bridge.nodes import Node
 from imc_bridge.roster import Roster
 from imc_bridge.settings import BridgeSettings
-from imc_bridge.transport import Transport
+from imc_bridge.transport import Address, Transport
 
 ENTITY_QUERY_S = 2.0
 
@@ -57,6 +57,7 @@ class Speaker:
         self._wall_clock = wall_clock
         self._announce_due = 0.0
         self._heartbeat_due = 0.0
+        self._greeted: set[Address] = set()
 
     def begin(self, now: float) -> None:
         """Announce from now on, or as soon as it is known where we are."""
@@ -70,8 +71,10 @@ class Speaker:
             self.announce(now)
         if now >= self._heartbeat_due:
             self._heartbeat_due = now + self.settings.heartbeat_period_s
+            self._greeted.clear()
             for node in self._roster:
-                if self.talks_to(node):
+                # Who was announced and never heard may not exist: whoever has its address is not bothered for long.
+                if self.talks_to(node) and (node.packets or not node.given_up(now)):
                     self._beat(node)
         for node in self._roster:
             if node.is_vehicle and self.talks_to(node):
@@ -94,6 +97,16 @@ class Speaker:
         packet = self._encoded(imcpy.Heartbeat(), node.imc_id)
         for address in node.addresses:
             self.transport.send(packet, address)
+
+    def greet(self, announcement: Announcement, host: str) -> None:
+        """Send a heartbeat to a system that announced itself, at the host that its announce came from.
+
+        However many systems claim an address, it gets one a period.
+        """
+        here = next((address for address in announcement.addresses if address[0] == host), None)
+        if here is not None and here not in self._greeted and announcement.system_type != int(imcpy.SystemType.CCU):
+            self._greeted.add(here)
+            self.transport.send(self._encoded(imcpy.Heartbeat(), announcement.imc_id), here)
 
     def announce(self, now: float) -> None:
         """Announce ourselves on every port and interface."""

@@ -148,3 +148,36 @@ def test_what_counts_as_this_machine(host: str, loopback: bool) -> None:
 def test_every_setting_is_explained() -> None:
     for name, field in Settings.model_fields.items():
         assert field.description or name in ("log_level", "log_format"), name
+
+
+@pytest.mark.parametrize(
+    ("origin", "said"),
+    [
+        ("*", "every page there is"),
+        ("https://*.example", "every page there is"),
+        ("null", "sandbox"),
+        ("console.example", "no scheme"),
+        ("console.example:8080", "no scheme"),
+        ("ftp://console.example", "no scheme"),
+        ("https://", "names no host"),
+        ("https://console.example/", "which would be https://console.example"),
+        ("https://console.example/path", "which would be https://console.example"),
+        ("https://console.example?query", "which would be https://console.example"),
+        ("https://console.example:443", "which would be https://console.example"),
+        ("https://user:password@console.example", "which would be https://console.example"),
+        ("HTTPS://Console.Example", "which would be https://console.example"),
+        ("https://console.example:port", "cannot be taken apart"),
+        ("", "no scheme"),
+    ],
+)
+def test_only_origins_may_use_the_api_from_elsewhere(origin: str, said: str) -> None:
+    with pytest.raises(SettingsError) as refused:
+        load_settings(allowed_origins=("https://good.example", origin))
+    (problem,) = refused.value.problems
+    assert said in problem
+    assert "such as https://console.example" in problem
+
+
+def test_origins_with_and_without_a_port_are_taken() -> None:
+    good = ("https://console.example", "http://10.0.0.5:8080", "http://[::1]:8080", "http://localhost:5173")
+    assert load_settings(allowed_origins=good).allowed_origins == good

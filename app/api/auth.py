@@ -14,13 +14,11 @@ from app.api.limits import Limits, host_of
 from app.api.peers import is_another_user
 from app.api.problems import ProblemError
 from app.api.state import EdgeState, State
-from app.api.tokens import Principal, Role, TokenStore
+from app.api.tokens import LOCAL_OPERATOR, Principal, Role, TokenStore
 from app.settings import is_loopback
 
 RECHECK_S = 15.0
 """How long a live view may outlast its token."""
-
-LOCAL_OPERATOR = Principal("local operator", Role.ADMIN)
 
 # Only for the OpenAPI document: the header itself is read below, so that problems are answered our way.
 _bearer = HTTPBearer(
@@ -91,7 +89,7 @@ async def console_log_in(
 
     As with HTTP, without any token this machine's own user is an operator.
     """
-    if limits.locked_out(host):
+    if limits.locked_out(host) and not await tokens.exists(password.strip()):
         return None
     principal = await tokens.principal(password.strip())
     if principal is not None:

@@ -1,11 +1,16 @@
 """Connections of clients that are slow on purpose, or too many: they must not keep the others out."""
 
 import asyncio
-from collections import Counter
+import ipaddress
 
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 
+from app.api.auth import OPERATORS
+from app.api.limits import network_of
+from app.api.sockets import Rank, Sockets
 from app.settings import Settings, is_loopback
+
+__all__ = ["Sockets", "is_shared_host", "patient_http"]
 
 MAX_HEAD_BYTES = 65_536
 _END = b"\r\nconnection: close\r\ncontent-length: 0\r\n\r\n"
@@ -13,33 +18,42 @@ _TOO_SLOW = b"HTTP/1.1 408 Request Timeout" + _END
 _TOO_LARGE = b"HTTP/1.1 431 Request Header Fields Too Large" + _END
 
 
-def patient_http(settings: Settings) -> type[asyncio.Protocol]:
-    """Return uvicorn's HTTP protocol that bounds a request's head, in time and size, and connections per address.
+def is_shared_host(settings: Settings, host: str) -> bool:
+    """Tell whether many different people may come from an address: this machine, and the trusted proxies."""
+    if not host or is_loopback(host):
+        return True
+    try:
+        address = ipaddress.ip_address(host.split("%")[0])
+    except ValueError:
+        return False
+    return any(address in ipaddress.ip_network(proxy) for proxy in settings.trusted_proxies)
+
+
+def patient_http(settings: Settings, sockets: Sockets[asyncio.Protocol]) -> type[asyncio.Protocol]:
+    """Return uvicorn's HTTP protocol that bounds a request's head, in time and size, and the open connections.
 
     Between requests uvicorn itself closes idle connections; the body's time is the business of the middleware.
     """
-    held: Counter[str] = Counter()
-    share = settings.max_connections // 4
 
     class PatientHttp(HttpToolsProtocol):
         """One connection."""
 
         _timer: asyncio.TimerHandle | None = None
-        _counted = ""
         _head_bytes = 0
         _in_head = False
 
         def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
-            """Count it; refuse one too many."""
+            """Count it; of too many the one that was idle for longest is closed."""
             super().connection_made(transport)
-            host = self.client[0] if self.client else ""
-            if host and not is_loopback(host) and host not in settings.trusted_proxies:
-                if held[host] >= share:
-                    transport.abort()
-                    return
-                held[host] += 1
-                self._counted = host
+            leaver = sockets.opened(self, network_of(self.client[0]) if self.client else "")
+            if isinstance(leaver, PatientHttp):
+                leaver.leave()
             self._watch()
+
+        def leave(self) -> None:
+            """Make room for another connection."""
+            self._forget()
+            self.transport.abort()
 
         def data_received(self, data: bytes) -> None:
             """Take data in; a head that is not complete yet has as long as the first byte had."""
@@ -59,7 +73,17 @@ def patient_http(settings: Settings) -> type[asyncio.Protocol]:
         def on_headers_complete(self) -> None:
             """End it."""
             self._in_head = False
+            sockets.busy(self)
             super().on_headers_complete()
+
+        def on_response_complete(self) -> None:
+            """Note who was served, and that the connection is idle."""
+            served = self.cycle.scope.get("state", {}).get("principal")
+            super().on_response_complete()
+            if self.cycle.response_complete:
+                operator = served is not None and served.role in OPERATORS
+                rank = Rank.OPERATOR if operator else Rank.STRANGER if served is None else Rank.USER
+                sockets.idle(self, rank)
 
         def handle_websocket_upgrade(self) -> None:
             """Leave the connection to the other protocol, whose number has a limit of its own."""
@@ -94,10 +118,6 @@ def patient_http(settings: Settings) -> type[asyncio.Protocol]:
 
         def _forget(self) -> None:
             self._stop_timer()
-            if self._counted:
-                held[self._counted] -= 1
-                if not held[self._counted]:
-                    del held[self._counted]
-                self._counted = ""
+            sockets.closed(self)
 
     return PatientHttp

@@ -76,7 +76,7 @@ class Limits:
             Buckets(max_requests_per_s, max(BURST_S * max_requests_per_s, 1.0)) if max_requests_per_s else None
         )
         self._failures = Buckets(max_failed_logins / 60.0, max_failed_logins)
-        # Tokens that were valid when last used: their holders are served whatever others at their address do.
+        # Tokens that were valid when last looked at: their holders are served whatever others at their address do.
         self._known: OrderedDict[str, None] = OrderedDict()
 
     def wait_s(self, token: str | None, host: str) -> tuple[float, str]:
@@ -158,7 +158,12 @@ class LimitMiddleware:
         if scope["type"] not in ("http", "websocket") or comes_from_peer(scope):
             await self.app(scope, receive, send)
             return
-        wait_s, reason = self.limits.wait_s(token_of(scope), host_of(scope))
+        token, host = token_of(scope), host_of(scope)
+        wait_s, reason = self.limits.wait_s(token, host)
+        if wait_s > 0.0 and token is not None and await scope["app"].state.edge.is_good(token):
+            # Its holder has nothing to do with what others at his address have sent.
+            self.limits.log_in(token, host, good=True)
+            wait_s, reason = self.limits.wait_s(token, host)
         if wait_s == 0.0:
             await self.app(scope, receive, send)
         elif scope["type"] == "websocket":

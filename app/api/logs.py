@@ -6,12 +6,26 @@ from typing import Any, Literal, TextIO
 
 import structlog
 
+from imc_bridge.printable import printable
+
+_OF_SEVERAL_LINES = frozenset(("exception", "stack"))
+
 
 def _without_repetition(_logger: Any, _method: str, event: structlog.typing.EventDict) -> structlog.typing.EventDict:
     """Drop what uvicorn and other handlers add: the message again."""
     event.pop("color_message", None)
     event.pop("message", None)
     return event
+
+
+def _made_printable(_logger: Any, _method: str, event: structlog.typing.EventDict) -> structlog.typing.EventDict:
+    """Escape what a terminal would obey: paths, names and errors hold what strangers sent."""
+    return {
+        printable(key): printable(value, keep="\n\t" if key in _OF_SEVERAL_LINES else "")
+        if isinstance(value, str)
+        else value
+        for key, value in event.items()
+    }
 
 
 class _Handler(logging.Handler):
@@ -45,11 +59,13 @@ def configure(level: str = "info", form: Literal["console", "json"] = "console",
         final = [structlog.processors.format_exc_info, structlog.processors.JSONRenderer()]
     else:
         final = [
+            structlog.processors.format_exc_info,
+            _made_printable,
             structlog.dev.ConsoleRenderer(
                 colors=(stream or sys.stderr).isatty(),
                 pad_event_to=0,
                 exception_formatter=structlog.dev.plain_traceback,
-            )
+            ),
         ]
     handler = _Handler(stream)
     handler.setFormatter(

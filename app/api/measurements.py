@@ -44,8 +44,8 @@ async def post_measurements(
             min_length=1,
             max_length=128,
             pattern=r"^[\x21-\x7e]+$",
-            description="Name of this batch, made by the sender. Sent again with the same key and content, nothing is "
-            "stored twice and the first answer is given again",
+            description="Name of this batch, made by the sender. Sent again by the same sender with the same key and "
+            "content, nothing is stored twice and the first answer is given again",
             examples=["lauv-xplore-1-000042"],
         ),
     ] = None,
@@ -63,7 +63,9 @@ async def post_measurements(
         for i, item in enumerate(batch.items)
         if isinstance(item, str)
     ]
-    answer = await service.measure(mission_id, [item for _, item in readable], idempotency_key=idempotency_key)
+    answer = await service.measure(
+        mission_id, [item for _, item in readable], idempotency_key=idempotency_key, sender=vehicle.identity
+    )
     if not verdicts:
         return answer
     verdicts += [verdict.model_copy(update={"index": readable[verdict.index][0]}) for verdict in answer.items]

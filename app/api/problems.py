@@ -87,6 +87,7 @@ TITLES: dict[str, tuple[int, str]] = {
     "too-many-streams": (429, "Too many live views"),
     "too-many-requests": (429, "Too many requests"),
     "internal": (500, "Something went wrong inside the service"),
+    "too-many-connections": (503, "Too many requests at the same time"),
     "mission-elsewhere": (503, "Another process has the mission"),
     "not-ready": (503, "The service is not ready"),
     "database-unavailable": (503, "The database cannot be used now"),

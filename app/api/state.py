@@ -11,10 +11,11 @@ from fastapi import Depends
 from starlette.requests import HTTPConnection
 
 from app.api.audit_log import AuditLog
-from app.api.limits import Limits
+from app.api.limits import Limits, host_of, network_of
 from app.api.metrics import LIVE_VIEWERS
 from app.api.problems import ProblemError
 from app.api.processes import PeerClients
+from app.api.quotas import Holder, Shares, holder_of
 from app.api.tokens import TokenStore
 from app.missions.service import MissionService
 from app.settings import Settings
@@ -39,25 +40,40 @@ class EdgeState:
     audit: AuditLog
     stopping: asyncio.Event = field(default_factory=asyncio.Event)
     run_id: str = field(default_factory=lambda: secrets.token_hex(4))
-    streams: int = 0
     peers: PeerClients = field(default_factory=PeerClients)
+    streams: Shares = field(init=False)
 
-    @contextmanager
-    def stream(self, kind: str) -> Iterator[None]:
-        """Count a live view (``websocket``) or event stream (``sse``). Raises ProblemError above the limit."""
-        if self.streams >= self.settings.max_streams:
+    def __post_init__(self) -> None:
+        """Share the live views out."""
+        self.streams = Shares(self.settings.max_streams)
+
+    async def is_good(self, token: str) -> bool:
+        """Tell whether a token that a request carries may be valid; see :meth:`TokenStore.exists`."""
+        return await self.tokens.exists(token)
+
+    def check_stream(self, connection: HTTPConnection) -> Holder:
+        """Return to whom another live view would be counted. Raises ProblemError when there is none left for him."""
+        who = holder_of(connection.scope.get("state", {}).get("principal"), network_of(host_of(connection.scope)))
+        if not self.streams.has_room(who):
             raise ProblemError(
                 "too-many-streams",
-                f"{self.streams} live views and event streams are open, as many as max_streams allows",
+                f"{self.streams.held} live views and event streams are open, as many as max_streams allows "
+                "all together or this user",
                 remedy="Close some, or raise max_streams in the settings",
                 headers={"Retry-After": "10"},
             )
-        self.streams += 1
+        return who
+
+    @contextmanager
+    def stream(self, kind: str, connection: HTTPConnection) -> Iterator[None]:
+        """Count a live view (``websocket``) or event stream (``sse``). Raises ProblemError above the limits."""
+        who = self.check_stream(connection)
+        self.streams.take(who)
         LIVE_VIEWERS.labels(kind).inc()
         try:
             yield
         finally:
-            self.streams -= 1
+            self.streams.give_back(who)
             LIVE_VIEWERS.labels(kind).dec()
 
 

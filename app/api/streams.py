@@ -88,9 +88,7 @@ async def get_events(
         entries = await service.events(mission_id, after=start, limit=limit)
         return Response(_events.dump_json(entries), media_type="application/json")
     await service.mission(mission_id)
-    if state.streams >= state.settings.max_streams:
-        with state.stream("sse"):
-            pass  # raises: the limit is reached
+    state.check_stream(request)  # before the answer begins
     return EventSourceResponse(
         _stream(service, state, mission_id, start, request),
         ping=KEEP_ALIVE_S,
@@ -132,7 +130,7 @@ async def _stream(
     service: MissionService, state: EdgeState, mission_id: str, start: int, request: Request
 ) -> AsyncIterator[ServerSentEvent]:
     """Yield the log after ``start``, first what is stored, then what happens, as long as the client may see it."""
-    with state.stream("sse"):
+    with state.stream("sse", request):
         async with service.subscribe(mission_id) as messages:
             snapshot = await anext(messages)
             assert isinstance(snapshot, SnapshotMessage)  # noqa: S101 - the subscription's contract
@@ -185,7 +183,7 @@ async def live(websocket: WebSocket, mission_id: str) -> None:
     await websocket.accept()
     try:
         await authenticate(websocket, state, query_token=True)
-        with state.stream("websocket"):
+        with state.stream("websocket", websocket):
             await _serve(websocket, state, mission_id)
     except ProblemError as error:
         codes = {

@@ -1,5 +1,6 @@
 """Access tokens: made once, shown once, kept as a hash."""
 
+import asyncio
 import hashlib
 import secrets
 import uuid
@@ -16,6 +17,8 @@ from app.storage.sharing import Shared
 
 TOKEN_PREFIX = "bf_"  # noqa: S105 - makes leaked tokens easy to search for
 FIRST_TOKEN_FILE = "operator.token"  # noqa: S105 - the file's name
+DIGESTS_READ_AGAIN_S = 0.1
+"""However many guesses come, the tokens are not read again sooner."""
 
 
 class Role(StrEnum):
@@ -39,10 +42,19 @@ class Principal:
     role: Role
     vehicle: str | None = None
 
+    @property
+    def identity(self) -> str:
+        """The same for every token of this name, role and vehicle, and for no other."""
+        return "\0".join((self.role, self.name, self.vehicle or ""))
+
+
+LOCAL_OPERATOR = Principal("local operator", Role.ADMIN)
+"""The user of this machine who runs the service, while nobody has made a token."""
+
 
 def token_hash(token: str) -> str:
     """Return what is stored of a token. Its 256 random bits need no slow hash."""
-    return hashlib.sha256(token.encode()).hexdigest()
+    return hashlib.sha256(token.encode(errors="surrogateescape")).hexdigest()
 
 
 class TokenStore:
@@ -53,6 +65,9 @@ class TokenStore:
         # Asked with every request: pages that ask for a new map at the same moment are answered by one query.
         self._any = Shared(self._any_stored)
         self._at_once = AtOnce(database)
+        self._digests: dict[str, Principal] = {}
+        self._digests_read_s = -DIGESTS_READ_AGAIN_S
+        self._read_again = Shared(self._read_in_turn)
 
     async def create(
         self, name: str, role: Role, *, vehicle: str | None = None, expires_at: datetime | None = None
@@ -100,16 +115,46 @@ class TokenStore:
 
     async def principal(self, token: str) -> Principal | None:
         """Return who holds ``token``; None when it is unknown, revoked or has run out."""
-        values = {"hash": token_hash(token), "now": datetime.now(UTC)}
-        found = await self._at_once(tokens.VALID, values)
+        digest = token_hash(token)
+        found = await self._at_once(tokens.VALID, {"hash": digest, "now": datetime.now(UTC)})
         if not found:
+            self._digests.pop(digest, None)
             return None
-        name, role, vehicle = found[0]
-        return Principal(name, Role(role), vehicle)
+        return _principal(*found[0])
+
+    async def exists(self, token: str) -> bool:
+        """Tell whether a token may be valid, at a cost that has a bound however many are asked for.
+
+        For those who would else be refused unseen. What is revoked meanwhile may still be said to exist;
+        :meth:`principal` has the last word. A token that is not known yet waits for the tokens to be read again.
+        """
+        digest = token_hash(token)
+        if digest not in self._digests:
+            self._digests = await self._read_again()
+        return digest in self._digests
+
+    def known(self, token: str) -> Principal | None:
+        """Return who holds a token as far as that is known without asking the database, for counting only."""
+        return self._digests.get(token_hash(token))
+
+    async def _read_in_turn(self) -> dict[str, Principal]:
+        loop = asyncio.get_running_loop()
+        await asyncio.sleep(max(self._digests_read_s + DIGESTS_READ_AGAIN_S - loop.time(), 0.0))
+        self._digests_read_s = loop.time()
+        return await self._read_digests()
+
+    async def _read_digests(self) -> dict[str, Principal]:
+        async with self._database.reading() as session:
+            valid = await tokens.all_valid(session, datetime.now(UTC))
+        return {digest: _principal(name, role, vehicle) for digest, name, role, vehicle in valid}
 
     def close(self) -> None:
         """Let go of the database."""
         self._at_once.close()
+
+
+def _principal(name: str, role: str, vehicle: str | None) -> Principal:
+    return Principal(name, Role(role), vehicle)
 
 
 def _made(

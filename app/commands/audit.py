@@ -67,9 +67,11 @@ def audit(
             for entry in entries:
                 typer.echo(json.dumps(entry))
         elif form == "csv":
+            from app.csv_cells import text_cell
+
             writer = csv.DictWriter(sys.stdout, FIELDS)
             writer.writeheader()
-            writer.writerows({name: _harmless(value) for name, value in entry.items()} for entry in entries)
+            writer.writerows({name: text_cell(value) for name, value in entry.items()} for entry in entries)
         else:
             _show(entries)
     except BrokenPipeError:
@@ -84,15 +86,12 @@ def _plain(row: "AuditRow") -> dict[str, Any]:
     }
 
 
-def _harmless(value: object) -> object:
-    """Keep a spreadsheet from taking a text that a stranger sent for a formula."""
-    return f"'{value}" if isinstance(value, str) and value[:1] in ("=", "+", "-", "@", "\t", "\r") else value
-
-
 def _show(entries: list[dict[str, Any]]) -> None:
     from rich.console import Console
     from rich.table import Table
     from rich.text import Text
+
+    from imc_bridge.printable import printable
 
     table = Table("time", "who", "from", "what", "result", "why")
     for entry in entries:
@@ -100,5 +99,5 @@ def _show(entries: list[dict[str, Any]]) -> None:
         what = f"{entry['action']} {entry['target']}"
         result = entry["result"] if entry["status"] is None else f"{entry['result']} ({entry['status']})"
         shown = (entry["time"][:19] + "Z", who, entry["origin"], what, result, entry["detail"])
-        table.add_row(*(Text(text) for text in shown))
+        table.add_row(*(Text(printable(text)) for text in shown))
     Console().print(table)

@@ -87,9 +87,13 @@ def prune(
         finally:
             await store.close()
 
+    from imc_bridge.printable import printable
+
     missions, note = asyncio.run(run())
     for mission in missions:
-        typer.echo(f"{mission.id}  ended {mission.ended:%Y-%m-%d}  {mission.soundings} soundings  {mission.name}")
+        typer.echo(
+            f"{mission.id}  ended {mission.ended:%Y-%m-%d}  {mission.soundings} soundings  {printable(mission.name)}"
+        )
     number = f"{len(missions)} mission{'' if len(missions) == 1 else 's'}"
     if not apply:
         hint = "; --apply removes them: bathyfleet export and bathyfleet backup keep them" if missions else ""

@@ -151,10 +151,12 @@ def import_file(
         view = with_missions(
             command_settings(database_url=database), run, changing="import", mission=f"{mission} {file.name}"
         )
+    from imc_bridge.printable import printable
+
     for note in view.notes:
-        typer.echo(f"note: {note}", err=True)
+        typer.echo(f"note: {printable(note)}", err=True)
     if isinstance(view, ReferenceView):
-        typer.echo(f"the map is compared with {view.filename} in {view.cells} cells")
+        typer.echo(f"the map is compared with {printable(view.filename)} in {view.cells} cells")
     else:
         known = ", as before" if view.replayed else ""
         typer.echo(

@@ -59,7 +59,9 @@ def import_logs(
         if as_json:
             typer.echo(json.dumps([view.model_dump() for view in views], indent=2))
         else:
-            typer.echo("\n".join(line for view in views for line in _import_lines(view)), nl=bool(views))
+            from imc_bridge.printable import printable
+
+            typer.echo("\n".join(printable(line) for view in views for line in _import_lines(view)), nl=bool(views))
 
 
 def _import_lines(view: "LogImportView") -> Iterator[str]:

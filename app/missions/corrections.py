@@ -7,12 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.mapping.georeference import LocalFrame
-from app.mapping.printable import printable
 from app.mapping.sound_speed import SoundSpeedProfile
 from app.mapping.tides import TideTable
 from app.mapping.vertical import INSTANTANEOUS_WATER_LEVEL, VerticalDatum
 from app.missions.fleet import Position, SoundingReport
 from app.missions.spec import SoundSpeed, Tide
+from imc_bridge.printable import printable
 
 NO_LEVEL = "tide: "
 """How the reason of a sounding begins that is refused because no water level is known for its time."""
@@ -59,10 +59,10 @@ class Corrections:
     def vertical_datum(self) -> VerticalDatum:
         """Return what corrected depths are counted from."""
         tide = self._tide
-        source = printable(tide.source)
+        source = printable(tide.source).strip()
         sound = ""
         if self._sound_speed is not None:
-            sound = f"; sound speed: {printable(self._sound_speed.source) or 'profile'}"
+            sound = f"; sound speed: {printable(self._sound_speed.source).strip() or 'profile'}"
         if self.table is None and not tide.is_applied:
             statement = f"instantaneous water level (tide: {source}{sound})"
             return VerticalDatum(INSTANTANEOUS_WATER_LEVEL, statement)

@@ -7,13 +7,13 @@ import numpy as np
 
 from app.mapping.georeference import LocalFrame
 from app.mapping.layers import Layer
-from app.mapping.printable import printable
 from app.mapping.products.overlay import overlay_corners
 from app.mapping.types import FloatArray
 from app.mapping.vertical import VerticalDatum
 from app.missions.map_builder import BuiltMap
 from app.missions.map_views import MapView
 from app.missions.spec import MissionSpec
+from imc_bridge.printable import printable
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class MissionFacts:
     @property
     def title(self) -> str:
         """Return the mission's name as it may stand in every file."""
-        return printable(self.spec.name)
+        return printable(self.spec.name).strip()
 
     @property
     def common_sd_m(self) -> float:

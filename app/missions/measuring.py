@@ -36,6 +36,9 @@ KEYS_KEPT = timedelta(days=1)
 """For so long the answer to an idempotency key is given again."""
 LOOK_AT_KEYS_S = 3600.0
 
+_Answer = tuple[str, BatchVerdict]
+"""The digest of a batch, and what was answered."""
+
 
 async def measure(
     live: LiveMission,
@@ -44,8 +47,11 @@ async def measure(
     items: Sequence[Measurement],
     *,
     idempotency_key: str | None = None,
+    sender: str = "",
 ) -> BatchVerdict:
     """Take in measurements; what is counted accepted is stored for good when this returns.
+
+    Idempotency keys are the ``sender``'s own: what others sent under the same key has nothing to do with his.
 
     Raises
     ------
@@ -60,7 +66,8 @@ async def measure(
     strangers = {i: _stranger(live, item) for i, item in enumerate(items)}
     reports = {i: report for i, item in enumerate(items) if not strangers[i] and (report := _sounding(item))}
     ranges = _ranges(live, items, strangers)
-    batch = _Batch(items, idempotency_key, digest, strangers, reports, ranges)
+    key = _Key.of(sender, idempotency_key) if idempotency_key is not None else None
+    batch = _Batch(items, key, digest, strangers, reports, ranges)
     if live.intake is None:
         live.intake = Grouped(partial(_take, live, hub, rest), lambda batch: bool(batch.ranges))
     answer: BatchVerdict = await live.intake(batch)
@@ -68,11 +75,28 @@ async def measure(
 
 
 @dataclass(frozen=True)
+class _Key:
+    """An idempotency key as its sender knows it, as it is stored, and as it was before keys had owners, if that."""
+
+    given: str
+    stored: str
+    before: str | None
+
+    @classmethod
+    def of(cls, sender: str, key: str) -> "_Key":
+        if not sender:
+            return cls(key, key, None)
+        owner = hashlib.sha256(sender.encode()).hexdigest()[:32]
+        # A log's keys are nobody's who sends measurements.
+        return cls(key, f"{owner}:{key}", None if key.startswith(LOG_KEY) else key)
+
+
+@dataclass(frozen=True)
 class _Batch:
     """A batch that was looked through: by item why it is refused, its sounding, its range to a target."""
 
     items: Sequence[Measurement]
-    key: str | None
+    key: _Key | None
     digest: str
     strangers: Mapping[int, str]
     reports: Mapping[int, SoundingReport]
@@ -87,17 +111,17 @@ async def _take(
     live: LiveMission, hub: FleetHub, rest: RestFleetLink, batches: Sequence[_Batch]
 ) -> list[BatchVerdict | Exception]:
     """Store batches in one transaction: many vehicles that post at the same time wait for the disk once."""
-    keys = {batch.key for batch in batches if batch.key is not None}
+    keys = {name for batch in batches if batch.key for name in (batch.key.stored, batch.key.before) if name}
     async with live.journal.writing, live.ranges.writing, live.database.writing() as session:
         rows = await sounding_queries.answers_to(session, live.id, keys)
-        known = {row.key: (row.digest, BatchVerdict.model_validate(row.answer)) for row in rows}
+        known = _answers(batches, {row.key: (row.digest, BatchVerdict.model_validate(row.answer)) for row in rows})
         fresh = _first_of_each(batches, known)
         stored, committed = await _store(live, [batches[i] for i in fresh], session)
         await _forget_old_keys(live, session)
     for work in committed:
         work()
     answers = dict(zip(fresh, stored, strict=True))
-    known |= {key: (batches[i].digest, answers[i]) for i in fresh if (key := batches[i].key) is not None}
+    known |= {key.stored: (batches[i].digest, answers[i]) for i in fresh if (key := batches[i].key) is not None}
     results: list[BatchVerdict | Exception] = [
         answers.get(i) or _again(batch, known) for i, batch in enumerate(batches)
     ]
@@ -110,25 +134,44 @@ async def _take(
     return results
 
 
+def _answers(batches: Sequence[_Batch], rows: Mapping[str, _Answer]) -> dict[str, _Answer]:
+    """Return the answers given to the batches' keys.
+
+    One that was stored before keys had owners is the answer to the same content, whoever sends it again; other content
+    under that key is another sender's.
+    """
+    found = {}
+    for batch in batches:
+        if batch.key is None:
+            continue
+        own, before = rows.get(batch.key.stored), rows.get(batch.key.before or "")
+        if own is not None:
+            found[batch.key.stored] = own
+        elif before is not None and before[0] == batch.digest:
+            found[batch.key.stored] = before
+    return found
+
+
 def _first_of_each(batches: Sequence[_Batch], known: Collection[str]) -> list[int]:
     """Return which batches are to be stored: those without a key, and the first of every key that is not known."""
     seen = set(known)
     found = []
     for i, batch in enumerate(batches):
-        if batch.key is None or batch.key not in seen:
+        if batch.key is None or batch.key.stored not in seen:
             found.append(i)
         if batch.key is not None:
-            seen.add(batch.key)
+            seen.add(batch.key.stored)
     return found
 
 
-def _again(batch: _Batch, known: Mapping[str, tuple[str, BatchVerdict]]) -> BatchVerdict | ConflictError:
+def _again(batch: _Batch, known: Mapping[str, _Answer]) -> BatchVerdict | ConflictError:
     """Return the answer to a batch whose key came before: the first one's, if it is the same batch."""
-    digest, first = known[batch.key or ""]
+    key = batch.key or _Key.of("", "")
+    digest, first = known[key.stored]
     if digest == batch.digest:
         return first.model_copy(update={"replayed": True})
     return ConflictError(
-        f"idempotency key {batch.key!r} was used before with other measurements", "use a new key for every new batch"
+        f"idempotency key {key.given!r} was used before with other measurements", "use a new key for every new batch"
     )
 
 
@@ -158,7 +201,7 @@ async def _store(
     session.add_all(
         BatchRow(
             mission_id=live.id,
-            key=batch.key,
+            key=batch.key.stored,
             digest=batch.digest,
             answer=answer.model_dump(mode="json"),
             created_at=moment,

@@ -11,6 +11,7 @@ import orjson
 from shapely.geometry import Polygon, mapping
 
 from app import __version__
+from app.csv_cells import text_cell
 from app.mapping.layers import Layer, make_layers
 from app.mapping.products.bag import bag
 from app.mapping.products.contours import Contour, contours_geojson, find_contours
@@ -300,7 +301,7 @@ def _soundings_csv(soundings: Sequence[SoundingRow], vertical_datum: str) -> byt
     text.write(f"# depth_m: positive down, from {vertical_datum}\n")
     writer = csv.writer(text)
     writer.writerow(COLUMNS)
-    writer.writerows([getattr(row, column) for column in COLUMNS] for row in soundings)
+    writer.writerows([text_cell(getattr(row, column)) for column in COLUMNS] for row in soundings)
     return text.getvalue().encode()
 
 

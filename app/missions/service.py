@@ -343,11 +343,16 @@ class MissionService:
     # Measurements and waypoints
 
     async def measure(
-        self, mission_id: str, items: Sequence[Measurement], *, idempotency_key: str | None = None
+        self,
+        mission_id: str,
+        items: Sequence[Measurement],
+        *,
+        idempotency_key: str | None = None,
+        sender: str = "",
     ) -> BatchVerdict:
         """Take in measurements; see ``measuring.measure``."""
         live = await self._get(mission_id)
-        return await measure(live, self._hub, self._rest, items, idempotency_key=idempotency_key)
+        return await measure(live, self._hub, self._rest, items, idempotency_key=idempotency_key, sender=sender)
 
     async def waypoint(
         self, mission_id: str, vehicle: str, *, after_step: int | None = None, timeout_s: float = 0.0

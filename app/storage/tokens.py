@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from datetime import datetime
 
-from sqlalchemy import bindparam, or_, select, update
+from sqlalchemy import Row, bindparam, or_, select, update
 from sqlalchemy.ext.asyncio import AsyncSession
 
 from app.storage.models import TokenRow
@@ -21,6 +21,14 @@ VALID = select(TokenRow.name, TokenRow.role, TokenRow.vehicle).where(
     or_(TokenRow.expires_at.is_(None), TokenRow.expires_at > bindparam("now")),
 )
 """Name, role and vehicle of the token with a ``hash``, unless it was revoked or has run out ``now``."""
+
+
+async def all_valid(session: AsyncSession, now: datetime) -> Sequence[Row[str, str, str, str | None]]:
+    """Return hash, name, role and vehicle of every token that was not revoked and has not run out."""
+    query = select(TokenRow.token_hash, TokenRow.name, TokenRow.role, TokenRow.vehicle).where(
+        TokenRow.revoked_at.is_(None), or_(TokenRow.expires_at.is_(None), TokenRow.expires_at > now)
+    )
+    return (await session.execute(query)).all()
 
 
 async def any_token(session: AsyncSession) -> bool:

@@ -2,12 +2,18 @@
 
 import asyncio
 import json
+from collections.abc import Callable
 from typing import Any
 
 import httpx
+from sqlalchemy import select
 
+from app.api.tokens import Role, TokenStore
 from app.main import Server
-from tests.api.conftest import mission_spec, soundings
+from app.settings import Settings
+from app.storage.database import Database
+from app.storage.models import BatchRow
+from tests.api.conftest import make_client, mission_spec, running, soundings
 
 
 async def test_every_item_has_its_own_verdict(client: httpx.AsyncClient, mission: dict[str, Any]) -> None:
@@ -71,6 +77,52 @@ async def test_a_batch_with_only_unreadable_items_is_answered(
     answer = await client.post(f"/missions/{mission['id']}/measurements", json={"items": [None, 3]})
     assert answer.status_code == 200, answer.text
     assert answer.json()["rejected"] == 2
+
+
+async def test_an_idempotency_key_is_its_senders_own(make_settings: Callable[..., Settings]) -> None:
+    settings = make_settings()
+    database = Database(settings.database_url)
+    store = TokenStore(database)
+    async with running(settings) as server, make_client(server) as client:
+        vehicles = [{"name": name, "kind": "rest"} for name in ("one", "two")]
+        mission = (await client.post("/missions", json=mission_spec(vehicles=vehicles))).json()
+        path = f"/missions/{mission['id']}/measurements"
+        tokens = {name: (await store.create(name, Role.VEHICLE, vehicle=name))[1] for name in ("one", "two")}
+
+        async def post(token: str, items: list[dict[str, Any]]) -> httpx.Response:
+            headers = {"Authorization": f"Bearer {token}", "Idempotency-Key": "batch-1"}
+            return await client.post(path, json={"items": items}, headers=headers)
+
+        first = await post(tokens["one"], soundings(3, "one"))
+        other = await post(tokens["two"], soundings(5, "two"))
+        assert (first.status_code, other.status_code) == (200, 200), other.text
+        assert (first.json()["accepted"], other.json()["accepted"], other.json()["replayed"]) == (3, 5, False)
+        again = await post(tokens["one"], soundings(3, "one"))
+        assert (again.json()["accepted"], again.json()["replayed"]) == (3, True)
+        changed = await post(tokens["one"], soundings(4, "one"))
+        assert (changed.status_code, changed.json()["type"]) == (409, "urn:bathyfleet:problem:conflict")
+        assert "'batch-1'" in changed.json()["detail"]
+        renewed = (await store.create("one", Role.VEHICLE, vehicle="one"))[1]
+        assert (await post(renewed, soundings(3, "one"))).json()["replayed"], "a new token of the same vehicle"
+    await database.close()
+
+
+async def test_a_key_of_before_keys_had_owners_is_answered_as_then(make_settings: Callable[..., Settings]) -> None:
+    settings = make_settings()
+    database = Database(settings.database_url)
+    async with running(settings) as server, make_client(server) as client:
+        mission = (await client.post("/missions", json=mission_spec())).json()
+        path, headers = f"/missions/{mission['id']}/measurements", {"Idempotency-Key": "old"}
+        first = await client.post(path, json={"items": soundings(3)}, headers=headers)
+        async with database.writing() as session:
+            (row,) = (await session.scalars(select(BatchRow))).all()
+            assert row.key != "old"
+            row.key = "old"  # as the versions before wrote it
+        again = await client.post(path, json={"items": soundings(3)}, headers=headers)
+        assert again.json() == first.json() | {"replayed": True}
+        other = await client.post(path, json={"items": soundings(5)}, headers=headers)
+        assert (other.status_code, other.json()["accepted"]) == (200, 2), "it was another sender's"
+    await database.close()
 
 
 async def test_an_idempotency_key_stores_once_and_repeats_the_answer(

@@ -12,9 +12,11 @@ import websockets
 from httpx_sse import ServerSentEvent, aconnect_sse
 from pydantic import TypeAdapter
 
+from app.api.tokens import Role, TokenStore
 from app.main import Server
 from app.missions.messages import LiveMessage
 from app.settings import Settings
+from app.storage.database import Database
 from tests.api.conftest import make_client, mission_spec, running, soundings
 
 LIST = {"Accept": "application/json"}
@@ -132,6 +134,40 @@ async def test_viewers_are_counted_and_limited(make_settings: Callable[..., Sett
             assert closed.value.rcvd.code == 4429
         while 'kind="websocket"} 0.0' not in (await client.get("/metrics")).text:
             pass
+
+
+async def test_no_viewer_takes_all_views_and_some_are_for_operators(
+    make_settings: Callable[..., Settings],
+) -> None:
+    settings = make_settings(max_streams=16)
+    database = Database(settings.database_url)
+    store = TokenStore(database)
+    async with running(settings) as server, make_client(server) as client, contextlib.AsyncExitStack() as open_views:
+        mission = (await client.post("/missions", json=mission_spec())).json()
+        tokens = [(await store.create(f"viewer-{n}", Role.VIEWER))[1] for n in range(5)]
+        tokens += [(await store.create(f"operator-{n}", Role.OPERATOR))[1] for n in range(2)]
+
+        async def views_of(token: str) -> int:
+            """As many live views as the holder of a token gets."""
+            headers = {"Authorization": f"Bearer {token}"}
+            for number in range(20):
+                view = await open_views.enter_async_context(
+                    websockets.connect(live_url(server, mission["id"]), additional_headers=headers)
+                )
+                with contextlib.suppress(websockets.ConnectionClosedError):
+                    await view.recv()
+                    continue
+                assert view.close_code == 4429
+                return number
+            return 20
+
+        taken = [await views_of(token) for token in tokens]
+        assert taken == [4, 4, 4, 2, 0, 2, 0]
+        refused = await client.get(
+            f"/missions/{mission['id']}/events", headers={"Authorization": f"Bearer {tokens[0]}"}
+        )
+        assert (refused.status_code, refused.json()["type"]) == (429, "urn:bathyfleet:problem:too-many-streams")
+    await database.close()
 
 
 async def test_a_stopping_service_ends_streams_and_sockets(make_settings: Callable[..., Settings]) -> None:

@@ -112,6 +112,9 @@ class ImcFleetLink:
     def lead(self, vehicle: str, guidance: str, gateway: str | None) -> None:
         """Say how a vehicle shall be led from its next engagement on, as its mission describes it."""
         self._led[vehicle] = Guidance(guidance), gateway or ""
+        self._bridge.want(vehicle)
+        if gateway:
+            self._bridge.want(gateway)
 
     def show_area(self, mission: str, ring: Sequence[tuple[float, float]]) -> None:
         """Show a mission's area on other consoles' maps, corner by corner: (longitude, latitude); empty: no longer."""
