@@ -105,7 +105,8 @@ def krige_tiles(
                 whitened[f, k] = basis[i, f]
             k += 1
         for i in range(k):
-            place[:] = near[:, i]
+            for f in range(7):
+                place[f] = near[f, i]
             covariance_row(kind, uniform, place, near, i, a[i])
             a[i, i] = place[2] * place[2] * (1.0 + 1e-9) + noise[neighbours[t, i]]
             covariance_row(kind, uniform, place, cells, m, v[i])

@@ -3,6 +3,7 @@
 import numpy as np
 from numba import njit
 
+from app.mapping.selection import median
 from app.mapping.types import BoolArray, FloatArray, IntArray
 
 SUSPICION = 4.0
@@ -26,12 +27,12 @@ def robust_plane(dx: FloatArray, dy: FloatArray, z: FloatArray, size: FloatArray
     radius2 = 1e-12
     for c in range(m):
         radius2 = max(radius2, dx[c] * dx[c] + dy[c] * dy[c])
-    centre = float(np.median(z))
+    centre = median(z)
     east = north = 0.0
     for _ in range(ROUNDS):
         for c in range(m):
             size[c] = abs(z[c] - centre - east * dx[c] - north * dy[c])
-        bound = 1.345 * 1.4826 * np.median(size) + 1e-9
+        bound = 1.345 * 1.4826 * median(size) + 1e-9
         s0 = sx = sy = sxx = sxy = syy = b0 = bx = by = 0.0
         for c in range(m):
             w = 1.0 if size[c] <= bound else bound / size[c]
@@ -128,7 +129,7 @@ def judge_squares(
         centre, east, north = robust_plane(dx[:m], dy[:m], z[:m], size[:m])
         for c in range(m):
             z[c] = abs(z[c] - centre - east * dx[c] - north * dy[c])
-        scale = 1.4826 * np.median(z[:m])
+        scale = 1.4826 * median(z[:m])
         for c in range(m):
             i = rows[c]
             suspect[i] = z[c] > SUSPICION * max(scale, sd[i])

@@ -7,9 +7,9 @@ from functools import partial
 
 import structlog
 
-from app.exploration.planners import warm_up
 from app.missions.claims import Claims
 from app.missions.clock import now
+from app.missions.compilation import Compilation
 from app.missions.errors import MissionElsewhereError
 from app.missions.fleet import LinkState, StopReceipt
 from app.missions.hub import FleetHub
@@ -39,8 +39,6 @@ class Conductor:
     ----------
     runs
         The step loops that go on, by their missions' ids.
-    warm
-        Done when what planning needs has been compiled.
     """
 
     def __init__(
@@ -49,18 +47,19 @@ class Conductor:
         claims: Claims,
         executor: Executor,
         maps: MapKeeper,
+        compilation: Compilation,
         time_scale: float,
     ) -> None:
         self._hub = hub
         self._claims = claims
         self._executor = executor
         self._maps = maps
+        self._compilation = compilation
         self._time_scale = time_scale
         self.runs: dict[str, asyncio.Task[None]] = {}
         self._acting: dict[str, asyncio.Lock] = {}
         self._unwritten: dict[str, asyncio.Task[None]] = {}
         """States that are in force and will be written down when that is possible again."""
-        self.warm: asyncio.Future[None] | None = None
 
     def acting(self, mission_id: str) -> asyncio.Lock:
         """Return the lock under which a mission's state changes.
@@ -79,18 +78,11 @@ class Conductor:
         runner = Runner(live, self._hub, self._executor, self._time_scale)
         self.runs[live.id] = asyncio.create_task(self._supervise(live, runner.run), name=f"mission {live.id}")
 
-    async def warmed(self) -> None:
-        """Return when what planning needs is compiled."""
-        if self.warm is not None:
-            await asyncio.wait([self.warm])
-
     async def _supervise(self, live: LiveMission, run: Callable[[], Awaitable[str]]) -> None:
         """Run a mission to its end; whatever happens, its vehicles are stopped."""
         try:
             # Compiling what planning needs takes seconds on a new machine; vehicles must not wait for it.
-            await self.warmed()
-            if live.search is not None:
-                await live.in_thread(warm_up, live.search.site.scanner)
+            await self._compilation.planner(live.spec.planner.name, live.planning_sensor)
             reason = await run()
         except asyncio.CancelledError:
             raise

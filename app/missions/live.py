@@ -11,6 +11,7 @@ from typing import Any, TypeVar
 import structlog
 from shapely.geometry import Polygon
 
+from app.estimation import Sensor, SingleBeam
 from app.mapping.georeference import LocalFrame
 from app.mapping.tides import TideTable
 from app.mapping.types import FloatArray
@@ -246,6 +247,11 @@ class LiveMission:
     def facts(self) -> MissionFacts:
         """Return what every product states."""
         return MissionFacts(self.id, self.spec, self.frame, self.gate.corrections.vertical_datum)
+
+    @property
+    def planning_sensor(self) -> Sensor:
+        """What the mission's planner takes its vehicles to measure with."""
+        return SingleBeam() if self.search is None else self.search.site.scanner
 
     def show_reference(self, depths_m: FloatArray | None) -> None:
         """Compare the map with these depths at its cells, or with nothing."""

@@ -13,7 +13,6 @@ from concurrent.futures import Executor
 import numpy as np
 from numpy.typing import NDArray
 
-from app.estimation import SingleBeam
 from app.exploration.planners import create_planner
 from app.exploration.problem import Planner
 from app.missions import metrics
@@ -117,8 +116,7 @@ class Runner:
 
     async def _recover(self) -> Planner:
         """Take up the last committed step: the planner's memory, and the waypoints that were not settled."""
-        sensor = SingleBeam() if self._live.search is None else self._live.search.site.scanner
-        planner = create_planner(self._spec.planner.name, self._spec.planner.options, sensor)
+        planner = create_planner(self._spec.planner.name, self._spec.planner.options, self._live.planning_sensor)
         async with self._live.database.reading() as session:
             step = await mission_queries.last_step(session, self._live.id)
             if step is None:

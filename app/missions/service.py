@@ -7,21 +7,18 @@ from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import asynccontextmanager
 from dataclasses import replace
-from functools import cache
 from pathlib import Path
 
 import structlog
 
-from app.estimation import SingleBeam
 from app.exploration.options import PlannerOptions
 from app.exploration.planners import PLANNERS
-from app.exploration.planners import warm_up as planning_warm_up
-from app.mapping.gp import warm_up as mapping_warm_up
 from app.mapping.products.tracks import Track, TrackPoint
 from app.missions import importing, states
 from app.missions.admission import check_spec
 from app.missions.claims import Claims, Lead, ShowArea, free_elsewhere
 from app.missions.clock import now
+from app.missions.compilation import Compilation
 from app.missions.conducting import Conductor
 from app.missions.correcting import check_level_is_known, corrections_view, set_sound_speed, set_tide
 from app.missions.correction_views import CorrectionsView, TideCorrection
@@ -155,7 +152,10 @@ class MissionService:
         self._claims = Claims(self._hub, self._sim, lead, show_area)
         self._maps = MapKeeper()
         self._forecaster = Forecaster()
-        self._conductor = Conductor(self._hub, self._claims, self._executor, self._maps, settings.time_scale)
+        self._compilation = Compilation(self._executor)
+        self._conductor = Conductor(
+            self._hub, self._claims, self._executor, self._maps, self._compilation, settings.time_scale
+        )
         self._runs = self._conductor.runs
         self._crews = Crews(self._hub, self._claims, self._conductor)
         self._memory = Memory(database, self._hub, self._executor, self._maps, settings.time_scale)
@@ -170,7 +170,7 @@ class MissionService:
 
     async def startup(self) -> None:
         """Open the links, join the processes that share the database and go on with missions that nobody has."""
-        self._conductor.warm = asyncio.get_running_loop().run_in_executor(self._executor, _warm_up)
+        self._compilation.begin()
         await self._hub.start()
         self._memory.share(self.process, self._watch.may_take_up, self._watch.resume)
         await self._watch.begin()
@@ -308,7 +308,7 @@ class MissionService:
         if spec.kind is MissionKind.SEARCH:
             raise InvalidRequestError("kind", NO_FORECAST, "forecast missions of kind survey")
         # The time that a forecast may take is for steps, not for compiling.
-        await self._conductor.warmed()
+        await self._compilation.maps()
         return await self._forecaster.make(spec, floor_depth_m=floor_depth_m)
 
     async def forecast_of(self, mission_id: str, *, floor_depth_m: float | None = None) -> ForecastView:
@@ -319,7 +319,7 @@ class MissionService:
             raise ConflictError(NO_FORECAST, "see its time window, search.window_s")
         async with self._database.reading() as session:
             prior = await sounding_queries.imported_arrays(session, mission_id)
-        await self._conductor.warmed()
+        await self._compilation.maps()
         team = [replace(member, report=member.report or self._hub.info(member.key).report) for member in live.team]
         return await self._forecaster.make(
             live.spec,
@@ -621,17 +621,6 @@ class MissionService:
 
 async def _nobody(_password: str, _host: str) -> str | None:
     return None
-
-
-@cache
-def _warm_up() -> None:
-    """Compile what planning needs; once in a process is enough."""
-    try:
-        mapping_warm_up()
-        planning_warm_up(SingleBeam())
-    except Exception:
-        # Then the first steps compile what they need, and tell what is wrong with it.
-        log.exception("compiling ahead of the first mission failed")
 
 
 def _summary(kind: type[object]) -> str:

@@ -85,22 +85,20 @@ def _searcher(name: str) -> type[PlannerBase]:
         raise ValueError(f"planner: {name!r} does not search; choose one of {there}") from None
 
 
-@cache
 def warm_up(*sensors: Sensor) -> None:
-    """Compile what the planners need for these sensors (or load it from the cache), so that no step waits for it.
-
-    Once in a process is enough: another call does nothing.
-    """
+    """Compile what every planner needs for these sensors (or load it from the cache), so that no step waits for it."""
     for sensor in sensors:
-        if isinstance(sensor, Scanner):
-            for name in SEARCHERS:
-                create_planner(name, QUICK, sensor).propose(_small_search(sensor), np.random.default_rng(0))
-            continue
-        # A sea floor of a few times the sensor's reach: one that a single step surveys needs the same machine code.
-        situation = _small_situation(sensor.visibility_m if isinstance(sensor, RangeSensor) else 4.0)
-        planners = {type(planner): planner for planner in (create_planner(name, QUICK, sensor) for name in PLANNERS)}
-        for planner in planners.values():
-            planner.propose(situation, np.random.default_rng(0))
+        for name in SEARCHERS if isinstance(sensor, Scanner) else PLANNERS:
+            warm_up_planner(name, sensor)
+
+
+@cache
+def warm_up_planner(name: str, sensor: Sensor) -> None:
+    """Compile what one planner needs for a sensor; once in a process is enough: another call does nothing."""
+    # A sea floor of a few times the sensor's reach: one that a single step surveys needs the same machine code.
+    unit_m = sensor.visibility_m if isinstance(sensor, RangeSensor) else 4.0
+    situation = _small_search(sensor) if isinstance(sensor, Scanner) else _small_situation(unit_m)
+    create_planner(name, QUICK, sensor).propose(situation, np.random.default_rng(0))
 
 
 def _small_situation(unit_m: float) -> Situation:

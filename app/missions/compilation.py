@@ -1,0 +1,66 @@
+"""What missions compute with is compiled before they need it, or loaded from the cache of an earlier start."""
+
+import asyncio
+from concurrent.futures import Executor, Future
+
+import structlog
+
+from app.estimation import Sensor, SingleBeam
+from app.exploration.planners import warm_up_planner
+from app.mapping.gp import warm_up as warm_up_maps
+from app.missions.spec import PlannerSpec
+
+log = structlog.get_logger(__name__)
+
+
+class Compilation:
+    """Compiles in the background: first the default planner, then what maps need, other planners when they are named.
+
+    A vehicle's first waypoint needs a planner and no map. A failure is logged: what is missing is then compiled when
+    it is first used, and tells what is wrong with it.
+
+    Parameters
+    ----------
+    executor
+        In whose threads it is done.
+    """
+
+    def __init__(self, executor: Executor) -> None:
+        self._executor = executor
+        self._planners: dict[tuple[str, Sensor], Future[None]] = {}
+        self._maps: Future[None] = Future()
+
+    def begin(self) -> None:
+        """Begin to compile what nearly every mission needs."""
+        # One after the other: the compiler does one function at a time, and planners come first.
+        self._planner(PlannerSpec().name, SingleBeam()).add_done_callback(lambda _: self._begin_maps())
+
+    async def planner(self, name: str, sensor: Sensor) -> None:
+        """Return when a planner is compiled for a sensor."""
+        await asyncio.wait([asyncio.wrap_future(self._planner(name, sensor))])
+
+    async def maps(self) -> None:
+        """Return when the default planner and what maps need are compiled."""
+        await asyncio.wait([asyncio.wrap_future(self._maps)])
+
+    def _planner(self, name: str, sensor: Sensor) -> Future[None]:
+        if (name, sensor) not in self._planners:
+            begun = self._executor.submit(warm_up_planner, name, sensor)
+            begun.add_done_callback(_log_failure)
+            self._planners[name, sensor] = begun
+        return self._planners[name, sensor]
+
+    def _begin_maps(self) -> None:
+        try:
+            begun = self._executor.submit(warm_up_maps)
+        except RuntimeError:  # the service ends
+            self._maps.cancel()
+            return
+        begun.add_done_callback(_log_failure)
+        begun.add_done_callback(lambda _: self._maps.set_result(None))
+
+
+def _log_failure(done: Future[None]) -> None:
+    error = None if done.cancelled() else done.exception()
+    if error is not None:
+        log.error("compiling ahead failed", exc_info=error)

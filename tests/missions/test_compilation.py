@@ -1,0 +1,64 @@
+"""What is compiled ahead, and what waits for it."""
+
+import subprocess
+import sys
+import threading
+
+import pytest
+
+from app.missions import compilation
+from tests.missions.fleet import Harbour, sim_spec, until_step
+
+COMPILED = """
+import pkgutil
+from importlib import import_module
+
+import numpy as np
+from numba.core.dispatcher import Dispatcher
+
+import app.exploration
+from app.estimation import SingleBeam
+from app.exploration.planners import create_planner, warm_up_planner
+from app.missions.decision import Place, decide, make_constraints
+from app.missions.live import builder_of
+from tests.missions.fleet import sim_spec
+
+names = [found.name for found in pkgutil.walk_packages(app.exploration.__path__, "app.exploration.")]
+compiled = {id(f): f for name in names for f in vars(import_module(name)).values() if isinstance(f, Dispatcher)}
+warm_up_planner("cao", SingleBeam())
+before = {key: len(f.signatures) for key, f in compiled.items()}
+spec = sim_spec(steps=20)
+builder = builder_of(spec)
+planner = create_planner("cao", spec.planner.options)
+places = [Place("one", np.array([5.0, 5.0]), 0.0, 2.0), Place("two", np.array([15.0, 5.0]), float("nan"), 2.0)]
+for step in (1, 2):
+    decide(step, spec, make_constraints(spec), planner, places, builder.belief(), builder.sounded_at_m()[0])
+    east = np.linspace(1.0, 20.0, 60)
+    builder.add(np.column_stack([east, np.full(60, 5.0), 10.0 + np.sin(east), np.full(60, 0.1)]))
+    builder.build()
+print([f.__name__ for key, f in compiled.items() if len(f.signatures) > before[key]])
+"""
+"""Prints which compiled functions the default planner's warm-up forgot."""
+
+
+def test_the_default_planner_leaves_nothing_to_compile() -> None:
+    # A process of its own: other tests have compiled everything in this one.
+    found = subprocess.run([sys.executable, "-c", COMPILED], capture_output=True, text=True, check=False)
+    assert found.returncode == 0, found.stderr
+    assert found.stdout.strip() == "[]"
+
+
+async def test_the_first_waypoint_does_not_wait_for_what_maps_need(
+    harbour: Harbour, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    compiled = threading.Event()
+    monkeypatch.setattr(compilation, "warm_up_maps", compiled.wait)
+    try:
+        await harbour.close()
+        await harbour.open()
+        service = harbour.service
+        mission = await service.create(sim_spec(steps=3))
+        await service.act(mission.id, "start", actor="Ana")
+        await until_step(service, mission.id, 1)
+    finally:
+        compiled.set()
