@@ -1,0 +1,63 @@
+"""What an operator sends never brings anything back of what else lies on the service's machine."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tests.faults.leading_out import grids, told
+
+ROOT = Path(__file__).parents[2]
+SAMPLES = ["external.nc", "external_relative.nc", "external_link.nc", "soft_link.nc", "virtual.nc"]
+TASK = {
+    "kind": ".nc",
+    "what": "soundings",
+    "origin": (41.1850, -8.7050),
+    "grid": {"west_m": 0.0, "south_m": 0.0, "cell_m": 2.0, "rows": 10, "cols": 10},
+    "margin_m": 50.0,
+    "options": {"sd_m": 0.3, "positive": "down"},
+    "unconfined": True,
+}
+PROCESS = """
+import sys
+import app.mapping.readers.netcdf as reader
+if sys.argv[3] == "uninspected":
+    reader.check_contained = lambda content: None
+from app.mapping.readers.__main__ import main
+sys.exit(main(tuple(filter(None, sys.argv[4].split(",")))))
+"""
+
+
+def read(folder: Path, name: str, inspection: str, layers: str) -> tuple[int, dict[str, Any], np.ndarray]:
+    with (folder / name).open("rb") as file, (folder / "result").open("w+b") as result:
+        ended = subprocess.run(
+            [sys.executable, "-P", "-c", PROCESS, json.dumps(TASK), str(result.fileno()), inspection, layers],
+            stdin=file,
+            capture_output=True,
+            pass_fds=[result.fileno()],
+            env={"PYTHONPATH": str(ROOT), "OPENBLAS_NUM_THREADS": "1", "LANG": "C.UTF-8"},
+            cwd=folder,
+            check=False,
+        )
+        assert ended.stdout, ended.stderr.decode()[-2000:]
+        return ended.returncode, json.loads(ended.stdout), np.fromfile(folder / "result", "<f8")
+
+
+@pytest.mark.parametrize("name", SAMPLES)
+def test_confinement_holds_where_inspection_misses_something(name: str, tmp_path: Path) -> None:
+    (tmp_path / name).write_bytes(grids(tmp_path)[name])
+    code, said, values = read(tmp_path, name, "uninspected", "")
+    assert code == 0, "the attack itself works"
+    depths = values.reshape(said["shape"])[2]
+    assert np.any(depths > 30.0), "the private file's letters"
+    for layers in ("landlock", "seccomp", "namespaces,landlock,seccomp"):
+        code, said, values = read(tmp_path, name, "uninspected", layers)
+        assert code == 3 or not np.any(values.reshape(said["shape"])[2] != 0.0), (layers, said)
+        assert not told(json.dumps(said))
+    code, said, values = read(tmp_path, name, "inspected", "")
+    assert (code, len(values)) == (3, 0)
+    assert not told(json.dumps(said))
