@@ -127,6 +127,11 @@ class Settings(BaseSettings):
     max_import_bytes: int = Field(
         default=64 * 2**20, ge=1024, le=2**30, description="Largest file of soundings or of a map that is taken"
     )
+    unconfined_imports: bool = Field(
+        default=False,
+        description="Read imported files also where the kernel has neither Landlock nor seccomp, which keep them from "
+        "reading other files",
+    )
     max_streams: int = Field(
         default=200, ge=1, le=100_000, description="Most live views and event streams at the same time"
     )
@@ -204,6 +209,7 @@ class Settings(BaseSettings):
         return ServiceSettings(
             database_url=self.database_url,
             time_scale=self.time_scale,
+            unconfined_imports=self.unconfined_imports,
             imc=self.imc,
             neptus=self.neptus,
             simulation=self.simulation,
