@@ -61,3 +61,38 @@ def test_confinement_holds_where_inspection_misses_something(name: str, tmp_path
     code, said, values = read(tmp_path, name, "inspected", "")
     assert (code, len(values)) == (3, 0)
     assert not told(json.dumps(said))
+
+
+@pytest.mark.parametrize(
+    ("beginning", "repeated", "times"),
+    [
+        (b"", b"\n", 60 * 2**20),
+        (b"lon,lat,depth\n", b",", 30 * 10**6),
+        (b"lon,lat,depth,verdict\n", b"," * 4000 + b"\n", 7500),
+        (b"", b"1 2 3\r\n\r\n\r\n", 3 * 10**6),
+    ],
+    ids=["line ends", "one line of commas", "lines of commas", "empty lines between"],
+)
+def test_text_of_whatever_length_takes_little_memory(
+    beginning: bytes, repeated: bytes, times: int, tmp_path: Path
+) -> None:
+    with (tmp_path / "long.csv").open("wb") as file:
+        file.write(beginning)
+        for _ in range(100):
+            file.write(repeated * (times // 100))
+    code = (
+        "import resource, sys, io; from app.mapping.readers.text import read_text\n"
+        "from app.mapping.readers.types import ReadError\n"
+        "before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss\n"
+        "try:\n    read_text(open(sys.argv[1], 'rb'))\nexcept ReadError as error:\n    sys.stderr.write(str(error))\n"
+        "sys.stdout.write(str(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before))"
+    )
+    ended = subprocess.run(
+        [sys.executable, "-P", "-c", code, str(tmp_path / "long.csv")],
+        env={"PYTHONPATH": str(ROOT), "OPENBLAS_NUM_THREADS": "1"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert "more than" in ended.stderr or "no sounding" in ended.stderr, ended.stderr
+    assert int(ended.stdout) < 150 * 1024, "KiB more than before"
