@@ -129,6 +129,11 @@ class Settings(BaseSettings):
     max_import_bytes: int = Field(
         default=64 * 2**20, ge=1024, le=2**30, description="Largest file of soundings or of a map that is taken"
     )
+    unconfined_imports: bool = Field(
+        default=False,
+        description="Read imported files also where the kernel has neither Landlock nor seccomp, which keep them from "
+        "reading other files",
+    )
     max_streams: int = Field(
         default=200,
         ge=1,
@@ -221,6 +226,7 @@ class Settings(BaseSettings):
         return ServiceSettings(
             database_url=self.database_url,
             time_scale=self.time_scale,
+            unconfined_imports=self.unconfined_imports,
             imc=self.imc,
             neptus=self.neptus,
             simulation=self.simulation,

@@ -1,14 +1,18 @@
 """Files from elsewhere: soundings and maps to begin with, and a grid to compare the map with."""
 
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Path, Query, Request, Response
+from starlette.requests import ClientDisconnect
 
 from app.api.auth import Operator, Reader
-from app.api.problems import problems
+from app.api.problems import ProblemError, problems
 from app.api.schemas import API, MissionId
-from app.api.state import Service
+from app.api.state import EdgeState, Service, State
 from app.missions.import_views import ImportOptions, ImportView, ReferenceView
+from app.missions.uploads import Upload
 
 router = APIRouter(
     prefix=f"{API}/missions/{{mission_id}}", tags=["imports"], responses=problems("unauthenticated", "forbidden")
@@ -21,10 +25,23 @@ _FILE: dict[str, Any] = {
         "content": {"application/octet-stream": {"schema": {"type": "string", "format": "binary"}}},
     }
 }
-_SENT = problems("mission-not-found", "conflict", "body-too-large", "invalid-request")
+_SENT = problems(
+    "malformed-body", "mission-not-found", "conflict", "body-too-large", "invalid-request", "import-unavailable"
+)
 _FOUND = problems("mission-not-found", "import-not-found", "invalid-request")
 
 ImportId = Annotated[str, Path(min_length=1, max_length=64, pattern=r"^[A-Za-z0-9_-]+$", description="The import's id")]
+
+
+@asynccontextmanager
+async def _sent(state: EdgeState, request: Request, mission_id: str, options: ImportOptions) -> AsyncIterator[Upload]:
+    """Take a file in. What would be refused anyhow is not waited for."""
+    await state.service.expect_file(mission_id, options)
+    try:
+        async with state.service.uploads.receive(request.stream(), state.settings.max_import_bytes) as upload:
+            yield upload
+    except ClientDisconnect:
+        raise ProblemError("malformed-body", "the connection ended before the file did") from None
 
 
 @router.post(
@@ -40,7 +57,7 @@ async def import_soundings(
     options: Annotated[ImportOptions, Query()],
     request: Request,
     response: Response,
-    service: Service,
+    state: State,
     operator: Operator,
 ) -> ImportView:
     """Take all of a file's soundings near the area, or nothing when any of it is wrong.
@@ -48,7 +65,8 @@ async def import_soundings(
     They count in the map by their own uncertainty, and are told apart from the mission's own. Sending the same file
     again changes nothing.
     """
-    view = await service.import_soundings(mission_id, await request.body(), options, actor=operator.name)
+    async with _sent(state, request, mission_id, options) as upload:
+        view = await state.service.import_soundings(mission_id, upload, options, actor=operator.name)
     if view.replayed:
         response.status_code = 200
     return view
@@ -88,14 +106,15 @@ async def set_reference(
     mission_id: MissionId,
     options: Annotated[ImportOptions, Query()],
     request: Request,
-    service: Service,
+    state: State,
     operator: Operator,
 ) -> ReferenceView:
     """Sample a file's depths at the map's cells, to see how far off the map is.
 
     Shown by `quality`, the layer `difference` and the GeoTIFF; never used for the map or for planning.
     """
-    return await service.set_reference(mission_id, await request.body(), options, actor=operator.name)
+    async with _sent(state, request, mission_id, options) as upload:
+        return await state.service.set_reference(mission_id, upload, options, actor=operator.name)
 
 
 @router.get("/reference", operation_id="getReference", summary="See what the map is compared with", responses=_FOUND)

@@ -18,7 +18,9 @@ from starlette.responses import Response
 
 from app.missions.errors import (
     ConflictError,
+    FileTooLargeError,
     ImportNotFoundError,
+    ImportUnavailableError,
     InvalidRequestError,
     MapNotReadyError,
     MissionElsewhereError,
@@ -89,6 +91,7 @@ TITLES: dict[str, tuple[int, str]] = {
     "internal": (500, "Something went wrong inside the service"),
     "too-many-connections": (503, "Too many requests at the same time"),
     "mission-elsewhere": (503, "Another process has the mission"),
+    "import-unavailable": (503, "No file can be read now"),
     "not-ready": (503, "The service is not ready"),
     "database-unavailable": (503, "The database cannot be used now"),
 }
@@ -364,6 +367,8 @@ def describe_mission_error(error: Exception) -> tuple[str, str, str]:
         (SoundingNotFoundError, "sounding-not-found"),
         (TargetNotFoundError, "target-not-found"),
         (ImportNotFoundError, "import-not-found"),
+        (ImportUnavailableError, "import-unavailable"),
+        (FileTooLargeError, "body-too-large"),
         (MapNotReadyError, "map-not-ready"),
         (MissionElsewhereError, "mission-elsewhere"),
         (MoveRefusedError, "move-refused"),
@@ -388,9 +393,9 @@ def _mission_problem(request: Request, error: Exception) -> Response:
                 location="body", field=error.field, value=None, message=_shortened(detail), expected=_shortened(remedy)
             )
         )
-    return problem_response(
-        make_problem(kind, detail, instance=instance_of(request.scope), remedy=remedy, errors=errors)
-    )
+    problem = make_problem(kind, detail, instance=instance_of(request.scope), remedy=remedy, errors=errors)
+    later = isinstance(error, ImportUnavailableError)
+    return problem_response(problem, {"Retry-After": str(RETRY_AFTER_S)} if later else None)
 
 
 def _edge_problem(request: Request, error: ProblemError) -> Response:
@@ -420,6 +425,8 @@ def install(app: FastAPI) -> None:
         SoundingNotFoundError,
         TargetNotFoundError,
         ImportNotFoundError,
+        ImportUnavailableError,
+        FileTooLargeError,
         MapNotReadyError,
         MissionElsewhereError,
         MoveRefusedError,

@@ -1,5 +1,6 @@
 """``bathyfleet export``, ``import`` and ``tide``: what goes into a mission and what comes out of it."""
 
+import asyncio
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -115,6 +116,7 @@ def import_file(
 ) -> None:
     """Begin a mission with soundings or a map from elsewhere. The same file again changes nothing."""
     from app.missions.import_views import ImportOptions, ImportView, ReferenceView
+    from app.missions.uploads import open_upload
 
     given = {
         "filename": file.name,
@@ -126,27 +128,29 @@ def import_file(
         "datum_offset_m": datum_offset,
     }
     options = checked(ImportOptions, given)
-    content = file.read_bytes()
     view: ImportView | ReferenceView
     if url is not None:
         path, method = ("reference", "PUT") if reference else ("imports", "POST")
-        answer = ask_service(
-            url,
-            token,
-            mission,
-            method,
-            path,
-            content=content,
-            params=options.model_dump(exclude_none=True, mode="json"),
-        )
+        with file.open("rb") as content:
+            answer = ask_service(
+                url,
+                token,
+                mission,
+                method,
+                path,
+                content=content,
+                params=options.model_dump(exclude_none=True, mode="json"),
+            )
         view = (ReferenceView if reference else ImportView).model_validate(answer)
     else:
 
         async def run(service: "MissionService") -> ImportView | ReferenceView:
             mission_id = await resting_mission(service, mission)
-            if reference:
-                return await service.set_reference(mission_id, content, options, actor="command line")
-            return await service.import_soundings(mission_id, content, options, actor="command line")
+            upload = await asyncio.to_thread(open_upload, file)
+            with upload.file:
+                if reference:
+                    return await service.set_reference(mission_id, upload, options, actor="command line")
+                return await service.import_soundings(mission_id, upload, options, actor="command line")
 
         view = with_missions(
             command_settings(database_url=database), run, changing="import", mission=f"{mission} {file.name}"

@@ -39,6 +39,14 @@ class ImportNotFoundError(MissionError):
     """There is no such import, or no reference grid."""
 
 
+class FileTooLargeError(MissionError):
+    """A file is longer than is taken."""
+
+
+class ImportUnavailableError(MissionError):
+    """No file can be taken in or read now."""
+
+
 class SoundingNotFoundError(MissionError):
     """There is no such sounding in the mission."""
 

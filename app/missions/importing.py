@@ -1,16 +1,9 @@
 """Soundings, maps and reference grids from elsewhere, for a mission: everything in a file or nothing."""
 
 import asyncio
-import hashlib
-import json
-import os
-import signal
-import sys
-import tempfile
 import uuid
 from concurrent.futures import Executor
-from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import shapely
@@ -18,28 +11,181 @@ from numpy.typing import NDArray
 from shapely.geometry import Polygon
 from sqlalchemy import select
 
-import app
-from app.mapping.readers.files import ending
-from app.mapping.readers.types import UNUSABLE, ReadError
+from app.mapping.readers.endings import ending
+from app.mapping.readers.types import Place, ReadError, ReadOptions
 from app.mapping.supersoundings import merge_soundings
 from app.mapping.types import Soundings
 from app.missions.clock import now
 from app.missions.errors import ConflictError, ImportNotFoundError, InvalidRequestError
 from app.missions.import_views import ImportOptions, ImportView, ReferenceView
 from app.missions.live import LiveMission
+from app.missions.reading import Reader
 from app.missions.states import ENDED
+from app.missions.uploads import Upload
 from app.missions.views import Level
 from app.storage import soundings as sounding_queries
 from app.storage import stored_maps
 from app.storage.models import ImportRow, ReferenceRow
 from app.storage.shielding import to_the_end
 
-ROOT = str(Path(app.__file__).resolve().parents[1])
-"""Where the reading process finds this program."""
-
-READING_TIMEOUT_S = 180.0
 MAX_PRIOR = 100_000
 """Imported soundings per file that the map takes one by one; where there are more they are merged per cell."""
+
+
+def kind_of(options: ImportOptions) -> str:
+    """Return the ending of a file's name, which says how it is read. Raises InvalidRequestError."""
+    try:
+        return ending(options.filename)
+    except ReadError as error:
+        raise InvalidRequestError(error.field, str(error), error.remedy) from None
+
+
+class Importing:
+    """Takes files into missions and out of them again.
+
+    Parameters
+    ----------
+    reader
+        Reads them.
+    executor
+        Where what takes long is computed.
+    """
+
+    def __init__(self, reader: Reader, executor: Executor) -> None:
+        self._reader = reader
+        self._executor = executor
+        # Held while something is stored or taken away, not while a file is read.
+        self._storing = asyncio.Lock()
+
+    async def add(self, live: LiveMission, upload: Upload, options: ImportOptions, actor: str) -> ImportView:
+        """Add the soundings of a file to what is known before a mission measures.
+
+        The same file again changes nothing and gives the first answer.
+
+        Raises
+        ------
+        InvalidRequestError, ConflictError, ImportUnavailableError
+            When the file cannot be used; when the mission has ended, or has the same file with other options; when
+            nothing can be read now.
+        """
+        kind = _checked(upload, options)
+        known = await _same_file(live, upload.sha256, options)
+        if known is not None:
+            return known
+        _refuse_ended(live)
+        async with self._reader.turn():
+            # It may have been taken in while this waited.
+            known = await _same_file(live, upload.sha256, options)
+            if known is not None:
+                return known
+            found = await self._reader.read(upload, kind, "soundings", _place(live), _read_options(options))
+            loop = asyncio.get_running_loop()
+            kept, merged = await loop.run_in_executor(self._executor, _kept, live, found.values)
+            if not len(kept):
+                wrong = "none of its depths lies near the mission's area"
+                raise InvalidRequestError("file", wrong, "check file and crs")
+            notes = [*found.notes, *([f"{merged} soundings were merged per cell of the map"] if merged else [])]
+            row = ImportRow(
+                id=str(uuid.uuid4()),
+                mission_id=live.id,
+                digest=upload.sha256,
+                filename=options.filename,
+                count=len(kept),
+                summary=options.model_dump(mode="json")
+                | {
+                    "notes": notes,
+                    "found": found.found,
+                    "min_depth_m": float(kept[:, 2].min()),
+                    "max_depth_m": float(kept[:, 2].max()),
+                    "median_sd_m": float(np.median(kept[:, 3])),
+                },
+                soundings=await asyncio.to_thread(sounding_queries.pack, kept),
+            )
+            view = await to_the_end(self._store(live, row, kept))
+        words = f"{view.taken} prior soundings of {view.filename} imported by {actor}"
+        await live.journal.log(Level.INFO, "import", words, actor=actor)
+        return view
+
+    async def _store(self, live: LiveMission, row: ImportRow, kept: NDArray[np.float64]) -> ImportView:
+        async with self._storing:
+            _refuse_ended(live)
+            before = await _imported(live)
+            prior = np.concatenate([before, kept])
+            row.created_at = now()
+            view = _view(row)
+            # A map that is stored meanwhile would lack these.
+            async with live.journal.writing:
+                async with live.database.writing() as session:
+                    session.add(row)
+                    await session.flush()
+                    await stored_maps.forget(session, live.id)
+                live.builder.arrivals.replace_prior(prior)
+        live.changed.set()
+        live.publish_summary()
+        return view
+
+    async def delete(self, live: LiveMission, import_id: str, actor: str) -> None:
+        """Take an import back. Raises ImportNotFoundError."""
+        filename = await to_the_end(self._take_away(live, import_id))
+        await live.journal.log(Level.INFO, "import", f"import of {filename} taken back by {actor}", actor=actor)
+
+    async def _take_away(self, live: LiveMission, import_id: str) -> str:
+        async with self._storing:
+            prior = await _imported(live, without=import_id)
+            async with live.journal.writing:
+                async with live.database.writing() as session:
+                    row = await session.get(ImportRow, import_id)
+                    if row is None or row.mission_id != live.id:
+                        raise ImportNotFoundError(
+                            f"there is no import {import_id!r}", "GET /api/v1/missions/{id}/imports lists them"
+                        )
+                    filename = row.filename
+                    await session.delete(row)
+                    await session.flush()
+                    await stored_maps.forget(session, live.id)
+                live.builder.arrivals.replace_prior(prior)
+        return filename
+
+    async def set_reference(
+        self, live: LiveMission, upload: Upload, options: ImportOptions, actor: str
+    ) -> ReferenceView:
+        """Compare the mission's map with the grid in a file from now on.
+
+        Raises
+        ------
+        InvalidRequestError, ImportUnavailableError
+            When the file cannot be used, or nothing can be read now.
+        """
+        kind = _checked(upload, options)
+        async with self._reader.turn():
+            found = await self._reader.read(upload, kind, "reference", _place(live), _read_options(options))
+        depths = found.values
+        row = ReferenceRow(
+            mission_id=live.id,
+            filename=options.filename,
+            created_at=now(),
+            rows=depths.shape[0],
+            cols=depths.shape[1],
+            summary=options.model_dump(mode="json") | {"notes": found.notes, "cells": int(np.isfinite(depths).sum())},
+            depths=await asyncio.to_thread(sounding_queries.pack, depths),
+        )
+        view = _reference_view(row)
+        async with self._storing:
+            async with live.database.writing() as session:
+                await _forget_reference(session, live.id)
+                session.add(row)
+            live.show_reference(depths)
+        await live.journal.log(Level.INFO, "import", f"reference grid {options.filename} set by {actor}", actor=actor)
+        return view
+
+    async def delete_reference(self, live: LiveMission, actor: str) -> None:
+        """Compare with nothing any more. Raises ImportNotFoundError when there was nothing."""
+        async with self._storing:
+            await reference_of(live)
+            async with live.database.writing() as session:
+                await _forget_reference(session, live.id)
+            live.show_reference(None)
+        await live.journal.log(Level.INFO, "import", f"reference grid taken away by {actor}", actor=actor)
 
 
 async def imports_of(live: LiveMission) -> list[ImportView]:
@@ -47,92 +193,6 @@ async def imports_of(live: LiveMission) -> list[ImportView]:
     async with live.database.reading() as session:
         query = select(ImportRow).where(ImportRow.mission_id == live.id).order_by(ImportRow.created_at, ImportRow.id)
         return [_view(row) for row in await session.scalars(query)]
-
-
-async def import_soundings(
-    live: LiveMission, executor: Executor, content: bytes, options: ImportOptions, actor: str
-) -> ImportView:
-    """Add the soundings of a file to what is known before a mission measures.
-
-    The same file again changes nothing and gives the first answer.
-
-    Raises
-    ------
-    InvalidRequestError, ConflictError
-        When the file cannot be used; when the mission has ended, or has the same file with other options.
-    """
-    digest = hashlib.sha256(content).hexdigest()
-    known = await _same_file(live, digest, options)
-    if known is not None:
-        return known
-    if live.header.state in ENDED:
-        raise ConflictError(f"the mission is {live.header.state} and takes no more soundings", "create a new mission")
-    table, said = await _read(live, content, options, "soundings")
-    loop = asyncio.get_running_loop()
-    kept, merged = await loop.run_in_executor(executor, _kept, live, table)
-    if not len(kept):
-        raise InvalidRequestError("file", "none of its depths lies near the mission's area", "check file and crs")
-    notes = [*said["notes"], *([f"{merged} soundings were merged per cell of the map"] if merged else [])]
-    row = ImportRow(
-        id=str(uuid.uuid4()),
-        mission_id=live.id,
-        digest=digest,
-        filename=options.filename,
-        created_at=now(),
-        count=len(kept),
-        summary=options.model_dump(mode="json")
-        | {
-            "notes": notes,
-            "found": said["found"],
-            "min_depth_m": float(kept[:, 2].min()),
-            "max_depth_m": float(kept[:, 2].max()),
-            "median_sd_m": float(np.median(kept[:, 3])),
-        },
-        soundings=sounding_queries.pack(kept),
-    )
-    view = _view(row)
-    await to_the_end(_store_import(live, row))
-    words = f"{view.taken} prior soundings of {view.filename} imported by {actor}"
-    await live.journal.log(Level.INFO, "import", words, actor=actor)
-    return view
-
-
-async def delete_import(live: LiveMission, import_id: str, actor: str) -> None:
-    """Take an import back. Raises ImportNotFoundError."""
-    async with live.journal.writing, live.database.writing() as session:
-        row = await session.get(ImportRow, import_id)
-        if row is None or row.mission_id != live.id:
-            raise ImportNotFoundError(
-                f"there is no import {import_id!r}", "GET /api/v1/missions/{id}/imports lists them"
-            )
-        filename = row.filename
-        await session.delete(row)
-        await session.flush()
-        await stored_maps.forget(session, live.id)
-        prior = await sounding_queries.imported_arrays(session, live.id)
-    live.builder.arrivals.replace_prior(prior)
-    await live.journal.log(Level.INFO, "import", f"import of {filename} taken back by {actor}", actor=actor)
-
-
-async def set_reference(live: LiveMission, content: bytes, options: ImportOptions, actor: str) -> ReferenceView:
-    """Compare the mission's map with the grid in a file from now on. Raises InvalidRequestError."""
-    depths, said = await _read(live, content, options, "reference")
-    row = ReferenceRow(
-        mission_id=live.id,
-        filename=options.filename,
-        created_at=now(),
-        rows=depths.shape[0],
-        cols=depths.shape[1],
-        summary=options.model_dump(mode="json") | {"notes": said["notes"], "cells": int(np.isfinite(depths).sum())},
-        depths=sounding_queries.pack(depths),
-    )
-    view = _reference_view(row)
-    async with live.database.writing() as session:
-        await _forget_reference(session, live.id)
-        session.add(row)
-    live.show_reference(depths)
-    await live.journal.log(Level.INFO, "import", f"reference grid {options.filename} set by {actor}", actor=actor)
-    return view
 
 
 async def reference_of(live: LiveMission) -> ReferenceView:
@@ -144,13 +204,31 @@ async def reference_of(live: LiveMission) -> ReferenceView:
     return _reference_view(row)
 
 
-async def delete_reference(live: LiveMission, actor: str) -> None:
-    """Compare with nothing any more. Raises ImportNotFoundError when there was nothing."""
-    await reference_of(live)
-    async with live.database.writing() as session:
-        await _forget_reference(session, live.id)
-    live.show_reference(None)
-    await live.journal.log(Level.INFO, "import", f"reference grid taken away by {actor}", actor=actor)
+def _checked(upload: Upload, options: ImportOptions) -> str:
+    kind = kind_of(options)
+    if not upload.size_bytes:
+        raise InvalidRequestError("file", "it is empty", "send the file's content as the body")
+    return kind
+
+
+def _refuse_ended(live: LiveMission) -> None:
+    if live.header.state in ENDED:
+        raise ConflictError(f"the mission is {live.header.state} and takes no more soundings", "create a new mission")
+
+
+def _place(live: LiveMission) -> Place:
+    return Place(live.frame, live.builder.grid, live.margin_m)
+
+
+def _read_options(options: ImportOptions) -> ReadOptions:
+    return ReadOptions(**options.model_dump(mode="json", exclude={"filename", "source"}))
+
+
+async def _imported(live: LiveMission, *, without: str = "") -> NDArray[np.float64]:
+    """Return what was imported, unpacked aside: that takes a while where it is much."""
+    async with live.database.reading() as session:
+        stored = await sounding_queries.imported(session, live.id, without=without)
+    return await asyncio.to_thread(sounding_queries.unpack_imported, stored)
 
 
 async def _forget_reference(session: Any, mission_id: str) -> None:
@@ -176,18 +254,6 @@ async def _same_file(live: LiveMission, digest: str, options: ImportOptions) -> 
     return _view(row).model_copy(update={"replayed": True})
 
 
-async def _store_import(live: LiveMission, row: ImportRow) -> None:
-    # A map that is stored meanwhile would lack these.
-    async with live.journal.writing, live.database.writing() as session:
-        session.add(row)
-        await session.flush()
-        await stored_maps.forget(session, live.id)
-        prior = await sounding_queries.imported_arrays(session, live.id)
-    live.builder.arrivals.replace_prior(prior)
-    live.changed.set()
-    live.publish_summary()
-
-
 def _kept(live: LiveMission, table: NDArray[np.float64]) -> tuple[NDArray[np.float64], int]:
     """Return the soundings in or near the area, (n, 4), and how many were merged into them (0: none was)."""
     zone = Polygon(live.area).buffer(live.margin_m)
@@ -199,65 +265,6 @@ def _kept(live: LiveMission, table: NDArray[np.float64]) -> tuple[NDArray[np.flo
     # Errors of one survey belong together: a mean of many is not better known than one of them.
     deviation = np.sqrt(np.bincount(group, near[:, 3] ** 2) / np.bincount(group))
     return np.column_stack([merged.east_m, merged.north_m, merged.depth_m, deviation]), len(near)
-
-
-async def _read(
-    live: LiveMission, content: bytes, options: ImportOptions, what: Literal["soundings", "reference"]
-) -> tuple[NDArray[np.float64], dict[str, Any]]:
-    """Read a file in a process of its own; returns what it wrote and what it said."""
-    try:
-        suffix = ending(options.filename)
-    except ReadError as error:
-        raise InvalidRequestError(error.field, str(error), error.remedy) from None
-    if not content:
-        raise InvalidRequestError("file", "it is empty", "send the file's content as the body")
-    grid = live.builder.grid
-    task = {
-        "what": what,
-        "origin": (live.frame.origin_lat_deg, live.frame.origin_lon_deg),
-        "grid": {name: getattr(grid, name) for name in ("west_m", "south_m", "cell_m", "rows", "cols")},
-        "margin_m": live.margin_m,
-        "options": options.model_dump(mode="json", exclude={"filename", "source"}),
-    }
-    with tempfile.TemporaryDirectory(prefix="bathyfleet-") as folder:
-        path, out = Path(folder) / f"file{suffix}", Path(folder) / "found.npy"
-        await asyncio.to_thread(path.write_bytes, content)
-        code, text = await _run_reader(path, json.dumps(task), out)
-        if code == UNUSABLE:
-            fault = json.loads(text)
-            raise InvalidRequestError(fault["field"], fault["message"], fault["remedy"])
-        if code != 0:
-            said = "the reading process broke off: the file is damaged or too large"
-            raise InvalidRequestError("file", said, "check or divide it")
-        return await asyncio.to_thread(np.load, out, allow_pickle=False), json.loads(text)
-
-
-async def _run_reader(path: Path, task: str, out: Path) -> tuple[int, str]:
-    """Return the reader's exit code and what it said; a reader that takes too long is ended."""
-    search = os.pathsep.join(filter(None, [ROOT, os.environ.get("PYTHONPATH", "")]))
-    process = await asyncio.create_subprocess_exec(
-        sys.executable,
-        "-m",
-        "app.mapping.readers",
-        str(path),
-        task,
-        str(out),
-        stdin=asyncio.subprocess.DEVNULL,
-        stdout=asyncio.subprocess.PIPE,
-        stderr=asyncio.subprocess.DEVNULL,
-        env=os.environ | {"PYTHONPATH": search},
-        # Its own session: a signal from a terminal to the service is not for it.
-        start_new_session=True,
-    )
-    try:
-        stdout, _ = await asyncio.wait_for(process.communicate(), READING_TIMEOUT_S)
-    except TimeoutError:
-        return -signal.SIGKILL, ""
-    finally:
-        if process.returncode is None:
-            process.kill()
-            await process.wait()
-    return process.returncode or 0, stdout.decode()
 
 
 def _view(row: ImportRow) -> ImportView:

@@ -38,6 +38,7 @@ from app.missions.forecasts import Forecaster, ForecastView
 from app.missions.history import map_at_step, steps_after
 from app.missions.hub import FleetHub
 from app.missions.import_views import ImportOptions, ImportView, ReferenceView
+from app.missions.importing import Importing
 from app.missions.journal import event_view
 from app.missions.links.rest import RestFleetLink
 from app.missions.links.sim import SimFleetLink
@@ -62,6 +63,7 @@ from app.missions.products import (
     make_product,
     product_kind,
 )
+from app.missions.reading import Reader
 from app.missions.reviewing import rule, soundings_page
 from app.missions.search.obstacles import obstacles_geojson
 from app.missions.search.posted import Scan
@@ -75,6 +77,7 @@ from app.missions.target_pages import target_ranges_page
 from app.missions.target_views import TargetRangePage, TargetView
 from app.missions.telemetry import TelemetryView, telemetry_view
 from app.missions.trails import Trail
+from app.missions.uploads import Upload, Uploads
 from app.missions.views import (
     ActionView,
     EventView,
@@ -162,8 +165,9 @@ class MissionService:
         self.process = Ownership(database, url, certificate)
         """This process among those that share the database."""
         self._watch = Watch(database, self._hub, self.process, self._memory, self._conductor, self._claims)
-        # One file after the other: reading takes memory and a core.
-        self._importing = asyncio.Lock()
+        self.uploads = Uploads()
+        """Files on their way in."""
+        self._importing = Importing(Reader(unconfined=settings.unconfined_imports), self._executor)
         self._started = False
 
     # Life of the service
@@ -461,37 +465,34 @@ class MissionService:
         """Return what was imported, oldest first."""
         return await importing.imports_of(await self._get(mission_id))
 
+    async def expect_file(self, mission_id: str, options: ImportOptions) -> None:
+        """Say before a file comes what would be wrong with it. Raises MissionNotFoundError, InvalidRequestError."""
+        await self._get(mission_id)
+        importing.kind_of(options)
+
     async def import_soundings(
-        self, mission_id: str, content: bytes, options: ImportOptions, *, actor: str = "operator"
+        self, mission_id: str, upload: Upload, options: ImportOptions, *, actor: str = "operator"
     ) -> ImportView:
-        """Begin with the soundings of a file; see ``importing.import_soundings``."""
-        live = await self._get(mission_id)
-        async with self._importing:
-            return await importing.import_soundings(live, self._executor, content, options, actor)
+        """Begin with the soundings of a file; see ``importing.Importing.add``."""
+        return await self._importing.add(await self._get(mission_id), upload, options, actor)
 
     async def delete_import(self, mission_id: str, import_id: str, *, actor: str = "operator") -> None:
         """Take an import back. Raises ImportNotFoundError."""
-        live = await self._get(mission_id)
-        async with self._importing:
-            await importing.delete_import(live, import_id, actor)
+        await self._importing.delete(await self._get(mission_id), import_id, actor)
 
     async def reference(self, mission_id: str) -> ReferenceView:
         """Return what the map is compared with. Raises ImportNotFoundError."""
         return await importing.reference_of(await self._get(mission_id))
 
     async def set_reference(
-        self, mission_id: str, content: bytes, options: ImportOptions, *, actor: str = "operator"
+        self, mission_id: str, upload: Upload, options: ImportOptions, *, actor: str = "operator"
     ) -> ReferenceView:
-        """Compare the map with the grid in a file from now on. Raises InvalidRequestError."""
-        live = await self._get(mission_id)
-        async with self._importing:
-            return await importing.set_reference(live, content, options, actor)
+        """Compare the map with the grid in a file from now on; see ``importing.Importing.set_reference``."""
+        return await self._importing.set_reference(await self._get(mission_id), upload, options, actor)
 
     async def delete_reference(self, mission_id: str, *, actor: str = "operator") -> None:
         """Compare the map with nothing any more. Raises ImportNotFoundError."""
-        live = await self._get(mission_id)
-        async with self._importing:
-            await importing.delete_reference(live, actor)
+        await self._importing.delete_reference(await self._get(mission_id), actor)
 
     # What came of it
 

@@ -169,6 +169,9 @@ class ServiceSettings(Section):
     time_scale: float = Field(
         default=1.0, gt=0, le=1000, description="How much faster than wall time simulated vehicles live"
     )
+    unconfined_imports: bool = Field(
+        default=False, description="Read imported files even where nothing keeps them from reading others"
+    )
     imc: ImcSettings = ImcSettings()
     neptus: NeptusSettings = NeptusSettings()
     simulation: SimulationSettings = SimulationSettings()

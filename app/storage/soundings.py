@@ -122,8 +122,17 @@ def unpack(stored: bytes, *shape: int) -> NDArray[np.float64]:
 
 async def imported_arrays(session: AsyncSession, mission_id: str) -> NDArray[np.float64]:
     """Return what was imported, in that order, shape (n, 4): east, north, depth, deviation (metres)."""
-    query = select(ImportRow.soundings).where(ImportRow.mission_id == mission_id)
-    stored = (await session.scalars(query.order_by(ImportRow.created_at, ImportRow.id))).all()
+    return unpack_imported(await imported(session, mission_id))
+
+
+async def imported(session: AsyncSession, mission_id: str, *, without: str = "") -> Sequence[bytes]:
+    """Return the soundings of every import as they are stored, in that order; ``without`` one of them."""
+    query = select(ImportRow.soundings).where(ImportRow.mission_id == mission_id, ImportRow.id != without)
+    return (await session.scalars(query.order_by(ImportRow.created_at, ImportRow.id))).all()
+
+
+def unpack_imported(stored: Sequence[bytes]) -> NDArray[np.float64]:
+    """Return stored soundings of imports one after another, shape (n, 4)."""
     return np.concatenate([np.zeros((0, 4)), *(unpack(soundings, -1, 4) for soundings in stored)])
 
 

@@ -146,11 +146,13 @@ def read(reader: str, path: Path) -> str:
         except TerrainError as error:
             return str(error)
         return ""
+    from app.mapping.readers.endings import ending
     from app.mapping.readers.files import read_file
     from app.mapping.readers.types import ReadError
 
     try:
-        read_file(path)
+        with path.open("rb") as file:
+            read_file(file, ending(path.name))
     except ReadError as error:
         return f"{error.field}: {error}; {error.remedy}"
     return ""

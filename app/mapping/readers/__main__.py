@@ -1,58 +1,43 @@
-"""Reads one file and writes what it found; see ``app.missions.importing`` for the other side.
+"""Reads one file, locked in; see ``app.missions.reading`` for the other side.
 
-Arguments: the file, the task as JSON, the file to write. Exit code 3: the file cannot be used, stdout says why.
+The file is standard input. Arguments: the task as JSON, and the number of the open file for the values found. What was
+found is said as JSON on standard output, in one line. Exit code 3: the file cannot be used, and why; 4: this system
+cannot lock the process in.
 """
 
 import json
-import resource
 import sys
-from dataclasses import asdict
-from pathlib import Path
 from typing import Any
 
-import numpy as np
+from app.mapping.readers.confinement import LAYERS, Limits, confine, limit
+from app.mapping.readers.types import UNCONFINED, UNUSABLE, ReadError
 
-MAX_MEMORY_BYTES = 6 * 2**30
-MAX_CPU_S = 120
+LIMITS = Limits(memory_bytes=4 * 2**30, cpu_s=120, file_bytes=2**30)
 
 
-def main() -> int:
-    """Do what the arguments say."""
-    resource.setrlimit(resource.RLIMIT_AS, (MAX_MEMORY_BYTES, MAX_MEMORY_BYTES))
-    resource.setrlimit(resource.RLIMIT_CPU, (MAX_CPU_S, MAX_CPU_S))
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    path, task, out = Path(sys.argv[1]), json.loads(sys.argv[2]), Path(sys.argv[3])
-    from app.mapping.readers.types import UNUSABLE, ReadError
+def main(layers: tuple[str, ...] = LAYERS) -> int:
+    """Do what the arguments say, with these layers of confinement."""
+    task, result = json.loads(sys.argv[1]), int(sys.argv[2])
+    limit(LIMITS)
+    # Everything is imported and used once before the file is looked at: afterwards nothing more can be loaded.
+    from app.mapping.readers.reading import place_file
+    from app.mapping.readers.warming import data_folders, warm_up
 
-    try:
-        sys.stdout.write(json.dumps(_read(path, task, out)))
-    except ReadError as error:
-        sys.stdout.write(json.dumps({"field": error.field, "message": str(error), "remedy": error.remedy}))
-        return UNUSABLE
-    except MemoryError:
-        words = {"field": "file", "message": "reading it takes too much memory", "remedy": "send a smaller one"}
+    warm_up(task)
+    held = confine([result], data_folders(), layers)
+    words: dict[str, Any] = {"confined": held}
+    if not task["unconfined"] and held["landlock"] and held["seccomp"]:
         sys.stdout.write(json.dumps(words))
-        return UNUSABLE
-    return 0
-
-
-def _read(path: Path, task: dict[str, Any], out: Path) -> dict[str, Any]:
-    from app.mapping.georeference import LocalFrame
-    from app.mapping.readers.files import read_file
-    from app.mapping.readers.placing import place_reference, place_soundings
-    from app.mapping.readers.types import Place, ReadOptions
-    from app.mapping.types import Grid
-
-    place = Place(LocalFrame(*task["origin"]), Grid(**task["grid"]), task["margin_m"])
-    options = ReadOptions(**task["options"])
-    content = read_file(path)
-    if task["what"] == "reference":
-        depths, notes = place_reference(content, options, place)
-        np.save(out, depths, allow_pickle=False)
-        return {"notes": notes}
-    placed = place_soundings(content, options, place)
-    np.save(out, np.column_stack(list(asdict(placed.soundings).values())), allow_pickle=False)
-    return {"notes": placed.notes, "found": placed.found}
+        return UNCONFINED
+    try:
+        with open(result, "wb", closefd=False) as out:
+            words |= place_file(sys.stdin.buffer, task, out)
+    except ReadError as error:
+        words |= {"field": error.field, "message": str(error), "remedy": error.remedy}
+    except MemoryError:
+        words |= {"field": "file", "message": "reading it takes too much memory", "remedy": "send a smaller one"}
+    sys.stdout.write(json.dumps(words))
+    return UNUSABLE if "remedy" in words else 0
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """Grids in NetCDF: one variable of depths or heights over two regular axes."""
 
-from pathlib import Path
+import re
 from typing import Any
 
 import numpy as np
@@ -8,6 +8,7 @@ import pyproj
 from affine import Affine
 from netCDF4 import Dataset
 
+from app.mapping.readers.hdf5 import check_contained
 from app.mapping.readers.types import MAX_RASTER_CELLS, Positive, Raster, ReadError
 from app.mapping.types import FloatArray
 
@@ -17,7 +18,13 @@ REGULAR = 1e-3
 """Largest deviation of an axis from even spacing, in cells."""
 
 
-def read_netcdf(path: Path) -> Raster:
+CLASSIC = (b"CDF\x01", b"CDF\x02", b"CDF\x05")
+"""How NetCDF begins that is not HDF5. It has nothing that leads to other files."""
+
+_PLAIN_NAME = re.compile(r"[A-Za-z0-9_]{1,40}")
+
+
+def read_netcdf(content: bytes) -> Raster:
     """Return the grid of depths in a file.
 
     Raises
@@ -25,19 +32,23 @@ def read_netcdf(path: Path) -> Raster:
     ReadError
         When there is no such variable, or its axes are not regular.
     """
+    if not content.startswith(CLASSIC):
+        check_contained(content)
     try:
-        file = Dataset(path)
-    except OSError as error:
-        raise ReadError("file", f"it cannot be read as NetCDF: {error.strerror}", "send a NetCDF file") from None
-    try:
-        return _read(file)
-    finally:
-        file.close()
+        file = Dataset("memory.nc", memory=content)
+        try:
+            return _read(file)
+        finally:
+            file.close()
+    except ReadError:
+        raise
+    except (OSError, RuntimeError, ValueError, TypeError, IndexError, AttributeError, OverflowError):
+        raise ReadError("file", "it cannot be read as NetCDF", "send a NetCDF file that is whole") from None
 
 
 def _read(file: Any) -> Raster:
     variable = _depth_variable(file)
-    name = f"variable {variable.name}"
+    name = _called(variable.name)
     rows, cols = variable.shape
     if rows * cols > MAX_RASTER_CELLS:
         raise ReadError(name, f"{cols} x {rows} cells are more than {MAX_RASTER_CELLS}", "cut it to the mission's area")
@@ -62,24 +73,28 @@ def _depth_variable(file: Any) -> Any:
     lower = {variable.name.lower(): variable for variable in flat}
     found = next((lower[name] for name in DEPTH_NAMES if name in lower), None)
     if found is None:
-        there = ", ".join(sorted(lower)) or "none of two dimensions"
         raise ReadError(
-            "variable", f"none of its variables is a grid of depths ({there})", "name it depth or elevation"
+            "variable",
+            f"none of its {len(lower)} variables of two dimensions is a grid of depths",
+            "name it depth or elevation",
         )
     return found
+
+
+def _called(name: str) -> str:
+    """Name a variable for a message, where its name is one and not a text of whatever kind."""
+    return f"variable {name}" if _PLAIN_NAME.fullmatch(name) else "a variable"
 
 
 def _axis(file: Any, name: str) -> FloatArray:
     variable = file.variables.get(name)
     if variable is None or variable.ndim != 1 or len(variable) < 2:
-        raise ReadError(
-            f"variable {name}", "it is not an axis of at least two values", "give each axis its coordinates"
-        )
+        raise ReadError(_called(name), "it is not an axis of at least two values", "give each axis its coordinates")
     values = _values(variable)
     even = np.linspace(values[0], values[-1], len(values))
     step = (values[-1] - values[0]) / (len(values) - 1)
     if not np.all(np.isfinite(values)) or step == 0 or np.max(np.abs(values - even)) > REGULAR * abs(step):
-        raise ReadError(f"variable {name}", "its values are not evenly spaced", "regrid the file, or send it as XYZ")
+        raise ReadError(_called(name), "its values are not evenly spaced", "regrid the file, or send it as XYZ")
     return values
 
 
@@ -96,7 +111,7 @@ def _crs(file: Any, variable: Any, x_name: str, y_name: str) -> pyproj.CRS | Non
             wkt = attributes.get("crs_wkt") or attributes.get("spatial_ref")
             return pyproj.CRS.from_wkt(wkt) if wkt else pyproj.CRS.from_cf(attributes)
         except (pyproj.exceptions.CRSError, KeyError):
-            raise ReadError(f"variable {mapping.name}", "it describes no known projection", "write crs_wkt") from None
+            raise ReadError(_called(mapping.name), "it describes no known projection", "write crs_wkt") from None
     geographic = x_name.lower().startswith("lon") and y_name.lower().startswith("lat")
     return pyproj.CRS.from_epsg(4326) if geographic else None
 

@@ -7,7 +7,9 @@ import pyproj
 import rasterio.crs
 from affine import Affine
 from numpy.typing import ArrayLike
-from pyproj.exceptions import CRSError
+from pyproj.exceptions import CRSError, ProjError
+from rasterio._err import CPLE_BaseError
+from rasterio.errors import RasterioError
 from rasterio.warp import Resampling, reproject
 
 from app.mapping.counting import cell_numbers
@@ -77,7 +79,8 @@ def place_soundings(content: Points | Raster, options: ReadOptions, place: Place
         raise ReadError("file", "none of its depths lies near the mission's area", "check the file and its crs")
     if near.sum() > MAX_SOUNDINGS:
         raise ReadError("file", f"{near.sum()} depths are more than {MAX_SOUNDINGS}", "thin the file")
-    east, north, depth, sd = east[near], north[near], depth[near], sd[near]
+    if not near.all():  # else two million soundings need not be copied
+        east, north, depth, sd = east[near], north[near], depth[near], sd[near]
     return Placed(Soundings(east, north, depth, _deviations(sd, depth, options, notes)), found, notes)
 
 
@@ -130,7 +133,7 @@ def _check_depths(depth: FloatArray, content: Points | Raster) -> None:
         index = np.unravel_index(int(np.argmax(wrong)), depth.shape)
         raise ReadError(
             _where(content, index),
-            f"a depth of {depth[index]:g} m is not between {MIN_DEPTH_M:g} and {MAX_DEPTH_M:g}",
+            f"its depth is not between {MIN_DEPTH_M:g} and {MAX_DEPTH_M:g} m",
             "check units, sign and nodata value",
         )
 
@@ -163,7 +166,7 @@ def _crs(found: "pyproj.CRS | str | None", options: ReadOptions, notes: list[str
             "crs", f"{named[:60]!r} is no coordinate reference system", "say for example EPSG:32629"
         ) from None
     if not (crs.is_projected or crs.is_geographic or crs.is_compound):
-        raise ReadError("crs", f"{crs.name} has no horizontal axes", "say for example EPSG:32629")
+        raise ReadError("crs", "it has no horizontal axes", "say for example EPSG:32629")
     return crs
 
 
@@ -177,12 +180,21 @@ def _to_local(x: FloatArray, y: FloatArray, crs: pyproj.CRS | None, place: Place
             i = int(np.argmax(wrong))
             raise ReadError(
                 f"position {i + 1}",
-                f"({x[i]:g}, {y[i]:g}) is no longitude and latitude",
+                "it is no longitude and latitude",
                 "longitude comes first; say crs where positions are metres",
             )
-    to_frame = pyproj.Transformer.from_crs(horizontal, place.frame.crs, always_xy=True)
-    east, north = to_frame.transform(x, y)
+    try:
+        to_frame = pyproj.Transformer.from_crs(horizontal, place.frame.crs, always_xy=True)
+        east, north = to_frame.transform(x, y)
+    except ProjError:
+        raise _no_way() from None
     return np.asarray(east, float), np.asarray(north, float)
+
+
+def _no_way() -> ReadError:
+    return ReadError(
+        "crs", "there is no way from it to the mission's frame", "say crs as EPSG:32629, or send the file in WGS 84"
+    )
 
 
 def _cells(
@@ -227,18 +239,21 @@ def _resampled(raster: Raster, values: FloatArray, crs: pyproj.CRS | None, place
         source = rasterio.crs.CRS.from_wkt((crs.sub_crs_list[0] if crs.is_compound else crs).to_wkt())
     north_m = grid.south_m + grid.rows * grid.cell_m
     target = np.full((grid.rows, grid.cols), np.nan)
-    reproject(
-        values,
-        target,
-        src_transform=raster.transform,
-        src_crs=source,
-        src_nodata=np.nan,
-        dst_transform=Affine(grid.cell_m, 0.0, grid.west_m, 0.0, -grid.cell_m, north_m),
-        dst_crs=frame,
-        dst_nodata=np.nan,
-        # GDAL's bilinear kernel widens to an average where the source is finer.
-        resampling=Resampling.bilinear,
-    )
+    try:
+        reproject(
+            values,
+            target,
+            src_transform=raster.transform,
+            src_crs=source,
+            src_nodata=np.nan,
+            dst_transform=Affine(grid.cell_m, 0.0, grid.west_m, 0.0, -grid.cell_m, north_m),
+            dst_crs=frame,
+            dst_nodata=np.nan,
+            # GDAL's bilinear kernel widens to an average where the source is finer.
+            resampling=Resampling.bilinear,
+        )
+    except (RasterioError, CPLE_BaseError):
+        raise _no_way() from None
     return target[::-1].copy()
 
 
@@ -261,7 +276,7 @@ def _deviations(sd: FloatArray, depth: FloatArray, options: ReadOptions, notes: 
         notes.append(f"{np.sum(~stated)} depths state no uncertainty: {said} is assumed")
         sd = np.where(stated, sd, assumed)
     if np.max(sd) > MAX_SD_M:
-        i = int(np.argmax(sd))
-        said = f"the standard deviation of the depth of {depth[i]:g} m is {sd[i]:g} m"
-        raise ReadError("uncertainty", said, f"at most {MAX_SD_M:g} m is taken")
+        raise ReadError(
+            "uncertainty", f"a standard deviation is above {MAX_SD_M:g} m", "check its unit and nodata value"
+        )
     return np.maximum(sd, MIN_SD_M)

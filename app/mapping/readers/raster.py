@@ -1,6 +1,5 @@
 """Grids by GDAL: GeoTIFF, ESRI ASCII and BAG."""
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -8,31 +7,43 @@ import pyproj
 import rasterio
 from rasterio.errors import RasterioError
 
+from app.mapping.readers.endings import DRIVERS
+from app.mapping.readers.hdf5 import check_contained
 from app.mapping.readers.types import MAX_RASTER_CELLS, Positive, Raster, ReadError
 from app.mapping.types import FloatArray
-
-DRIVERS = {".tif": "GTiff", ".tiff": "GTiff", ".asc": "AAIGrid", ".bag": "BAG"}
-"""Which library reads which ending; whatever else a file pretends to be is refused."""
 
 DEPTH_BANDS = ("depth", "elevation", "height", "z")
 SD_BANDS = ("uncertainty", "sd", "standard deviation", "standard_deviation")
 
 
-def read_raster(path: Path) -> Raster:
+NAMES = {"GTiff": "GeoTIFF", "AAIGrid": "ESRI ASCII grid", "BAG": "BAG"}
+
+
+def read_raster(content: bytes, kind: str) -> Raster:
     """Return the grid in a file: its depths and, if it has such a band, their standard deviations.
+
+    Parameters
+    ----------
+    kind
+        The ending of its name, a key of :data:`DRIVERS`.
 
     Raises
     ------
     ReadError
         When the file cannot be read, is too large or has no band with a value.
     """
+    driver = DRIVERS[kind]
+    if driver == "BAG":
+        check_contained(content)
     try:
-        with rasterio.open(path, driver=DRIVERS[path.suffix], sharing=False) as file:
+        if not content:
+            raise RasterioError("empty")
+        with rasterio.MemoryFile(content, filename=f"file{kind}") as memory, memory.open(driver=driver) as file:
             return _read(file)
-    except RasterioError as error:
-        what = {".tif": "GeoTIFF", ".tiff": "GeoTIFF", ".asc": "ESRI ASCII grid", ".bag": "BAG"}[path.suffix]
-        reason = str(error).replace(str(path), "it").partition("\n")[0]
-        raise ReadError("file", f"it cannot be read as {what}: {reason}", f"send a {what}") from None
+    except RasterioError:
+        # GDAL's words quote what it stumbled over.
+        what = NAMES[driver]
+        raise ReadError("file", f"it cannot be read as {what}", f"send a {what} that is whole") from None
 
 
 def _read(file: Any) -> Raster:

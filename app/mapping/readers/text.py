@@ -1,14 +1,15 @@
 """Soundings as text: XYZ and CSV, with or without names for the columns."""
 
-import re
+import math
 from collections.abc import Sequence
-from typing import Literal
+from typing import BinaryIO, Literal
 
 import numpy as np
 import pyproj
 
+from app.mapping.readers.lines import Block, blocks
 from app.mapping.readers.types import LOCAL, MAX_SOUNDINGS, Points, Positive, ReadError
-from app.mapping.types import FloatArray, IntArray
+from app.mapping.types import FloatArray
 
 NAMES = {
     "lon": ("lon", "lon_deg", "longitude", "long", "lng"),
@@ -25,12 +26,13 @@ NAMES = {
 }
 """What columns may be called, without regard to case."""
 
-_SEPARATORS = re.compile(r"[,;\t ]+")
 EPSG_4326 = 4326
+MAX_COLUMNS = 256
+ACCEPTED = "accepted"
 
 
-def read_text(text: str) -> Points:
-    """Return the soundings of a text file.
+def read_text(file: BinaryIO, *, packed: bool = False) -> Points:
+    """Return the soundings of a text file, read a block at a time.
 
     A first line of names, also behind ``#``, says what the columns are; without one they are x, y and z. Other lines
     behind ``#`` are comments. Where there is a column ``verdict`` only accepted soundings are taken.
@@ -40,36 +42,120 @@ def read_text(text: str) -> Points:
     ReadError
         For the first line that cannot be read, with its number and column.
     """
-    columns: dict[str, int] | None = None
-    rows: list[tuple[float, ...]] = []
-    lines: list[int] = []
-    wanted: list[tuple[str, int]] = []
-    separator = ","
-    for number, line in enumerate(text.splitlines(), start=1):
-        bare = line.strip().lstrip("\ufeff")
-        if not bare:
-            continue
-        if bare.startswith("#") or columns is None:
-            named = _named(bare.lstrip("# "))
-            if columns is None and named is not None:
-                columns, separator = named, _separator(bare.lstrip("# "))
-                wanted = _wanted(columns)
+    table = _Table()
+    layout: _Layout | None = None
+    for block in blocks(file, packed=packed):
+        begin = 0
+        if layout is None:
+            found = ((index, _layout(line, block.first + index)) for index, line in enumerate(block.lines))
+            begin, layout = next(((index, layout) for index, layout in found if layout), (0, None))
+            if layout is None:
                 continue
-            if bare.startswith("#"):
-                continue
-        if columns is None:
-            columns, separator = {"x": 0, "y": 1, "z": 2}, _separator(bare)
-            wanted = _wanted(columns)
-        cells = _split(bare, separator)
-        if "verdict" in columns and (columns["verdict"] >= len(cells) or cells[columns["verdict"]] != "accepted"):
+            begin += layout.named
+        lines = block.lines[begin:]
+        rows = _at_once(lines, layout) if layout.verdict is None else None
+        if rows is not None:
+            table.add(rows, range(block.first + begin, block.first + len(block.lines)))
             continue
-        rows.append(_row(cells, wanted, number))
-        lines.append(number)
-        if len(rows) > MAX_SOUNDINGS:
-            raise ReadError(f"line {number}", f"more than {MAX_SOUNDINGS} soundings", "split or thin the file")
-    if not rows or columns is None:
+        lines, numbers = _taken(block, begin, layout)
+        if lines:
+            rows = _at_once(lines, layout)
+            table.add(_one_by_one(lines, numbers, layout) if rows is None else rows, numbers)
+    if layout is None or not table.size:
         raise ReadError("file", "there is no sounding in it", "send lines of x, y and depth")
-    return _points(np.array(rows), [name for name, _ in wanted], np.array(lines))
+    return _points(table, [name for name, _ in layout.wanted])
+
+
+class _Layout:
+    """How lines are divided and which of their columns count.
+
+    Attributes
+    ----------
+    named
+        Whether the line that showed it names the columns, so that it is no sounding itself.
+    wanted
+        Names and numbers of the columns that are read: x, y, depth, and the standard deviation if there is one.
+    verdict
+        Number of the column that says whether a sounding is taken.
+    """
+
+    def __init__(self, columns: dict[str, int], separator: str, *, named: bool) -> None:
+        self.named = named
+        self.separator = separator
+        self.wanted = _wanted(columns)
+        self.verdict = columns.get("verdict")
+
+
+class _Table:
+    """Soundings as they come; the memory of those that never come is not touched."""
+
+    def __init__(self) -> None:
+        self.size = 0
+        self.values = np.empty((4, MAX_SOUNDINGS))
+        self.lines = np.empty(MAX_SOUNDINGS, np.int32)
+
+    def add(self, rows: FloatArray, numbers: Sequence[int]) -> None:
+        """Append (n, 3 or 4) values and the numbers of their lines."""
+        end = self.size + len(rows)
+        if end > MAX_SOUNDINGS:
+            number = numbers[MAX_SOUNDINGS - self.size]
+            raise ReadError(f"line {number}", f"more than {MAX_SOUNDINGS} soundings", "split or thin the file")
+        self.values[: rows.shape[1], self.size : end] = rows.T
+        self.lines[self.size : end] = numbers
+        self.size = end
+
+
+def _layout(line: str, number: int) -> _Layout | None:
+    """Return what a line shows of the columns; None for an empty one and for a comment that names none."""
+    bare = line.strip().lstrip("\ufeff")
+    text = bare.lstrip("# ")
+    if len(_split(text, _separator(text))) > MAX_COLUMNS:
+        raise ReadError(f"line {number}", f"it has more than {MAX_COLUMNS} columns", "send fewer columns")
+    columns = _named(text)
+    if columns is not None:
+        return _Layout(columns, _separator(text), named=True)
+    if not bare or bare.startswith("#"):
+        return None
+    return _Layout({"x": 0, "y": 1, "z": 2}, _separator(bare), named=False)
+
+
+def _taken(block: Block, begin: int, layout: _Layout) -> tuple[list[str], list[int]]:
+    """Return a block's lines from ``begin`` on that are soundings to be taken, and their numbers."""
+    lines, numbers = [], []
+    for number, line in enumerate(block.lines[begin:], start=block.first + begin):
+        bare = line.strip()
+        if not bare or bare.startswith("#"):
+            continue
+        if layout.verdict is not None:
+            cells = _split(bare, layout.separator)
+            if layout.verdict >= len(cells) or cells[layout.verdict] != ACCEPTED:
+                continue
+        lines.append(bare)
+        numbers.append(number)
+    return lines, numbers
+
+
+def _at_once(lines: list[str], layout: _Layout) -> FloatArray | None:
+    """Return soundings, (n, columns), one a line; None where a line is none, or has something to be said about."""
+    if not lines:
+        return None
+    try:
+        rows = np.loadtxt(
+            lines,
+            delimiter=None if layout.separator == " " else layout.separator,
+            usecols=[column for _, column in layout.wanted],
+            comments=None,
+            ndmin=2,
+        )
+    except ValueError:
+        return None
+    # Empty lines are passed over: then the numbers of the others are not known.
+    return rows if len(rows) == len(lines) and np.isfinite(rows).all() else None
+
+
+def _one_by_one(lines: list[str], numbers: list[int], layout: _Layout) -> FloatArray:
+    """Return the same of lines with a deviation left out. Raises ReadError for the first that has no number."""
+    return np.array([_row(line, layout, number) for line, number in zip(lines, numbers, strict=True)])
 
 
 def _named(line: str) -> dict[str, int] | None:
@@ -95,19 +181,20 @@ def _split(line: str, separator: str) -> Sequence[str]:
     return line.split() if separator == " " else [cell.strip() for cell in line.split(separator)]
 
 
-def _row(cells: Sequence[str], wanted: Sequence[tuple[str, int]], number: int) -> tuple[float, ...]:
+def _row(line: str, layout: _Layout, number: int) -> tuple[float, ...]:
+    cells = _split(line.lstrip("\ufeff"), layout.separator)
     values = []
-    for name, column in wanted:
+    for name, column in layout.wanted:
         said = cells[column] if column < len(cells) else ""
         if not said and name == "sd":
-            values.append(np.nan)
+            values.append(math.nan)
             continue
         try:
             value = float(said)
         except ValueError:
-            value = np.nan
-        if not np.isfinite(value):
-            seen = f"{said[:40]!r} is not a number" if said else f"it has only {len(cells)} columns"
+            value = math.nan
+        if not math.isfinite(value):
+            seen = "it is not a number" if column < len(cells) else f"the line has only {len(cells)} columns"
             what = {"down": "depth", "up": "height"}.get(name, name)
             raise ReadError(
                 f"line {number}, column {column + 1} ({what})", seen, "write a number, or leave the line out"
@@ -116,13 +203,14 @@ def _row(cells: Sequence[str], wanted: Sequence[tuple[str, int]], number: int) -
     return tuple(values)
 
 
-def _points(table: FloatArray, names: Sequence[str], lines: IntArray) -> Points:
-    x, y, z = table[:, 0], table[:, 1], table[:, 2]
-    sd = table[:, 3] if len(names) > 3 else np.full(len(z), np.nan)
+def _points(table: _Table, names: Sequence[str]) -> Points:
+    x, y, z, sd = table.values[:, : table.size]
+    if len(names) == 3:
+        sd = np.broadcast_to(np.nan, z.shape)
     positive: Positive | None = {"down": "down", "up": "up"}.get(names[2])  # type: ignore[assignment]
     crs: pyproj.CRS | Literal["local"] | None = None
     if names[0] == "lon":
         crs = pyproj.CRS.from_epsg(EPSG_4326)
     elif names[0] == "east":
         crs = LOCAL
-    return Points(x, y, z, sd, crs, positive, lines)
+    return Points(x, y, z, sd, crs, positive, table.lines[: table.size])

@@ -3,11 +3,13 @@
 from dataclasses import dataclass
 from typing import Literal
 
+import numpy as np
 import pyproj
 from affine import Affine
+from numpy.typing import NDArray
 
 from app.mapping.georeference import LocalFrame
-from app.mapping.types import FloatArray, Grid, IntArray
+from app.mapping.types import FloatArray, Grid
 
 MAX_SOUNDINGS = 2_000_000
 MAX_RASTER_CELLS = 30_000_000
@@ -20,6 +22,9 @@ MIN_SD_M, MAX_SD_M = 0.001, 1000.0
 
 UNUSABLE = 3
 """Exit code of the reading process when the file, not the program, is wrong."""
+
+UNCONFINED = 4
+"""Exit code of the reading process when nothing keeps it from other files."""
 
 Positive = Literal["down", "up"]
 
@@ -79,7 +84,7 @@ class Points:
     sd_m: FloatArray
     crs: pyproj.CRS | Literal["local"] | None
     positive: Positive | None
-    lines: IntArray
+    lines: NDArray[np.signedinteger]
 
 
 @dataclass(frozen=True)

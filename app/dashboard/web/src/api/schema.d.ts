@@ -6097,6 +6097,15 @@ export interface operations {
                     "application/json": components["schemas"]["ImportView"];
                 };
             };
+            /** @description The body cannot be read */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description An access token is needed */
             401: {
                 headers: {
@@ -6162,6 +6171,15 @@ export interface operations {
             };
             /** @description Too many requests */
             429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No file can be read now */
+            503: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -6348,6 +6366,15 @@ export interface operations {
                     "application/json": components["schemas"]["ReferenceView"];
                 };
             };
+            /** @description The body cannot be read */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description An access token is needed */
             401: {
                 headers: {
@@ -6413,6 +6440,15 @@ export interface operations {
             };
             /** @description Too many requests */
             429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No file can be read now */
+            503: {
                 headers: {
                     [name: string]: unknown;
                 };

@@ -1,0 +1,44 @@
+"""From an open file and a task to depths in the mission's frame, written as plain numbers."""
+
+from typing import Any, BinaryIO
+
+import numpy as np
+
+from app.mapping.georeference import LocalFrame
+from app.mapping.readers.files import read_file
+from app.mapping.readers.placing import place_reference, place_soundings
+from app.mapping.readers.types import Place, ReadOptions
+from app.mapping.types import FloatArray, Grid
+
+
+def place_file(file: BinaryIO, task: dict[str, Any], out: BinaryIO) -> dict[str, Any]:
+    """Read a file and write what it says of the mission's place as little-endian float64.
+
+    Soundings are four columns one after the other, east, north, depth and standard deviation (metres); a reference
+    grid is the depths at the map's cells, row after row.
+
+    Returns
+    -------
+    ``shape``, ``notes`` and, of soundings, how many were ``found``.
+
+    Raises
+    ------
+    ReadError
+        When the file cannot be used.
+    """
+    place = Place(LocalFrame(*task["origin"]), Grid(**task["grid"]), task["margin_m"])
+    options = ReadOptions(**task["options"])
+    content = read_file(file, task["kind"])
+    if task["what"] == "reference":
+        depths, notes = place_reference(content, options, place)
+        _write(out, depths)
+        return {"shape": depths.shape, "notes": notes}
+    placed = place_soundings(content, options, place)
+    found = placed.soundings
+    for column in (found.east_m, found.north_m, found.depth_m, found.sd_m):
+        _write(out, column)
+    return {"shape": (4, len(found)), "notes": placed.notes, "found": placed.found}
+
+
+def _write(out: BinaryIO, values: FloatArray) -> None:
+    out.write(np.ascontiguousarray(values, "<f8").data)

@@ -1,0 +1,75 @@
+"""Libraries load files when they are first used. A process that will be locked in uses them once before."""
+
+import contextlib
+import io
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyproj
+import rasterio
+from affine import Affine
+from netCDF4 import Dataset
+
+from app.mapping.georeference import LocalFrame
+from app.mapping.readers.endings import NETCDF, PACKED, TEXT
+from app.mapping.readers.files import read_file
+from app.mapping.readers.placing import place_reference, place_soundings
+from app.mapping.readers.types import Place, ReadError, ReadOptions
+from app.mapping.types import Grid
+
+_ROWS = 8
+_GRID = Grid(-_ROWS, -_ROWS, 2.0, _ROWS, _ROWS)
+_OPTIONS = ReadOptions(crs="EPSG:4326", sd_m=1.0, positive="down")
+
+
+def data_folders() -> list[Path]:
+    """Return where PROJ and GDAL keep tables, which they look things up in while they work."""
+    named = [*pyproj.datadir.get_data_dir().split(":")]
+    beside = Path(rasterio.__file__).parent
+    folders = [*map(Path, named), beside / "proj_data", beside / "gdal_data"]
+    return [folder for folder in dict.fromkeys(folders) if folder.is_dir()]
+
+
+def warm_up(task: dict[str, Any]) -> None:
+    """Read small files of the kind that the task is about, good and bad ones, in every way that it may be used."""
+    frame = LocalFrame(*task["origin"])
+    kind = task["kind"].removesuffix(PACKED)
+    if kind in TEXT:
+        content = _text(frame)
+    elif kind in NETCDF:
+        content = _netcdf(frame)
+    else:
+        # BAG is HDF5, and the other grids go through GDAL as this one does.
+        read_file(io.BytesIO(_netcdf(frame)), NETCDF[0])
+        kind, content = ".tif", _geotiff(frame)
+    place = Place(frame, _GRID, _GRID.cell_m)
+    found = read_file(io.BytesIO(content), kind)
+    place_reference(found, _OPTIONS, place)
+    place_soundings(found, _OPTIONS, place)
+    for content in (b"", b"x,y,z\na,b,c\n", b"\x89HDF\r\n\x1a\n"):
+        with contextlib.suppress(ReadError):
+            read_file(io.BytesIO(content), kind)
+
+
+def _text(frame: LocalFrame) -> bytes:
+    return f"lon,lat,depth,sd\n{frame.origin_lon_deg!r},{frame.origin_lat_deg!r},5,\n".encode()
+
+
+def _netcdf(frame: LocalFrame) -> bytes:
+    file = Dataset("small.nc", "w", memory=1 << 14)
+    for name, middle in (("lat", frame.origin_lat_deg), ("lon", frame.origin_lon_deg)):
+        file.createDimension(name, _ROWS)
+        file.createVariable(name, "f8", (name,))[:] = middle + 1e-5 * (np.arange(_ROWS) - 0.5 * _ROWS)
+    file.createVariable("depth", "f4", ("lat", "lon"), zlib=True)[:] = 5.0
+    return bytes(file.close())
+
+
+def _geotiff(frame: LocalFrame) -> bytes:
+    with rasterio.MemoryFile() as memory:
+        with memory.open(
+            driver="GTiff", width=_ROWS, height=_ROWS, count=1, dtype="float32", crs=frame.crs.to_wkt(),
+            transform=Affine(2, 0, -_ROWS, 0, -2, _ROWS), compress="deflate",
+        ) as file:  # fmt: skip
+            file.write(np.full((_ROWS, _ROWS), 5.0, np.float32), 1)
+        return bytes(memory.read())
