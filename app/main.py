@@ -43,6 +43,7 @@ from app.api.forwarding import ForwardingMiddleware, PeerMiddleware
 from app.api.health import health_router
 from app.api.limits import LimitMiddleware, Limits
 from app.api.middleware import BodyMiddleware, RequestMiddleware
+from app.api.peers import is_own_user
 from app.api.schemas import API
 from app.api.state import EdgeState
 from app.api.tokens import Role, TokenStore
@@ -95,8 +96,10 @@ def create_app(settings: Settings | None = None, *, port: int | None = None) -> 
                 )
             audit = AuditLog(database, settings.audit_days)
 
-            async def log_in(password: str, host: str) -> str | None:
-                name = await console_log_in(tokens, limits, password, host, insecure=settings.insecure)
+            async def log_in(password: str, host: str, own_user: bool) -> str | None:
+                name = await console_log_in(
+                    tokens, limits, password, host, own_user=own_user, insecure=settings.insecure
+                )
                 if name is None:  # who is let in is in the log of his session's mission
                     await audit.write(Command("", "", host, "log in", "Neptus gateway", "refused"))
                 return name
@@ -105,6 +108,7 @@ def create_app(settings: Settings | None = None, *, port: int | None = None) -> 
                 settings.service(),
                 database,
                 log_in,
+                is_own_user=is_own_user,
                 url=settings.peer_url or _own_url(settings, port or settings.port),
                 certificate=settings.tls_certificate.read_text() if settings.tls_certificate else None,
             )
