@@ -53,7 +53,9 @@ from app.missions.service import MissionService
 from app.settings import Settings, StartupError, is_loopback, load_settings
 from app.storage.audit import Command
 from app.storage.database import Database
+from app.storage.membership import MembershipLostError
 from app.storage.prepare import prepare_database
+from imc_bridge import PortInUseError
 
 GRACE_S = 5
 """Seconds that open requests get to end when the process is asked to."""
@@ -113,8 +115,8 @@ def create_app(settings: Settings | None = None, *, port: int | None = None) -> 
                 certificate=settings.tls_certificate.read_text() if settings.tls_certificate else None,
             )
             app.state.edge = EdgeState(settings, service, tokens, limits, audit)
-            await service.startup()
             try:
+                await _begin(service)
                 yield
             finally:
                 app.state.edge.stopping.set()
@@ -174,6 +176,16 @@ def create_app(settings: Settings | None = None, *, port: int | None = None) -> 
     app.add_middleware(PeerMiddleware)
     app.add_middleware(RequestMiddleware)
     return app
+
+
+async def _begin(service: MissionService) -> None:
+    """Start the service; raise StartupError where something outside of it is in the way."""
+    try:
+        await service.startup()
+    except PortInUseError as error:
+        raise StartupError(str(error)) from None
+    except MembershipLostError as error:
+        raise StartupError(f"this process cannot join those on its database: {error}") from None
 
 
 def _own_url(settings: Settings, port: int) -> str:
