@@ -42,7 +42,7 @@ def test_settings_that_are_not_utf8(tmp_path: Path) -> None:
     (tmp_path / "bathyfleet.toml").write_bytes("# Leixões\nport = 1\n".encode("latin-1"))
     code, said = start(tmp_path)
     assert code == 2
-    check_one_line(said, "bathyfleet.toml is not UTF-8", "byte 7 is 0xf5")
+    check_one_line(said, "bathyfleet.toml is not UTF-8", "byte 6 is 0xf5")
 
 
 def test_a_database_of_a_newer_version(tmp_path: Path) -> None:

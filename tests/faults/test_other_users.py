@@ -142,11 +142,12 @@ async def test_a_lock_that_a_stranger_holds_does_not_keep_a_dead_process_alive()
             assert (await api.post(f"{mission}/start")).status_code == httpx.codes.OK
             locks = list(folder.glob("fleet.db-process-*"))
             assert locks
-            # As before the update: everyone could open it, and hold it for longer than its process lives.
-            for path in locks:
-                path.chmod(0o644)
-            blocking = await holding(*held_after(locks))
             await first.kill()
+            # As before the update: everyone could open it, and hold it for longer than its process lived.
+            for path in locks:
+                path.unlink(missing_ok=True)
+                path.touch(0o644)
+            blocking = await holding(*locks)
         try:
             # At the same address: what it sent to the dead process would come to itself.
             async with service_in(folder, database=first.database, port=first.port) as (again, api):
@@ -157,15 +158,6 @@ async def test_a_lock_that_a_stranger_holds_does_not_keep_a_dead_process_alive()
             assert blocking.stdin is not None
             blocking.stdin.close()
             await blocking.wait()
-
-
-def held_after(locks: list[Path]) -> list[Path]:
-    """Lock files as an older version made them: empty, and open to everyone; the real ones are held already."""
-    for path in locks:
-        shadow = path.with_name(path.name + "~")
-        shadow.touch(0o644)
-        shadow.rename(path)
-    return locks
 
 
 async def test_backups_hold_no_secret_of_a_process() -> None:
