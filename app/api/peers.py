@@ -70,7 +70,7 @@ def user_of_socket(near: End, far: End) -> int | None:
     try:
         found = _asked_by_netlink(near, far)
     except (OSError, AttributeError):
-        # A kernel without that interface may still have the table.
+        # A kernel without that interface may still have the table; a socket that is gone is in neither.
         found = _looked_up_in_table(near, far)
     if found is None:
         return None
@@ -100,8 +100,8 @@ def _stand_in() -> int | None:
         return None
 
 
-def _asked_by_netlink(near: End, far: End) -> tuple[int, int, int] | None:
-    """Return state, user and inode of a socket; None where there is none. Raises OSError where this cannot be asked."""
+def _asked_by_netlink(near: End, far: End) -> tuple[int, int, int]:
+    """Return state, user and inode of a socket. Raises OSError where there is none, or this cannot be asked."""
     family = socket.AF_INET if near[0].version == 4 else socket.AF_INET6
     ends = [end[0].packed.ljust(16, b"\0") for end in (near, far)]
     ports = [struct.pack(">H", end[1]) for end in (near, far)]
@@ -114,10 +114,8 @@ def _asked_by_netlink(near: End, far: End) -> tuple[int, int, int] | None:
     if len(answer) < _HEADER.size + 4:
         raise OSError("the kernel's answer is cut off")
     if _HEADER.unpack_from(answer)[1] != _SOCK_DIAG_BY_FAMILY:
-        (negative,) = struct.unpack_from("=i", answer, _HEADER.size)
-        if -negative == 2:  # ENOENT: there is no such socket
-            return None
-        raise OSError(-negative, os.strerror(-negative))
+        # No such socket, or nobody in this kernel to answer the question: both are the same error.
+        raise OSError("the kernel does not tell by this way")
     if len(answer) < _UID_AT + _UID_AND_INODE.size:
         raise OSError("the kernel's answer is cut off")
     user, inode = _UID_AND_INODE.unpack_from(answer, _UID_AT)

@@ -78,6 +78,7 @@ def file_of(url: str) -> Path | None:
 
 def keep_for_owner(files: Iterable[Path]) -> None:
     """Take other users' rights from files that were made by an earlier version, or by hand, and say so."""
+    files = list(files)
     for file, mode in private.mend(files).items():
         log.warning(
             "file permissions mended: other users of this machine could have read or locked it",
@@ -85,6 +86,10 @@ def keep_for_owner(files: Iterable[Path]) -> None:
             before=mode,
             now=f"{file.stat().st_mode & 0o777:o}",
         )
+    for file in private.still_open(files):
+        log.warning("file permissions are another user's to mend: others may read or lock it", file=str(file))
+    for folder in {file.parent for file in files if private.is_public(file.parent)}:
+        log.warning("every user of this machine may put files beside the database", folder=str(folder.resolve()))
 
 
 async def _check_that_empty(url: str) -> None:

@@ -80,18 +80,19 @@ def mend(paths: Iterable[Path]) -> dict[Path, str]:
                 continue
             path.chmod(stat.S_IMODE(found.st_mode) & ~OTHERS)
         except OSError:
-            continue  # gone, or another user's: see ``strange``
+            continue  # gone, or another user's
         mended[path] = f"{stat.S_IMODE(found.st_mode):o}"
     return mended
 
 
-def others_may_write(folder: Path) -> bool:
-    """Tell whether other users may replace what is in a folder."""
-    try:
-        found = folder.stat()
-    except OSError:
-        return False
-    return bool(found.st_mode & 0o022)
+def still_open(paths: Iterable[Path]) -> list[Path]:
+    """Return the files that others may read or write, and which are not ours to close."""
+    return [path for path in paths if path.is_file() and path.stat().st_mode & OTHERS]
+
+
+def is_public(folder: Path) -> bool:
+    """Tell whether every user may put files into a folder."""
+    return folder.is_dir() and bool(folder.stat().st_mode & stat.S_IWOTH)
 
 
 def family(database: Path) -> list[Path]:

@@ -60,6 +60,14 @@ def test_what_is_open_is_mended_and_named(tmp_path: Path) -> None:
     found = private.mend([*private.family(tmp_path / "db"), tmp_path / "absent"])
     assert {path.name: before for path, before in found.items()} == {"db": "644", "db-wal": "664"}
     assert [mode(tmp_path / name) for name in ("db", "db-wal", "db-process-3", "other")] == ["600", "600", "600", "644"]
+    assert private.still_open([tmp_path / "db", tmp_path / "other", tmp_path / "absent"]) == [tmp_path / "other"]
+
+
+def test_a_folder_that_everybody_may_write_to_is_told(tmp_path: Path) -> None:
+    assert not private.is_public(tmp_path)
+    tmp_path.chmod(0o1777)
+    assert private.is_public(tmp_path)
+    assert not private.is_public(tmp_path / "absent")
 
 
 def test_programs_that_are_started_write_privately_too(tmp_path: Path) -> None:
