@@ -67,6 +67,7 @@ def user_of(connection: socket.socket) -> int | None:
 
 def user_of_socket(near: End, far: End) -> int | None:
     """Return who has the TCP socket that is bound to ``near`` and connected to ``far``; None where nobody can tell."""
+    found: tuple[int, int, int] | None
     try:
         found = _asked_by_netlink(near, far)
     except (OSError, AttributeError):

@@ -78,9 +78,10 @@ def recognise(scope: Scope, secret: str, deliveries: Deliveries) -> bool:
     given = {name: headers.get(name) for name in (PEER, PRINCIPAL, FOR, HOST)}
     for name in given:
         del headers[name]
-    if given[PEER] is None:
+    shown, host = given[PEER], given[HOST]
+    if shown is None:
         return True
-    sender, _, rest = given[PEER].partition(".")
+    sender, _, rest = shown.partition(".")
     number, _, signature = rest.partition(".")
     wanted = _signature(secret, _method(scope), target_of(scope), given, f"{sender}.{number}")
     # As bytes: a stranger may send what is not ASCII.
@@ -89,8 +90,8 @@ def recognise(scope: Scope, secret: str, deliveries: Deliveries) -> bool:
     state = scope.setdefault("state", {})
     state["vouched"] = _read(given[PRINCIPAL] or "")
     scope["client"] = (given[FOR], 0) if given[FOR] else None
-    if given[HOST]:
-        headers["host"] = given[HOST]
+    if host:
+        headers["host"] = host
     return True
 
 

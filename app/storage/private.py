@@ -6,7 +6,7 @@ import secrets
 import stat
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import IO, Literal, overload
+from typing import BinaryIO, Literal, TextIO, cast, overload
 
 FILE_MODE = 0o600
 FOLDER_MODE = 0o700
@@ -34,16 +34,17 @@ def make_folder(folder: Path) -> None:
 
 
 @overload
-def open_new(path: Path, mode: Literal["w"] = "w") -> IO[str]: ...
+def open_new(path: Path, mode: Literal["w"] = "w") -> TextIO: ...
 @overload
-def open_new(path: Path, mode: Literal["wb"]) -> IO[bytes]: ...
-def open_new(path: Path, mode: Literal["w", "wb"] = "w") -> IO[str] | IO[bytes]:
+def open_new(path: Path, mode: Literal["wb"]) -> BinaryIO: ...
+def open_new(path: Path, mode: Literal["w", "wb"] = "w") -> TextIO | BinaryIO:
     """Open an empty file for writing; a file that is there is emptied, and its owner's only from then on."""
     descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_CLOEXEC, FILE_MODE)
     if stat.S_ISREG(os.fstat(descriptor).st_mode):  # else a terminal or a pipe that the user named
         os.fchmod(descriptor, FILE_MODE)
         os.ftruncate(descriptor, 0)
-    return os.fdopen(descriptor, mode, encoding=None if mode == "wb" else "utf-8")
+    file = os.fdopen(descriptor, mode, encoding=None if mode == "wb" else "utf-8")
+    return cast("TextIO | BinaryIO", file)
 
 
 def write(path: Path, content: bytes | str) -> None:
