@@ -7,6 +7,7 @@ from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 
 from app.api.auth import OPERATORS
 from app.api.limits import network_of
+from app.api.peers import OWN_USER, is_own_user
 from app.api.sockets import Rank, Sockets
 from app.settings import Settings, is_loopback
 
@@ -48,6 +49,9 @@ def patient_http(settings: Settings, sockets: Sockets[asyncio.Protocol]) -> type
             leaver = sockets.opened(self, network_of(self.client[0]) if self.client else "")
             if isinstance(leaver, PatientHttp):
                 leaver.leave()
+            # Now: of who closes or resets his connection the kernel will not know any more whose it was.
+            connection = transport.get_extra_info("socket")
+            self.app_state = {**self.app_state, OWN_USER: connection is not None and is_own_user(connection)}
             self._watch()
 
         def leave(self) -> None:

@@ -1,5 +1,6 @@
 """Sessions of Neptus' ConvCAO panel as missions: begun by its CONNECT, started by its START, fed by its steps."""
 
+import socket
 from collections.abc import Awaitable, Callable
 from typing import Protocol
 
@@ -15,8 +16,8 @@ from app.storage import missions as mission_queries
 from app.storage.database import Database
 from imc_bridge.neptus import Area, Restored, SessionRefusedError, StepData
 
-LogIn = Callable[[str, str], Awaitable[str | None]]
-"""Who logs in with a password from a host; None: not let in."""
+LogIn = Callable[[str, str, bool], Awaitable[str | None]]
+"""Who logs in with a password from a host, and whether he runs this process himself; None: not let in."""
 
 ARRIVAL_RADIUS_M = 1.0
 """The panel says itself when its vehicles have arrived; nothing is judged by distance here."""
@@ -45,19 +46,27 @@ class Missions(Protocol):
 class NeptusSessions:
     """Turns what the panel uploads into missions' lives; see :class:`imc_bridge.neptus.SessionKeeper`."""
 
-    def __init__(self, service: Missions, database: Database, settings: NeptusSettings, log_in: LogIn) -> None:
+    def __init__(
+        self,
+        service: Missions,
+        database: Database,
+        settings: NeptusSettings,
+        log_in: LogIn,
+        is_own_user: Callable[[socket.socket], bool],
+    ) -> None:
         self._service = service
         self._database = database
         self._settings = settings
         self._log_in = log_in
+        self.is_own_user = is_own_user
         self._missions: dict[str, str] = {}
         self._users: dict[str, str] = {}
         self._warned: set[str] = set()
         self.link = NeptusFleetLink(settings, self)
 
-    async def log_in(self, user: str, password: str, host: str) -> str | None:
+    async def log_in(self, user: str, password: str, host: str, *, own_user: bool) -> str | None:
         """Return who that is; the user's name is the panel's, only the password counts."""
-        return await self._log_in(password, host)
+        return await self._log_in(password, host, own_user)
 
     async def begin(self, session: str, vehicles: int, user: str, host: str) -> None:
         """Make the session's mission. What its console flew before is over."""

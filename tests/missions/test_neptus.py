@@ -17,6 +17,7 @@ import pytest
 
 from app.api.auth import console_log_in
 from app.api.limits import Limits
+from app.api.peers import is_own_user
 from app.api.tokens import Role, TokenStore
 from app.missions.links.neptus import GATHER_S, gateway_settings
 from app.missions.service import MissionService
@@ -161,9 +162,11 @@ class Gateway:
     async def open(self) -> None:
         self.database = Database(self.settings.database_url)
         store = TokenStore(self.database)
-        self.service = MissionService(
-            self.settings, self.database, lambda word, host: console_log_in(store, Limits(0, 1000), word, host)
-        )
+
+        async def log_in(password: str, host: str, own_user: bool) -> str | None:
+            return await console_log_in(store, Limits(0, 1000), password, host, own_user=own_user)
+
+        self.service = MissionService(self.settings, self.database, log_in, is_own_user=is_own_user)
         await self.service.startup()
 
     async def close(self) -> None:
