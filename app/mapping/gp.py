@@ -31,9 +31,9 @@ from app.mapping.reach import (
     FACTOR_STEP,
     LEAST_IN_STRIP,
     TESTS,
-    Factors,
     Reach,
-    factor_of,
+    likely_factor,
+    likely_square,
     radii,
     reach,
     strip_neighbours,
@@ -216,7 +216,7 @@ class GaussianProcessMap:
             self._calibration = replace(
                 self._calibration, log_scale=self.log_scale_, log_scale_beyond=self.log_scale_beyond_
             )
-        self._reach: Reach | None = reach(self._levels, self._unit_m, self._factors) if self.calibrate else None
+        self._reach: Reach | None = reach(self._levels, self._unit_m, self._factor) if self.calibrate else None
         best = self._refined if self._refined is not None and self.refinement_ >= 0.5 else self._plain
         self.hyperparameters_ = (
             self._refined_hyperparameters if best is self._refined else self.stationary_hyperparameters_
@@ -282,29 +282,24 @@ class GaussianProcessMap:
                 self._rough or self._plain, rows, NEIGHBOURS_OF_LARGE_GRIDS, BEYOND_UNITS * self._unit_m
             )
             self.log_scale_beyond_ = max(self.log_scale_, checked_log_scale(self._calibration, beyond))
-            self._factors = self._checked_factors(self._calibration)
+            self._factor = self._checked_factor(self._calibration)
 
-    def _checked_factors(self, calibration: Calibration) -> Factors:
-        """Hold soundings out over longer and longer distances: which factors on the deviations that leaves possible."""
+    def _checked_factor(self, calibration: Calibration) -> float:
+        """Hold soundings out over longer and longer distances: which factor on the deviation that leaves possible."""
         n = self._levels.n_fine
         rows = np.unique(np.linspace(0, n - 1, min(n, TESTS)).astype(np.int64))
-        distances, factors = [], []
+        squares = []
         for radius in radii(self._levels, self._unit_m, FACTOR_STEP):
             holes = self._levels.neighbours_beyond(
                 self._levels.points[rows], np.full(len(rows), radius), *NEIGHBOURS_OF_LARGE_GRIDS
             )
             strips = strip_neighbours(self._levels, rows, radius)
             enough = (strips >= 0).sum(axis=1) >= LEAST_IN_STRIP
-            tried = [self._predicted(rows, holes), self._predicted(rows[enough], strips[enough])]
-            found = [
-                factor_of(held_out, calibration.steepness_factor(held_out.points_m), self.log_scale_, 2.0 * radius)
-                for held_out in tried
-            ]
-            known = [factor for factor in found if factor is not None]
-            if known:
-                distances.append(radius)
-                factors.append(max(known))
-        return Factors(np.array(distances), np.maximum.accumulate(np.array(factors, dtype=np.float64)))
+            for held_out in (self._predicted(rows, holes), self._predicted(rows[enough], strips[enough])):
+                steepness = calibration.steepness_factor(held_out.points_m)
+                square = likely_square(held_out, steepness, self.log_scale_, 2.0 * radius)
+                squares += [] if square is None else [square]
+        return likely_factor(squares)
 
     def _predicted(self, rows: IntArray, neighbours: IntArray) -> HeldOut:
         """Predict soundings from others as the map would."""

@@ -7,7 +7,7 @@ places to do that, in several directions, the map's deviations are believed, tim
 possible. Beyond that the sea floor may slope away.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -58,23 +58,6 @@ LEAST_CELLS = 1.0
 
 
 @dataclass(frozen=True)
-class Factors:
-    """Factors on the deviation that the checks leave possible, by distance from the soundings, (k,) each.
-
-    They do not fall with the distance: predictions over a longer one rest on what is believed of a shorter one.
-    """
-
-    distance_m: FloatArray = field(default_factory=lambda: np.zeros(0))
-    factor: FloatArray = field(default_factory=lambda: np.zeros(0))
-
-    def at(self, distance_m: FloatArray) -> FloatArray:
-        """Return the factor at some distances."""
-        if len(self.distance_m) == 0:
-            return np.full(np.shape(distance_m), UNCHECKED_FACTOR)
-        return np.asarray(np.interp(distance_m, self.distance_m, self.factor))
-
-
-@dataclass(frozen=True)
 class Reach:
     """What is believed at a distance from the soundings.
 
@@ -82,14 +65,14 @@ class Reach:
     ----------
     checked_m
         The longest distance over which predictions could be checked at enough places and in enough directions.
-    factors
-        What the checks leave possible.
+    factor
+        On the deviation: what the checks leave possible.
     slope, relief_m
         Beyond ``checked_m`` the depth is uncertain by at least ``slope`` times the rest of the way, up to ``relief_m``.
     """
 
     checked_m: float
-    factors: Factors
+    factor: float
     slope: float
     relief_m: float
 
@@ -100,26 +83,26 @@ class Reach:
     def bound(self, sd_m: FloatArray, distance_m: FloatArray, cell_m: float) -> FloatArray:
         """Return what the deviation hardly exceeds; infinite where no sounding supports it."""
         supported = distance_m <= max(self.checked_m, LEAST_CELLS * cell_m)
-        likely = np.maximum(sd_m * self.factors.at(distance_m), self._unseen_m(distance_m))
+        likely = np.maximum(sd_m * self.factor, self._unseen_m(distance_m))
         return np.where(np.isnan(sd_m) | supported, likely, np.inf)
 
     def _unseen_m(self, distance_m: FloatArray) -> FloatArray:
         return np.minimum(self.slope * np.maximum(distance_m - self.checked_m, 0.0), self.relief_m)
 
 
-def reach(levels: TwoLevels, unit_m: float, factors: Factors) -> Reach:
+def reach(levels: TwoLevels, unit_m: float, factor: float) -> Reach:
     """Return how far the soundings can be believed.
 
     Parameters
     ----------
     unit_m
         Side of the squares of single soundings.
-    factors
-        From checks of the process, see :func:`factors_of`.
+    factor
+        On the deviation, from checks of the process, see :func:`likely_factor`.
     """
     fine = levels.fine
     slope, relief = _steepness(levels), RELIEF * abs(float(fine.depth_m.mean()))
-    return Reach(_checked_m(levels, unit_m), factors, slope, max(relief, float(fine.depth_m.std())))
+    return Reach(_checked_m(levels, unit_m), factor, slope, max(relief, float(fine.depth_m.std())))
 
 
 def radii(levels: TwoLevels, unit_m: float, step: float = RADIUS_STEP) -> list[float]:
@@ -197,8 +180,8 @@ def strip_neighbours(levels: TwoLevels, rows: IntArray, half_width_m: float) -> 
     return found
 
 
-def factor_of(held_out: HeldOut, steepness: FloatArray, log_scale: float, side_m: float) -> float | None:
-    """Return the factor on deviations that some held-out soundings leave possible; None where they are too few.
+def likely_square(held_out: HeldOut, steepness: FloatArray, log_scale: float, side_m: float) -> float | None:
+    """Return how large the mean square of errors over their deviations may be; None where too few soundings tell.
 
     Parameters
     ----------
@@ -220,4 +203,11 @@ def factor_of(held_out: HeldOut, steepness: FloatArray, log_scale: float, side_m
         return None
     middle = float(mean.mean())
     error = max(float(mean.std(ddof=1)), np.sqrt(2.0) * middle) / np.sqrt(len(mean))
-    return float(np.clip(np.sqrt(middle + CONFIDENCE * error), 1.0, LARGEST_FACTOR))
+    return float(middle + CONFIDENCE * error)
+
+
+def likely_factor(squares: list[float]) -> float:
+    """Return the factor on deviations from the checks over all distances: their mean, since each alone is uncertain."""
+    if not squares:
+        return UNCHECKED_FACTOR
+    return float(np.clip(np.sqrt(np.mean(squares)), 1.0, LARGEST_FACTOR))

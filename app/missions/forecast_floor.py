@@ -81,7 +81,7 @@ def floors_of(spec: MissionSpec, prior: FloatArray, deepest_m: float, depth_m: f
         shape = generate(family, seed, width_m=cols * cell_m, height_m=rows * cell_m, cell_m=cell_m).z_m
         hills = relief * middle * np.clip((shape - shape.mean()) / max(float(shape.std()), 1e-9), -3, 3)
         z = middle + hills
-        words = f"{kind}, about {middle:.0f} m deep" + ("" if depth_m is not None else " (a guess)")
+        words = f"{kind}, about {middle:.0f} m deep" + ("" if depth_m is not None else ", which is a guess")
         if has.any():
             # Outside of the area it goes on from the nearest place in it.
             near = distance_transform_edt(~has, return_distances=False, return_indices=True)

@@ -28,7 +28,7 @@ NEAR_M = 500.0
 """A vehicle farther away than this is taken to be brought to the area first."""
 
 
-class Range(View):
+class ForecastRange(View):
     """From where to where a figure went, over floors of different roughness: 10 % were below, 10 % above."""
 
     low: float
@@ -40,23 +40,23 @@ class VehicleForecast(View):
 
     vehicle: str
     distance_m: float = Field(description="Median over the floors")
-    distance_m_range: Range
+    distance_m_range: ForecastRange
 
 
 class ForecastView(View):
     """What is to be expected of a mission: a forecast from a simulation, not a promise."""
 
     duration_s: float = Field(description="Seconds of the vehicles' time until the last step is done; median")
-    duration_s_range: Range
+    duration_s_range: ForecastRange
     vehicles: list[VehicleForecast]
     coverage_pct: float = Field(
         description="Share of the area's cells that will be known to `accuracy_m`; median over the floors"
     )
-    coverage_pct_range: Range
+    coverage_pct_range: ForecastRange
     remaining_pct: float = Field(description="Share of the landmarks that will not be; median over the floors")
-    remaining_pct_range: Range
+    remaining_pct_range: ForecastRange
     mean_sd_m: float | None = Field(description="Mean deviation of the map; median; null: nothing was sounded")
-    mean_sd_m_range: Range | None
+    mean_sd_m_range: ForecastRange | None
     steps: int = Field(description="Steps that are still to be flown")
     steps_simulated: int = Field(
         description="Of these were simulated in the time allowed; `coverage_pct` and what follows is after as many"
@@ -202,6 +202,6 @@ def _median(values: list[float]) -> float:
     return float(np.median(values))
 
 
-def _range(values: list[float]) -> Range:
+def _range(values: list[float]) -> ForecastRange:
     low, high = (float(x) for x in np.quantile(values, [LOW, HIGH]))
-    return Range(low=low, high=high)
+    return ForecastRange(low=low, high=high)

@@ -21,9 +21,11 @@ from app.missions.arrivals import Arrivals, Everything
 MAX_LANDMARKS = 4000
 """More landmarks make planning slower, not better: neighbouring cells are almost the same question."""
 
-CLAIM_MARGIN = 1.15
-"""By so much a cell's deviation must be below the asked accuracy to become known; up to the accuracy it stays so. What
-is learned of the sea floor changes a little with every map: cells at the limit do not come and go with it."""
+CLAIM_MARGIN, UNSEEN_MARGIN = 1.25, 1.0
+"""By the first factor a cell's deviation must be below the asked accuracy to become known; up to the accuracy it stays
+so. What is learned of the sea floor changes a little with every map: cells at the limit do not come and go with it. Ground
+that no sounding supports may be rougher than the rest, and a model that learns of it will be less sure of all: the
+second is added times its share of the area."""
 
 RELEARN_GROWTH = 1.15
 """Hyperparameters are learned again when the soundings grew by this factor."""
@@ -202,9 +204,11 @@ class MapBuilder:
 
     def _with_margin(self, bathymetry: BathymetricMap) -> BathymetricMap:
         """Ask more of cells that were not known in the newest map."""
-        before = None if self._newest is None else self._newest.map.known(self._accuracy_m)
-        margin = np.where(False if before is None else before, 1.0, CLAIM_MARGIN)
-        return replace(bathymetry, bound_sd_m=bathymetry.claim_sd_m * margin)
+        bound = bathymetry.claim_sd_m
+        margin = CLAIM_MARGIN + UNSEEN_MARGIN * float(np.isinf(bound[self.mask]).mean())
+        if self._newest is not None:
+            margin = np.where(self._newest.map.known(self._accuracy_m), 1.0, margin)
+        return replace(bathymetry, bound_sd_m=bound * margin)
 
     def _measured(self) -> BathymetricMap:
         """Return the map of the mission's own soundings."""
@@ -251,6 +255,11 @@ class MapBuilder:
         Does not wait for a map that is being made.
         """
         return self._learned.doubted if self._learned.reasons else self._doubted
+
+    @property
+    def soundings(self) -> NDArray[np.float64]:
+        """All that the newest map was made of, (n, 4), those left out as outliers included."""
+        return self._soundings
 
     def as_of(self, soundings: NDArray[np.float64]) -> BathymetricMap:
         """Return the map that the first soundings (n, 4) alone make, under the model learned of all of them."""
