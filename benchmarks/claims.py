@@ -32,7 +32,7 @@ from simulator.seafloors import generate
 from simulator.terrain import Terrain
 
 PARTS = (1, 2, 5, 10, 20, 50)
-MAPS_AT = (1, 2, 3, 4, 5, 7, 10, 13, 16, 20, 25, 30, 40, 50, 60, 70, 80, 90, 100)
+MAPS_AT = (1, 2, 3, 5, 7, 10, 15, 20, 30, 40, 50, 65, 80, 100)
 """Percent of the steps after which a map is made; the model is learned beside the flight, so the next map is the first
 to use it."""
 

@@ -23,9 +23,9 @@ MAX_LANDMARKS = 4000
 
 CLAIM_MARGIN, UNSEEN_MARGIN = 1.25, 1.0
 """By the first factor a cell's deviation must be below the asked accuracy to become known; up to the accuracy it stays
-so. What is learned of the sea floor changes a little with every map: cells at the limit do not come and go with it. Ground
-that no sounding supports may be rougher than the rest, and a model that learns of it will be less sure of all: the
-second is added times its share of the area."""
+so. What is learned of the sea floor changes a little with every map: cells at the limit do not come and go with it.
+Ground that no sounding supports may be rougher than the rest, and a model that learns of it will be less sure of all:
+the second is added times its share of the area."""
 
 RELEARN_GROWTH = 1.15
 """Hyperparameters are learned again when the soundings grew by this factor."""
