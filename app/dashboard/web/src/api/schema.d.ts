@@ -2490,7 +2490,7 @@ export interface components {
             coverage_pct: number;
             /**
              * Remaining Pct
-             * @description Share of the landmarks never known to accuracy_m
+             * @description Share of the landmarks not known to accuracy_m
              * @default 100
              */
             remaining_pct: number;
