@@ -88,7 +88,7 @@ class Progress(View):
     rejected: int = Field(description="Soundings kept but not used")
     distance_m: float = Field(description="Distance travelled by all vehicles, along their tracks")
     coverage_pct: float = Field(description="Share of the area's cells known to accuracy_m")
-    remaining_pct: float = Field(default=100.0, description="Share of the landmarks never known to accuracy_m")
+    remaining_pct: float = Field(default=100.0, description="Share of the landmarks not known to accuracy_m")
     mean_sd_m: float | None = Field(default=None, description="Mean standard deviation of the map")
     objective: float | None = Field(default=None, description="The planner's objective at the last step")
     terms: dict[str, float] = Field(default_factory=dict)

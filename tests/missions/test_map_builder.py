@@ -6,7 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 
-from app.missions.map_builder import MAX_LANDMARKS, MapBuilder, make_grid
+from app.missions.map_builder import CLAIM_MARGIN, MAX_LANDMARKS, UNSEEN_MARGIN, MapBuilder, make_grid
 
 AREA = np.array([[0.0, 0.0], [30.0, 0.0], [30.0, 30.0], [0.0, 30.0]])
 
@@ -77,16 +77,61 @@ def test_the_map_is_that_of_the_sea_floor_and_the_belief_that_of_the_map() -> No
     belief = builder.belief()
     np.testing.assert_array_equal(belief.depth_m, newest.map.depth_m.ravel())
     assert 0.0 < builder.coverage_pct() <= 100.0
-    np.testing.assert_array_equal(belief.accurate, belief.sd_m <= 0.25)
+    np.testing.assert_array_equal(belief.accurate, newest.map.known(0.25).ravel())
+    np.testing.assert_array_equal(belief.sd_m, newest.map.planning_sd_m.ravel())
+    assert builder.remaining_pct() == pytest.approx(100.0 - builder.coverage_pct())
 
 
-def test_what_was_accurate_once_stays_so() -> None:
+def corner(count: int, seed: int) -> np.ndarray:
+    """Soundings of a flat corner of 6 x 6 m."""
+    east, north = np.random.default_rng(seed).uniform(0, 6, (2, count))
+    return np.column_stack([east, north, np.full(count, 9.0), np.full(count, 0.05)])
+
+
+def test_a_first_look_at_a_flat_corner_claims_nothing_of_the_rest() -> None:
+    builder = built_of(corner(40, 3))
+    builder.learn(always=True)
+    builder.add(corner(2, 4))
+    built = builder.build()
+    assert built is not None
+    belief = builder.belief()
+    assert not belief.accurate[(belief.xy_m > 10.0).any(axis=1)].any()
+    assert builder.coverage_pct() < 12.0
+    assert builder.remaining_pct() > 88.0
+    assert built.mean_sd_m > 0.5
+
+
+def test_what_was_claimed_is_taken_back_when_more_soundings_contradict_it() -> None:
     builder = built_of(soundings(150))
     before = builder.belief().accurate
     assert before.any()
-    builder.add(np.array([[15.0, 15.0, 9.0, 3.0], [16.0, 15.0, 4.0, 3.0]]))
+    spread = soundings(400, seed=8)
+    spread[:, 2] += np.random.default_rng(9).normal(0.0, 4.0, 400)
+    spread[:, 3] = 5.0
+    builder.arrivals.replace(np.concatenate([soundings(3), spread]), np.zeros((0, 4)))
     builder.build()
-    assert (builder.belief().accurate | ~before).all()
+    assert builder.belief().accurate.sum() < before.sum() / 2
+    assert builder.remaining_pct() == pytest.approx(100.0 - builder.coverage_pct())
+
+
+def margin(claim_sd_m: np.ndarray) -> float:
+    return CLAIM_MARGIN + UNSEEN_MARGIN * float(np.isinf(claim_sd_m).mean())
+
+
+def test_a_cell_becomes_known_with_a_margin_and_stays_so_up_to_the_accuracy() -> None:
+    builder = built_of(soundings(30))
+    first = builder.newest
+    assert first is not None
+    plain = builder.as_of(soundings(30)).claim_sd_m
+    np.testing.assert_allclose(first.map.claim_sd_m, margin(plain) * plain)
+    builder.add(soundings(1, seed=4))
+    second = builder.build()
+    assert second is not None
+    known = first.map.known(0.25)
+    assert known.any()
+    later = builder.as_of(builder.soundings).claim_sd_m
+    np.testing.assert_allclose(second.map.claim_sd_m[known], later[known])
+    np.testing.assert_allclose(second.map.claim_sd_m[~known], margin(later) * later[~known])
 
 
 def test_soundings_that_come_while_a_map_is_built_are_in_the_next_one() -> None:

@@ -67,7 +67,7 @@ def test_a_map_comes_whole_and_then_only_where_it_changed() -> None:
     np.testing.assert_allclose(whole / 100, depths, atol=0.0051)
     flags = np.concatenate([layers["flags"].ravel() for layers in tiles.values()])
     assert (flags & SOUNDED).astype(bool).sum() == first.built.map.sounded.sum()
-    assert (flags & ACCURATE).astype(bool).sum() == (first.built.map.sd_m <= SPEC.accuracy_m).sum()
+    assert (flags & ACCURATE).astype(bool).sum() == (first.built.map.known(SPEC.accuracy_m)).sum()
     assert ((flags & VISIBLE).astype(bool) >= (flags & SOUNDED).astype(bool)).all()
 
     moved = first.built.map.depth_m.copy()

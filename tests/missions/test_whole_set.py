@@ -41,7 +41,7 @@ def test_a_map_comes_back_as_it_was_and_no_other() -> None:
     for bathymetry in (built.map, replace(built.map, prior=built.map.sounded)):
         content = pack(bathymetry, [(np.arange(4.0), "a fish")])
         again, doubted = unpack(content, built.digest, 60, thorough=True)
-        for name in ("depth_m", "sd_m", "count", "sounded", "roughness", "prior"):
+        for name in ("depth_m", "sd_m", "count", "sounded", "roughness", "prior", "process_sd_m", "bound_sd_m"):
             was, now = getattr(bathymetry, name), getattr(again.map, name)
             assert (was is None and now is None) or np.array_equal(was, now, equal_nan=was.dtype.kind == "f")
         assert (again.map.grid, again.map.model) == (bathymetry.grid, bathymetry.model)

@@ -1400,32 +1400,46 @@ export interface components {
             remedy: string;
         };
         /**
+         * ForecastRange
+         * @description From where to where a figure went, over floors of different roughness: 10 % were below, 10 % above.
+         */
+        ForecastRange: {
+            /** Low */
+            low: number;
+            /** High */
+            high: number;
+        };
+        /**
          * ForecastView
          * @description What is to be expected of a mission: a forecast from a simulation, not a promise.
          */
         ForecastView: {
             /**
              * Duration S
-             * @description Seconds of the vehicles' time until the last step is done
+             * @description Seconds of the vehicles' time until the last step is done; median
              */
             duration_s: number;
+            duration_s_range: components["schemas"]["ForecastRange"];
             /** Vehicles */
             vehicles: components["schemas"]["VehicleForecast"][];
             /**
              * Coverage Pct
-             * @description Share of the area's cells that will be known to `accuracy_m`
+             * @description Share of the area's cells that will be known to `accuracy_m`; median over the floors
              */
             coverage_pct: number;
+            coverage_pct_range: components["schemas"]["ForecastRange"];
             /**
              * Remaining Pct
-             * @description Share of the landmarks that never were
+             * @description Share of the landmarks that will not be; median over the floors
              */
             remaining_pct: number;
+            remaining_pct_range: components["schemas"]["ForecastRange"];
             /**
              * Mean Sd M
-             * @description Mean deviation of the map; null: nothing was sounded
+             * @description Mean deviation of the map; median; null: nothing was sounded
              */
             mean_sd_m: number | null;
+            mean_sd_m_range: components["schemas"]["ForecastRange"] | null;
             /**
              * Steps
              * @description Steps that are still to be flown
@@ -1436,6 +1450,16 @@ export interface components {
              * @description Of these were simulated in the time allowed; `coverage_pct` and what follows is after as many
              */
             steps_simulated: number;
+            /**
+             * Steps Flown
+             * @description The same as `steps_simulated`
+             */
+            steps_flown: number;
+            /**
+             * Floors
+             * @description Over how many floors of different roughness it was flown
+             */
+            floors: number;
             /**
              * Assumptions
              * @description What was taken to be so, in words
@@ -2466,7 +2490,7 @@ export interface components {
             coverage_pct: number;
             /**
              * Remaining Pct
-             * @description Share of the landmarks never known to accuracy_m
+             * @description Share of the landmarks not known to accuracy_m
              * @default 100
              */
             remaining_pct: number;
@@ -3561,8 +3585,12 @@ export interface components {
         VehicleForecast: {
             /** Vehicle */
             vehicle: string;
-            /** Distance M */
+            /**
+             * Distance M
+             * @description Median over the floors
+             */
             distance_m: number;
+            distance_m_range: components["schemas"]["ForecastRange"];
         };
         /**
          * VehicleKind

@@ -70,6 +70,13 @@ export function Forecast({ of, ask }: { of: string; ask: (gone: AbortSignal) => 
   );
 }
 
+/** "low to high" where they differ as they are shown. */
+function between(range: { low: number; high: number } | null, shown: (value: number) => string): string {
+  if (range === null) return "–";
+  const [low, high] = [shown(range.low), shown(range.high)];
+  return low === high ? low : `${low} to ${high}`;
+}
+
 function Found({ view }: { view: ForecastView }) {
   const simulated = view.steps_simulated < view.steps ? ` after ${view.steps_simulated} steps` : "";
   return (
@@ -78,22 +85,22 @@ function Found({ view }: { view: ForecastView }) {
       <dl class="figures">
         <div class="figure">
           <dt>Duration</dt>
-          <dd data-testid="forecast-duration">{duration(view.duration_s)}</dd>
+          <dd data-testid="forecast-duration">{between(view.duration_s_range, duration)}</dd>
         </div>
         <div class="figure">
           <dt>Well known{simulated}</dt>
-          <dd data-testid="forecast-coverage">{percent(view.coverage_pct)}</dd>
+          <dd data-testid="forecast-coverage">{between(view.coverage_pct_range, percent)}</dd>
         </div>
         <div class="figure">
           <dt>Landmarks left{simulated}</dt>
-          <dd>{percent(view.remaining_pct)}</dd>
+          <dd>{between(view.remaining_pct_range, percent)}</dd>
         </div>
         <div class="figure">
           <dt>Mean deviation{simulated}</dt>
-          <dd>{metres(view.mean_sd_m, 2)}</dd>
+          <dd>{between(view.mean_sd_m_range, (sd) => metres(sd, 2))}</dd>
         </div>
       </dl>
-      <p class="hint">{view.vehicles.map((v) => `${v.vehicle} ${distance(v.distance_m)}`).join(" · ")}</p>
+      <p class="hint">{view.vehicles.map((v) => `${v.vehicle} ${between(v.distance_m_range, distance)}`).join(" · ")}</p>
       <ul class="hint assumptions">
         {view.assumptions.map((words) => (
           <li key={words}>{words}</li>
