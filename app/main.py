@@ -32,6 +32,7 @@ from app.api import (
     openapi,
     problems,
     searches,
+    signing_in,
     soundings,
     streams,
     targets,
@@ -44,6 +45,7 @@ from app.api.health import health_router
 from app.api.limits import LimitMiddleware, Limits
 from app.api.middleware import BodyMiddleware, RequestMiddleware
 from app.api.schemas import API
+from app.api.sessions import SessionStore
 from app.api.state import EdgeState
 from app.api.tokens import Role, TokenStore
 from app.dashboard.serve import mount_dashboard
@@ -108,7 +110,7 @@ def create_app(settings: Settings | None = None, *, port: int | None = None) -> 
                 url=settings.peer_url or _own_url(settings, port or settings.port),
                 certificate=settings.tls_certificate.read_text() if settings.tls_certificate else None,
             )
-            app.state.edge = EdgeState(settings, service, tokens, limits, audit)
+            app.state.edge = EdgeState(settings, service, tokens, limits, audit, SessionStore(database))
             await service.startup()
             try:
                 yield
@@ -117,6 +119,7 @@ def create_app(settings: Settings | None = None, *, port: int | None = None) -> 
                 await service.shutdown()
                 await app.state.edge.peers.close()
                 tokens.close()
+                app.state.edge.sessions.close()
         finally:
             await database.close()
 
@@ -147,6 +150,7 @@ def create_app(settings: Settings | None = None, *, port: int | None = None) -> 
         streams.router,
         fleet.router,
         auditing.router,
+        signing_in.router,
         health_router(API),
     ):
         app.include_router(router)

@@ -15,6 +15,7 @@ from app.api.limits import Limits
 from app.api.metrics import LIVE_VIEWERS
 from app.api.problems import ProblemError
 from app.api.processes import PeerClients
+from app.api.sessions import SessionStore
 from app.api.tokens import TokenStore
 from app.missions.service import MissionService
 from app.settings import Settings
@@ -37,6 +38,7 @@ class EdgeState:
     tokens: TokenStore
     limits: Limits
     audit: AuditLog
+    sessions: SessionStore
     stopping: asyncio.Event = field(default_factory=asyncio.Event)
     run_id: str = field(default_factory=lambda: secrets.token_hex(4))
     streams: int = 0

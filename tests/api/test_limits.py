@@ -90,7 +90,7 @@ async def test_guessing_tokens_ends_soon_and_disturbs_nobody_who_has_one(
         assert await ask(client, other) == 429  # not known yet: it could be a guess
         url = f"{server.url.replace('http', 'ws', 1)}/api/v1/missions/none/live"
         with pytest.raises(websockets.InvalidStatus):
-            await websockets.connect(f"{url}?token=bf_guess")
+            await websockets.connect(url, additional_headers={"Authorization": "Bearer bf_guess"})
 
 
 async def _answer(server: Server, sent: bytes) -> bytes:
