@@ -291,7 +291,7 @@ async def test_vehicles_join_and_leave_while_a_mission_runs(service: MissionServ
 
     await until(flown_by("late"), "the late one reached a waypoint")
     left = await service.remove_vehicle(mission_id, "a")
-    assert [v.name for v in left.vehicles] == ["late"]
+    assert [(v.name, v.active, v.mission_id) for v in left.vehicles] == [("late", True, mission_id), ("a", False, None)]
     step = left.progress.step
     await until_step(service, mission_id, step + 3)
     async with database.reading() as session:
