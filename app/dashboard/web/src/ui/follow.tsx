@@ -70,7 +70,7 @@ export function follow(chart: Chart): () => void {
         if (present) markOnce("mission-shown");
       });
     }),
-    effect(() => chart.setDraft(draftShapes.value?.area ?? null, draftShapes.value?.keepOut ?? [])),
+    followDraft(chart),
     effect(() => {
       stripHeight.value;
       requestAnimationFrame(() => chart.refit());
@@ -113,6 +113,28 @@ export function follow(chart: Chart): () => void {
   ];
   return () => {
     for (const stop of stops) stop();
+  };
+}
+
+/** While an area is being typed every digit would be another place. */
+const TYPED_MS = 500;
+
+function followDraft(chart: Chart): () => void {
+  let shown = "";
+  let typing: ReturnType<typeof setTimeout> | undefined;
+  const stop = effect(() => {
+    const area = draftShapes.value?.area ?? null;
+    chart.setDraft(area, draftShapes.value?.keepOut ?? []);
+    const corners = JSON.stringify(area?.coordinates ?? "");
+    if (corners === shown) return;
+    shown = corners;
+    clearTimeout(typing);
+    // What is drawn or dragged on the map is in sight already.
+    if (area && !drawing.peek()) typing = setTimeout(() => chart.goToDraft(overlaid), TYPED_MS);
+  });
+  return () => {
+    clearTimeout(typing);
+    stop();
   };
 }
 
