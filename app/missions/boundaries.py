@@ -60,7 +60,14 @@ class Boundaries:
         for number, zone in enumerate(self._zones, 1):
             inside_m = -_signed_distance_m(zone, place)
             crossings += self._follow(
-                vehicle, number, f"in keep-out zone {number}", inside_m, inside_m > 0, inside_m < -CLEAR_M, depth_m, at_s
+                vehicle,
+                number,
+                f"in keep-out zone {number}",
+                inside_m,
+                inside_m > 0,
+                inside_m < -CLEAR_M,
+                depth_m,
+                at_s,
             )
         outside_m = _signed_distance_m(self._area, place)
         if outside_m <= 0:

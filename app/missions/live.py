@@ -225,9 +225,7 @@ class LiveMission:
         for crossing in self.boundaries.judge(
             report.vehicle, place, report.position.depth_m, asyncio.get_running_loop().time()
         ):
-            self.journal.note_line(
-                self.journal.line(crossing.level, "boundary", crossing.message, **crossing.data)
-            )
+            self.journal.note_line(self.journal.line(crossing.level, "boundary", crossing.message, **crossing.data))
 
     def _receive_waypoint(self, member: Member, event: WaypointReport) -> None:
         if event.mission_id != self.id or member.order is None or event.step != member.order.step:

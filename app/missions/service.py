@@ -25,8 +25,8 @@ from app.missions.clock import now
 from app.missions.conducting import Conductor
 from app.missions.correcting import check_level_is_known, corrections_view, set_sound_speed, set_tide
 from app.missions.correction_views import CorrectionsView, TideCorrection
-from app.missions.deleting import check_deletable, delete_mission
 from app.missions.crews import Crews, refuse_ended, vehicle_row
+from app.missions.deleting import check_deletable, delete_mission
 from app.missions.doctoring import DoctorView, Examine, doctor_view, switched_off
 from app.missions.errors import (
     ConflictError,

@@ -128,7 +128,9 @@ async def test_a_bound_token_acts_for_its_vehicle_only(guarded: Guarded, path: s
     assert waypoint.status_code == 403
 
 
-async def test_the_socket_takes_the_token_from_the_header_and_never_from_the_address(guarded: Guarded, path: str) -> None:
+async def test_the_socket_takes_the_token_from_the_header_and_never_from_the_address(
+    guarded: Guarded, path: str
+) -> None:
     url = f"{guarded.server.url.replace('http', 'ws', 1)}/api/v1{path}/live"
     async with websockets.connect(url, additional_headers=guarded.as_("viewer")) as socket:
         assert "snapshot" in str(await socket.recv())

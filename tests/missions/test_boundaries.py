@@ -77,17 +77,13 @@ def test_no_vehicle_that_waits_at_its_waypoint_circles_farther_than_the_margin(s
 
 @pytest.mark.parametrize(("asked_m", "kept_m"), [(0.0, WAITING_CIRCLE_M), (5.0, WAITING_CIRCLE_M), (25.0, 25.0)])
 def test_surveys_keep_their_waypoints_a_waiting_circle_away_from_zones(asked_m: float, kept_m: float) -> None:
-    spec = make_spec(
-        100, keep_out=[rectangle(40, 40, 60, 60)], limits={"max_step_m": 8, "keep_out_margin_m": asked_m}
-    )
+    spec = make_spec(100, keep_out=[rectangle(40, 40, 60, 60)], limits={"max_step_m": 8, "keep_out_margin_m": asked_m})
     zone, margin = make_constraints(spec).keep_out
     assert zone[:, 0].min() - margin[:, 0].min() == pytest.approx(kept_m, abs=0.05)
 
 
 async def test_a_vehicle_reported_in_a_zone_is_an_alarm_of_its_mission(service: MissionService) -> None:
-    spec = make_spec(
-        100, steps=50, vehicles=[{"name": "a", "kind": "rest"}], keep_out=[rectangle(40, 40, 60, 60)]
-    )
+    spec = make_spec(100, steps=50, vehicles=[{"name": "a", "kind": "rest"}], keep_out=[rectangle(40, 40, 60, 60)])
     mission = (await service.create(spec)).id
     rover = Rover(service, mission, "a", 10, 10)
     await rover.post()
