@@ -121,7 +121,7 @@ def _unauthenticated(detail: str) -> ProblemError:
     return ProblemError(
         "unauthenticated",
         detail,
-        remedy="Send the header Authorization: Bearer TOKEN, or sign in on the page; bathyfleet token create makes a token",
+        remedy="Send the header Authorization: Bearer TOKEN, or sign in on the page; bathyfleet token create makes one",
         headers={"WWW-Authenticate": 'Bearer realm="bathyfleet"'},
     )
 
