@@ -44,16 +44,22 @@ export function Dialog({
     const before = document.activeElement;
     stack.push(me);
     element.show();
+    const leave = () => {
+      const at = stack.indexOf(me);
+      if (at >= 0) stack.splice(at, 1);
+    };
     const onKey = (event: KeyboardEvent) => {
       if (event.key !== "Escape" || stack.at(-1) !== me) return;
       event.preventDefault();
       event.stopImmediatePropagation();
+      // At once: the next key may come before this dialog is drawn as closed.
+      leave();
       close.current();
     };
     window.addEventListener("keydown", onKey);
     return () => {
       window.removeEventListener("keydown", onKey);
-      stack.splice(stack.indexOf(me), 1);
+      leave();
       element.close();
       if (before instanceof HTMLElement && before.isConnected) before.focus();
     };

@@ -97,7 +97,7 @@ function Card({ vehicle }: { vehicle: Vehicle }) {
           .map((part) => part?.replaceAll(" ", "\u00a0"))
           .join(" · ")}
       </p>
-      {vehicle.waypoint ? (
+      {vehicle.waypoint && v.active ? (
         <p class="small waypoint-line">
           <WaypointShape status={vehicle.waypoint.status} colour={vehicle.colour} />
           Waypoint {vehicle.waypoint.step} at {metres(vehicle.waypoint.depth_m)} depth,{" "}

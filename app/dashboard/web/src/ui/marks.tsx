@@ -21,7 +21,7 @@ export function VehicleMark({ vehicle, past }: { vehicle?: Vehicle; past?: Past 
   }
   if (!vehicle) return null;
   const { name, heading_deg, link, active, breach } = vehicle.view;
-  const old = vehicle.stale || link === "lost" || link === "unknown" || !active;
+  const old = vehicle.stale || link === "lost" || link === "unknown";
   return (
     <Mark
       name={name}
@@ -79,7 +79,7 @@ function Mark({
       </svg>
       <span class="mark-label">
         {name}
-        {left ? " left," : ""}
+        {left ? " left" : ""}
         {old ? <b> {old} old</b> : null}
         {alarm ? <b> ✕ {alarm}</b> : null}
       </span>
