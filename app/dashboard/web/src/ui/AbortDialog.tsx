@@ -38,7 +38,9 @@ export function AbortDialog() {
   const refused = refusal.value?.what === what ? refusal.value.error : null;
   const again = only !== null && mission.value !== null && hasEnded(mission.value.state);
   const name = only ?? mission.value?.name ?? "the mission";
-  const asked = vehicles.value.filter((v) => v.view.active && (only === null || v.view.name === only));
+  const asked = !open
+    ? []
+    : vehicles.value.filter((v) => v.view.active && (only === null || v.view.name === only));
 
   return (
     <Dialog open={open} onClose={close} title="abort-title" id="abort-dialog" kind="stopping" above>
