@@ -33,6 +33,7 @@ from app.api import (
     openapi,
     problems,
     searches,
+    signing_in,
     soundings,
     streams,
     targets,
@@ -47,6 +48,7 @@ from app.api.middleware import BodyMiddleware, RequestMiddleware
 from app.api.peers import is_own_user
 from app.api.quotas import Shares
 from app.api.schemas import API
+from app.api.sessions import SessionStore
 from app.api.shares import ShareMiddleware
 from app.api.state import EdgeState
 from app.api.tokens import Role, TokenStore
@@ -118,7 +120,7 @@ def create_app(settings: Settings | None = None, *, port: int | None = None) -> 
                 url=settings.peer_url or _own_url(settings, port or settings.port),
                 certificate=settings.tls_certificate.read_text() if settings.tls_certificate else None,
             )
-            app.state.edge = EdgeState(settings, service, tokens, limits, audit)
+            app.state.edge = EdgeState(settings, service, tokens, limits, audit, SessionStore(database))
             await tokens.exists("")  # so that they are known when it matters
             try:
                 await _begin(service)
@@ -128,6 +130,7 @@ def create_app(settings: Settings | None = None, *, port: int | None = None) -> 
                 await service.shutdown()
                 await app.state.edge.peers.close()
                 tokens.close()
+                app.state.edge.sessions.close()
         finally:
             await database.close()
 
@@ -158,6 +161,7 @@ def create_app(settings: Settings | None = None, *, port: int | None = None) -> 
         streams.router,
         fleet.router,
         auditing.router,
+        signing_in.router,
         health_router(API),
     ):
         app.include_router(router)

@@ -14,6 +14,7 @@ from app.api.limits import Limits, host_of
 from app.api.peers import OWN_USER
 from app.api.problems import ProblemError
 from app.api.processes import vouched_for
+from app.api.sessions import check_own_page, session_of
 from app.api.state import EdgeState, State
 from app.api.tokens import LOCAL_OPERATOR, Principal, Role, TokenStore
 from app.settings import is_loopback
@@ -47,10 +48,9 @@ OPERATORS = frozenset({Role.OPERATOR, Role.ADMIN})
 VEHICLES = OPERATORS | {Role.VEHICLE}
 
 
-async def authenticate(connection: HTTPConnection, state: EdgeState, *, query_token: bool = False) -> Principal:
-    """Return who asks.
+async def authenticate(connection: HTTPConnection, state: EdgeState) -> Principal:
+    """Return who asks: by a token in the header, by a browser's session, or on this machine without either.
 
-    ``query_token`` also takes the token from ``?token=``, for browsers' sockets, which cannot send headers.
     Raises ProblemError (unauthenticated, forbidden).
     """
     principal = vouched_for(connection.scope)
@@ -58,7 +58,7 @@ async def authenticate(connection: HTTPConnection, state: EdgeState, *, query_to
         # Another process has looked at him; he is for this one who he is there, and no more.
         return _remember(connection, principal)
     _check_origin(connection, state)
-    token = connection.query_params.get("token") if query_token else None
+    token = None
     header = connection.headers.get("authorization")
     if header is not None:
         scheme, _, token = header.partition(" ")
@@ -70,8 +70,12 @@ async def authenticate(connection: HTTPConnection, state: EdgeState, *, query_to
         if principal is None:
             raise _unauthenticated("the access token is unknown, revoked or has run out")
         return _remember(connection, principal)
+    signed_in = await _signed_in(connection, state)
+    if signed_in is not None:
+        return _remember(connection, signed_in)
     if await state.tokens.any():
-        raise _unauthenticated("the request carries no access token")
+        ended = "the browser's session has ended" if session_of(connection.scope) else ""
+        raise _unauthenticated(ended or "the request carries no access token")
     if state.settings.insecure or _is_local(connection, state):
         return _remember(connection, LOCAL_OPERATOR)
     raise ProblemError(
@@ -82,18 +86,29 @@ async def authenticate(connection: HTTPConnection, state: EdgeState, *, query_to
     )
 
 
+async def _signed_in(connection: HTTPConnection, state: EdgeState) -> Principal | None:
+    """Return who signed in with this browser; a session that has ended is like none. Raises ProblemError."""
+    secret = session_of(connection.scope)
+    principal = await state.sessions.principal(secret) if secret is not None else None
+    if secret is None or principal is None:
+        return None
+    check_own_page(connection)
+    state.limits.log_in(secret, host_of(connection.scope), good=True)
+    return principal
+
+
 def _remember(connection: HTTPConnection, principal: Principal) -> Principal:
     """Keep with the request who asks, for the audit log."""
     connection.scope.setdefault("state", {})["principal"] = principal
     return principal
 
 
-async def until_unwelcome(connection: HTTPConnection, state: EdgeState, *, query_token: bool = False) -> None:
-    """Return when whoever listens may not any more: the token was revoked or has run out."""
+async def until_unwelcome(connection: HTTPConnection, state: EdgeState) -> None:
+    """Return when whoever listens may not any more: token or session was ended or has run out."""
     while True:
         await asyncio.sleep(RECHECK_S)
         try:
-            await authenticate(connection, state, query_token=query_token)
+            await authenticate(connection, state)
         except ProblemError:
             return
 
@@ -121,7 +136,7 @@ def _unauthenticated(detail: str) -> ProblemError:
     return ProblemError(
         "unauthenticated",
         detail,
-        remedy="Send the header Authorization: Bearer TOKEN; bathyfleet token create makes a token",
+        remedy="Send the header Authorization: Bearer TOKEN, or sign in on the page; bathyfleet token create makes one",
         headers={"WWW-Authenticate": 'Bearer realm="bathyfleet"'},
     )
 

@@ -137,9 +137,8 @@ class ForwardingMiddleware:
 
 
 async def _is_known(edge: EdgeState, scope: Scope) -> bool:
-    view = scope["type"] == "websocket"
     try:
-        await authenticate(HTTPConnection(scope), edge, query_token=view)
+        await authenticate(HTTPConnection(scope), edge)
     except ProblemError:
         return False
     return True

@@ -7,13 +7,13 @@ import time
 from collections import OrderedDict
 from collections.abc import Callable
 from functools import lru_cache
-from urllib.parse import parse_qs
 
 from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from app.api.problems import instance_of, make_problem, problem_response
 from app.api.processes import comes_from_peer
+from app.api.sessions import session_of
 
 MAX_CLIENTS = 10_000
 """Of more than these the longest silent is forgotten: no number of addresses may fill the memory."""
@@ -124,15 +124,15 @@ def network_of(host: str) -> str:
 
 
 def token_of(scope: Scope) -> str | None:
-    """Return the access token that a request carries, if it carries one; for sockets also in the query."""
+    """Return the access token that a request carries, or the secret of its session, if it carries one."""
+    return bearer_of(scope) or session_of(scope)
+
+
+def bearer_of(scope: Scope) -> str | None:
+    """Return the access token in a request's header, if there is one."""
     header = Headers(scope=scope).get("authorization", "")
     scheme, _, token = header.partition(" ")
-    if scheme.lower() == "bearer" and token:
-        return token.strip()
-    if scope["type"] == "websocket":
-        given = parse_qs(scope.get("query_string", b"").decode("latin1")).get("token")
-        return given[0].strip() if given else None
-    return None
+    return token.strip() or None if scheme.lower() == "bearer" else None
 
 
 def host_of(scope: Scope) -> str:

@@ -85,6 +85,21 @@ async def get_mission(mission_id: MissionId, service: Service, reader: Reader) -
     return await service.mission(mission_id)
 
 
+@router.delete(
+    "/{mission_id}",
+    operation_id="deleteMission",
+    summary="Delete a mission that was not flown",
+    status_code=204,
+    responses=problems("mission-not-found", "conflict", "invalid-request"),
+)
+async def delete_mission(mission_id: MissionId, service: Service, operator: Operator) -> None:
+    """Remove a mission in which no step was taken and nothing measured, with its imports. The audit log keeps who did.
+
+    Any other one is refused: what was measured is kept.
+    """
+    await service.delete(mission_id)
+
+
 _ACTION_PROBLEMS = problems(
     "malformed-body",
     "mission-not-found",
@@ -227,6 +242,18 @@ async def abort_vehicle(mission_id: MissionId, name: VehicleName, service: Servi
 async def add_vehicle(mission_id: MissionId, vehicle: VehicleSpec, service: Service, operator: Operator) -> MissionView:
     """Let a vehicle take part, also while the mission runs: it joins at the next step."""
     return await service.add_vehicle(mission_id, vehicle, actor=operator.name)
+
+
+@router.post(
+    "/{mission_id}/vehicles/{name}/rejoin",
+    operation_id="rejoinVehicle",
+    summary="Take back a vehicle that left",
+    responses=problems("mission-not-found", "vehicle-not-found", "conflict", "invalid-request"),
+    tags=["vehicles"],
+)
+async def rejoin_vehicle(mission_id: MissionId, name: VehicleName, service: Service, operator: Operator) -> MissionView:
+    """Let a vehicle that was aborted or removed take part again, as it was described: it joins at the next step."""
+    return await service.rejoin_vehicle(mission_id, name, actor=operator.name)
 
 
 @router.delete(

@@ -20,9 +20,11 @@ TAGS = [
         "name": "live",
         "description": "What happens, as it happens. Besides the log there is the WebSocket "
         "`/api/v1/missions/{mission_id}/live`: it sends `LiveMessage` objects as JSON text, first a `SnapshotMessage`. "
-        "Browsers pass a token as `?token=`. Close codes: 4401 no valid token, 4403 forbidden, 4404 no such mission, "
+        "Programs send their token in the header, browsers their session's cookie; the address holds neither. "
+        "Close codes: 4401 no valid token, 4403 forbidden, 4404 no such mission, "
         "4429 too many viewers, 1013 fell behind (reconnect), 1001 the service ends.",
     },
+    {"name": "session", "description": "Who asks, and signing in and out from a browser."},
     {"name": "audit", "description": "Who commanded what, from where, and what came of it."},
     {"name": "planners", "description": "Which planners decide where the vehicles go."},
     {
@@ -43,8 +45,8 @@ to do. `instance` carries the request's id, which is also in the header `X-Reque
 
 **Access.** While nobody has made a token, the user who runs the service may ask from the service's own machine. As
 soon as one was made with `bathyfleet token create`, every request needs `Authorization: Bearer TOKEN`; health needs
-none. Roles: viewer, vehicle, operator, admin. Who asks too often, or with too many wrong tokens, is answered 429 with
-`Retry-After`.
+none. A browser exchanges its token for a session: `POST /api/v1/session`. Roles: viewer, vehicle, operator, admin. Who
+asks too often, or with too many wrong tokens, is answered 429 with `Retry-After`.
 """
 
 

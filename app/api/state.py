@@ -16,6 +16,7 @@ from app.api.metrics import LIVE_VIEWERS
 from app.api.problems import ProblemError
 from app.api.processes import PeerClients
 from app.api.quotas import Holder, Shares, holder_of
+from app.api.sessions import SessionStore
 from app.api.tokens import TokenStore
 from app.missions.service import MissionService
 from app.settings import Settings
@@ -38,6 +39,7 @@ class EdgeState:
     tokens: TokenStore
     limits: Limits
     audit: AuditLog
+    sessions: SessionStore
     stopping: asyncio.Event = field(default_factory=asyncio.Event)
     run_id: str = field(default_factory=lambda: secrets.token_hex(4))
     peers: PeerClients = field(default_factory=PeerClients)
@@ -48,8 +50,8 @@ class EdgeState:
         self.streams = Shares(self.settings.max_streams)
 
     async def is_good(self, token: str) -> bool:
-        """Tell whether a token that a request carries may be valid; see :meth:`TokenStore.exists`."""
-        return await self.tokens.exists(token)
+        """Tell whether a token, or a session's secret, that a request carries may be valid."""
+        return await self.tokens.exists(token) or await self.sessions.principal(token) is not None
 
     def check_stream(self, connection: HTTPConnection) -> Holder:
         """Return to whom another live view would be counted. Raises ProblemError when there is none left for him."""

@@ -176,13 +176,13 @@ async def _until_either(
 async def live(websocket: WebSocket, mission_id: str) -> None:
     """Send LiveMessage objects as JSON text: first a snapshot, then what changes.
 
-    Closes with 4401 (no valid token; send it in the Authorization header or as ``?token=``), 4403, 4404 (no such
-    mission), 4429 (too many viewers), 1013 (fell behind: reconnect) or 1001 (the service ends).
+    Closes with 4401 (no valid token in the Authorization header and no session), 4403, 4404 (no such mission),
+    4429 (too many viewers), 1013 (fell behind: reconnect) or 1001 (the service ends).
     """
     state = edge_state(websocket)
     await websocket.accept()
     try:
-        await authenticate(websocket, state, query_token=True)
+        await authenticate(websocket, state)
         with state.stream("websocket", websocket):
             await _serve(websocket, state, mission_id)
     except ProblemError as error:
@@ -206,12 +206,12 @@ async def _serve(websocket: WebSocket, state: EdgeState, mission_id: str) -> Non
             _send_all(websocket, messages),
             _until_left(websocket),
             state.stopping.wait(),
-            until_unwelcome(websocket, state, query_token=True),
+            until_unwelcome(websocket, state),
         )
         if ended == 2:
             await _close(websocket, CLOSE_GOING_AWAY, "the service ends")
         if ended == 3:
-            await _close(websocket, CLOSE_UNAUTHENTICATED, "the access token was revoked or has run out")
+            await _close(websocket, CLOSE_UNAUTHENTICATED, "the access token or the session has ended")
 
 
 async def _send_all(websocket: WebSocket, messages: AsyncIterator[LiveMessage]) -> None:

@@ -109,6 +109,7 @@ class Claims:
         search = live.spec.search
         launch = Launch(
             vehicle=vehicle.name,
+            mission_id=live.id,
             sensor=vehicle.sensor,
             south_west=(live.frame.origin_lat_deg, live.frame.origin_lon_deg),
             width_m=float(size[0]),
@@ -143,7 +144,9 @@ class Claims:
         return float(lat), float(lon)
 
     def release_team(self, live: LiveMission) -> None:
-        """Give every vehicle of a mission up."""
+        """Give every vehicle of a mission up; its simulated ones are put away."""
         self._show_area(live.spec.name, ())
-        for member in live.team:
+        for member in [*live.team, *live.team.left.values()]:
             self._hub.release(member.key, live.id)
+            if member.spec.kind is VehicleKind.SIM and self._hub.claimed_by(member.key) is None:
+                self._sim.put_away(member.name)

@@ -1,6 +1,7 @@
 """Vehicles that join a mission and leave it, while it runs too."""
 
 import asyncio
+from datetime import datetime
 
 from app.missions import states
 from app.missions.admission import check_vehicle
@@ -50,6 +51,14 @@ class Crews:
             await live.journal.log(Level.INFO, "vehicle", f"{vehicle.name} joined", vehicle=vehicle.name, actor=actor)
             live.changed.set()
 
+    async def rejoin(self, live: LiveMission, name: str, actor: str) -> None:
+        """Let a vehicle that left take part again, described as it was. Raises VehicleNotFoundError, ConflictError."""
+        member = live.team.left.get(name)
+        if member is None:
+            gone = ", ".join(live.team.left) or "none"
+            raise VehicleNotFoundError(f"vehicle {name!r} has not left this mission", f"those that have: {gone}")
+        await self.join(live, member.spec, actor)
+
     async def stop_one(self, live: LiveMission, name: str, actor: str) -> list[StopReceipt]:
         """Stop a vehicle and take it out of the mission; once that has ended it stays in it and is told once more.
 
@@ -80,11 +89,13 @@ class Crews:
 
     async def _take_out(self, live: LiveMission, member: Member, actor: str) -> list[StopReceipt]:
         stops: list[StopReceipt] = []
+        at = now()
         # As with a mission: a vehicle does not wait for a slow disk.
-        written = asyncio.ensure_future(_store_leaving(live, member.name))
+        written = asyncio.ensure_future(_store_leaving(live, member.name, at))
         await asyncio.wait([written], timeout=PATIENCE_S)
         claimed = self._hub.claimed_by(member.key) == live.id
-        live.team.leave(member.name)
+        live.team.leave(member.name, at)
+        live.boundaries.forget(member.name)
         live.changed.set()
         live.publish_summary()
         if claimed:
@@ -113,11 +124,11 @@ async def _store_joining(live: LiveMission, vehicle: VehicleSpec) -> int:
         return len(rows)
 
 
-async def _store_leaving(live: LiveMission, name: str) -> None:
+async def _store_leaving(live: LiveMission, name: str, at: datetime) -> None:
     async with live.database.writing() as session:
         for row in await mission_queries.vehicles_of(session, live.id):
             if row.name == name:
-                row.left_at = now()
+                row.left_at = at
 
 
 def vehicle_row(mission_id: str, vehicle: VehicleSpec, slot: int) -> MissionVehicleRow:

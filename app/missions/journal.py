@@ -329,8 +329,8 @@ class Journal:
             self._on_accepted(np.array([(s.east_m, s.north_m, s.depth_m, s.sd_m) for s in accepted]))
 
 
-def position_row(mission_id: str, report: VehicleReport) -> dict[str, Any]:
-    """Return a point of a vehicle's track as it is stored."""
+def position_row(mission_id: str, report: VehicleReport, *, imported: bool = False) -> dict[str, Any]:
+    """Return a point of a vehicle's track as it is stored; ``imported``: a log brought it, it was not heard."""
     place = report.position
     return {
         "mission_id": mission_id,
@@ -339,6 +339,7 @@ def position_row(mission_id: str, report: VehicleReport) -> dict[str, Any]:
         "lat_deg": place.lat_deg,
         "lon_deg": place.lon_deg,
         "depth_m": place.depth_m,
+        "imported": imported,
     }
 
 

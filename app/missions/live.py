@@ -15,7 +15,9 @@ from app.estimation import Sensor, SingleBeam
 from app.mapping.georeference import LocalFrame
 from app.mapping.tides import TideTable
 from app.mapping.types import FloatArray
+from app.missions.boundaries import Boundaries
 from app.missions.broadcast import Broadcaster
+from app.missions.clock import now
 from app.missions.corrections import Corrections
 from app.missions.fleet import (
     FleetEvent,
@@ -137,7 +139,8 @@ class LiveMission:
         self.database = database
         """What is written through it is refused once another process has the mission."""
         self.waypoints = WaypointBoard(spec, self.broadcaster)
-        self.vehicles = VehicleShowing(row.id, spec, self.frame, hub, self.team)
+        self.boundaries = Boundaries(self.area, [spec.to_local(zone) for zone in spec.keep_out])
+        self.vehicles = VehicleShowing(row.id, spec, self.frame, hub, self.team, self.boundaries.breach)
         targets = self.target_views if spec.targets else None
         self.telling = Telling(self.broadcaster, self.vehicles.all, targets, self.search_progress)
         self._time_scale = time_scale
@@ -190,11 +193,13 @@ class LiveMission:
             return
         match event:
             case VehicleReport():
-                if local_place(self.frame, event.position) is None:
+                place = local_place(self.frame, event.position)
+                if place is None:
                     log.warning("position is not near the mission, ignored", vehicle=event.vehicle)
                     return
-                member.report = event
+                member.report, member.heard_s = event, now().timestamp()
                 self.journal.position(event)
+                self._hold_against_boundaries(event, place)
                 if self.spec.targets:
                     self.ranges.times.heard(event.vehicle, event.time_s)
             case SoundingReport():
@@ -214,6 +219,14 @@ class LiveMission:
             case WaypointReport():
                 self._receive_waypoint(member, event)
         self.changed.set()
+
+    def _hold_against_boundaries(self, report: VehicleReport, place: tuple[float, float]) -> None:
+        if self.header.state in ENDED:
+            return
+        for crossing in self.boundaries.judge(
+            report.vehicle, place, report.position.depth_m, asyncio.get_running_loop().time()
+        ):
+            self.journal.note_line(self.journal.line(crossing.level, "boundary", crossing.message, **crossing.data))
 
     def _receive_waypoint(self, member: Member, event: WaypointReport) -> None:
         if event.mission_id != self.id or member.order is None or event.step != member.order.step:
@@ -340,12 +353,12 @@ class LiveMission:
         pursuers = {member.pursuing: member.name for member in self.team if member.pursuing is not None}
         return target_views(self.ranges.tracking, self.frame, self.area, self.ranges.times.now_s(), pursuers)
 
-    def abandon(self) -> None:
-        """Write nothing any more, and send everyone who watches to the process that has the mission now."""
+    def abandon(self, why: str = "another process has the mission now") -> None:
+        """Write nothing any more, and let everyone who watches ask again."""
         self.telling.stop()
         self.ranges.abandon()
         self.journal.abandon()
-        self.broadcaster.end("another process has the mission now")
+        self.broadcaster.end(why)
 
     async def close(self) -> None:
         """Write what is left."""

@@ -155,7 +155,9 @@ class LogImport:
     async def _write(self, batch: list[Report]) -> None:
         live, tally = self._live, self._tally
         soundings = [report for report in batch if isinstance(report, SoundingReport)]
-        positions = [position_row(live.id, report) for report in batch if isinstance(report, VehicleReport)]
+        positions = [
+            position_row(live.id, report, imported=True) for report in batch if isinstance(report, VehicleReport)
+        ]
         for report in batch:
             tally.span(report.time_s)
         key = f"{self._key}-{tally.batches}"

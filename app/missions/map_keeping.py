@@ -39,6 +39,12 @@ class MapKeeper:
         if task is not None:
             await asyncio.wait([task])
 
+    def forget(self, mission_id: str) -> None:
+        """Make no map of a mission that is deleted."""
+        for tasks in (self._taken_up, self._last):
+            if mission_id in tasks:
+                tasks[mission_id].cancel()
+
     async def close(self) -> None:
         """Make no more maps."""
         tasks = [*self._taken_up.values(), *self._last.values()]

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from datetime import datetime
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +28,10 @@ class Member:
     spec: VehicleSpec
     slot: int
     report: VehicleReport | None = None
+    heard_s: float | None = None
+    """When that was, Unix seconds by the service's clock."""
+    left_at: datetime | None = None
+    """When it left the mission; None while it takes part."""
     link: LinkState = LinkState.UNKNOWN
     engaged: bool = False
     followed: bool = False
@@ -82,16 +87,25 @@ class Team:
     """All vehicles of a mission, by name, in the order of their slots."""
 
     members: dict[str, Member] = field(default_factory=dict)
+    left: dict[str, Member] = field(default_factory=dict)
+    """Those that took part and do not any more, as they were last."""
 
     def join(self, spec: VehicleSpec, slot: int) -> Member:
-        """Add a vehicle."""
+        """Add a vehicle, or take one back."""
+        before = self.left.pop(spec.name, None)
         member = Member(spec, slot)
+        if before is not None and before.key == member.key:
+            member.report, member.heard_s, member.risings = before.report, before.heard_s, before.risings
         self.members[spec.name] = member
         return member
 
-    def leave(self, name: str) -> None:
-        """Take a vehicle out."""
-        self.members.pop(name, None)
+    def leave(self, name: str, at: datetime) -> None:
+        """Take a vehicle out; what was last known of it stays."""
+        member = self.members.pop(name, None)
+        if member is not None:
+            member.left_at, member.order, member.status, member.pursuing = at, None, None, None
+            member.engaged = member.surfacing = False
+            self.left[name] = member
 
     def __iter__(self) -> Iterator[Member]:
         return iter(list(self.members.values()))

@@ -111,6 +111,15 @@ class Memory:
             if self._ownership is not None:
                 await self._ownership.release([live.id])
 
+    async def forget(self, mission_id: str) -> None:
+        """Let go of a mission that was deleted, without writing anything more."""
+        self._left.pop(mission_id, None)
+        live = self._live.pop(mission_id, None)
+        if live is not None:
+            live.abandon("the mission was deleted")
+        if self._ownership is not None:
+            await self._ownership.release([mission_id])
+
     async def close(self) -> None:
         """Write down what is left."""
         for live in self:

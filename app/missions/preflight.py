@@ -11,6 +11,7 @@ from app.missions.fleet import LinkState
 from app.missions.hub import FleetHub
 from app.missions.live import LiveMission
 from app.missions.members import Member
+from app.missions.safety import zone_margin_m
 from app.missions.search.checks import search_checks
 from app.missions.spec import VehicleKind
 from app.missions.vehicle_showing import local_place
@@ -167,7 +168,7 @@ def _room(live: LiveMission) -> Iterator[CheckView]:
     side, limits = float(min(high - low)), live.spec.limits
     words = f"{high[0] - low[0]:.0f} x {high[1] - low[1]:.0f} m, {area.area / 1e4:.2f} ha"
     if live.spec.keep_out:
-        margin_m = limits.keep_out_margin_m
+        margin_m = zone_margin_m(limits.keep_out_margin_m, circles=live.search is None)
         zones = unary_union([Polygon(live.spec.to_local(zone)).buffer(margin_m) for zone in live.spec.keep_out])
         free = area.difference(zones)
         taken = 100 * (1 - free.area / area.area)
@@ -230,6 +231,14 @@ def _water_level(live: LiveMission) -> Iterator[CheckView]:
 
 def _known_bottom(live: LiveMission) -> Iterator[CheckView]:
     built, limits = live.builder.newest, live.spec.limits
+    if built is None and (live.builder.stale or live.builder.arrivals.at_rest):
+        yield CheckView(
+            id="bottom",
+            title="Known bottom",
+            status=NOTE,
+            message="soundings were imported; their map is being made",
+        )
+        return
     if built is None:
         yield CheckView(
             id="bottom",

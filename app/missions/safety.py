@@ -23,6 +23,8 @@ WAY_SPACING_M = 5.0
 LEAST_LEG_M = 0.5
 ENTRY_POINTS = 400
 LEAD_CLEARANCE_M = 0.5
+WAITING_CIRCLE_M = 10.0
+"""How far from its waypoint a vehicle comes that waits there in circles: 7.5 m of radius, and what it overshoots."""
 UNCERTAINTY_FACTOR = 2.0
 """The bottom is taken to be this many standard deviations shallower than estimated."""
 
@@ -149,6 +151,19 @@ def lead_point(constraints: Constraints, start: FloatArray, target: FloatArray, 
         return target
     ends = np.array(first.coords)
     return np.asarray(ends[np.argmax(np.linalg.norm(ends - target, axis=1))])
+
+
+def zone_margin_m(asked_m: float, *, circles: bool) -> float:
+    """Return how far waypoints and legs stay from keep-out zones.
+
+    Parameters
+    ----------
+    asked_m
+        As the mission's description has it.
+    circles
+        Whether vehicles wait at their waypoints in circles, none of which may enter a zone.
+    """
+    return max(asked_m, WAITING_CIRCLE_M) if circles else asked_m
 
 
 def widened(zone: FloatArray, margin_m: float) -> FloatArray:

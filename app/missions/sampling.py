@@ -25,5 +25,5 @@ def samples_of(live: LiveMission) -> list[VehicleSample]:
     return [
         VehicleSample(view.name, at_s, view.depth_m, view.altitude_m, view.battery_pct, view.age_s)
         for view in live.vehicles.all()
-        if view.age_s is not None
+        if view.active and view.age_s is not None
     ]

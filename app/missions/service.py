@@ -24,6 +24,7 @@ from app.missions.conducting import Conductor
 from app.missions.correcting import check_level_is_known, corrections_view, set_sound_speed, set_tide
 from app.missions.correction_views import CorrectionsView, TideCorrection
 from app.missions.crews import Crews, refuse_ended, vehicle_row
+from app.missions.deleting import check_deletable, delete_mission
 from app.missions.doctoring import DoctorView, Examine, doctor_view, switched_off
 from app.missions.errors import (
     ConflictError,
@@ -285,10 +286,25 @@ class MissionService:
                 live.publish_summary()
         return action_view(live, stops)
 
+    async def delete(self, mission_id: str) -> None:
+        """Remove a mission in which nothing was measured. Raises MissionNotFoundError, ConflictError."""
+        live = await self._get(mission_id)
+        async with self._conductor.acting(mission_id):
+            check_deletable(live)
+            self._maps.forget(mission_id)
+            await delete_mission(live)
+            await self._memory.forget(mission_id)
+
     async def add_vehicle(self, mission_id: str, vehicle: VehicleSpec, *, actor: str = "operator") -> MissionView:
         """Let a vehicle join, while the mission runs too. Raises ConflictError, InvalidRequestError."""
         live = await self._get(mission_id)
         await self._crews.join(live, vehicle, actor)
+        return mission_view(live)
+
+    async def rejoin_vehicle(self, mission_id: str, name: str, *, actor: str = "operator") -> MissionView:
+        """Let a vehicle that left take part again. Raises VehicleNotFoundError, ConflictError."""
+        live = await self._get(mission_id)
+        await self._crews.rejoin(live, name, actor)
         return mission_view(live)
 
     async def remove_vehicle(self, mission_id: str, name: str, *, actor: str = "operator") -> MissionView:
@@ -478,11 +494,21 @@ class MissionService:
         self, mission_id: str, upload: Upload, options: ImportOptions, *, actor: str = "operator"
     ) -> ImportView:
         """Begin with the soundings of a file; see ``importing.Importing.add``."""
-        return await self._importing.add(await self._get(mission_id), upload, options, actor)
+        live = await self._get(mission_id)
+        view = await self._importing.add(live, upload, options, actor)
+        self._map_imports(live)
+        return view
 
     async def delete_import(self, mission_id: str, import_id: str, *, actor: str = "operator") -> None:
         """Take an import back. Raises ImportNotFoundError."""
-        await self._importing.delete(await self._get(mission_id), import_id, actor)
+        live = await self._get(mission_id)
+        await self._importing.delete(live, import_id, actor)
+        self._map_imports(live)
+
+    def _map_imports(self, live: LiveMission) -> None:
+        """Show what was imported at once; while the mission runs its next step does."""
+        if live.id not in self._runs:
+            self._maps.take_up(live)
 
     async def reference(self, mission_id: str) -> ReferenceView:
         """Return what the map is compared with. Raises ImportNotFoundError."""

@@ -116,10 +116,11 @@ class Limits(Model):
     max_depth_m: float = Field(default=30.0, gt=0, le=6000, description="Deepest depth of travel")
     min_altitude_m: float = Field(default=1.0, ge=0, le=1000, description="Least clearance above the sea floor")
     keep_out_margin_m: float = Field(
-        default=5.0,
+        default=10.0,
         ge=0,
         le=1000,
-        description="Legs stay this far from keep-out zones: vehicles turn in circles and drift",
+        description="Legs stay this far from keep-out zones: vehicles turn in circles and drift. In surveys at least "
+        "10 m, the circle in which they wait for their next waypoint",
     )
     com_range_m: float | None = Field(
         default=None, gt=0, description="Every vehicle keeps another one within this range; null: unlimited"

@@ -19,6 +19,7 @@ from app.storage import missions as mission_queries
 from app.storage import scans as scan_queries
 from app.storage import soundings as sounding_queries
 from app.storage import stored_maps
+from app.storage import telemetry as telemetry_queries
 from app.storage.database import Database
 from app.storage.models import MissionRow, PositionRow, TideTableRow
 
@@ -37,6 +38,7 @@ async def take_up(
         positions = await mission_queries.last_positions(session, row.id)
         reference = await sounding_queries.reference_grid(session, row.id)
         tide = await session.get(TideTableRow, row.id)
+        heard = await telemetry_queries.last_heard(session, row.id)
         risings = await event_queries.count_by_vehicle(session, row.id, "surface", RISES)
     # Building the spec checks geometry, which takes milliseconds: not on the event loop.
     loop = asyncio.get_running_loop()
@@ -65,10 +67,12 @@ async def take_up(
     if step is not None:
         live.set_step(step.number, step.objective, step.terms)
     for vehicle in vehicles:
-        if vehicle.left_at is None:
-            member = live.team.join(VehicleSpec.model_validate(vehicle.spec), vehicle.slot)
-            member.report = _last_report(positions.get(member.name))
-            member.risings = risings.get(member.name, 0)
+        member = live.team.join(VehicleSpec.model_validate(vehicle.spec), vehicle.slot)
+        member.report = _last_report(positions.get(member.name))
+        member.heard_s = heard.get(member.name)
+        member.risings = risings.get(member.name, 0)
+        if vehicle.left_at is not None:
+            live.team.leave(member.name, vehicle.left_at)
     live.waypoints.show_rows(waypoints)
     return live
 

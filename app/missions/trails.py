@@ -33,10 +33,15 @@ class Trails:
         self._reading = asyncio.Lock()
         self._newest_id = 0
         self._points: dict[str, FloatArray] = {}
+        self._heard: dict[str, FloatArray] = {}
+        self._imported: dict[str, FloatArray] = {}
         self._trails: dict[str, Trail] = {}
 
     async def newest(self) -> dict[str, Trail]:
-        """Return each vehicle's trail as (longitude, latitude, depth), in the order of the vehicle's clock."""
+        """Return each vehicle's trail as (longitude, latitude, depth), in the order of receipt.
+
+        What a log brought later lies where the vehicle's clock puts it among what was heard.
+        """
         async with self._reading:
             found: dict[str, list[FloatArray]] = {}
             newest = self._newest_id
@@ -45,7 +50,7 @@ class Trails:
                 nonlocal newest
                 newest = rows[-1][0]
                 names = np.array([row[1] for row in rows])
-                places = np.array([tuple(row)[2:] for row in rows])
+                places = np.array([tuple(row)[2:] for row in rows], dtype=float)
                 for name in np.unique(names).tolist():
                     found.setdefault(name, []).append(places[names == name])
 
@@ -63,15 +68,35 @@ class Trails:
 
     def _add(self, found: dict[str, list[FloatArray]]) -> None:
         for vehicle, more in found.items():
-            points = np.concatenate(more)
-            known = self._points.get(vehicle)
-            if known is not None:
-                points = np.concatenate([known, points])
-            # A log that is read in later brings what was before.
-            points = points[np.argsort(points[:, 0], kind="stable")]
+            came = np.concatenate(more)
+            by_log = came[:, 0] > 0
+            for kept_in, part in ((self._heard, came[~by_log, 1:]), (self._imported, came[by_log, 1:])):
+                kept_in[vehicle] = np.concatenate([kept_in.get(vehicle, np.zeros((0, 4))), part])
+            points = in_order(self._heard[vehicle], self._imported[vehicle])
             self._points[vehicle] = points
             kept = points[worth_drawing(points[:, 1:]), 1:]
             self._trails[vehicle] = [(round(x, DIGITS), round(y, DIGITS), round(z, 2)) for x, y, z in kept.tolist()]
+
+
+def in_order(heard: FloatArray, imported: FloatArray) -> FloatArray:
+    """Return a way, shape (n, 4): time, longitude, latitude, depth, as the vehicle went it.
+
+    Parameters
+    ----------
+    heard : (n, 4)
+        Points in the order of receipt, whatever the vehicle's clock said: it may have begun anew.
+    imported : (m, 4)
+        Points of the vehicle's logs: each follows the newest of those heard that its clock puts before it.
+    """
+    if not len(imported):
+        return heard
+    imported = imported[np.argsort(imported[:, 0], kind="stable")]
+    if not len(heard):
+        return imported
+    by_clock = np.argsort(heard[:, 0], kind="stable")
+    before = np.searchsorted(heard[by_clock, 0], imported[:, 0], side="right")
+    after = np.where(before > 0, by_clock[np.maximum(before - 1, 0)] + 1, 0)
+    return np.insert(heard, after, imported, axis=0)
 
 
 def _length_m(points: FloatArray) -> float:

@@ -1,31 +1,49 @@
 """What operators are shown of a mission's vehicles."""
 
 import math
+from collections.abc import Callable
 
 from app.mapping.georeference import LocalFrame
-from app.missions.fleet import Position, VehicleInfo
+from app.missions.clock import now
+from app.missions.fleet import LinkState, Position, VehicleInfo
 from app.missions.hub import FleetHub
 from app.missions.members import Member, Team
 from app.missions.position_quality import position_quality
-from app.missions.spec import MissionSpec
+from app.missions.spec import MissionSpec, VehicleKind
 from app.missions.views import VehicleView
 
 
 class VehicleShowing:
-    """Shows the vehicles of one mission as their links know them now."""
+    """Shows the vehicles of one mission as their links know them now.
 
-    def __init__(self, mission_id: str, spec: MissionSpec, frame: LocalFrame, hub: FleetHub, team: Team) -> None:
+    Parameters
+    ----------
+    breach
+        Returns where a vehicle is that it must not be.
+    """
+
+    def __init__(
+        self,
+        mission_id: str,
+        spec: MissionSpec,
+        frame: LocalFrame,
+        hub: FleetHub,
+        team: Team,
+        breach: Callable[[str], str],
+    ) -> None:
         self._mission_id = mission_id
         self._spec = spec
         self._frame = frame
         self._hub = hub
         self._team = team
+        self._breach = breach
         self._places: dict[str, tuple[Position, tuple[float, float] | None]] = {}
 
     def all(self) -> list[VehicleView]:
-        """Return the vehicles that take part."""
+        """Return the vehicles that take part, and after them those that left, as they were last heard of."""
         infos = self._hub.infos()
-        return [self._view(member, infos.get(member.key)) for member in self._team]
+        shown = [*self._team, *(member for member in self._team.left.values() if member.report is not None)]
+        return [self._view(member, infos.get(member.key)) for member in shown]
 
     def of(self, info: VehicleInfo) -> VehicleView | None:
         """Return a vehicle of this name and kind, if it takes part."""
@@ -34,15 +52,20 @@ class VehicleShowing:
 
     def _view(self, member: Member, info: VehicleInfo | None) -> VehicleView:
         info = info or self._hub.info(member.key)
-        report = member.report or info.report
+        # Whoever left is not heard by the mission any more, but perhaps by its link.
+        report = (info.report or member.report) if member.left_at is not None else (member.report or info.report)
+        heard_s = member.heard_s if info.age_s is None else now().timestamp() - info.age_s
         view = VehicleView(
             name=member.name,
             kind=member.spec.kind,
             sensor=member.spec.sensor,
-            mission_id=self._mission_id,
+            mission_id=self._mission_id if member.left_at is None else None,
+            active=member.left_at is None,
+            left_at=member.left_at,
+            breach=self._breach(member.name),
             link=info.state,
-            reason=member.refusal or info.reason,
-            age_s=rounded(info.age_s, 2),
+            reason=_reason(member, info),
+            age_s=None if heard_s is None else rounded(max(now().timestamp() - heard_s, 0.0), 2),
             address=info.address,
             imc_id=info.imc_id,
             surfacing=member.surfacing,
@@ -76,6 +99,12 @@ class VehicleShowing:
         if known is None or known[0] is not position:
             known = self._places[name] = position, local_place(self._frame, position)
         return known[1]
+
+
+def _reason(member: Member, info: VehicleInfo) -> str:
+    launched = member.spec.kind is VehicleKind.SIM and info.state is LinkState.UNKNOWN and member.report is not None
+    # Nothing is to be done about a simulated vehicle that was put away with its mission.
+    return member.refusal or ("" if launched else info.reason)
 
 
 def local_place(frame: LocalFrame, position: Position) -> tuple[float, float] | None:

@@ -37,6 +37,10 @@ class VehicleView(View):
     sensor: Sensor | None = None
     mission_id: str | None = Field(default=None, description="The mission it takes part in, if any")
     active: bool = Field(default=True, description="False once it left its mission")
+    left_at: datetime | None = Field(default=None, description="When it left the mission; null while it takes part")
+    breach: str = Field(
+        default="", description="Where it is that it must not be: in a keep-out zone or outside the area; else empty"
+    )
     link: LinkState
     reason: str = Field(default="", description="What is missing or wrong, and what to do; empty when all is well")
     age_s: float | None = Field(default=None, description="Seconds since last heard; null: never")

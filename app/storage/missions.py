@@ -113,11 +113,12 @@ async def add_positions(session: AsyncSession, rows: Sequence[dict[str, Any]]) -
 
 
 def positions_after(mission_id: str, after_id: int) -> Select[*tuple[Any, ...]]:
-    """Return the query of places that were written after the one of this id: id, vehicle, time and place."""
+    """Return the query of places that were written after the one of this id: id, vehicle, origin, time and place."""
     return (
         select(
             PositionRow.id,
             PositionRow.vehicle,
+            PositionRow.imported,
             PositionRow.time_s,
             PositionRow.lon_deg,
             PositionRow.lat_deg,
@@ -129,18 +130,13 @@ def positions_after(mission_id: str, after_id: int) -> Select[*tuple[Any, ...]]:
 
 
 async def last_positions(session: AsyncSession, mission_id: str) -> dict[str, PositionRow]:
-    """Return each vehicle's newest position by its own clock; what a log brought later may be older."""
+    """Return each vehicle's position that was heard last; its own clock may have begun anew, and logs come later."""
     newest = (
-        select(PositionRow.vehicle, func.max(PositionRow.time_s).label("time_s"))
-        .where(PositionRow.mission_id == mission_id)
+        select(func.max(PositionRow.id))
+        .where(PositionRow.mission_id == mission_id, PositionRow.imported.is_(False))
         .group_by(PositionRow.vehicle)
-        .subquery()
     )
-    query = (
-        select(PositionRow)
-        .join(newest, (PositionRow.vehicle == newest.c.vehicle) & (PositionRow.time_s == newest.c.time_s))
-        .where(PositionRow.mission_id == mission_id)
-    )
+    query = select(PositionRow).where(PositionRow.id.in_(newest))
     return {row.vehicle: row for row in await session.scalars(query)}
 
 

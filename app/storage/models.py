@@ -19,6 +19,7 @@ from sqlalchemy import (
     Text,
     TypeDecorator,
     UniqueConstraint,
+    false,
 )
 from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
 
@@ -310,9 +311,12 @@ class PositionRow(Base):
     mission_id: Mapped[str] = mapped_column(ForeignKey("missions.id", ondelete="CASCADE"))
     vehicle: Mapped[str] = mapped_column(String(64))
     time_s: Mapped[float]
+    """By the vehicle's clock, which may begin anew."""
     lat_deg: Mapped[float]
     lon_deg: Mapped[float]
     depth_m: Mapped[float]
+    imported: Mapped[bool] = mapped_column(default=False, server_default=false())
+    """Whether a log brought it later; else ids are in the order in which positions were heard."""
 
 
 class TelemetryRow(Base):
@@ -399,6 +403,17 @@ class TokenRow(Base):
     created_at: Mapped[datetime]
     expires_at: Mapped[datetime | None]
     revoked_at: Mapped[datetime | None]
+
+
+class SessionRow(Base):
+    """A browser that signed in with an access token: what it shows from then on is not the token. Ends with it."""
+
+    __tablename__ = "sessions"
+
+    secret_hash: Mapped[str] = mapped_column(String(64), primary_key=True)
+    token_hash: Mapped[str] = mapped_column(ForeignKey("tokens.token_hash", ondelete="CASCADE"), index=True)
+    created_at: Mapped[datetime]
+    expires_at: Mapped[datetime]
 
 
 class AuditRow(Base):

@@ -35,3 +35,11 @@ async def samples(session: AsyncSession, mission_id: str, most: int) -> Sequence
     if stride > 1:
         query = query.where(every.c.number % stride == 1)
     return (await session.execute(query)).all()
+
+
+async def last_heard(session: AsyncSession, mission_id: str) -> dict[str, float]:
+    """Return when each vehicle was last heard, Unix seconds by the service's clock."""
+    heard = func.max(TelemetryRow.at_s - TelemetryRow.age_s)
+    query = select(TelemetryRow.vehicle, heard).where(TelemetryRow.mission_id == mission_id)
+    found = await session.execute(query.group_by(TelemetryRow.vehicle))
+    return {vehicle: at_s for vehicle, at_s in found if at_s is not None}

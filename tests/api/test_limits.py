@@ -96,7 +96,7 @@ async def test_guessing_tokens_ends_soon_and_disturbs_nobody_who_has_one(
         assert await ask(client, "bf_guess") == 429
         url = f"{server.url.replace('http', 'ws', 1)}/api/v1/missions/none/live"
         with pytest.raises(websockets.InvalidStatus):
-            await websockets.connect(f"{url}?token=bf_guess")
+            await websockets.connect(url, additional_headers={"Authorization": "Bearer bf_guess"})
 
 
 async def test_a_right_token_is_never_refused_for_wrong_ones_from_its_address(

@@ -99,7 +99,7 @@ def test_one_vehicle_is_aborted_the_others_go_on_and_it_is_noted(page: Page, ser
     by_id(page, "abort-confirm").click()
     expect(by_id(page, "receipt-sim-1")).to_contain_text("acknowledged the stop")
     by_id(page, "abort-close").click()
-    expect(by_id(page, "card-sim-1")).to_be_hidden()
+    expect(by_id(page, "state-sim-1")).to_contain_text("Left the mission")
     expect_state(page, "running")
     by_id(page, "toggle-log").click()
     by_id(page, "note").fill("sim-1 taken out, its battery")

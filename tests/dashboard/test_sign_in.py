@@ -1,8 +1,10 @@
+import re
 from collections.abc import Iterator
 
 import pytest
 from playwright.sync_api import Page, expect
 
+from .conftest import Watched
 from .service import Service
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(400)]
@@ -22,15 +24,71 @@ def nothing_goes_on() -> None:
     """No vehicle is engaged here, and the service would ask for a token."""
 
 
-def test_a_service_with_tokens_asks_for_one_and_takes_it(page: Page, service: Service) -> None:
+@pytest.fixture(scope="module")
+def tokens(service: Service) -> dict[str, str]:
+    """A token of each role that matters here; the mission was there before, else nobody could make it."""
     mission = service.create(name="Guarded")
-    token = service.make_token("quay", "operator")
-    page.goto(f"/#/missions/{mission}")
-    page.get_by_test_id("token").fill("not-a-token")
-    page.get_by_role("button", name="Sign in").click()
-    expect(page.get_by_text("unknown, revoked or has run out")).to_be_visible()
+    return {"mission": mission} | {role: service.make_token(f"the {role}", role) for role in ("operator", "viewer")}
+
+
+def sign_in(page: Page, token: str) -> None:
     page.get_by_test_id("token").fill(token)
     page.get_by_role("button", name="Sign in").click()
+
+
+def kept_by_scripts(page: Page) -> str:
+    """All that a script of the page can read at rest."""
+    return str(
+        page.evaluate("JSON.stringify([{ ...localStorage }, { ...sessionStorage }, document.cookie, location.href])")
+    )
+
+
+def test_a_wrong_token_is_tried_once_and_a_right_one_is_kept_out_of_reach(
+    watched: Watched, service: Service, tokens: dict[str, str]
+) -> None:
+    page = watched.page
+    page.clock.install()
+    sockets: list[str] = []
+    page.on("websocket", lambda socket: sockets.append(socket.url))
+    page.goto(f"/#/missions/{tokens['mission']}")
+    expect(page.get_by_test_id("sign-in")).to_be_visible()
+    sign_in(page, "not-a-token")
+    expect(page.get_by_test_id("sign-in-fault")).to_contain_text("unknown, revoked or has run out")
+    asked = len(watched.addresses)
+    page.clock.fast_forward(60_000)  # far longer than the page waits between two looks at its lists
+    page.evaluate("new Promise(resolve => queueMicrotask(resolve))")
+    assert watched.addresses[asked:] == []
+    sign_in(page, tokens["operator"])
     expect(page.get_by_test_id("mission-name")).to_have_text("Guarded")
     expect(page.get_by_test_id("link")).to_have_attribute("data-status", "open")
-    expect(page.get_by_test_id("start")).to_be_visible()
+    expect(page.get_by_test_id("start")).to_be_enabled()
+    expect(page.get_by_test_id("account")).to_contain_text("the operator")
+    page.reload()
+    expect(page.get_by_test_id("link")).to_have_attribute("data-status", "open")
+    assert sockets
+    assert tokens["operator"] not in kept_by_scripts(page)
+    assert not any(tokens["operator"] in address for address in [*watched.addresses, *sockets])
+
+
+def test_a_token_that_an_earlier_page_kept_is_used_once_and_removed(page: Page, tokens: dict[str, str]) -> None:
+    page.goto("/charts.json")
+    page.evaluate("token => localStorage.setItem('bathyfleet.token', JSON.stringify(token))", tokens["viewer"])
+    page.goto(f"/#/missions/{tokens['mission']}")
+    expect(page.get_by_test_id("account")).to_contain_text("the viewer")
+    assert tokens["viewer"] not in kept_by_scripts(page)
+    page.reload()
+    expect(page.get_by_test_id("account")).to_contain_text("the viewer")
+
+
+def test_a_viewer_sees_what_he_may_not_do_and_signs_out(page: Page, tokens: dict[str, str]) -> None:
+    page.goto(f"/#/missions/{tokens['mission']}")
+    sign_in(page, tokens["viewer"])
+    expect(page.get_by_test_id("account")).to_contain_text("viewer: looks only")
+    for command in ("start", "abort", "new-mission", "copy-mission", "delete-mission"):
+        expect(page.get_by_test_id(command)).to_be_disabled()
+        expect(page.get_by_test_id(command)).to_have_attribute("title", re.compile("role viewer, which may look only"))
+    page.get_by_test_id("account").click()
+    page.get_by_test_id("sign-out").click()
+    expect(page.get_by_test_id("sign-in")).to_be_visible()
+    page.reload()
+    expect(page.get_by_test_id("sign-in")).to_be_visible()

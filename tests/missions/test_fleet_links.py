@@ -128,7 +128,14 @@ class SimBench(Bench):
         await link.start(self.events.append)
         link.launch(
             Launch(
-                self.name, Sensor.SINGLE_BEAM, (LAT, LON), 100, 100, start=FLOOR.frame.to_geodetic(50, 5), noise=0.005
+                self.name,
+                "m",
+                Sensor.SINGLE_BEAM,
+                (LAT, LON),
+                100,
+                100,
+                start=FLOOR.frame.to_geodetic(50, 5),
+                noise=0.005,
             )
         )
 

@@ -3,7 +3,7 @@ import pytest
 from shapely.geometry import LineString, Point
 
 from app.missions.journal import METRES_PER_DEGREE
-from app.missions.trails import TOLERANCE_M, worth_drawing
+from app.missions.trails import TOLERANCE_M, in_order, worth_drawing
 
 
 def wandering(seed: int, count: int = 400) -> np.ndarray:
@@ -44,3 +44,19 @@ def test_a_straight_way_is_two_places_and_a_dive_on_it_stays() -> None:
 @pytest.mark.parametrize("count", [0, 1, 2])
 def test_the_shortest_ways_stay_as_they_are(count: int) -> None:
     assert len(worth_drawing(np.full((count, 3), 4.0))) == count
+
+
+def at(time_s: float, lon: float) -> list[float]:
+    return [time_s, lon, 41.0, 2.0]
+
+
+def test_a_way_is_in_the_order_of_receipt_when_the_vehicles_clock_began_anew() -> None:
+    heard = np.array([at(100, 1), at(200, 2), at(120, 3), at(150, 4)])
+    assert in_order(heard, np.zeros((0, 4)))[:, 1].tolist() == [1, 2, 3, 4]
+
+
+def test_points_of_a_log_lie_where_the_clock_puts_them() -> None:
+    heard = np.array([at(100, 1), at(110, 2), at(200, 5)])
+    log = np.array([at(190, 4), at(115, 3), at(90, 0), at(210, 6)])
+    assert in_order(heard, log)[:, 1].tolist() == [0, 1, 2, 3, 4, 5, 6]
+    assert in_order(np.zeros((0, 4)), log)[:, 1].tolist() == [0, 3, 4, 6]

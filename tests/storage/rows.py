@@ -17,6 +17,7 @@ from app.storage.models import (
     ProcessRow,
     ReferenceRow,
     ScanRow,
+    SessionRow,
     SoundingRow,
     StepRow,
     StoredMapRow,
@@ -233,4 +234,5 @@ def one_of_each() -> list[list[Any]]:
                 revoked_at=None,
             ),
         ],
+        [SessionRow(secret_hash="e" * 64, token_hash="f" * 64, created_at=TIME, expires_at=TIME)],
     ]

@@ -122,7 +122,7 @@ async def test_tracks_keep_the_order_in_which_they_were_heard(database: Database
         last = await mission_queries.last_positions(session, "m1")
     tracks: list[tuple[str, float]] = []
     for after in (0, 1):
-        take = lambda part: tracks.extend((row[1], row[4]) for row in part)  # noqa: E731
+        take = lambda part: tracks.extend((row[1], row[5]) for row in part)  # noqa: E731
         await read_in_pieces(database, mission_queries.positions_after("m1", after), take)
     assert tracks == [("a", 41.3), ("a", 41.1), ("b", 41.18), ("a", 41.1), ("b", 41.18)]
     assert {name: row.lat_deg for name, row in last.items()} == {"a": 41.1, "b": 41.18}

@@ -85,6 +85,8 @@ class Launch:
     ----------
     vehicle, sensor
         Its name and its sonar.
+    mission_id
+        Whose it is.
     south_west
         Latitude and longitude of the sea floor's corner.
     width_m, height_m
@@ -100,6 +102,7 @@ class Launch:
     """
 
     vehicle: str
+    mission_id: str
     sensor: Sensor
     south_west: tuple[float, float]
     width_m: float
@@ -113,8 +116,14 @@ class Launch:
 
 class _Swimmer:
     def __init__(
-        self, body: SimulatedVehicle, terrain: Terrain, ranging: Ranging, scanning: Scanning | None = None
+        self,
+        mission_id: str,
+        body: SimulatedVehicle,
+        terrain: Terrain,
+        ranging: Ranging,
+        scanning: Scanning | None = None,
     ) -> None:
+        self.mission_id = mission_id
         self.body = body
         self.ranging = ranging
         self.scanning = scanning
@@ -186,18 +195,15 @@ class SimFleetLink:
             await asyncio.gather(self._task, return_exceptions=True)
 
     def launch(self, launch: Launch) -> None:
-        """Bring a vehicle into the world; nothing happens when it is there already.
+        """Bring a vehicle into the world; nothing happens when it is there already for the same mission.
 
-        Raises
-        ------
-        ValueError
-            When the start lies outside of the sea floor, or a vehicle of that name is there and cannot do this.
+        One that another mission left there is put away: it is over that one's sea floor, with that one's sonar.
+        Raises ValueError when the start lies outside of the sea floor.
         """
         there = self._swimmers.get(launch.vehicle)
-        if there is not None:
-            if (there.scanning is None) != (launch.lookout is None):
-                raise ValueError("a vehicle of that name is in the water for another kind of mission")
+        if there is not None and there.mission_id == launch.mission_id:
             return
+        self.put_away(launch.vehicle)
         terrain = self._terrain(launch)
         seed = [self._settings.seed, *launch.vehicle.encode()]
         started_s = now().timestamp()
@@ -220,9 +226,13 @@ class SimFleetLink:
             out = launch.lookout
             noise = np.random.default_rng([*seed, 2])
             scanning = Scanning(out.world, out.reach_m, out.resolution_deg, SCAN_NOISE_M, noise, started_s)
-        swimmer = _Swimmer(body, terrain, ranging, scanning)
+        swimmer = _Swimmer(launch.mission_id, body, terrain, ranging, scanning)
         swimmer.make_report()
         self._swimmers[launch.vehicle] = swimmer
+
+    def put_away(self, vehicle: str) -> None:
+        """Take a vehicle out of the world; nothing happens when it is not there."""
+        self._swimmers.pop(vehicle, None)
 
     def _terrain(self, launch: Launch) -> Terrain:
         """Return the sea floor of a mission's area; its vehicles share one, which takes a while to lay."""

@@ -1,4 +1,3 @@
-import { kept } from "../kept";
 import type {
   ActionView,
   DoctorView,
@@ -15,6 +14,7 @@ import type {
   ProductView,
   QualityView,
   SearchGridView,
+  SessionView,
   SoundingPage,
   SoundingState,
   SoundingView,
@@ -26,9 +26,6 @@ import type {
 
 const BASE = "/api/v1";
 const LOG_PAGE = 1000;
-
-/** The access token, kept on this device; empty where the service asks for none. */
-export const token = kept("token", "");
 
 /** The service refused a request, or could not be reached. Its message is meant for the operator. */
 export class ServiceError extends Error {
@@ -71,9 +68,7 @@ async function request<T>(path: string, init: RequestInit = {}): Promise<T> {
 async function ask(address: string, init: RequestInit): Promise<Response> {
   let response: Response;
   try {
-    const headers = new Headers(init.headers);
-    if (token.value) headers.set("Authorization", `Bearer ${token.value}`);
-    response = await fetch(address, { ...init, headers });
+    response = await fetch(address, init);
   } catch {
     throw new ServiceError(
       "The service does not answer",
@@ -85,11 +80,28 @@ async function ask(address: string, init: RequestInit): Promise<Response> {
   return response;
 }
 
-/** A file, fetched rather than linked to: links cannot carry the access token. */
-async function file(address: string): Promise<{ name: string; content: Blob }> {
+/** A file, fetched rather than linked to, so that what goes wrong is said. `onBytes` is told how much has come. */
+async function file(
+  address: string,
+  onBytes: (received: number) => void = () => {},
+): Promise<{ name: string; content: Blob }> {
   const response = await ask(address, {});
   const name = /filename="([^"]+)"/.exec(response.headers.get("Content-Disposition") ?? "")?.[1];
-  return { name: name ?? "bathyfleet", content: await response.blob() };
+  const type = response.headers.get("Content-Type") ?? "application/octet-stream";
+  const parts: BlobPart[] = [];
+  let received = 0;
+  const reader = response.body?.getReader();
+  for (let part = await reader?.read(); part && !part.done; part = await reader?.read()) {
+    parts.push(part.value);
+    received += part.value.byteLength;
+    onBytes(received);
+  }
+  return { name: name ?? "bathyfleet", content: new Blob(parts, { type }) };
+}
+
+/** What answers nothing when it succeeds. */
+async function remove(path: string): Promise<void> {
+  await ask(`${BASE}${path}`, { method: "DELETE", headers: { Accept: "application/json" } });
 }
 
 function post<T>(path: string, body?: unknown): Promise<T> {
@@ -104,6 +116,10 @@ function post<T>(path: string, body?: unknown): Promise<T> {
 const missionPath = (id: string) => `/missions/${encodeURIComponent(id)}`;
 
 export const api = {
+  session: () => request<SessionView>("/session"),
+  signIn: (token: string) =>
+    request<SessionView>("/session", { method: "POST", headers: { Authorization: `Bearer ${token}` } }),
+  signOut: () => remove("/session"),
   missions: () => request<MissionSummary[]>("/missions"),
   doctor: () => request<DoctorView>("/doctor"),
   vehicles: () => request<VehicleView[]>("/vehicles"),
@@ -112,6 +128,7 @@ export const api = {
   act: (id: string, action: MissionAction) => post<ActionView>(`${missionPath(id)}/${action}`),
   log: readLog,
   mission: (id: string) => request<MissionView>(missionPath(id)),
+  deleteMission: (id: string) => remove(missionPath(id)),
   preflight: (id: string) => request<PreflightView>(`${missionPath(id)}/preflight`),
   forecast: (id: string, gone: AbortSignal) =>
     request<ForecastView>(`${missionPath(id)}/forecast`, { method: "POST", signal: gone }),
@@ -129,6 +146,8 @@ export const api = {
   note: (id: string, text: string) => post<EventView>(`${missionPath(id)}/notes`, { text }),
   abortVehicle: (id: string, name: string) =>
     post<ActionView>(`${missionPath(id)}/vehicles/${encodeURIComponent(name)}/abort`),
+  rejoin: (id: string, name: string) =>
+    post<MissionView>(`${missionPath(id)}/vehicles/${encodeURIComponent(name)}/rejoin`),
   soundings: (id: string, after: number, state?: SoundingState) =>
     request<SoundingPage>(
       `${missionPath(id)}/soundings?limit=200&after=${after}${state ? `&state=${state}` : ""}`,
@@ -174,8 +193,6 @@ async function readLog(id: string, after: number, last: number): Promise<EventVi
   return lines;
 }
 
-/** Sockets of browsers cannot send headers, so the token goes into the address. */
 export function liveUrl(id: string, page: Location = window.location): string {
-  const query = token.value ? `?token=${encodeURIComponent(token.value)}` : "";
-  return `${page.protocol === "https:" ? "wss" : "ws"}://${page.host}${BASE}${missionPath(id)}/live${query}`;
+  return `${page.protocol === "https:" ? "wss" : "ws"}://${page.host}${BASE}${missionPath(id)}/live`;
 }

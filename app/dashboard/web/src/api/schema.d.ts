@@ -42,7 +42,13 @@ export interface paths {
         get: operations["getMission"];
         put?: never;
         post?: never;
-        delete?: never;
+        /**
+         * Delete a mission that was not flown
+         * @description Remove a mission in which no step was taken and nothing measured, with its imports. The audit log keeps who did.
+         *
+         *     Any other one is refused: what was measured is kept.
+         */
+        delete: operations["deleteMission"];
         options?: never;
         head?: never;
         patch?: never;
@@ -262,6 +268,26 @@ export interface paths {
          * @description Let a vehicle take part, also while the mission runs: it joins at the next step.
          */
         post: operations["addVehicle"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/missions/{mission_id}/vehicles/{name}/rejoin": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Take back a vehicle that left
+         * @description Let a vehicle that was aborted or removed take part again, as it was described: it joins at the next step.
+         */
+        post: operations["rejoinVehicle"];
         delete?: never;
         options?: never;
         head?: never;
@@ -941,6 +967,36 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/session": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * See who you are
+         * @description Return who asks and in which role, by token, by session or as the service's own user.
+         */
+        get: operations["getSession"];
+        put?: never;
+        /**
+         * Sign a browser in
+         * @description Exchange the access token in the header for a cookie that no script can read.
+         *
+         *     The session ends with the token, by `DELETE`, or after 30 days. Without a token in the header nothing is given.
+         */
+        post: operations["signIn"];
+        /**
+         * Sign a browser out
+         * @description End the browser's session; its live views end within seconds. The token stays valid.
+         */
+        delete: operations["signOut"];
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/health": {
         parameters: {
             query?: never;
@@ -1584,8 +1640,8 @@ export interface components {
             min_altitude_m: number;
             /**
              * Keep Out Margin M
-             * @description Legs stay this far from keep-out zones: vehicles turn in circles and drift
-             * @default 5
+             * @description Legs stay this far from keep-out zones: vehicles turn in circles and drift. In surveys at least 10 m, the circle in which they wait for their next waypoint
+             * @default 10
              */
             keep_out_margin_m: number;
             /**
@@ -2567,6 +2623,12 @@ export interface components {
             notes: string[];
         };
         /**
+         * Role
+         * @description What the holder of a token may do.
+         * @enum {string}
+         */
+        Role: "viewer" | "vehicle" | "operator" | "admin";
+        /**
          * Scan
          * @description One look round from a vehicle: a laser scanner's turn, or a sweep of an imaging sonar.
          */
@@ -2842,6 +2904,33 @@ export interface components {
          * @enum {string}
          */
         Sensor: "single_beam" | "dvl" | "multibeam";
+        /**
+         * SessionView
+         * @description Who asks, and what he may do.
+         */
+        SessionView: {
+            /**
+             * Name
+             * @description Name of the access token, or `local operator`
+             */
+            name: string;
+            role: components["schemas"]["Role"];
+            /**
+             * Vehicle
+             * @description The one vehicle that a token of role vehicle acts for
+             */
+            vehicle?: string | null;
+            /**
+             * Local
+             * @description True while no token was made and the user asks who runs the service
+             */
+            local: boolean;
+            /**
+             * Signed In
+             * @description True when a browser's session says who asks: it can be signed out
+             */
+            signed_in: boolean;
+        };
         /**
          * Severity
          * @description How much a finding matters.
@@ -3679,6 +3768,17 @@ export interface components {
              * @default true
              */
             active: boolean;
+            /**
+             * Left At
+             * @description When it left the mission; null while it takes part
+             */
+            left_at: string | null;
+            /**
+             * Breach
+             * @description Where it is that it must not be: in a keep-out zone or outside the area; else empty
+             * @default
+             */
+            breach: string;
             link: components["schemas"]["LinkState"];
             /**
              * Reason
@@ -4022,6 +4122,81 @@ export interface operations {
             };
             /** @description There is no such mission */
             404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too many requests */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    deleteMission: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description The mission's id */
+                mission_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            204: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such mission */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description It contradicts the present state */
+            409: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -5123,6 +5298,85 @@ export interface operations {
             };
             /** @description The body's media type is not supported */
             415: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too many requests */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    rejoinVehicle: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description The mission's id */
+                mission_id: string;
+                /** @description The vehicle's name */
+                name: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["MissionView"];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such mission; there is no such vehicle */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description It contradicts the present state */
+            409: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -8202,6 +8456,145 @@ export interface operations {
             };
             /** @description Some values cannot be taken */
             422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too many requests */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    getSession: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["SessionView"];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too many requests */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    signIn: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            201: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["SessionView"];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too many requests */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    signOut: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            204: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
                 headers: {
                     [name: string]: unknown;
                 };

@@ -6,7 +6,7 @@ import type { LiveMessage } from "./types";
 class Line {
   static opened: Line[] = [];
   onopen: (() => void) | null = null;
-  onclose: (() => void) | null = null;
+  onclose: ((event: { code: number; reason: string }) => void) | null = null;
   onmessage: ((raw: { data: string }) => void) | null = null;
   closed = false;
 
@@ -46,9 +46,17 @@ describe("the live socket", () => {
     vi.useRealTimers();
   });
 
+  it("does not ask again where it is not let in", () => {
+    newest().onopen?.();
+    newest().onclose?.({ code: 4401, reason: "the session has ended" });
+    vi.advanceTimersByTime(60_000);
+    expect(Line.opened).toHaveLength(1);
+    expect(statuses).toEqual(["connecting", "open", "refused"]);
+  });
+
   it("connects again after the connection closed", () => {
     newest().onopen?.();
-    newest().onclose?.();
+    newest().onclose?.({ code: 1006, reason: "" });
     vi.advanceTimersByTime(600);
     expect(Line.opened).toHaveLength(2);
     expect(statuses).toEqual(["connecting", "open", "waiting", "connecting"]);
@@ -66,24 +74,24 @@ describe("the live socket", () => {
   });
 
   it("does not wait when the network comes back", () => {
-    newest().onclose?.();
+    newest().onclose?.({ code: 1006, reason: "" });
     window.dispatchEvent(new Event("online"));
     expect(Line.opened).toHaveLength(2);
   });
 
   it("ignores what an abandoned connection still says", () => {
     const old = newest();
-    old.onclose?.();
+    old.onclose?.({ code: 1006, reason: "" });
     vi.advanceTimersByTime(600);
     old.onmessage?.({ data: '{"type":"vehicles","time":"","vehicles":[]}' });
-    old.onclose?.();
+    old.onclose?.({ code: 1006, reason: "" });
     expect(messages).toHaveLength(0);
     expect(Line.opened).toHaveLength(2);
   });
 
   it("stays closed once closed", () => {
     socket.close();
-    newest().onclose?.();
+    newest().onclose?.({ code: 1006, reason: "" });
     vi.advanceTimersByTime(60_000);
     expect(Line.opened).toHaveLength(1);
   });

@@ -3,7 +3,12 @@ import type { LiveMessage } from "./types";
 export type SocketStatus =
   | { kind: "connecting" }
   | { kind: "open" }
-  | { kind: "waiting"; attempt: number; retryAt: number };
+  | { kind: "waiting"; attempt: number; retryAt: number }
+  /** The service does not let this viewer in; asking again would change nothing. */
+  | { kind: "refused"; reason: string };
+
+const UNAUTHENTICATED = 4401;
+const FORBIDDEN = 4403;
 
 export interface SocketHooks {
   onMessage: (message: LiveMessage) => void;
@@ -65,8 +70,10 @@ export class LiveSocket {
     socket.onopen = () => {
       if (this.#socket === socket) this.hooks.onStatus({ kind: "open" });
     };
-    socket.onclose = () => {
-      if (this.#socket === socket) this.#lost();
+    socket.onclose = ({ code, reason }: CloseEvent) => {
+      if (this.#socket !== socket) return;
+      if (code === UNAUTHENTICATED || code === FORBIDDEN) this.#refused(reason);
+      else this.#lost();
     };
   }
 
@@ -82,6 +89,11 @@ export class LiveSocket {
     const delay = backoffMs(this.#attempt);
     this.hooks.onStatus({ kind: "waiting", attempt: this.#attempt, retryAt: Date.now() + delay });
     this.#retry = setTimeout(() => this.#connect(), delay);
+  }
+
+  #refused(reason: string): void {
+    this.close();
+    this.hooks.onStatus({ kind: "refused", reason });
   }
 
   #drop(): void {

@@ -47,6 +47,7 @@ export type VehicleDiagnosis = Complete<Schemas["VehicleDiagnosis"]>;
 export type Finding = Complete<Schemas["Finding"]>;
 export type StopView = Complete<Schemas["StopView"]>;
 export type LiveMessage = Complete<Schemas["LiveMessage"]>;
+export type SessionView = Complete<Schemas["SessionView"]>;
 export type Problem = Complete<Schemas["Problem"]>;
 export type FieldProblem = Complete<Schemas["FieldProblem"]>;
 

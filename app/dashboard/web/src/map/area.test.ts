@@ -73,3 +73,31 @@ it("ways are measured on the ellipsoid", () => {
     bearing_deg: expect.closeTo(180, 1),
   });
 });
+
+describe("a file with several areas", () => {
+  const square = (west: number, south: number, side: number): LngLat[] => [
+    [west, south],
+    [west + side, south],
+    [west + side, south + side],
+    [west, south + side],
+    [west, south],
+  ];
+  const multi = (...rings: LngLat[][]) =>
+    JSON.stringify({ type: "MultiPolygon", coordinates: rings.map((ring) => [ring]) });
+
+  it("takes one that lies apart for another area, not for a keep-out zone", () => {
+    const found = areasIn("two.geojson", multi(square(0, 0, 0.001), square(0.01, 0, 0.0008)));
+    expect(found.keepOut).toEqual([]);
+    expect(found.others).toHaveLength(1);
+    expect(found.note).toContain("1 more area lies apart and is left out");
+  });
+
+  it("takes one within it, and one across its border, for keep-out zones", () => {
+    const found = areasIn(
+      "zones.geojson",
+      multi(square(0, 0, 0.001), square(0.0003, 0.0003, 0.0001), square(0.0009, 0.0004, 0.0005)),
+    );
+    expect(found.keepOut).toHaveLength(2);
+    expect(found.others).toEqual([]);
+  });
+});

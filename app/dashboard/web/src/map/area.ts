@@ -78,11 +78,16 @@ const turn = (a: LngLat, b: LngLat, c: LngLat) =>
 export interface FoundAreas {
   area: LngLat[];
   keepOut: LngLat[][];
+  /** Areas beside it: a mission has one, so which it is has to be chosen. */
+  others: LngLat[][];
   /** What was done with the file, in words. */
   note: string;
 }
 
-/** The polygons of a GeoJSON or KML file: the largest is the area, those in it or called keep-out are zones. */
+/**
+ * The polygons of a GeoJSON or KML file: the largest is the area, those that reach into it or are called keep-out are
+ * zones, those that lie apart are other areas.
+ */
 export function areasIn(name: string, text: string): FoundAreas {
   const json = /\.kml$/i.test(name) || text.trimStart().startsWith("<") ? fromKml(text) : parsed(text);
   const polygons = polygonsOf(json);
@@ -91,11 +96,43 @@ export function areasIn(name: string, text: string): FoundAreas {
   const largest = polygons.reduce((a, b) => (sizeOf(b.ring).area_m2 > sizeOf(a.ring).area_m2 ? b : a), first);
   const area =
     polygons.find((p) => !p.keepOut && p === largest) ?? polygons.find((p) => !p.keepOut) ?? largest;
-  const keepOut = polygons.filter((p) => p !== area).map((p) => p.ring);
+  const isZone = (p: Found) => p.keepOut || reaches(p.ring, area.ring);
+  const keepOut = polygons.filter((p) => p !== area && isZone(p)).map((p) => p.ring);
+  const others = polygons.filter((p) => p !== area && !isZone(p)).map((p) => p.ring);
   const zones = keepOut.length
     ? `, ${keepOut.length} more as keep-out zone${keepOut.length > 1 ? "s" : ""}`
     : "";
-  return { area: area.ring, keepOut, note: `${name}: area of ${area.ring.length} corners${zones}` };
+  const apart = others.length
+    ? `. ${others.length} more area${others.length > 1 ? "s lie" : " lies"} apart and ${others.length > 1 ? "are" : "is"} left out: a mission has one`
+    : "";
+  return {
+    area: area.ring,
+    keepOut,
+    others,
+    note: `${name}: area of ${area.ring.length} corners${zones}${apart}`,
+  };
+}
+
+/** Whether two rings share any place: a corner of one in the other, or sides that cross. */
+function reaches(one: readonly LngLat[], other: readonly LngLat[]): boolean {
+  const sides = (ring: readonly LngLat[]) =>
+    ring.map((corner, i) => [corner, ring[(i + 1) % ring.length] as LngLat] as const);
+  return (
+    one.some((corner) => isWithin(corner, other)) ||
+    other.some((corner) => isWithin(corner, one)) ||
+    sides(one).some(([a, b]) =>
+      sides(other).some(([c, d]) => turn(a, b, c) * turn(a, b, d) < 0 && turn(c, d, a) * turn(c, d, b) < 0),
+    )
+  );
+}
+
+function isWithin([x, y]: LngLat, ring: readonly LngLat[]): boolean {
+  let within = false;
+  ring.forEach(([x1, y1], i) => {
+    const [x2, y2] = ring[(i + 1) % ring.length] as LngLat;
+    if (y1 > y !== y2 > y && x < x1 + ((y - y1) / (y2 - y1)) * (x2 - x1)) within = !within;
+  });
+  return within;
 }
 
 function parsed(text: string): unknown {

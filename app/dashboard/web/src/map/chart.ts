@@ -61,6 +61,7 @@ export class Chart {
   #still: StillContent = { floor: null, area: null, keepOut: [], tracks: [], site: null };
   #lively: LivelyContent = NOTHING;
   #areaBounds: Bounds | null = null;
+  #draftBounds: Bounds | null = null;
   #fitting: (() => Padding) | null = null;
   #tiles = "";
   #styled = false;
@@ -146,8 +147,27 @@ export class Chart {
     this.#lay({ area, keepOut });
   }
 
+  /** A mission that is being described; its area is what is to be seen meanwhile. */
   setDraft(area: PolygonGeometry | null, keepOut: readonly PolygonGeometry[]): void {
+    this.#draftBounds = boundsOf(area?.coordinates[0] ?? []);
     this.#show({ draft: { area, keepOut } });
+  }
+
+  /** Goes to the area of the mission that is being described, unless enough of it can be seen. */
+  goToDraft(padding: () => Padding): void {
+    const bounds = this.#draftBounds;
+    if (!bounds || this.#isInSight(bounds, padding())) return;
+    this.#map.fitBounds(bounds, { padding: padding(), animate: false, maxZoom: 19 });
+  }
+
+  /** Whether the middle of something lies in the free part of the map, and neither tiny nor larger than that. */
+  #isInSight([west, south, east, north]: Bounds, { left, right, top, bottom }: Padding): boolean {
+    const at = this.#sheets.projection;
+    const [x, y] = [at.x((west + east) / 2), at.y((south + north) / 2)];
+    const [free_x, free_y] = [at.width - left - right, at.height - top - bottom];
+    const share = Math.max((at.x(east) - at.x(west)) / free_x, (at.y(south) - at.y(north)) / free_y);
+    const within = x > left && x < at.width - right && y > top && y < at.height - bottom;
+    return within && share > 0.02 && share < 1.2;
   }
 
   /** Shows the mission's area with room for what lies over the map's edges, and goes on to until the map is moved. */
@@ -159,12 +179,6 @@ export class Chart {
   /** What lies over the map has changed: shows the area in what is left of it, unless the map was moved by hand. */
   refit(): void {
     this.#fitAgain();
-  }
-
-  /** Shows a place once, as the area of a mission being described. */
-  show(points: readonly LngLat[], padding: () => Padding): void {
-    const bounds = boundsOf(points);
-    if (bounds) this.#map.fitBounds(bounds, { padding: padding(), animate: false, maxZoom: 19 });
   }
 
   /** A painted layer with its contours, whose levels are divided by `scale`; null: nothing is known. */
@@ -281,8 +295,9 @@ export class Chart {
   }
 
   #fitAgain = (): void => {
-    if (this.#fitting && this.#areaBounds) {
-      this.#map.fitBounds(this.#areaBounds, { padding: this.#fitting(), animate: false, maxZoom: 21 });
+    const bounds = this.#draftBounds ?? this.#areaBounds;
+    if (this.#fitting && bounds) {
+      this.#map.fitBounds(bounds, { padding: this.#fitting(), animate: false, maxZoom: 21 });
     }
   };
 

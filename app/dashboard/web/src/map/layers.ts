@@ -141,3 +141,11 @@ export function shareOutside(map: SeaFloor, layer: Shown, { low, high }: Range):
 }
 
 export { LANDMARK_COLOURS };
+
+/** What is wrong with the two ends of a colour range as typed; empty when it can be taken. */
+export function rangeFault(low: string, high: string): string {
+  const ends = [low, high].map((text) => (text.trim() === "" ? Number.NaN : Number(text)));
+  const [from, to] = ends as [number, number];
+  if (!Number.isFinite(from) || !Number.isFinite(to)) return "Both ends need a number";
+  return from < to ? "" : `The lower end, ${low.trim()}, must be below the upper one, ${high.trim()}`;
+}

@@ -1,6 +1,7 @@
 import { describe, expect, it } from "vitest";
+import type { MissionView } from "../api/types";
 import { boundsOf } from "../map/geo";
-import { areaOf, centred, emptyDraft, estimate, faultsOf, fieldOf, toMission } from "./draft";
+import { areaOf, centred, copyOf, emptyDraft, estimate, faultsOf, fieldOf, toMission } from "./draft";
 
 const draft = { ...emptyDraft([-8.705, 41.185]), name: "Quay" };
 
@@ -133,4 +134,39 @@ it("says before the start how long it takes at most and how dense it gets", () =
     spacing_m: 5,
   });
   expect(estimate({ ...draft, simulated: "0" }, 10_000)).toBeNull();
+});
+
+describe("names of simulated vehicles", () => {
+  it("are those that were given", () => {
+    const mission = toMission({ ...draft, simulated: "2", names: "north, south" });
+    expect(mission.vehicles.map((v) => v.name)).toEqual(["north", "south"]);
+  });
+
+  it.each([
+    ["north", "1 names for 2 vehicles"],
+    ["north, north", "Two vehicles are called north"],
+  ])("%s is refused", (names, words) => {
+    expect(faultsOf({ ...draft, simulated: "2", names }).names).toContain(words);
+  });
+});
+
+it("a copy keeps what the form does not show, and its vehicles as they are described", () => {
+  const vehicle = { name: "lauv-1", kind: "imc", sensor: "dvl", guidance: "legs", depth_m: 3 };
+  const original = {
+    ...toMission({ ...draft, com_range_m: "80" }),
+    kind: "survey",
+    keep_out: [],
+    seed: 7,
+    vehicles: [vehicle],
+    tide: { level_m: 0, source: "none" },
+    search: null,
+  };
+  const limits = { ...original.limits, keep_out_margin_m: 25 };
+  const copy = copyOf({ name: "Quay", spec: { ...original, limits } } as unknown as MissionView);
+  expect(copy.name).toBe("Quay (copy)");
+  const again = toMission({ ...copy, com_range_m: "" }) as unknown as Record<string, unknown>;
+  expect(again.vehicles).toEqual([vehicle]);
+  expect(again.seed).toBe(7);
+  expect(again.limits).toMatchObject({ keep_out_margin_m: 25, com_range_m: null });
+  expect(again.area).toEqual(original.area);
 });

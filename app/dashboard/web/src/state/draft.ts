@@ -1,6 +1,6 @@
 /** A mission being described: the form's fields, checked and turned into what the service takes. Pure. */
 
-import type { LngLat, NewMission, PlannerOptions, VehicleSpec } from "../api/types";
+import type { LngLat, MissionView, NewMission, PlannerOptions, VehicleSpec } from "../api/types";
 import { areaFault, polygonOf, ringOf } from "../map/area";
 import { rectangle } from "../map/geo";
 
@@ -42,7 +42,11 @@ export interface Draft {
   planner: string;
   options: PlannerOptions;
   simulated: string;
+  /** Of the simulated vehicles, separated by commas; empty: sim-1, sim-2 and so on. */
+  names: string;
   chosen: readonly VehicleSpec[];
+  /** What a mission that is copied has and the form does not show. */
+  base: Partial<NewMission>;
 }
 
 export type Faults = Partial<Record<keyof Draft, string>>;
@@ -96,9 +100,69 @@ export function emptyDraft(middle: LngLat): Draft {
     planner: "cao",
     options: {},
     simulated: "2",
+    names: "",
     chosen: [],
+    base: {},
   };
   return { ...draft, ...centred(draft, middle) };
+}
+
+/** A draft of a mission like one that there is, its vehicles as they are described there. */
+export function copyOf({ spec, name }: Pick<MissionView, "spec" | "name">): Draft {
+  const ring = ringOf(spec.area as NewMission["area"]);
+  const { tide, ...base } = spec;
+  const { limits, search } = base;
+  const text = (value: number | null | undefined) => (value == null ? "" : String(value));
+  const goal = search
+    ? { goal: typedPlace(search.goal as LngLat), entry: typedPlace(search.entry as LngLat) }
+    : {};
+  return {
+    ...emptyDraft(ring[0] ?? [0, 0]),
+    ...goal,
+    name: `${name} (copy)`,
+    kind: spec.kind,
+    ...(search
+      ? {
+          goal_radius_m: String(search.goal_radius_m),
+          window_min: String(search.window_s / 60),
+          safety_m: String(search.safety_m),
+          reach_m: String(search.scanner.reach_m),
+          obstacles: search.obstacles.map((one) => ringOf(one as NewMission["area"])),
+        }
+      : {}),
+    source: "drawn",
+    ring,
+    keepOut: spec.keep_out.map((zone) => ringOf(zone as NewMission["area"])),
+    steps: String(spec.steps),
+    cell_m: String(spec.cell_m),
+    accuracy_m: String(spec.accuracy_m),
+    speed_mps: String(spec.speed_mps),
+    max_step_m: String(limits.max_step_m),
+    min_depth_m: String(limits.min_depth_m),
+    max_depth_m: String(limits.max_depth_m),
+    min_altitude_m: String(limits.min_altitude_m),
+    min_separation_m: String(limits.min_separation_m),
+    com_range_m: text(limits.com_range_m),
+    tide_m: tide.level_m === 0 ? "" : String(tide.level_m),
+    tide_source: tide.level_m === 0 ? "" : tide.source,
+    planner: spec.planner.name,
+    options: spec.planner.options as PlannerOptions,
+    simulated: "0",
+    chosen: spec.vehicles as VehicleSpec[],
+    base: base as Partial<NewMission>,
+  };
+}
+
+/** Names of the simulated vehicles, each another one than those that were chosen have. */
+export function simulatedNames(draft: Draft): string[] {
+  const given = draft.names.split(",").map((name) => name.trim());
+  if (draft.names.trim() !== "") return given.filter((name) => name !== "");
+  const taken = new Set(draft.chosen.map((v) => v.name));
+  const names: string[] = [];
+  for (let n = 1; names.length < Number(draft.simulated); n++) {
+    if (!taken.has(`sim-${n}`)) names.push(`sim-${n}`);
+  }
+  return names;
 }
 
 /** Where a typed area begins when a place is to be its middle; nothing while its size is no size. */
@@ -184,6 +248,14 @@ export function faultsOf(draft: Draft): Faults {
   if (!faults.max_depth_m && !faults.min_depth_m && Number(draft.max_depth_m) < Number(draft.min_depth_m)) {
     faults.max_depth_m = "Deepest travel must not be above the shallowest";
   }
+  if (!faults.simulated) {
+    const names = simulatedNames(draft);
+    const all = [...draft.chosen.map((v) => v.name), ...names];
+    const twice = all.find((name, i) => all.indexOf(name) !== i);
+    if (names.length !== Number(draft.simulated))
+      faults.names = `${names.length} names for ${draft.simulated} vehicles: one for each, separated by commas`;
+    else if (twice !== undefined) faults.names = `Two vehicles are called ${twice || "nothing"}`;
+  }
   if (!faults.simulated && Number(draft.simulated) + draft.chosen.length === 0) {
     faults.simulated = "Choose at least one vehicle, or simulate some";
   }
@@ -224,16 +296,12 @@ export function cornersOf(draft: Draft): LngLat[] {
 export function toMission(draft: Draft): NewMission {
   const area = areaOf(draft);
   if (!area) throw new Error("the draft has faults");
-  const taken = new Set(draft.chosen.map((v) => v.name));
-  const simulated: VehicleSpec[] = [];
-  for (let n = 1; simulated.length < Number(draft.simulated); n++) {
-    const name = `sim-${n}`;
-    if (!taken.has(name)) simulated.push({ name, kind: "sim", sensor: "dvl" });
-  }
+  const simulated = simulatedNames(draft).map((name): VehicleSpec => ({ name, kind: "sim", sensor: "dvl" }));
   const range = draft.com_range_m.trim();
   const tide = draft.tide_m.trim();
   if (draft.kind === "search") return toSearch(draft, area, [...draft.chosen, ...simulated]);
   return {
+    ...draft.base,
     name: draft.name.trim(),
     area,
     keep_out: draft.keepOut.map(polygonOf),
@@ -243,12 +311,13 @@ export function toMission(draft: Draft): NewMission {
     accuracy_m: Number(draft.accuracy_m),
     speed_mps: Number(draft.speed_mps),
     limits: {
+      ...draft.base.limits,
       max_step_m: Number(draft.max_step_m),
       min_depth_m: Number(draft.min_depth_m),
       max_depth_m: Number(draft.max_depth_m),
       min_altitude_m: Number(draft.min_altitude_m),
       min_separation_m: Number(draft.min_separation_m),
-      ...(range ? { com_range_m: Number(range) } : {}),
+      ...(range || draft.base.limits ? { com_range_m: range ? Number(range) : null } : {}),
     },
     planner: { name: draft.planner, options: draft.options },
     ...(tide
@@ -262,6 +331,7 @@ function toSearch(draft: Draft, area: NewMission["area"], vehicles: VehicleSpec[
   const [goal, entry] = [placeOf(draft.goal), placeOf(draft.entry)];
   if (!goal || !entry) throw new Error("the draft has faults");
   return {
+    ...draft.base,
     name: draft.name.trim(),
     kind: "search",
     area,
@@ -269,12 +339,14 @@ function toSearch(draft: Draft, area: NewMission["area"], vehicles: VehicleSpec[
     vehicles: vehicles.map((vehicle) => (vehicle.kind === "sim" ? { ...vehicle, depth_m: 0 } : vehicle)),
     cell_m: Number(draft.cell_m),
     limits: {
+      ...draft.base.limits,
       min_depth_m: 0,
       max_depth_m: Number(draft.max_depth_m),
       min_altitude_m: Math.min(Number(draft.min_altitude_m), 0.5),
       min_separation_m: Number(draft.min_separation_m),
     },
     search: {
+      ...draft.base.search,
       goal,
       goal_radius_m: Number(draft.goal_radius_m),
       entry,

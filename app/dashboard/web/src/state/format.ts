@@ -66,3 +66,7 @@ export function clock(date: Date, zone: "utc" | "local"): string {
 function pad(value: number): string {
   return String(value).padStart(2, "0");
 }
+
+export function megabytes(bytes: number): string {
+  return `${(bytes / 1e6).toFixed(1)} MB`;
+}

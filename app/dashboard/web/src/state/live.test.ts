@@ -13,6 +13,8 @@ const vehicle = (
   sensor: "dvl",
   mission_id: "m",
   active: true,
+  left_at: null,
+  breach: "",
   link: "engaged",
   reason: "",
   age_s,

@@ -130,8 +130,9 @@ function newest(old: readonly WaypointView[], changed: readonly WaypointView[]):
 
 function extendTracks(tracks: LiveView["tracks"], vehicles: readonly VehicleView[]): LiveView["tracks"] {
   let changed: Record<string, TrackView> | null = null;
-  for (const { name, lon_deg, lat_deg, depth_m } of vehicles) {
-    if (lon_deg === null || lat_deg === null) continue;
+  for (const { name, active, lon_deg, lat_deg, depth_m } of vehicles) {
+    // Where a vehicle goes that left is no part of the mission's tracks.
+    if (!active || lon_deg === null || lat_deg === null) continue;
     const track = tracks[name] ?? { old: [], tail: [] };
     const last = track.tail.at(-1);
     if (last && Math.hypot(last[0] - lon_deg, last[1] - lat_deg) < LEAST_MOVE_DEG) continue;
@@ -159,7 +160,8 @@ function sampled(
   at: number,
 ): LiveView["samples"] {
   const next = { ...samples };
-  for (const { name, depth_m, altitude_m, battery_pct, age_s } of vehicles) {
+  for (const { name, active, depth_m, altitude_m, battery_pct, age_s } of vehicles) {
+    if (!active) continue;
     next[name] = [
       ...(samples[name] ?? []).slice(1 - MOST_SAMPLES),
       { at, depth_m, altitude_m, battery_pct, age_s },

@@ -46,6 +46,15 @@ export const replayed = computed<Replayed[] | null>(() => {
   });
 });
 
+/** The step that is replayed; undefined while the present is shown. */
+export const shownStep = computed(() => steps.value.find((s) => s.number === replayStep.value));
+
+/** Seconds from the first step to the one that is replayed, pauses included. */
+export const elapsedThen = computed(() => {
+  const [first, then] = [steps.value[0], shownStep.value];
+  return first && then ? (Date.parse(then.committed_at) - Date.parse(first.committed_at)) / 1000 : null;
+});
+
 /** Shows a step of the past; asks for what is needed the first time. */
 export async function replay(step: number): Promise<void> {
   const id = selectedId.peek();

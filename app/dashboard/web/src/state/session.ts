@@ -1,11 +1,12 @@
 /** What goes on while the page is open: asking for lists, following one mission, sending commands. */
 
 import { effect, signal, untracked } from "@preact/signals";
-import { api, liveUrl, ServiceError, token } from "../api/client";
+import { api, liveUrl, ServiceError } from "../api/client";
 import { LiveSocket } from "../api/socket";
 import type { ActionView, MissionAction, NewMission } from "../api/types";
 import { withTiles } from "../map/seafloor";
 import { siteOf } from "../map/site";
+import { identify, me, signedOut } from "./access";
 import { EMPTY_VIEW, reduce, withEvents, withMission } from "./live";
 import {
   fleet,
@@ -47,7 +48,7 @@ export function startSession(): void {
   void refreshForever();
   effect(() => {
     const id = selectedId.value;
-    return id ? followMission(id) : clear();
+    return id && me.value && !signedOut.value ? followMission(id) : clear();
   });
 }
 
@@ -57,13 +58,15 @@ export function selectMission(id: string): void {
 
 async function refreshForever(): Promise<never> {
   for (;;) {
-    await refresh();
+    // Without anybody signed in every request would be refused, and count as one more.
+    if (!signedOut.peek()) await refresh();
     await new Promise((resolve) => setTimeout(resolve, LIST_PERIOD_MS));
   }
 }
 
 export async function refresh(): Promise<void> {
   try {
+    if (!me.peek()) await identify();
     const [list, vehicles] = await Promise.all([api.missions(), api.vehicles()]);
     missions.value = list;
     fleet.value = vehicles;
@@ -79,19 +82,15 @@ export async function refresh(): Promise<void> {
 
 export function noteFault(error: unknown): void {
   if (!(error instanceof ServiceError)) throw error;
-  serviceFault.value = error;
+  // Whoever asked without a session may not even say who he is: that is settled by signing in.
+  if (error.status === 401 || (error.status === 403 && !me.peek())) signedOut.value = error;
+  else serviceFault.value = error;
 }
 
 /** What the service said, for the operator. */
 export function said(error: unknown): string {
   if (!(error instanceof ServiceError)) return String(error);
   return [error.message, error.remedy].filter(Boolean).join(". ");
-}
-
-/** Uses another access token from now on, and asks for everything again. */
-export function signIn(text: string): void {
-  token.value = text.trim();
-  location.reload();
 }
 
 function clear(): void {
@@ -122,6 +121,7 @@ function followMission(id: string): () => void {
   const socket = new LiveSocket(liveUrl(id), {
     onStatus: (status) => {
       socketStatus.value = status;
+      if (status.kind === "refused" && !closed) void refresh();
     },
     onMessage: (message) => {
       view.value = reduce(view.peek(), message, Date.now());
@@ -255,6 +255,19 @@ export async function act(action: MissionAction): Promise<ActionView | null> {
 export async function abortVehicle(name: string): Promise<ActionView | null> {
   const id = selectedId.value;
   return id ? send(`abort of ${name}`, api.abortVehicle(id, name)) : null;
+}
+
+/** Lets a vehicle that left take part again. */
+export async function rejoin(name: string): Promise<void> {
+  const id = selectedId.value;
+  if (id) await send(`taking ${name} back`, api.rejoin(id, name));
+}
+
+/** Deletes a mission in which nothing was measured. */
+export async function deleteMission(id: string): Promise<void> {
+  await send("deleting the mission", api.deleteMission(id));
+  if (selectedId.value === id) location.hash = "#/";
+  await refresh();
 }
 
 async function send<T>(what: string, answer: Promise<T>): Promise<T | null> {

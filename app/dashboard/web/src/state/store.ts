@@ -6,6 +6,7 @@ import type { SocketStatus } from "../api/socket";
 import type {
   LngLat,
   MissionSummary,
+  MissionView,
   PolygonGeometry,
   SoundingView,
   StepView,
@@ -60,6 +61,17 @@ export interface Vehicle {
   age_s: number | null;
   stale: boolean;
 }
+
+/** Whether a dialog lies over the page. */
+export const dialogOpen = computed(
+  () =>
+    abortDialogOpen.value ||
+    finishOpen.value ||
+    preflightOpen.value ||
+    linksOpen.value ||
+    fleetOpen.value ||
+    accountOpen.value,
+);
 
 export const vehicles = computed<Vehicle[]>(() =>
   (mission.value?.vehicles ?? []).map((v) => {
@@ -170,6 +182,8 @@ export const stripHeight = signal(0);
 
 export const panelOpen = signal(matchMedia("(min-width: 1180px)").matches);
 export const describing = signal(false);
+/** The mission that the one being described begins as a copy of. */
+export const copied = signal<MissionView | null>(null);
 /** What is being asked before an abort: of the whole team, or of one vehicle. */
 export const abortDialogOpen = signal(false);
 export const abortOne = signal<string | null>(null);
@@ -178,6 +192,10 @@ export const fleetOpen = signal(false);
 export const preflightOpen = signal(false);
 /** Whether the link doctor is shown. */
 export const linksOpen = signal(false);
+/** Whether is asked if the mission is to be finished early. */
+export const finishOpen = signal(false);
+/** Whether is shown who is signed in. */
+export const accountOpen = signal(false);
 
 export type Tab = "log" | "files" | "charts" | "soundings" | "compare";
 /** What is opened above the bottom strip. */

@@ -37,6 +37,11 @@ describe("numbers", () => {
 
 describe("a vehicle's state in words", () => {
   const vehicle = (link: VehicleView["link"], active = true) => ({ link, active }) as VehicleView;
+  it("is loudest about a vehicle that is where it must not be", () => {
+    const inside = { ...vehicle("engaged"), breach: "in keep-out zone 1" } as VehicleView;
+    expect(vehicleState(inside, undefined)).toEqual({ words: "In keep-out zone 1", tone: "alarm" });
+  });
+
   const waypoint = (status: WaypointView["status"]) => ({ step: 7, status }) as WaypointView;
 
   it("is loud about unexpected silence and calm about silence by plan", () => {

@@ -69,8 +69,10 @@ export function vehicleState(
   waypoint: WaypointView | undefined,
 ): { words: string; tone: Tone } {
   if (!vehicle.active) return { words: "Left the mission", tone: "calm" };
+  if (vehicle.breach) return { words: capital(vehicle.breach), tone: "alarm" };
   // It is launched when the mission starts and put away when that ends: nothing to worry about.
-  if (vehicle.kind === "sim" && vehicle.link === "unknown") return { words: "Not launched", tone: "calm" };
+  if (vehicle.kind === "sim" && vehicle.link === "unknown")
+    return { words: vehicle.lat_deg === null ? "Not launched" : "Simulation over", tone: "calm" };
   const tone = LINK_TONES[vehicle.link];
   if (vehicle.link !== "engaged" || !waypoint) return { words: LINK_WORDS[vehicle.link], tone };
   switch (waypoint.status) {
@@ -86,6 +88,8 @@ export function vehicleState(
       return { words: `Waypoint ${waypoint.step} not acknowledged`, tone: "calm" };
   }
 }
+
+const capital = (words: string): string => words.charAt(0).toUpperCase() + words.slice(1);
 
 const ALLOWED: Record<MissionAction, readonly MissionState[]> = {
   start: ["ready"],

@@ -1,26 +1,25 @@
 import { useSignal } from "@preact/signals";
-import { useEffect, useRef } from "preact/hooks";
+import { useEffect } from "preact/hooks";
 import type { StopView } from "../api/types";
 import { abortVehicle, act, refusal } from "../state/session";
-import { abortDialogOpen, abortOne, mission, vehicles } from "../state/store";
+import { abortDialogOpen, abortOne, mission, type Vehicle, vehicles } from "../state/store";
 import { hasEnded } from "../state/words";
+import { Dialog } from "./Dialog";
+import { Receipts } from "./Receipts";
 
-/** Asks once, then stays until it has shown what every vehicle answered. Of the whole team, or of one vehicle. */
+/**
+ * Asks once, then stays until it has shown what every vehicle answered. Of the whole team, or of one vehicle, which can
+ * be chosen here, too: the cards may be covered.
+ */
 export function AbortDialog() {
-  const dialog = useRef<HTMLDialogElement>(null);
   const receipts = useSignal<readonly StopView[] | null>(null);
   const sending = useSignal(false);
   const open = abortDialogOpen.value;
   const only = abortOne.value;
 
   useEffect(() => {
-    if (open) {
-      receipts.value = null;
-      dialog.current?.showModal();
-    } else {
-      dialog.current?.close();
-    }
-  }, [open]);
+    if (open) receipts.value = null;
+  }, [open, only]);
 
   const close = () => {
     abortDialogOpen.value = false;
@@ -39,33 +38,32 @@ export function AbortDialog() {
   const refused = refusal.value?.what === what ? refusal.value.error : null;
   const again = only !== null && mission.value !== null && hasEnded(mission.value.state);
   const name = only ?? mission.value?.name ?? "the mission";
+  const asked = !open
+    ? []
+    : vehicles.value.filter((v) => v.view.active && (only === null || v.view.name === only));
 
   return (
-    <dialog
-      ref={dialog}
-      class="dialog"
-      aria-labelledby="abort-title"
-      onClose={close}
-      data-testid="abort-dialog"
-    >
+    <Dialog open={open} onClose={close} title="abort-title" id="abort-dialog" kind="stopping" above>
       <h2 id="abort-title">
         {receipts.value ? doneTitle(only, again) : `${again ? "Stop" : "Abort"} ${name}?`}
       </h2>
-      {receipts.value ? null : <p>{consequence(only, again)}</p>}
-      <ul class="receipts" aria-live="polite">
-        {rows(receipts.value, sending.value, only).map((row) => (
-          <li key={row.vehicle} class={row.tone} data-testid={`receipt-${row.vehicle}`}>
-            <span aria-hidden="true">{row.sign}</span> <b>{row.vehicle}</b> {row.words}
-          </li>
-        ))}
-      </ul>
-      {receipts.value?.length === 0 ? <p>No vehicle was under way.</p> : null}
-      {receipts.value?.some((r) => !r.acknowledged) ? (
-        <p class="reason alarm">
-          A vehicle that did not acknowledge may go on until its own time-out. Watch it, and stop it from its
-          console if it does not surface.
-        </p>
-      ) : null}
+      {receipts.value ? (
+        <Receipts stops={receipts.value} />
+      ) : (
+        <>
+          <p>{consequence(only, again)}</p>
+          <ul class="receipts" aria-live="polite">
+            {asked.map((vehicle) => (
+              <Asked
+                key={vehicle.view.name}
+                vehicle={vehicle}
+                sending={sending.value}
+                choice={only === null && asked.length > 1}
+              />
+            ))}
+          </ul>
+        </>
+      )}
       {refused ? (
         <p class="reason alarm" role="alert">
           {refused.message}. {refused.remedy}
@@ -87,7 +85,32 @@ export function AbortDialog() {
           </button>
         )}
       </div>
-    </dialog>
+    </Dialog>
+  );
+}
+
+/** A vehicle that is about to be stopped; of several each can be stopped alone. */
+function Asked({ vehicle, sending, choice }: { vehicle: Vehicle; sending: boolean; choice: boolean }) {
+  const { name } = vehicle.view;
+  return (
+    <li class="calm" data-testid={`receipt-${name}`}>
+      <span>
+        <span aria-hidden="true">{sending ? "…" : "•"}</span> <b>{name}</b>{" "}
+        {sending ? "waiting for its acknowledgement" : ""}
+      </span>
+      {choice && !sending ? (
+        <button
+          type="button"
+          class="abort-one"
+          data-testid={`abort-only-${name}`}
+          onClick={() => {
+            abortOne.value = name;
+          }}
+        >
+          Only {name}…
+        </button>
+      ) : null}
+    </li>
   );
 }
 
@@ -100,25 +123,6 @@ function doneTitle(only: string | null, again: boolean): string {
 function consequence(only: string | null, again: boolean): string {
   if (again) return "It did not acknowledge its last stop. It is told once more.";
   return only
-    ? "This vehicle is told to stop and leaves the mission; the others go on. It can be added again."
+    ? "This vehicle is told to stop and leaves the mission; the others go on. It stays in sight and can be added again."
     : "Every vehicle is told to stop following its waypoints. An aborted mission cannot be resumed; its map stays.";
-}
-
-function rows(receipts: readonly StopView[] | null, sending: boolean, only: string | null) {
-  if (receipts) {
-    return receipts.map((r) => ({
-      vehicle: r.vehicle,
-      tone: r.acknowledged ? "good" : "alarm",
-      sign: r.acknowledged ? "✓" : "✕",
-      words: `${r.acknowledged ? "acknowledged the stop" : "did not acknowledge"}${r.detail ? `: ${r.detail}` : ""}`,
-    }));
-  }
-  return vehicles.value
-    .filter((v) => v.view.active && (only === null || v.view.name === only))
-    .map((v) => ({
-      vehicle: v.view.name,
-      tone: "calm",
-      sign: sending ? "…" : "•",
-      words: sending ? "waiting for its acknowledgement" : "",
-    }));
 }

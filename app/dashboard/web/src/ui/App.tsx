@@ -1,8 +1,11 @@
-import { in3d, mission, panelOpen, stripHeight } from "../state/store";
+import { useEffect, useRef } from "preact/hooks";
+import { dialogOpen, in3d, mission, panelOpen, stripHeight } from "../state/store";
 import { AbortDialog } from "./AbortDialog";
+import { AccountDialog } from "./Account";
 import { BottomStrip } from "./BottomStrip";
 import { ChartPane } from "./ChartPane";
 import { Alarms } from "./EventLog";
+import { FinishDialog } from "./FinishDialog";
 import { FleetDialog } from "./FleetDialog";
 import { Legend } from "./Legend";
 import { LinksDialog } from "./LinksDialog";
@@ -18,11 +21,28 @@ import { VehicleCards } from "./VehicleCards";
 const LEAST_STRIP_PX = 106;
 
 export function App() {
+  const root = useRef<HTMLDivElement>(null);
+  useEffect(() => {
+    // The bar wraps as the window says: dialogs begin below it.
+    const bar = root.current?.querySelector<HTMLElement>(".top-bar");
+    if (!bar) return;
+    const watcher = new ResizeObserver(() => {
+      root.current?.style.setProperty("--below-bar", `${bar.getBoundingClientRect().bottom}px`);
+    });
+    watcher.observe(bar);
+    return () => watcher.disconnect();
+  }, []);
+  // What lies under a dialog is out of reach; the top bar with the stop never is.
+  const covered = dialogOpen.value;
   const classes = ["app", panelOpen.value ? "with-missions" : "", mission.value ? "with-mission" : ""];
   return (
-    <div class={classes.join(" ")} style={{ "--strip": `${Math.max(LEAST_STRIP_PX, stripHeight.value)}px` }}>
+    <div
+      ref={root}
+      class={classes.join(" ")}
+      style={{ "--strip": `${Math.max(LEAST_STRIP_PX, stripHeight.value)}px` }}
+    >
       <TopBar />
-      <main class="stage">
+      <main class="stage" inert={covered}>
         <ChartPane />
         {in3d.value ? <SpaceView /> : <Readout />}
         <Legend />
@@ -31,13 +51,17 @@ export function App() {
           <Notices />
         </div>
       </main>
-      {panelOpen.value ? <MissionPanel /> : null}
-      <VehicleCards />
-      <BottomStrip />
+      <div class="around" inert={covered}>
+        {panelOpen.value ? <MissionPanel /> : null}
+        <VehicleCards />
+        <BottomStrip />
+      </div>
       <PreflightDialog />
       <AbortDialog />
       <LinksDialog />
       <FleetDialog />
+      <FinishDialog />
+      <AccountDialog />
     </div>
   );
 }

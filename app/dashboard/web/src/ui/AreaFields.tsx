@@ -11,6 +11,7 @@ import { Fault, Text, useForm } from "./Fields";
 export function AreaFields() {
   const { draft, faults, set } = useForm();
   const note = useSignal("");
+  const others = useSignal<readonly (readonly LngLat[])[]>([]);
   const corners = cornersOf(draft);
   const size = corners.length > 2 ? sizeOf(corners) : null;
   const dragged = useRef<readonly LngLat[] | null>(null);
@@ -39,6 +40,7 @@ export function AreaFields() {
   };
   const take = (ring: LngLat[]) => {
     note.value = "";
+    others.value = [];
     set({ source: "drawn", ring });
   };
   const read = async (file: File | undefined) => {
@@ -47,6 +49,7 @@ export function AreaFields() {
       const found = areasIn(file.name, await file.text());
       set({ source: "drawn", ring: found.area, keepOut: [...draft.keepOut, ...found.keepOut] });
       note.value = found.note;
+      others.value = found.others;
     } catch (error) {
       note.value = error instanceof Error ? error.message : String(error);
     }
@@ -103,6 +106,24 @@ export function AreaFields() {
         <p class="hint" role="status" data-testid="area-note">
           {note.value}
         </p>
+      ) : null}
+      {others.value.length > 0 ? (
+        <div class="other-areas">
+          {others.value.map((ring, i) => (
+            <button
+              key={ring.join()}
+              type="button"
+              class="command"
+              data-testid={`other-area-${i + 1}`}
+              onClick={() => {
+                others.value = others.value.map((one) => (one === ring ? draft.ring : one));
+                set({ source: "drawn", ring });
+              }}
+            >
+              Take the one of {(sizeOf(ring).area_m2 / 1e4).toFixed(2)} ha
+            </button>
+          ))}
+        </div>
       ) : null}
       {draft.source === "typed" ? (
         <>

@@ -1,7 +1,8 @@
 import type { ComponentChildren } from "preact";
 import { useEffect, useRef } from "preact/hooks";
 import { count, distance, metres, percent } from "../state/format";
-import { mission, stripHeight, type Tab, tab, view } from "../state/store";
+import { shownStep } from "../state/replay";
+import { mission, replayStep, stripHeight, type Tab, tab, view } from "../state/store";
 import { Charts } from "./Charts";
 import { Compare } from "./Compare";
 import { EventLog } from "./EventLog";
@@ -24,6 +25,13 @@ export function BottomStrip() {
   }, [present === null]);
   if (!present) return null;
   const p = present.progress;
+  const then = shownStep.value;
+  const past = replayStep.value !== null;
+  const figures = then?.figures ?? {};
+  const coverage_pct = past ? (figures.coverage_pct ?? null) : p.coverage_pct;
+  const mean_sd_m = past ? (figures.mean_sd_m ?? null) : p.mean_sd_m;
+  const soundings = past ? (then?.soundings ?? null) : p.soundings;
+  const distance_m = past ? (figures.distance_m ?? null) : p.distance_m;
   const newest = view.value.events.at(-1);
   return (
     <section ref={strip} class="bottom" aria-label="Progress and log">
@@ -34,24 +42,24 @@ export function BottomStrip() {
       {tab.value === "compare" ? <Compare /> : null}
       <TimeSlider />
       <div class="strip">
-        <dl class="figures">
-          {p.search ? (
+        <dl class="figures" data-past={past}>
+          {p.search && !past ? (
             <>
               <Figure label="Goal area seen" value={percent(p.search.goal_pct, 1)} id="strip-goal" />
               <Figure label="Site seen" value={percent(p.search.explored_pct, 1)} id="strip-site" />
             </>
-          ) : (
+          ) : p.search ? null : (
             <>
               <Figure
                 label={`Known to ${present.spec.accuracy_m} m`}
-                value={percent(p.coverage_pct, 1)}
+                value={percent(coverage_pct, 1)}
                 id="coverage"
               />
-              <Figure label="Mean deviation" value={metres(p.mean_sd_m, 2)} id="mean-sd" />
+              <Figure label="Mean deviation" value={metres(mean_sd_m, 2)} id="mean-sd" />
             </>
           )}
-          <Figure label="Soundings" value={count(p.soundings)} id="soundings" />
-          <Figure label="Travelled" value={distance(p.distance_m)} id="distance" />
+          <Figure label="Soundings" value={soundings === null ? "–" : count(soundings)} id="soundings" />
+          <Figure label="Travelled" value={distance_m === null ? "–" : distance(distance_m)} id="distance" />
         </dl>
         <nav class="tabs" aria-label="More about this mission">
           <Toggle name="charts">Charts</Toggle>

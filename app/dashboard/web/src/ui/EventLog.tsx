@@ -1,6 +1,7 @@
 import { useComputed, useSignal } from "@preact/signals";
 import { api } from "../api/client";
 import type { Level } from "../api/types";
+import { whyNotCommand } from "../state/access";
 import { clock } from "../state/format";
 import { said } from "../state/session";
 import { openAlarms, selectedId, takeAlarms, view } from "../state/store";
@@ -119,7 +120,12 @@ function NoteForm() {
           text.value = event.currentTarget.value;
         }}
       />
-      <button type="submit" class="command" disabled={sending.value || text.value.trim() === ""}>
+      <button
+        type="submit"
+        class="command"
+        disabled={sending.value || text.value.trim() === "" || whyNotCommand.value !== ""}
+        title={whyNotCommand.value}
+      >
         Write down
       </button>
       {fault.value ? (

@@ -20,7 +20,7 @@ export function useForm(): FormState {
 
 type TextField = Exclude<
   keyof Draft,
-  "chosen" | "ring" | "keepOut" | "obstacles" | "options" | "source" | "kind"
+  "chosen" | "ring" | "keepOut" | "obstacles" | "options" | "source" | "kind" | "base"
 >;
 
 interface TextProps {

@@ -1,13 +1,21 @@
 import { useComputed, useSignal, useSignalEffect } from "@preact/signals";
 import { api, ServiceError } from "../api/client";
 import type { ProductView, QualityView } from "../api/types";
-import { mission, selectedId, view } from "../state/store";
+import { duration, megabytes } from "../state/format";
+import { mission, now, selectedId, view } from "../state/store";
+
+/** A file that is on its way. */
+interface Making {
+  since: number;
+  /** Bytes that have come; 0 while the service makes it. */
+  received: number;
+}
 
 /** What can be downloaded of the mission, and what may be said of its map's uncertainty. */
 export function Files() {
   const products = useSignal<ProductView[]>([]);
   const quality = useSignal<QualityView | null>(null);
-  const busy = useSignal("");
+  const making = useSignal<Readonly<Record<string, Making>>>({});
   const fault = useSignal("");
   const hasMap = useComputed(() => view.value.mapVersion > 0);
 
@@ -43,10 +51,14 @@ export function Files() {
   });
 
   const download = async (product: ProductView) => {
-    busy.value = product.name;
+    const note = (received: number) => {
+      const since = making.peek()[product.name]?.since ?? Date.now();
+      making.value = { ...making.peek(), [product.name]: { since, received } };
+    };
+    note(0);
     fault.value = "";
     try {
-      const file = await api.file(product.href);
+      const file = await api.file(product.href, note);
       const address = URL.createObjectURL(file.content);
       const link = document.createElement("a");
       link.href = address;
@@ -54,9 +66,10 @@ export function Files() {
       link.click();
       URL.revokeObjectURL(address);
     } catch (error) {
-      fault.value = said(error);
+      fault.value = `${product.name}: ${said(error)}`;
     } finally {
-      busy.value = "";
+      const { [product.name]: _, ...others } = making.peek();
+      making.value = others;
     }
   };
 
@@ -74,18 +87,29 @@ export function Files() {
             <button
               type="button"
               class="command"
-              disabled={busy.value !== "" || (product.needs_map && !hasMap.value)}
+              disabled={making.value[product.name] !== undefined || (product.needs_map && !hasMap.value)}
               data-testid={`file-${product.name}`}
               onClick={() => download(product)}
             >
-              {busy.value === product.name ? "…" : product.name}
+              {product.name}
             </button>
             <span>{product.title}</span>
+            {making.value[product.name] ? <Progress making={making.value[product.name] as Making} /> : null}
           </li>
         ))}
       </ul>
       {hasMap.value ? null : <p class="empty">Files of the map follow with the first accepted sounding.</p>}
     </div>
+  );
+}
+
+/** How a file comes along: how long the service has been making it, then how much has come. */
+function Progress({ making: { since, received } }: { making: Making }) {
+  const seconds = Math.max(0, (now.value - since) / 1000);
+  return (
+    <small role="status" data-testid="making">
+      {received === 0 ? `being made, ${duration(seconds)}` : `${megabytes(received)} received`}
+    </small>
   );
 }
 

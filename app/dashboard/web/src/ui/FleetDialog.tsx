@@ -1,28 +1,17 @@
-import { useEffect, useRef } from "preact/hooks";
 import type { VehicleView } from "../api/types";
 import { age, metres, percent, place } from "../state/format";
 import { coordinateFormat, fleet, fleetOpen, missions } from "../state/store";
 import { vehicleState } from "../state/words";
+import { Dialog } from "./Dialog";
 
 /** Every vehicle that the service knows of, in a mission or not, one a line. */
 export function FleetDialog() {
-  const dialog = useRef<HTMLDialogElement>(null);
   const open = fleetOpen.value;
-  useEffect(() => {
-    if (open) dialog.current?.showModal();
-    else dialog.current?.close();
-  }, [open]);
   const close = () => {
     fleetOpen.value = false;
   };
   return (
-    <dialog
-      ref={dialog}
-      class="dialog fleet"
-      data-testid="fleet-dialog"
-      aria-labelledby="fleet-title"
-      onClose={close}
-    >
+    <Dialog open={open} onClose={close} title="fleet-title" id="fleet-dialog" kind="fleet">
       <h2 id="fleet-title">Fleet</h2>
       {fleet.value.length === 0 ? (
         <p class="empty">
@@ -66,7 +55,7 @@ export function FleetDialog() {
           Close
         </button>
       </div>
-    </dialog>
+    </Dialog>
   );
 }
 

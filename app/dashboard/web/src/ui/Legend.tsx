@@ -1,5 +1,6 @@
 import { type Signal, useSignal } from "@preact/signals";
 import type { ComponentChildren } from "preact";
+import { useEffect, useRef } from "preact/hooks";
 import {
   KINDS,
   LANDMARK_COLOURS,
@@ -7,6 +8,7 @@ import {
   landmarkShares,
   paletteOf,
   type Range,
+  rangeFault,
   type Shown,
   shareOutside,
 } from "../map/layers";
@@ -81,7 +83,7 @@ function Scale({ range }: { range: Range }) {
   return (
     <>
       <div class="range-row">
-        <RangeInputs range={range} onChange={setRange} key={`${layer.value} ${range.low} ${range.high}`}>
+        <RangeInputs range={range} onChange={setRange} key={layer.value}>
           <div
             class="scale"
             role="img"
@@ -215,17 +217,24 @@ interface RangeProps {
 function RangeInputs({ range, onChange, children }: RangeProps) {
   const low = useSignal(String(range.low));
   const high = useSignal(String(range.high));
-  const valid = low.value.trim() !== "" && high.value.trim() !== "" && Number(low.value) < Number(high.value);
+  const form = useRef<HTMLFormElement>(null);
+  // The data may change the range, but not what is being typed: both ends belong together.
+  useEffect(() => {
+    if (form.current?.contains(document.activeElement)) return;
+    low.value = String(range.low);
+    high.value = String(range.high);
+  }, [range.low, range.high]);
+  const fault = rangeFault(low.value, high.value);
   const commit = () => {
     const next = { low: Number(low.value), high: Number(high.value) };
-    if (valid && (next.low !== range.low || next.high !== range.high)) onChange(next);
+    if (!fault && (next.low !== range.low || next.high !== range.high)) onChange(next);
   };
   const end = (value: Signal<string>, label: string, name: string) => (
     <input
       type="text"
       inputMode="decimal"
       aria-label={label}
-      aria-invalid={valid ? "false" : "true"}
+      aria-invalid={fault ? "true" : "false"}
       data-testid={name}
       value={value.value}
       onInput={(event) => {
@@ -236,6 +245,7 @@ function RangeInputs({ range, onChange, children }: RangeProps) {
   );
   return (
     <form
+      ref={form}
       class="range"
       onSubmit={(event) => {
         event.preventDefault();
@@ -245,6 +255,11 @@ function RangeInputs({ range, onChange, children }: RangeProps) {
       {end(low, "Lower end of the colour range", "range-low")}
       {children}
       {end(high, "Upper end of the colour range", "range-high")}
+      {fault ? (
+        <span class="fault range-fault" role="alert" data-testid="range-fault">
+          ▲ {fault}
+        </span>
+      ) : null}
       <button type="submit" class="visually-hidden" tabIndex={-1}>
         Set the range
       </button>

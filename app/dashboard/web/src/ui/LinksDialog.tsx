@@ -1,26 +1,22 @@
 import { useSignal } from "@preact/signals";
-import { useEffect, useRef } from "preact/hooks";
+import { useEffect } from "preact/hooks";
 import { api, ServiceError } from "../api/client";
 import type { DoctorView, Finding, VehicleDiagnosis } from "../api/types";
 import { clock } from "../state/format";
 import { linksOpen } from "../state/store";
 import { FINDING_SIGNS, FINDING_TONES } from "../state/words";
+import { Dialog } from "./Dialog";
 
 const AGAIN_MS = 5000;
 
 /** What keeps vehicles from working with us, as the link doctor sees it now. */
 export function LinksDialog() {
-  const dialog = useRef<HTMLDialogElement>(null);
   const found = useSignal<DoctorView | null>(null);
   const trouble = useSignal("");
   const open = linksOpen.value;
 
   useEffect(() => {
-    if (!open) {
-      dialog.current?.close();
-      return;
-    }
-    dialog.current?.showModal();
+    if (!open) return;
     const ask = async () => {
       try {
         found.value = await api.doctor();
@@ -39,13 +35,7 @@ export function LinksDialog() {
   };
   const view = found.value;
   return (
-    <dialog
-      ref={dialog}
-      class="dialog links"
-      aria-labelledby="links-title"
-      onClose={close}
-      data-testid="links-dialog"
-    >
+    <Dialog open={open} onClose={close} title="links-title" id="links-dialog" kind="links">
       <h2 id="links-title">Links to IMC vehicles</h2>
       {trouble.value ? (
         <p class="reason alarm" role="alert">
@@ -65,7 +55,7 @@ export function LinksDialog() {
           Close
         </button>
       </div>
-    </dialog>
+    </Dialog>
   );
 }
 

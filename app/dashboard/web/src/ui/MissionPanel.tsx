@@ -1,6 +1,9 @@
+import { useSignal } from "@preact/signals";
+import type { MissionSummary } from "../api/types";
+import { whyNotCommand } from "../state/access";
 import { count } from "../state/format";
-import { selectMission } from "../state/session";
-import { describing, fleetOpen, missions, selectedId, serviceFault } from "../state/store";
+import { deleteMission, selectMission } from "../state/session";
+import { copied, describing, fleetOpen, mission, missions, selectedId, serviceFault } from "../state/store";
 import { MISSION_SIGNS, MISSION_WORDS } from "../state/words";
 import { NewMissionForm } from "./NewMissionForm";
 
@@ -32,6 +35,8 @@ function MissionList() {
           type="button"
           class="command"
           data-testid="new-mission"
+          disabled={whyNotCommand.value !== ""}
+          title={whyNotCommand.value}
           onClick={() => {
             describing.value = true;
           }}
@@ -66,9 +71,69 @@ function MissionList() {
                 {new Date(m.created_at).toLocaleString("en-GB", { dateStyle: "medium", timeStyle: "short" })}
               </small>
             </a>
+            {m.id === selectedId.value ? <Actions of={m} /> : null}
           </li>
         ))}
       </ul>
     </>
+  );
+}
+
+/** What can be done with the mission that is shown: begin another one like it, or delete it while it holds nothing. */
+function Actions({ of: { id, state, progress } }: { of: MissionSummary }) {
+  const asked = useSignal(false);
+  const empty = progress.step === 0 && progress.soundings + progress.rejected === 0;
+  const atSea = state === "running" || state === "paused";
+  const forbidden = whyNotCommand.value;
+  return (
+    <div class="mission-actions">
+      <button
+        type="button"
+        class="command"
+        data-testid="copy-mission"
+        disabled={forbidden !== "" || mission.value?.id !== id}
+        title={forbidden || "Describe a new mission that begins as a copy of this one"}
+        onClick={() => {
+          copied.value = mission.value;
+          describing.value = true;
+        }}
+      >
+        Copy
+      </button>
+      {asked.value ? (
+        <>
+          <button
+            type="button"
+            class="command"
+            data-testid="confirm-delete"
+            onClick={() => void deleteMission(id)}
+          >
+            Delete it for good
+          </button>
+          <button
+            type="button"
+            class="command"
+            onClick={() => {
+              asked.value = false;
+            }}
+          >
+            Keep it
+          </button>
+        </>
+      ) : (
+        <button
+          type="button"
+          class="command"
+          data-testid="delete-mission"
+          disabled={forbidden !== "" || !empty || atSea}
+          title={forbidden || (empty && !atSea ? "" : "What was measured is kept")}
+          onClick={() => {
+            asked.value = true;
+          }}
+        >
+          Delete…
+        </button>
+      )}
+    </div>
   );
 }

@@ -6,6 +6,7 @@ import { polygonOf, sizeOf } from "../map/area";
 import type { SearchMark } from "../map/site";
 import {
   areaOf,
+  copyOf,
   cornersOf,
   type Draft,
   emptyDraft,
@@ -15,18 +16,20 @@ import {
   fieldOf,
   PLANNER_PRESETS,
   placeOf,
+  simulatedNames,
   toMission,
 } from "../state/draft";
 import { distance, duration } from "../state/format";
 import { createMission, said } from "../state/session";
-import { describing, draftShapes, drawing, fleet, mapCentre } from "../state/store";
+import { copied, describing, draftShapes, drawing, fleet, mapCentre } from "../state/store";
 import { AreaFields } from "./AreaFields";
 import { Fault, Form, Text, useForm } from "./Fields";
 import { Forecast } from "./Forecast";
 import { SearchFields } from "./SearchFields";
 
 export function NewMissionForm() {
-  const draft = useSignal(emptyDraft(mapCentre.peek()));
+  const original = copied.peek();
+  const draft = useSignal(original ? copyOf(original) : emptyDraft(mapCentre.peek()));
   const faults = useSignal<Faults>({});
   const refused = useSignal<ServiceError | null>(null);
   const sending = useSignal(false);
@@ -53,6 +56,7 @@ export function NewMissionForm() {
 
   const close = () => {
     describing.value = false;
+    copied.value = null;
   };
   const set = (change: Partial<Draft>) => {
     draft.value = { ...draft.value, ...change };
@@ -105,7 +109,7 @@ export function NewMissionForm() {
         data-testid="mission-form"
       >
         <header class="panel-head">
-          <h2>New mission</h2>
+          <h2>{original ? "Copy of a mission" : "New mission"}</h2>
           <button type="button" class="command" onClick={close}>
             Cancel
           </button>
@@ -116,7 +120,15 @@ export function NewMissionForm() {
         <fieldset>
           <legend>Vehicles</legend>
           <FleetChoice />
-          <Text field="simulated" label="Simulated vehicles" numeric />
+          <div class="pair">
+            <Text field="simulated" label="Simulated vehicles" numeric />
+            <Text
+              field="names"
+              label="Their names"
+              placeholder={simulatedNames({ ...draft.value, names: "" }).join(", ")}
+              hint="Separated by commas; empty: sim-1, sim-2 and so on"
+            />
+          </div>
         </fieldset>
         {draft.value.kind === "search" ? (
           <SearchFields />
@@ -361,16 +373,21 @@ function Options({ schema }: { schema: Record<string, unknown> | undefined }) {
 function FleetChoice() {
   const { draft, set } = useForm();
   const free = fleet.value.filter((v) => v.mission_id === null && v.kind !== "sim");
-  if (free.length === 0) {
+  const chosen = new Set(draft.chosen.map((v) => v.name));
+  // Of a copy: as they are described there, heard or not.
+  const described = draft.chosen.filter((spec) => !free.some((v) => v.name === spec.name));
+  if (free.length === 0 && described.length === 0) {
     return <p class="empty">No real vehicle is heard. Switch one on, or simulate some:</p>;
   }
-  const chosen = new Set(draft.chosen.map((v) => v.name));
   const toggle = (vehicle: VehicleView, on: boolean) =>
     set({
       chosen: on ? [...draft.chosen, asSpec(vehicle)] : draft.chosen.filter((v) => v.name !== vehicle.name),
     });
   return (
     <>
+      {described.map((spec) => (
+        <Described key={draft.chosen.indexOf(spec)} spec={spec} />
+      ))}
       {free.map((v) => (
         <label key={v.name} class="check">
           <input
@@ -382,6 +399,33 @@ function FleetChoice() {
         </label>
       ))}
     </>
+  );
+}
+
+/** A vehicle of the mission that is copied: it can be called otherwise, or left out. */
+function Described({ spec }: { spec: VehicleSpec }) {
+  const { draft, set } = useForm();
+  const change = (next: VehicleSpec[]) =>
+    set({ chosen: draft.chosen.flatMap((one) => (one === spec ? next : [one])) });
+  return (
+    <div class="chosen-vehicle field">
+      <input
+        type="text"
+        aria-label={`Name of ${spec.name}`}
+        value={spec.name}
+        data-testid={`vehicle-${spec.name}`}
+        onInput={(event) => change([{ ...spec, name: event.currentTarget.value.trim() }])}
+      />
+      <small>{spec.kind === "imc" ? "IMC" : spec.kind}</small>
+      <button
+        type="button"
+        class="tool small"
+        aria-label={`Leave ${spec.name} out`}
+        onClick={() => change([])}
+      >
+        ✕
+      </button>
+    </div>
   );
 }
 

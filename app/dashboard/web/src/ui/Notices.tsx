@@ -1,6 +1,7 @@
 import { useSignal } from "@preact/signals";
+import { signedOut, whyNotCommand } from "../state/access";
 import { emptyDraft, toMission } from "../state/draft";
-import { createMission, refusal, said, signIn } from "../state/session";
+import { createMission, refusal, said } from "../state/session";
 import {
   describing,
   fleet,
@@ -14,6 +15,7 @@ import {
   serviceFault,
   socketStatus,
 } from "../state/store";
+import { SignIn } from "./Account";
 
 /** What stands in the middle when there is nothing to show, or something is wrong: always with what to do next. */
 export function Notices() {
@@ -21,14 +23,14 @@ export function Notices() {
   const refused = refusal.value;
   return (
     <div class="notices">
-      {fault?.status === 401 || fault?.status === 403 ? <SignIn /> : null}
-      {fault && fault.status !== 401 && fault.status !== 403 ? (
+      {signedOut.value ? <SignIn /> : null}
+      {fault && !signedOut.value ? (
         <p class="notice alarm" role="alert" data-testid="service-fault">
           <b>✕ {fault.message}.</b> {fault.remedy} This page connects again by itself
           {mission.value ? "; what is shown is old." : "."}
         </p>
       ) : null}
-      {refused && !refused.what.startsWith("abort") && !preflightOpen.value ? (
+      {refused && !/^(abort|finish)/.test(refused.what) && !preflightOpen.value ? (
         <div class="notice alarm" role="alert" data-testid="refusal">
           <p>
             <b>✕ {refused.what} was refused:</b> {refused.error.message}. {refused.error.remedy}
@@ -50,7 +52,7 @@ export function Notices() {
 }
 
 function Guide() {
-  if (serviceFault.value || missions.value === null || describing.value) return null;
+  if (signedOut.value || serviceFault.value || missions.value === null || describing.value) return null;
   if (!selectedId.value) return <NoMission none={missions.value.length === 0} />;
   const known = missions.value.some((m) => m.id === selectedId.value);
   if (!mission.value && !known && socketStatus.value?.kind !== "open") {
@@ -99,7 +101,14 @@ function NoMission({ none }: { none: boolean }) {
       >
         {none ? "New mission" : "Show missions"}
       </button>
-      <button type="button" class="command" data-testid="try" onClick={() => void tryIt()}>
+      <button
+        type="button"
+        class="command"
+        data-testid="try"
+        disabled={whyNotCommand.value !== ""}
+        title={whyNotCommand.value}
+        onClick={() => void tryIt()}
+      >
         Try with two simulated vehicles
       </button>
       <button
@@ -113,38 +122,5 @@ function NoMission({ none }: { none: boolean }) {
       </button>
       {fault.value ? <p class="fault">{fault.value}</p> : null}
     </div>
-  );
-}
-
-function SignIn() {
-  const text = useSignal("");
-  const fault = serviceFault.value;
-  return (
-    <form
-      class="notice sign-in"
-      onSubmit={(event) => {
-        event.preventDefault();
-        signIn(text.value);
-      }}
-    >
-      <p>
-        <b>The service wants to know who you are.</b> {fault?.message}. {fault?.remedy}
-      </p>
-      <label class="field">
-        Access token
-        <input
-          type="password"
-          autocomplete="current-password"
-          value={text.value}
-          data-testid="token"
-          onInput={(event) => {
-            text.value = event.currentTarget.value;
-          }}
-        />
-      </label>
-      <button type="submit" class="command primary">
-        Sign in
-      </button>
-    </form>
   );
 }

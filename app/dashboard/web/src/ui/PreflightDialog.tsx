@@ -1,9 +1,11 @@
 import { useSignal } from "@preact/signals";
-import { useEffect, useRef } from "preact/hooks";
+import { useEffect } from "preact/hooks";
 import { api } from "../api/client";
 import type { CheckStatus, PreflightView } from "../api/types";
+import { whyNotCommand } from "../state/access";
 import { act, busyWith, refusal, said } from "../state/session";
 import { mission, preflightOpen, selectedId } from "../state/store";
+import { Dialog } from "./Dialog";
 import { Forecast } from "./Forecast";
 
 const SIGNS: Record<CheckStatus, string> = { ok: "✓", note: "•", warning: "▲", problem: "✕" };
@@ -12,17 +14,12 @@ const AGAIN_MS = 3000;
 
 /** The checklist before a start; starts the mission when nothing stands in its way. */
 export function PreflightDialog() {
-  const dialog = useRef<HTMLDialogElement>(null);
   const found = useSignal<PreflightView | null>(null);
   const fault = useSignal("");
   const open = preflightOpen.value;
 
   useEffect(() => {
-    if (!open) {
-      dialog.current?.close();
-      return;
-    }
-    dialog.current?.showModal();
+    if (!open) return;
     let stopped = false;
     const look = async () => {
       const id = selectedId.peek();
@@ -56,13 +53,13 @@ export function PreflightDialog() {
   const problems = view?.checks.filter((c) => c.status === "problem").length ?? 0;
   const refused = refusal.value?.what === "start" ? refusal.value.error : null;
   return (
-    <dialog
-      ref={dialog}
-      class="dialog preflight"
-      aria-labelledby="preflight-title"
+    <Dialog
+      open={open}
       onClose={close}
-      data-testid="preflight"
-      data-ready={view?.ready ?? "unknown"}
+      title="preflight-title"
+      id="preflight"
+      kind="preflight"
+      data={{ "data-ready": view?.ready ?? "unknown" }}
     >
       <h2 id="preflight-title">Start {mission.value?.name ?? "the mission"}?</h2>
       {fault.value || refused ? (
@@ -95,7 +92,8 @@ export function PreflightDialog() {
         <button
           type="button"
           class="command primary"
-          disabled={!view?.ready || busyWith.value !== null}
+          disabled={!view?.ready || busyWith.value !== null || whyNotCommand.value !== ""}
+          title={whyNotCommand.value}
           data-testid="confirm-start"
           onClick={() => void start()}
         >
@@ -106,6 +104,6 @@ export function PreflightDialog() {
               : "Start mission"}
         </button>
       </div>
-    </dialog>
+    </Dialog>
   );
 }

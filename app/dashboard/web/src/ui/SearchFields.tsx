@@ -22,8 +22,8 @@ export function SearchFields() {
   const read = async (file: File | undefined) => {
     if (!file) return;
     try {
-      const { area, keepOut } = areasIn(file.name, await file.text());
-      const obstacles = [area, ...keepOut];
+      const { area, keepOut, others } = areasIn(file.name, await file.text());
+      const obstacles = [area, ...keepOut, ...others];
       set({ obstacles: [...draft.obstacles, ...obstacles] });
       note.value = `${file.name}: ${obstacles.length} obstacle${obstacles.length === 1 ? "" : "s"}`;
     } catch (error) {

@@ -1,7 +1,8 @@
+import { whyNotCommand } from "../state/access";
 import { clock } from "../state/format";
 import { pace, playing, replay, showPresent } from "../state/replay";
-import { mission, replayStep, steps } from "../state/store";
-import { hasEnded } from "../state/words";
+import { finishOpen, mission, replayStep, steps } from "../state/store";
+import { hasEnded, isAllowed } from "../state/words";
 
 /** How far the mission has come, and back to any step of it. */
 export function TimeSlider() {
@@ -49,7 +50,23 @@ export function TimeSlider() {
         }}
       />
       {shown === null ? (
-        <span class="when">{over ? "as it ended" : "live"}</span>
+        <>
+          <span class="when">{over ? "as it ended" : "live"}</span>
+          {isAllowed("finish", present.state) ? (
+            <button
+              type="button"
+              class="command finish"
+              data-testid="finish"
+              disabled={whyNotCommand.value !== ""}
+              title={whyNotCommand.value || "End the mission before its last step"}
+              onClick={() => {
+                finishOpen.value = true;
+              }}
+            >
+              Finish early…
+            </button>
+          ) : null}
+        </>
       ) : (
         <>
           <span class="when" data-testid="replayed-at" role="status">

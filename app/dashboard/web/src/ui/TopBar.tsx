@@ -1,5 +1,7 @@
 import type { MissionAction } from "../api/types";
+import { whyNotCommand } from "../state/access";
 import { age, clock, duration } from "../state/format";
+import { elapsedThen } from "../state/replay";
 import { act, busyWith } from "../state/session";
 import {
   abortDialogOpen,
@@ -9,15 +11,19 @@ import {
   now,
   panelOpen,
   preflightOpen,
+  replayStep,
   socketStatus,
   theme,
   vehicles,
   view,
 } from "../state/store";
+import { decidingFor } from "../state/waiting";
 import { isAllowed, MISSION_SIGNS, MISSION_WORDS, type Tone } from "../state/words";
+import { AccountButton } from "./Account";
 
 export function TopBar() {
   const present = mission.value;
+  const past = replayStep.value !== null;
   return (
     <header class="top-bar">
       <button
@@ -48,27 +54,15 @@ export function TopBar() {
       </button>
       <div class="title">
         <h1 data-testid="mission-name">{present?.name ?? "bathyfleet"}</h1>
-        {present ? (
-          <p
-            class={`state ${present.state}`}
-            data-testid="mission-state"
-            data-state={present.state}
-            title={present.reason}
-          >
-            <span aria-hidden="true">{MISSION_SIGNS[present.state]}</span> {MISSION_WORDS[present.state]}
-            {present.reason ? <span class="reason"> · {present.reason}</span> : null}
-          </p>
-        ) : (
-          <p class="state">No mission chosen</p>
-        )}
+        {present ? <MissionLine /> : <p class="state">No mission chosen</p>}
       </div>
       <dl class="figures">
         {present ? (
           <>
-            <Figure label="Elapsed" value={duration(elapsed())} />
+            <Figure label={past ? "Elapsed then" : "Elapsed"} value={duration(elapsed())} id="elapsed" />
             <Figure
               label="Remaining"
-              value={present.state === "running" ? duration(present.progress.eta_s) : "–"}
+              value={present.state === "running" && !past ? duration(present.progress.eta_s) : "–"}
             />
           </>
         ) : null}
@@ -77,23 +71,25 @@ export function TopBar() {
         <Figure label="Local" value={clock(new Date(now.value), "local")} minor />
       </dl>
       <ThemeSwitch />
+      <AccountButton />
       <div class="commands">
         <Command action="start" label="Start" />
         <Command action="pause" label="Pause" />
         <Command action="resume" label="Resume" />
-        <Command action="finish" label="Finish" />
       </div>
       <button
         type="button"
         class="abort"
         data-testid="abort"
-        disabled={!present || !isAllowed("abort", present.state)}
+        disabled={!present || !isAllowed("abort", present.state) || whyNotCommand.value !== ""}
         title={
           !present
             ? "No mission is chosen"
-            : isAllowed("abort", present.state)
-              ? "Stop every vehicle of this mission"
-              : `This mission is over: ${MISSION_WORDS[present.state].toLowerCase()}`
+            : whyNotCommand.value
+              ? whyNotCommand.value
+              : isAllowed("abort", present.state)
+                ? "Stop every vehicle of this mission"
+                : `This mission is over: ${MISSION_WORDS[present.state].toLowerCase()}`
         }
         onClick={() => {
           abortOne.value = null;
@@ -106,27 +102,68 @@ export function TopBar() {
   );
 }
 
+/** The mission's state: as it was when the service is gone, and what its vehicles wait for. */
+function MissionLine() {
+  const present = mission.value;
+  if (!present) return null;
+  const live = socketStatus.value?.kind === "open";
+  const waiting = decidingFor.value;
+  const words = MISSION_WORDS[present.state];
+  return (
+    <p
+      class={`state ${live ? present.state : "unknown"}`}
+      data-testid="mission-state"
+      data-state={present.state}
+      data-live={live}
+      title={present.reason}
+    >
+      <span aria-hidden="true">{live ? MISSION_SIGNS[present.state] : "?"}</span>{" "}
+      {live ? words : `${words} when last heard`}
+      {live && waiting !== null ? (
+        <span class="reason" data-testid="deciding">
+          {" "}
+          · planning step {present.progress.step + 1} for {duration(waiting)}, vehicles wait at their
+          waypoints
+        </span>
+      ) : null}
+      {present.reason ? <span class="reason"> · {present.reason}</span> : null}
+    </p>
+  );
+}
+
 /** Counts on between the service's messages while the link stands. */
 function elapsed(): number {
   const present = mission.value;
   if (!present) return 0;
+  if (replayStep.value !== null) return elapsedThen.value ?? 0;
   const counting = present.state === "running" && socketStatus.value?.kind === "open";
   return present.progress.elapsed_s + (counting ? Math.max(0, now.value - view.value.progressAt) / 1000 : 0);
 }
 
-function Figure({ label, value, minor = false }: { label: string; value: string; minor?: boolean }) {
+function Figure({
+  label,
+  value,
+  minor = false,
+  id,
+}: {
+  label: string;
+  value: string;
+  minor?: boolean;
+  id?: string;
+}) {
   return (
     <div class={minor ? "figure minor" : "figure"}>
       <dt>{label}</dt>
-      <dd>{value}</dd>
+      <dd data-testid={id}>{value}</dd>
     </div>
   );
 }
 
 function LinkSummary() {
   const status = socketStatus.value;
-  const heard = vehicles.value.filter((v) => v.view.link === "ready" || v.view.link === "engaged").length;
-  const all = vehicles.value.length;
+  const team = vehicles.value.filter((v) => v.view.active);
+  const heard = team.filter((v) => v.view.link === "ready" || v.view.link === "engaged").length;
+  const all = team.length;
   if (!status) return null;
   let words: string;
   let tone: Tone = "warning";
@@ -137,6 +174,9 @@ function LinkSummary() {
     const wait = Math.max(0, Math.ceil((status.retryAt - now.value) / 1000));
     const old = view.value.vehiclesAt ? `, data ${age((now.value - view.value.vehiclesAt) / 1000)} old` : "";
     words = `Service gone${old}; trying again in ${wait} s`;
+    tone = "alarm";
+  } else if (status.kind === "refused") {
+    words = "Not signed in";
     tone = "alarm";
   } else {
     words = "Connecting…";
@@ -161,9 +201,10 @@ function Command({ action, label }: { action: MissionAction; label: string }) {
   return (
     <button
       type="button"
-      class={action === "finish" ? "command" : "command primary"}
+      class="command primary"
       data-testid={action}
-      disabled={busyWith.value !== null}
+      disabled={busyWith.value !== null || whyNotCommand.value !== ""}
+      title={whyNotCommand.value}
       onClick={() => {
         if (action === "start") preflightOpen.value = true;
         else void act(action);

@@ -1,9 +1,13 @@
-import { age, metres, percent } from "../state/format";
+import { whyNotCommand } from "../state/access";
+import { age, clock, metres, percent } from "../state/format";
 import { localizationWords } from "../state/localization";
+import { replayed } from "../state/replay";
+import { rejoin } from "../state/session";
 import {
   abortDialogOpen,
   abortOne,
   mission,
+  replayStep,
   socketStatus,
   unstopped,
   type Vehicle,
@@ -36,6 +40,8 @@ export function VehicleCards() {
 const LOW_BATTERY_PCT = 25;
 
 function Card({ vehicle }: { vehicle: Vehicle }) {
+  const then = replayed.value?.find((one) => one.vehicle === vehicle.view.name);
+  if (replayStep.value !== null) return <PastCard vehicle={vehicle} depth_m={then?.depth_m ?? null} />;
   const v = vehicle.view;
   const state = vehicleState(v, vehicle.waypoint);
   const away = v.kind === "sim" && v.link === "unknown";
@@ -43,7 +49,7 @@ function Card({ vehicle }: { vehicle: Vehicle }) {
   const low = v.battery_pct !== null && v.battery_pct < LOW_BATTERY_PCT;
   return (
     <article
-      class={`card ${state.tone}${vehicle.stale && !away ? " stale" : ""}`}
+      class={`card ${state.tone}${v.active ? "" : " left"}${vehicle.stale && !away ? " stale" : ""}`}
       style={{ "--vehicle": vehicle.colour }}
       data-testid={`card-${v.name}`}
       data-link={v.link}
@@ -91,7 +97,7 @@ function Card({ vehicle }: { vehicle: Vehicle }) {
           .map((part) => part?.replaceAll(" ", "\u00a0"))
           .join(" · ")}
       </p>
-      {vehicle.waypoint ? (
+      {vehicle.waypoint && v.active ? (
         <p class="small waypoint-line">
           <WaypointShape status={vehicle.waypoint.status} colour={vehicle.colour} />
           Waypoint {vehicle.waypoint.step} at {metres(vehicle.waypoint.depth_m)} depth,{" "}
@@ -103,6 +109,8 @@ function Card({ vehicle }: { vehicle: Vehicle }) {
           type="button"
           class="abort-one"
           data-testid={`abort-${v.name}`}
+          disabled={whyNotCommand.value !== ""}
+          title={whyNotCommand.value}
           onClick={() => {
             abortOne.value = v.name;
             abortDialogOpen.value = true;
@@ -111,8 +119,57 @@ function Card({ vehicle }: { vehicle: Vehicle }) {
           {ended ? `Stop ${v.name} again` : `Abort ${v.name}`}
         </button>
       ) : null}
+      {v.active ? null : (
+        <p class="small left-at" data-testid={`left-${v.name}`}>
+          Left{v.left_at ? ` at ${clock(new Date(v.left_at), "utc")} UTC` : ""}; it is shown where it was
+          last.
+        </p>
+      )}
+      {!v.active && !ended ? (
+        <button
+          type="button"
+          class="command again"
+          data-testid={`rejoin-${v.name}`}
+          disabled={whyNotCommand.value !== ""}
+          title={whyNotCommand.value || "Let it take part again, as it was described"}
+          onClick={() => void rejoin(v.name)}
+        >
+          Add again
+        </button>
+      ) : null}
       {v.reason ? <p class={`reason ${state.tone}`}>{v.reason}</p> : null}
       {vehicle.waypoint?.reason ? <p class={`reason ${state.tone}`}>{vehicle.waypoint.reason}</p> : null}
+    </article>
+  );
+}
+
+/** A vehicle as it was at the step that is replayed: what was not kept of it is not shown. */
+function PastCard({ vehicle, depth_m }: { vehicle: Vehicle; depth_m: number | null }) {
+  const { name } = vehicle.view;
+  const waypoint = replayed.value?.find((one) => one.vehicle === name)?.waypoint;
+  return (
+    <article
+      class="card calm past"
+      style={{ "--vehicle": vehicle.colour }}
+      data-testid={`card-${name}`}
+      aria-label={`Vehicle ${name} at step ${replayStep.value}`}
+    >
+      <header>
+        <h2>{name}</h2>
+        <span class="tone calm">At step {replayStep.value}</span>
+      </header>
+      <dl class="big">
+        <div>
+          <dt>Depth</dt>
+          <dd data-testid={`depth-${name}`}>{metres(depth_m)}</dd>
+        </div>
+      </dl>
+      {waypoint ? (
+        <p class="small waypoint-line">
+          <WaypointShape status={waypoint.status} colour={vehicle.colour} />
+          Waypoint {waypoint.step} at {metres(waypoint.depth_m)} depth, {WAYPOINT_WORDS[waypoint.status]}
+        </p>
+      ) : null}
     </article>
   );
 }

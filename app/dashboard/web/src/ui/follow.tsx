@@ -70,7 +70,7 @@ export function follow(chart: Chart): () => void {
         if (present) markOnce("mission-shown");
       });
     }),
-    effect(() => chart.setDraft(draftShapes.value?.area ?? null, draftShapes.value?.keepOut ?? [])),
+    followDraft(chart),
     effect(() => {
       stripHeight.value;
       requestAnimationFrame(() => chart.refit());
@@ -113,6 +113,28 @@ export function follow(chart: Chart): () => void {
   ];
   return () => {
     for (const stop of stops) stop();
+  };
+}
+
+/** While an area is being typed every digit would be another place. */
+const TYPED_MS = 500;
+
+function followDraft(chart: Chart): () => void {
+  let shown = "";
+  let typing: ReturnType<typeof setTimeout> | undefined;
+  const stop = effect(() => {
+    const area = draftShapes.value?.area ?? null;
+    chart.setDraft(area, draftShapes.value?.keepOut ?? []);
+    const corners = JSON.stringify(area?.coordinates ?? "");
+    if (corners === shown) return;
+    shown = corners;
+    clearTimeout(typing);
+    // What is drawn or dragged on the map is in sight already.
+    if (area && !drawing.peek()) typing = setTimeout(() => chart.goToDraft(overlaid), TYPED_MS);
+  });
+  return () => {
+    clearTimeout(typing);
+    stop();
   };
 }
 
@@ -230,14 +252,14 @@ function followTracks(chart: Chart): () => void {
 function places(): { at: LngLat; colour: string }[] {
   const past = replayed.value;
   if (past) return past.map(({ place, colour }) => ({ at: place, colour }));
-  return vehicles.value.flatMap(({ view: { lon_deg, lat_deg }, colour }) =>
-    lon_deg === null || lat_deg === null ? [] : [{ at: [lon_deg, lat_deg] as LngLat, colour }],
+  return vehicles.value.flatMap(({ view: { active, lon_deg, lat_deg }, colour }) =>
+    !active || lon_deg === null || lat_deg === null ? [] : [{ at: [lon_deg, lat_deg] as LngLat, colour }],
   );
 }
 
 function routes(): Route[] {
-  return vehicles.value.flatMap(({ view: { lon_deg, lat_deg }, waypoint, colour }) => {
-    if (!waypoint || lon_deg === null || lat_deg === null) return [];
+  return vehicles.value.flatMap(({ view: { active, lon_deg, lat_deg }, waypoint, colour }) => {
+    if (!active || !waypoint || lon_deg === null || lat_deg === null) return [];
     if (waypoint.status !== "sent" && waypoint.status !== "acknowledged") return [];
     return [
       {
@@ -265,7 +287,7 @@ function waypointPin(waypoint: WaypointView, colour: string): Pin {
 function pins(): Pin[] {
   return vehicles.value.flatMap((vehicle) => {
     const { view: v, waypoint, colour } = vehicle;
-    const made: Pin[] = waypoint ? [waypointPin(waypoint, colour)] : [];
+    const made: Pin[] = waypoint && v.active ? [waypointPin(waypoint, colour)] : [];
     if (v.lon_deg !== null && v.lat_deg !== null) {
       made.push({
         key: `vehicle ${v.name}`,

@@ -20,14 +20,16 @@ export function VehicleMark({ vehicle, past }: { vehicle?: Vehicle; past?: Past 
     return <Mark name={past.name} colour={past.colour} heading_deg={heading} age="" title={past.name} />;
   }
   if (!vehicle) return null;
-  const { name, heading_deg, link } = vehicle.view;
+  const { name, heading_deg, link, active, breach } = vehicle.view;
   const old = vehicle.stale || link === "lost" || link === "unknown";
   return (
     <Mark
       name={name}
       colour={vehicle.colour}
       heading_deg={heading_deg}
-      stale={vehicle.stale}
+      stale={vehicle.stale || !active}
+      left={!active}
+      alarm={breach}
       age={old ? age(vehicle.age_s) : ""}
       title={`${name}${vehicle.stale ? `, last heard ${age(vehicle.age_s)} ago` : ""}`}
     />
@@ -39,13 +41,30 @@ interface MarkProps {
   colour: string;
   heading_deg: number | null;
   stale?: boolean;
+  /** It takes no part any more. */
+  left?: boolean;
+  /** Where it is that it must not be. */
+  alarm?: string;
   age: string;
   title: string;
 }
 
-function Mark({ name, colour, heading_deg, stale = false, age: old, title }: MarkProps) {
+function Mark({
+  name,
+  colour,
+  heading_deg,
+  stale = false,
+  left = false,
+  alarm = "",
+  age: old,
+  title,
+}: MarkProps) {
   return (
-    <div class={`vehicle-mark${stale ? " stale" : ""}`} data-testid={`vehicle-mark-${name}`} title={title}>
+    <div
+      class={`vehicle-mark${stale ? " stale" : ""}${alarm ? " alarm" : ""}`}
+      data-testid={`vehicle-mark-${name}`}
+      title={title}
+    >
       <svg viewBox="-16 -16 32 32" width="34" height="34" aria-hidden="true">
         {heading_deg === null ? (
           <circle r="8" fill={colour} class="outline" />
@@ -60,7 +79,9 @@ function Mark({ name, colour, heading_deg, stale = false, age: old, title }: Mar
       </svg>
       <span class="mark-label">
         {name}
+        {left ? " left" : ""}
         {old ? <b> {old} old</b> : null}
+        {alarm ? <b> ✕ {alarm}</b> : null}
       </span>
     </div>
   );

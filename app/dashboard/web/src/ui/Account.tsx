@@ -1,0 +1,128 @@
+import { useSignal } from "@preact/signals";
+import { me, signedOut, signIn, signOut, whyNotCommand } from "../state/access";
+import { said } from "../state/session";
+import { accountOpen } from "../state/store";
+import { Dialog } from "./Dialog";
+
+/** Who uses the page, always in sight. */
+export function AccountButton() {
+  const who = me.value;
+  if (!who) return null;
+  const words = `${who.name}, role ${who.role}`;
+  return (
+    <button
+      type="button"
+      class={`tool account${whyNotCommand.value ? " looks-only" : ""}`}
+      data-testid="account"
+      aria-label={`Signed in: ${words}`}
+      title={`Signed in: ${words}`}
+      onClick={() => {
+        accountOpen.value = true;
+      }}
+    >
+      <span class="account-name">{who.name}</span>
+      <small>{whyNotCommand.value ? `${who.role}: looks only` : who.role}</small>
+    </button>
+  );
+}
+
+export function AccountDialog() {
+  const fault = useSignal("");
+  const who = me.value;
+  const close = () => {
+    accountOpen.value = false;
+  };
+  return (
+    <Dialog open={accountOpen.value} onClose={close} title="account-title" id="account-dialog">
+      <h2 id="account-title">{who?.local ? "Nobody has to sign in yet" : `Signed in as ${who?.name}`}</h2>
+      {who?.local ? (
+        <p>
+          No access token was made, so whoever runs the service commands it from this machine.{" "}
+          <code>bathyfleet token create NAME --role operator</code> makes one; from then on everybody signs
+          in.
+        </p>
+      ) : (
+        <p>
+          Role {who?.role}. {whyNotCommand.value || "This role commands missions."}
+        </p>
+      )}
+      {fault.value ? (
+        <p class="reason alarm" role="alert">
+          {fault.value}
+        </p>
+      ) : null}
+      <div class="dialog-actions">
+        <button type="button" class="command" onClick={close} data-testid="account-close">
+          Close
+        </button>
+        {who?.signed_in ? (
+          <button
+            type="button"
+            class="command primary"
+            data-testid="sign-out"
+            onClick={() => {
+              signOut().catch((error: unknown) => {
+                fault.value = said(error);
+              });
+            }}
+          >
+            Sign out
+          </button>
+        ) : null}
+      </div>
+    </Dialog>
+  );
+}
+
+/** Asks for an access token, which is tried once and kept nowhere. */
+export function SignIn() {
+  const text = useSignal("");
+  const fault = useSignal("");
+  const sending = useSignal(false);
+  const why = signedOut.value;
+  const submit = async () => {
+    sending.value = true;
+    fault.value = "";
+    try {
+      await signIn(text.value);
+    } catch (error) {
+      fault.value = said(error);
+    } finally {
+      sending.value = false;
+    }
+  };
+  return (
+    <form
+      class="notice sign-in"
+      data-testid="sign-in"
+      onSubmit={(event) => {
+        event.preventDefault();
+        void submit();
+      }}
+    >
+      <p>
+        <b>Sign in.</b> {why?.message}. {why?.status === 403 ? why.remedy : ""}
+      </p>
+      <label class="field">
+        Access token
+        <input
+          type="password"
+          autocomplete="current-password"
+          value={text.value}
+          data-testid="token"
+          onInput={(event) => {
+            text.value = event.currentTarget.value;
+          }}
+        />
+      </label>
+      <button type="submit" class="command primary" disabled={sending.value || text.value.trim() === ""}>
+        {sending.value ? "Signing in…" : "Sign in"}
+      </button>
+      {fault.value ? (
+        <p class="fault" role="alert" data-testid="sign-in-fault">
+          ▲ {fault.value}
+        </p>
+      ) : null}
+    </form>
+  );
+}

@@ -1,0 +1,214 @@
+"""What has to be in sight and in reach whatever is open: the stop, and every vehicle; on every screen."""
+
+import re
+from collections.abc import Iterator
+
+import pytest
+from playwright.sync_api import Browser, Page, expect
+
+from .conftest import PATIENCE_MS
+from .service import AREA, Service
+from .steps import by_id, expect_state, show, start
+
+pytestmark = [pytest.mark.browser, pytest.mark.timeout(600)]
+
+SCREENS = {"wide": (1600, 1000), "tablet": (1024, 768), "upright": (768, 1024), "phone": (390, 844)}
+PAIR = [{"name": f"sim-{n}", "kind": "sim", "sensor": "dvl"} for n in (1, 2)]
+
+
+@pytest.fixture(params=SCREENS)
+def screen(request: pytest.FixtureRequest, browser: Browser, service: Service) -> Iterator[Page]:
+    width, height = SCREENS[request.param]
+    context = browser.new_context(viewport={"width": width, "height": height}, base_url=service.url)
+    page = context.new_page()
+    page.set_default_timeout(PATIENCE_MS)
+    yield page
+    context.close()
+
+
+def is_on_top(page: Page, name: str) -> bool:
+    """Whether a click in the middle of an element meets it, and all of it is on the screen."""
+    return bool(
+        by_id(page, name).evaluate(
+            """element => {
+                const { left, right, top, bottom } = element.getBoundingClientRect();
+                const hit = document.elementFromPoint((left + right) / 2, (top + bottom) / 2);
+                return element.contains(hit) && left >= 0 && top >= 0 && right <= innerWidth && bottom <= innerHeight;
+            }"""
+        )
+    )
+
+
+def test_nothing_covers_the_stop_and_a_single_vehicle_can_be_stopped_from_there(screen: Page, service: Service) -> None:
+    page = screen
+    mission = service.create(name="Always in reach", vehicles=PAIR)
+    service.act(mission, "start")
+    show(page, mission)
+    assert is_on_top(page, "abort")
+    for pane in ("charts", "files", "soundings", "compare", "log"):
+        by_id(page, f"toggle-{pane}").click()
+        assert is_on_top(page, "abort"), pane
+    by_id(page, "toggle-log").click()
+    by_id(page, "finish").click()
+    expect(by_id(page, "finish-dialog")).to_be_visible()
+    assert is_on_top(page, "abort")
+    page.keyboard.press("Escape")
+    expect(by_id(page, "finish-dialog")).to_be_hidden()
+    if not by_id(page, "new-mission").is_visible():
+        by_id(page, "toggle-missions").click()
+    assert is_on_top(page, "abort")
+    by_id(page, "open-fleet").click()
+    expect(by_id(page, "fleet-dialog")).to_be_visible()
+    assert is_on_top(page, "abort")
+
+    by_id(page, "abort").click()
+    assert is_on_top(page, "abort-confirm")
+    by_id(page, "abort-only-sim-2").click()
+    by_id(page, "abort-confirm").click()
+    expect(by_id(page, "receipt-sim-2")).to_contain_text("acknowledged the stop")
+    page.keyboard.press("Escape")
+    expect(by_id(page, "abort-dialog")).to_be_hidden()
+    expect(by_id(page, "fleet-dialog")).to_be_visible()
+    expect_state(page, "running")
+
+
+def test_a_vehicle_that_was_aborted_stays_in_sight_and_can_be_added_again(page: Page, service: Service) -> None:
+    mission = service.create(name="Nobody disappears", vehicles=PAIR)
+    service.act(mission, "start")
+    show(page, mission)
+    expect(by_id(page, "card-sim-1")).to_have_attribute("data-link", "engaged")
+    by_id(page, "abort-sim-1").click()
+    by_id(page, "abort-confirm").click()
+    by_id(page, "abort-close").click()
+    expect(by_id(page, "state-sim-1")).to_contain_text("Left the mission")
+    expect(by_id(page, "left-sim-1")).to_contain_text(re.compile(r"Left at \d\d:\d\d:\d\d UTC"))
+    expect(by_id(page, "vehicle-mark-sim-1")).to_contain_text("left")
+    expect(by_id(page, "link")).to_contain_text("1 of 1 vehicles")
+    page.reload()
+    expect(by_id(page, "vehicle-mark-sim-1")).to_contain_text("left")
+    by_id(page, "rejoin-sim-1").click()
+    expect(by_id(page, "link")).to_contain_text("of 2 vehicles")
+    expect(by_id(page, "card-sim-1")).to_have_attribute("data-link", "engaged")
+    service.act(mission, "abort")
+    expect_state(page, "aborted")
+    for name in ("sim-1", "sim-2"):
+        expect(by_id(page, f"vehicle-mark-{name}")).to_be_visible()
+
+
+def test_finishing_early_asks_first(page: Page, service: Service) -> None:
+    show(page, service.create(name="Asked first"))
+    start(page)
+    by_id(page, "finish").click()
+    by_id(page, "finish-close").click()
+    expect_state(page, "running")
+    by_id(page, "finish").click()
+    by_id(page, "confirm-finish").click()
+    expect(by_id(page, "receipt-sim-1")).to_contain_text("acknowledged the stop")
+    expect_state(page, "finished")
+
+
+def test_with_the_service_gone_the_mission_is_not_green(page: Page, service: Service) -> None:
+    mission = service.create(name="Not green")
+    service.act(mission, "start")
+    show(page, mission)
+    expect(by_id(page, "mission-state")).to_have_attribute("data-live", "true")
+    service.kill()
+    try:
+        expect(by_id(page, "mission-state")).to_have_attribute("data-live", "false")
+        expect(by_id(page, "mission-state")).to_contain_text("Running when last heard")
+        expect(by_id(page, "mission-state")).to_have_class(re.compile("unknown"))
+    finally:
+        service.start()
+    expect(by_id(page, "mission-state")).to_have_attribute("data-live", "true")
+
+
+def test_an_entry_into_a_zone_is_told_over_the_map_and_on_the_card(page: Page, service: Service) -> None:
+    zone = [[-8.7047, 41.1852], [-8.7045, 41.1852], [-8.7045, 41.1853], [-8.7047, 41.1853], [-8.7047, 41.1852]]
+    mission = service.create(
+        name="Zone",
+        vehicles=[{"name": "rover", "kind": "rest"}],
+        keep_out=[{"type": "Polygon", "coordinates": [zone]}],
+    )
+    where = {"vehicle": "rover", "depth_m": 2.0, "range_m": 5.0}
+    items = [where | {"time_s": 1_795_225_140.0, "lat_deg": 41.1851, "lon_deg": -8.7049}]
+    service.post(f"/missions/{mission}/measurements", {"items": items})
+    service.act(mission, "start")
+    show(page, mission)
+    items = [where | {"time_s": 1_795_225_150.0, "lat_deg": 41.18525, "lon_deg": -8.7046}]
+    service.post(f"/missions/{mission}/measurements", {"items": items})
+    expect(by_id(page, "alarms")).to_contain_text("rover is in keep-out zone 1")
+    expect(by_id(page, "state-rover")).to_contain_text("In keep-out zone 1")
+    expect(by_id(page, "vehicle-mark-rover")).to_contain_text("in keep-out zone 1")
+
+
+def test_a_mission_is_copied_with_other_names_and_deleted_while_it_is_empty(page: Page, service: Service) -> None:
+    mission = service.create(name="Original", vehicles=PAIR, seed=7)
+    show(page, mission)
+    by_id(page, "copy-mission").click()
+    by_id(page, "vehicle-sim-1").fill("north")
+    by_id(page, "field-name").fill("Another")
+    by_id(page, "create-mission").click()
+    expect(by_id(page, "mission-name")).to_have_text("Another")
+    expect(by_id(page, "card-north")).to_be_visible()
+    [copy] = [one for one in service.get("/missions") if one["name"] == "Another"]
+    spec = service.get(f"/missions/{copy['id']}")["spec"]
+    assert [vehicle["name"] for vehicle in spec["vehicles"]] == ["north", "sim-2"]
+    assert spec["seed"] == 7
+    by_id(page, "delete-mission").click()
+    by_id(page, "confirm-delete").click()
+    expect(by_id(page, f"mission-{copy['id']}")).to_be_hidden()
+    assert copy["id"] not in [one["id"] for one in service.get("/missions")]
+
+
+def test_the_map_goes_to_an_area_that_is_typed_or_read_from_a_file(page: Page, service: Service) -> None:
+    page.goto("/")
+    expect(by_id(page, "map")).to_have_attribute("data-ready", "true")
+    by_id(page, "new-mission").click()
+    by_id(page, "field-latitude").fill("60.1")
+    by_id(page, "field-longitude").fill("25.2")
+    expect(page.locator(".grid-labels")).to_contain_text("60.1")
+    far = [[[lon, lat] for lon, lat in AREA["coordinates"][0]]]
+    apart = [[[lon + 0.01, lat] for lon, lat in AREA["coordinates"][0]]]
+    text = {"type": "MultiPolygon", "coordinates": [far, apart]}
+    import json
+
+    by_id(page, "area-file").set_input_files(
+        {"name": "two.geojson", "mimeType": "application/geo+json", "buffer": json.dumps(text).encode()}
+    )
+    expect(by_id(page, "area-note")).to_contain_text("1 more area lies apart and is left out")
+    expect(page.locator(".grid-labels")).to_contain_text("41.18")
+    by_id(page, "other-area-1").click()
+    expect(page.locator(".grid-labels")).to_contain_text("8.69")
+
+
+def test_both_ends_of_the_colour_range_are_kept_and_a_wrong_one_is_explained(page: Page, service: Service) -> None:
+    mission = service.create(name="Both ends")
+    service.act(mission, "start")
+    show(page, mission)
+    low, high = by_id(page, "range-low"), by_id(page, "range-high")
+    low.fill("8")
+    high.click()
+    high.fill("4")
+    expect(by_id(page, "range-fault")).to_contain_text("The lower end, 8, must be below the upper one, 4")
+    high.fill("12")
+    high.press("Enter")
+    expect(by_id(page, "range-fault")).to_be_hidden()
+    page.reload()
+    expect(low).to_have_value("8")
+    expect(high).to_have_value("12")
+    by_id(page, "range-fit").click()
+
+
+def test_a_replay_shows_the_figures_of_its_step(page: Page, service: Service) -> None:
+    mission = service.create(name="Then", steps=6)
+    service.act(mission, "start")
+    show(page, mission)
+    expect_state(page, "finished")
+    now = by_id(page, "distance").inner_text()
+    by_id(page, "slider").fill("1")
+    expect(by_id(page, "replayed-at")).to_contain_text("Replay")
+    expect(by_id(page, "distance")).not_to_have_text(now)
+    first = next(step for step in service.get(f"/missions/{mission}/steps") if step["number"] == 1)
+    expect(by_id(page, "soundings")).to_have_text(str(first["soundings"]))
+    by_id(page, "to-present").click()
+    expect(by_id(page, "distance")).to_have_text(now)
