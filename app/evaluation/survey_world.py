@@ -315,7 +315,7 @@ def belief_of(estimate: BathymetricMap) -> Belief:
     return Belief(
         estimate.grid.centres_m,
         estimate.depth_m.ravel(),
-        estimate.sd_m.ravel(),
+        estimate.planning_sd_m.ravel(),
         np.zeros(n, dtype=np.bool_),
         np.where(np.isfinite(estimate.roughness), estimate.roughness, 1.0).ravel(),
         estimate.correlation_length_m,

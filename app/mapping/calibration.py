@@ -121,7 +121,9 @@ def gaps(tree: cKDTree) -> FloatArray:
 def hold_out(process: Conditioned, rows: IntArray, neighbours: tuple[int, int]) -> HeldOut:
     """Predict the fine soundings ``rows`` across holes as wide as the survey's gaps."""
     radius = np.maximum(np.quantile(gaps(process.levels.fine_tree), _evenly(len(rows))), 1e-6)
-    return _held_out(process, rows, process.levels.neighbours_beyond(process.levels.points[rows], radius, *neighbours))
+    return predicted_without(
+        process, rows, process.levels.neighbours_beyond(process.levels.points[rows], radius, *neighbours)
+    )
 
 
 def hold_out_beyond(process: Conditioned, rows: IntArray, neighbours: tuple[int, int], farthest_m: float) -> HeldOut:
@@ -132,7 +134,7 @@ def hold_out_beyond(process: Conditioned, rows: IntArray, neighbours: tuple[int,
         process.levels.points[rows], farthest_m * even, *neighbours, np.column_stack([np.cos(course), np.sin(course)])
     )
     enough = (near >= 0).sum(axis=1) >= LEAST_BEYOND
-    return _held_out(process, rows[enough], near[enough])
+    return predicted_without(process, rows[enough], near[enough])
 
 
 def _evenly(n: int) -> FloatArray:
@@ -140,7 +142,8 @@ def _evenly(n: int) -> FloatArray:
     return np.asarray((0.5 + GOLDEN * np.arange(n)) % 1.0)
 
 
-def _held_out(process: Conditioned, rows: IntArray, neighbours: IntArray) -> HeldOut:
+def predicted_without(process: Conditioned, rows: IntArray, neighbours: IntArray) -> HeldOut:
+    """Predict the fine soundings ``rows`` from the given ones, (h, k), -1 for none."""
     points = process.levels.points
     error, noise_part, model_part = krige_holes(
         KERNEL_CODES[process.kernel],

@@ -22,9 +22,15 @@ def prior_map(prior: Soundings, grid: Grid, mask: BoolArray) -> BathymetricMap:
     _, nearest = cKDTree(np.column_stack([prior.east_m, prior.north_m])).query(grid.centres_m)
     stated = prior.sd_m[nearest].reshape(grid.rows, grid.cols)
     none = np.zeros((grid.rows, grid.cols), np.int64)
+
+    def at_least_stated(sd_m: FloatArray) -> FloatArray:
+        return np.where(np.isnan(sd_m), np.nan, np.maximum(sd_m, stated))
+
     return replace(
         found,
-        sd_m=np.where(np.isfinite(found.sd_m), np.maximum(found.sd_m, stated), np.nan),
+        sd_m=at_least_stated(found.sd_m),
+        process_sd_m=at_least_stated(found.planning_sd_m),
+        bound_sd_m=at_least_stated(found.claim_sd_m),
         count=none,
         sounded=none > 0,
         prior=mask & (count_per_cell(grid, prior) > 0),
@@ -39,15 +45,23 @@ def fuse(measured: BathymetricMap, prior: BathymetricMap) -> BathymetricMap:
     exp(d^2 / (2 l^2)) at distance d, l being its correlation length.
     """
     distrust = np.exp(np.minimum(0.5 * (_distance_m(measured) / measured.correlation_length_m) ** 2, 50.0))
-    precision, known = (measured.sd_m * distrust) ** -2.0, prior.sd_m**-2.0
+    precision, known = (measured.planning_sd_m * distrust) ** -2.0, prior.planning_sd_m**-2.0
     total = precision + known
     return replace(
         measured,
         depth_m=(precision * measured.depth_m + known * prior.depth_m) / total,
-        sd_m=total**-0.5,
+        sd_m=_together(measured.sd_m * distrust, prior.sd_m),
+        process_sd_m=total**-0.5,
+        bound_sd_m=_together(measured.claim_sd_m * distrust, prior.claim_sd_m),
         prior=prior.prior,
         model=f"{measured.model}; with imported soundings ({prior.model})",
     )
+
+
+def _together(one: FloatArray, other: FloatArray) -> FloatArray:
+    """Return the deviation of the mean of two depths weighted by their precision; they may be infinite."""
+    with np.errstate(divide="ignore"):
+        return np.asarray((one**-2.0 + other**-2.0) ** -0.5)
 
 
 def _distance_m(bathymetry: BathymetricMap) -> FloatArray:

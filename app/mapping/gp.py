@@ -8,11 +8,13 @@ import numpy as np
 
 from app.mapping.calibration import (
     Calibration,
+    HeldOut,
     checked_log_scale,
     error_ratio,
     hold_out,
     hold_out_beyond,
     mixed,
+    predicted_without,
     uncalibrated,
 )
 from app.mapping.counting import count_per_cell
@@ -23,7 +25,19 @@ from app.mapping.kriging import Conditioned
 from app.mapping.learning import ROUGHEST, choose_kernel, conditioned, lengthen, likelihood_of
 from app.mapping.levels import two_levels
 from app.mapping.likelihood import Hyperparameters, spread_subset
+from app.mapping.neighbours import nearest
 from app.mapping.outliers import OutlierReport, flag_outliers
+from app.mapping.reach import (
+    FACTOR_STEP,
+    LEAST_IN_STRIP,
+    TESTS,
+    Factors,
+    Reach,
+    factor_of,
+    radii,
+    reach,
+    strip_neighbours,
+)
 from app.mapping.roughness import hole_errors, local_ratio
 from app.mapping.scales import LocalScales, local_scales, stretch_from_relief, uniform_scales
 from app.mapping.support import support
@@ -202,6 +216,7 @@ class GaussianProcessMap:
             self._calibration = replace(
                 self._calibration, log_scale=self.log_scale_, log_scale_beyond=self.log_scale_beyond_
             )
+        self._reach: Reach | None = reach(self._levels, self._unit_m, self._factors) if self.calibrate else None
         best = self._refined if self._refined is not None and self.refinement_ >= 0.5 else self._plain
         self.hyperparameters_ = (
             self._refined_hyperparameters if best is self._refined else self.stationary_hyperparameters_
@@ -267,6 +282,36 @@ class GaussianProcessMap:
                 self._rough or self._plain, rows, NEIGHBOURS_OF_LARGE_GRIDS, BEYOND_UNITS * self._unit_m
             )
             self.log_scale_beyond_ = max(self.log_scale_, checked_log_scale(self._calibration, beyond))
+            self._factors = self._checked_factors(self._calibration)
+
+    def _checked_factors(self, calibration: Calibration) -> Factors:
+        """Hold soundings out over longer and longer distances: which factors on the deviations that leaves possible."""
+        n = self._levels.n_fine
+        rows = np.unique(np.linspace(0, n - 1, min(n, TESTS)).astype(np.int64))
+        distances, factors = [], []
+        for radius in radii(self._levels, self._unit_m, FACTOR_STEP):
+            holes = self._levels.neighbours_beyond(
+                self._levels.points[rows], np.full(len(rows), radius), *NEIGHBOURS_OF_LARGE_GRIDS
+            )
+            strips = strip_neighbours(self._levels, rows, radius)
+            enough = (strips >= 0).sum(axis=1) >= LEAST_IN_STRIP
+            tried = [self._predicted(rows, holes), self._predicted(rows[enough], strips[enough])]
+            found = [
+                factor_of(held_out, calibration.steepness_factor(held_out.points_m), self.log_scale_, 2.0 * radius)
+                for held_out in tried
+            ]
+            known = [factor for factor in found if factor is not None]
+            if known:
+                distances.append(radius)
+                factors.append(max(known))
+        return Factors(np.array(distances), np.maximum.accumulate(np.array(factors, dtype=np.float64)))
+
+    def _predicted(self, rows: IntArray, neighbours: IntArray) -> HeldOut:
+        """Predict soundings from others as the map would."""
+        plain = predicted_without(self._plain, rows, neighbours)
+        if self._refined is None or self.refinement_ == 0.0:
+            return plain
+        return mixed(predicted_without(self._refined, rows, neighbours), plain, self.refinement_)
 
     def _scales_over(self, grid: Grid) -> LocalScales:
         return _scales(self._scale_fields.over(grid).reshape(3, -1))
@@ -288,6 +333,11 @@ class GaussianProcessMap:
         neighbours = self.neighbours or (NEIGHBOURS_OF_SMALL_GRIDS if _small(grid) else NEIGHBOURS_OF_LARGE_GRIDS)
         depth, variance = self._predict(grid, wanted, neighbours)
         deviation = np.sqrt(variance) if self._calibration is None else self._calibration.deviation(grid, variance)
+        process_sd, bound = None, None
+        if self._reach is not None:
+            distance = nearest(self._levels.fine_tree, grid.centres_m, 1)[0].reshape(shape)
+            process_sd, bound = deviation, self._reach.bound(deviation, distance, grid.cell_m)
+            deviation = self._reach.deviation(deviation, distance)
         count = count_per_cell(grid, self.soundings_)
         roughness = np.where(wanted, np.exp(self._log_ratio.over(grid)[0]), np.nan)
         kind = "nonstationary" if self.refinement_ > 0.0 else "stationary"
@@ -300,6 +350,8 @@ class GaussianProcessMap:
             roughness=roughness / np.nanmean(roughness) if wanted.any() else roughness,
             correlation_length_m=self.hyperparameters_.length_m,
             model=f"{kind} Gaussian process, {self.kernel_}",
+            process_sd_m=process_sd,
+            bound_sd_m=bound,
         )
 
     def _predict(self, grid: Grid, wanted: BoolArray, neighbours: tuple[int, int]) -> tuple[FloatArray, FloatArray]:

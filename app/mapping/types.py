@@ -91,6 +91,12 @@ class BathymetricMap:
     prior
         True where soundings were imported as prior knowledge; None without any. They are not in ``count`` or
         ``sounded``.
+    process_sd_m
+        What the process alone says of the deviation, wherever soundings are: what planners weigh places by. None: the
+        same as ``sd_m``.
+    bound_sd_m
+        What the deviation hardly exceeds, as far as soundings could tell; infinite where none supports the cell. None:
+        the same as ``sd_m``.
     """
 
     grid: Grid
@@ -102,3 +108,19 @@ class BathymetricMap:
     correlation_length_m: float
     model: str
     prior: BoolArray | None = None
+    process_sd_m: FloatArray | None = None
+    bound_sd_m: FloatArray | None = None
+
+    @property
+    def planning_sd_m(self) -> FloatArray:
+        """The deviation that places are weighed by, (rows, cols)."""
+        return self.sd_m if self.process_sd_m is None else self.process_sd_m
+
+    @property
+    def claim_sd_m(self) -> FloatArray:
+        """The deviation that claims are made by, (rows, cols)."""
+        return self.sd_m if self.bound_sd_m is None else self.bound_sd_m
+
+    def known(self, accuracy_m: float) -> BoolArray:
+        """Return which cells are known to an accuracy and supported by soundings, (rows, cols)."""
+        return np.asarray(self.claim_sd_m <= accuracy_m)

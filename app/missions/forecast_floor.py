@@ -1,5 +1,6 @@
-"""The sea floor that a forecast is flown over: what was imported of it, and a guess for the rest."""
+"""The sea floors that a forecast is flown over: what was imported, and guesses of different roughness for the rest."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,8 +18,15 @@ LEAST_GUESS_M = 10.0
 ROOM_M = 3.0
 """How much deeper than the vehicles need the guessed floor is."""
 
-RELIEF = 0.1
-"""Standard deviation of the guessed floor's hills as a share of its depth."""
+KINDS: tuple[tuple[str, str, float], ...] = (
+    ("gently rolling", "smooth", 0.1),
+    ("rugged", "rugged", 0.15),
+    ("nearly flat", "smooth", 0.02),
+    ("rolling, with finer relief", "rugged", 0.05),
+    ("cut by a canyon", "canyon", 0.2),
+)
+"""The guesses, the most telling first: in words, the family of generated floors, the standard deviation of its relief
+as a share of the depth."""
 
 CELLS = 2500
 """Cells of a forecast's map at most: more make it slower, hardly other."""
@@ -26,10 +34,14 @@ CELLS = 2500
 
 @dataclass(frozen=True)
 class Floor:
-    """A floor and where it comes from, in words. ``known``: the share of the area's cells with imported soundings."""
+    """A floor and where it comes from, in words; ``kind`` is its roughness in words.
+
+    ``known``: the share of the area's cells with imported soundings.
+    """
 
     terrain: Terrain
     words: str
+    kind: str
     known: float
 
 
@@ -38,8 +50,10 @@ def forecast_cell_m(spec: MissionSpec) -> float:
     return float(max(spec.cell_m, np.sqrt(Polygon(spec.local_area()).area / CELLS)))
 
 
-def floor_of(spec: MissionSpec, prior: FloatArray, deepest_m: float, depth_m: float | None) -> Floor:
-    """Return the floor under a mission's area.
+def floors_of(spec: MissionSpec, prior: FloatArray, deepest_m: float, depth_m: float | None) -> Iterator[Floor]:
+    """Return floors of different roughness that may lie under a mission's area, made as they are asked for.
+
+    Where soundings were imported all are alike; the farther from them, the more they differ.
 
     Parameters
     ----------
@@ -53,23 +67,26 @@ def floor_of(spec: MissionSpec, prior: FloatArray, deepest_m: float, depth_m: fl
     cell_m = forecast_cell_m(spec)
     grid, mask = make_grid(spec.local_area(), cell_m)
     guess = max(LEAST_GUESS_M, deepest_m + spec.limits.min_altitude_m + ROOM_M)
-    known, share = np.full(mask.shape, np.nan), 0.0
+    known, doubt, share = np.full(mask.shape, np.nan), np.full(mask.shape, np.nan), 0.0
     if len(prior):
         imported = prior_map(Soundings(*prior.T.copy()), grid, mask)
-        known = imported.depth_m
+        known, doubt = imported.depth_m, imported.sd_m
         share = float(np.mean(imported.prior[mask])) if imported.prior is not None else 0.0
     has = np.isfinite(known)
     middle = depth_m if depth_m is not None else float(np.median(known[has])) if has.any() else guess
     # Two cells more, so that it is a floor however narrow the area is.
     rows, cols = grid.rows + 2, grid.cols + 2
-    hills = generate("smooth", spec.seed % 2**31, width_m=cols * cell_m, height_m=rows * cell_m, cell_m=cell_m).z_m
-    relief = (hills - hills.mean()) / max(float(hills.std()), 1e-9)
-    z = middle * (1 + RELIEF * np.clip(relief, -3, 3))
-    words = f"a gently rolling floor about {middle:.0f} m deep" + ("" if depth_m is not None else ", which is a guess")
-    if has.any():
-        # Outside of the area it goes on from the nearest place in it.
-        near = distance_transform_edt(~has, return_distances=False, return_indices=True)
-        inner = z[: grid.rows, : grid.cols]
-        inner[:] = np.where(has, known, known[tuple(near)])
-        words = f"as imported soundings have it, in {100 * share:.0f} % of the cells, and the map between them"
-    return Floor(Terrain(np.maximum(z, 0.2), cell_m, name="forecast"), words, share)
+    for number, (kind, family, relief) in enumerate(KINDS):
+        seed = (spec.seed + number) % 2**31
+        shape = generate(family, seed, width_m=cols * cell_m, height_m=rows * cell_m, cell_m=cell_m).z_m
+        hills = relief * middle * np.clip((shape - shape.mean()) / max(float(shape.std()), 1e-9), -3, 3)
+        z = middle + hills
+        words = f"{kind}, about {middle:.0f} m deep" + ("" if depth_m is not None else " (a guess)")
+        if has.any():
+            # Outside of the area it goes on from the nearest place in it.
+            near = distance_transform_edt(~has, return_distances=False, return_indices=True)
+            free = np.minimum(doubt[tuple(near)] / max(relief * middle, 1e-9), 1.0)
+            inner = z[: grid.rows, : grid.cols]
+            inner[:] = known[tuple(near)] + free * hills[: grid.rows, : grid.cols]
+            words = f"as imported soundings have it, in {100 * share:.0f} % of the cells, and {kind} between them"
+        yield Floor(Terrain(np.maximum(z, 0.2), cell_m, name="forecast"), words, kind, share)

@@ -17,30 +17,52 @@ from app.missions.spec import MissionSpec
 from app.missions.view_base import View
 
 BUDGET_S = 6.0
+"""Seconds of the processor for each floor."""
+
+PATIENCE_S = 45.0
+"""After so long by the clock no further floor is begun."""
+
+LOW, HIGH = 0.1, 0.9
 START_MARGIN_M, START_SPACING_M = 2.0, 5.0
 NEAR_M = 500.0
 """A vehicle farther away than this is taken to be brought to the area first."""
+
+
+class Range(View):
+    """From where to where a figure went, over floors of different roughness: 10 % were below, 10 % above."""
+
+    low: float
+    high: float
 
 
 class VehicleForecast(View):
     """What one vehicle will have done."""
 
     vehicle: str
-    distance_m: float
+    distance_m: float = Field(description="Median over the floors")
+    distance_m_range: Range
 
 
 class ForecastView(View):
     """What is to be expected of a mission: a forecast from a simulation, not a promise."""
 
-    duration_s: float = Field(description="Seconds of the vehicles' time until the last step is done")
+    duration_s: float = Field(description="Seconds of the vehicles' time until the last step is done; median")
+    duration_s_range: Range
     vehicles: list[VehicleForecast]
-    coverage_pct: float = Field(description="Share of the area's cells that will be known to `accuracy_m`")
-    remaining_pct: float = Field(description="Share of the landmarks that never were")
-    mean_sd_m: float | None = Field(description="Mean deviation of the map; null: nothing was sounded")
+    coverage_pct: float = Field(
+        description="Share of the area's cells that will be known to `accuracy_m`; median over the floors"
+    )
+    coverage_pct_range: Range
+    remaining_pct: float = Field(description="Share of the landmarks that will not be; median over the floors")
+    remaining_pct_range: Range
+    mean_sd_m: float | None = Field(description="Mean deviation of the map; median; null: nothing was sounded")
+    mean_sd_m_range: Range | None
     steps: int = Field(description="Steps that are still to be flown")
     steps_simulated: int = Field(
         description="Of these were simulated in the time allowed; `coverage_pct` and what follows is after as many"
     )
+    steps_flown: int = Field(description="The same as `steps_simulated`")
+    floors: int = Field(description="Over how many floors of different roughness it was flown")
     assumptions: list[str] = Field(description="What was taken to be so, in words")
 
 
@@ -96,6 +118,7 @@ class Forecaster:
             floor_depth_m=floor_depth_m,
             first_step=first_step,
             budget_s=BUDGET_S,
+            patience_s=PATIENCE_S,
             stop=lambda: gone.is_set() or self._closing.is_set(),
         )
         try:
@@ -128,9 +151,14 @@ def starts_of(spec: MissionSpec, members: list[Member]) -> tuple[FloatArray, str
 
 
 def _view(spec: MissionSpec, found: Forecast, where: str, steps: int) -> ForecastView:
-    floor = found.floor
+    first, flights = found.floors[0], found.flights
+    kinds = ", ".join(floor.kind for floor in found.floors)
     assumptions = [
-        f"Sea floor: {floor.words}.",
+        f"Sea floor: {first.words}.",
+        f"Flown over {len(flights)} floors: {kinds}. Ranges leave out the lowest and the highest tenth; which floor it "
+        "will be is not known."
+        if len(flights) > 1
+        else "Flown over one floor only, for want of time: on a rougher one it will be worse.",
         where,
         f"Straight legs at {spec.speed_mps:g} m/s without current; nobody waits for a link, and none is lost.",
     ]
@@ -140,16 +168,40 @@ def _view(spec: MissionSpec, found: Forecast, where: str, steps: int) -> Forecas
         assumptions.append("Going for moving targets is not in it.")
     if found.steps_flown < steps:
         assumptions.append(
-            f"Only {found.steps_flown} of {steps} steps were simulated in {BUDGET_S:g} s: duration and distances are "
-            "drawn out to all of them; coverage and deviation are those after as many."
+            f"Only {found.steps_flown} of {steps} steps were simulated on every floor, in {BUDGET_S:g} s of the "
+            "processor each: duration and distances are drawn out to all of them; coverage and deviation are those "
+            "after as many."
         )
+
+    sds = [flight.mean_sd_m for flight in flights if flight.mean_sd_m is not None]
+    durations = [flight.duration_s for flight in flights]
+    coverages, remainders = [flight.coverage_pct for flight in flights], [flight.remaining_pct for flight in flights]
+    ways = {name: [flight.distances_m[name] for flight in flights] for name in flights[0].distances_m}
     return ForecastView(
-        duration_s=found.duration_s,
-        vehicles=[VehicleForecast(vehicle=name, distance_m=metres) for name, metres in found.distances_m.items()],
-        coverage_pct=found.coverage_pct,
-        remaining_pct=found.remaining_pct,
-        mean_sd_m=found.mean_sd_m,
+        duration_s=_median(durations),
+        duration_s_range=_range(durations),
+        vehicles=[
+            VehicleForecast(vehicle=name, distance_m=_median(way), distance_m_range=_range(way))
+            for name, way in ways.items()
+        ],
+        coverage_pct=_median(coverages),
+        coverage_pct_range=_range(coverages),
+        remaining_pct=_median(remainders),
+        remaining_pct_range=_range(remainders),
+        mean_sd_m=_median(sds) if sds else None,
+        mean_sd_m_range=_range(sds) if sds else None,
         steps=steps,
         steps_simulated=found.steps_flown,
+        steps_flown=found.steps_flown,
+        floors=len(flights),
         assumptions=assumptions,
     )
+
+
+def _median(values: list[float]) -> float:
+    return float(np.median(values))
+
+
+def _range(values: list[float]) -> Range:
+    low, high = (float(x) for x in np.quantile(values, [LOW, HIGH]))
+    return Range(low=low, high=high)

@@ -3,7 +3,7 @@
 import copy
 import hashlib
 import threading
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -20,6 +20,10 @@ from app.missions.arrivals import Arrivals, Everything
 
 MAX_LANDMARKS = 4000
 """More landmarks make planning slower, not better: neighbouring cells are almost the same question."""
+
+CLAIM_MARGIN = 1.15
+"""By so much a cell's deviation must be below the asked accuracy to become known; up to the accuracy it stays so. What
+is learned of the sea floor changes a little with every map: cells at the limit do not come and go with it."""
 
 RELEARN_GROWTH = 1.15
 """Hyperparameters are learned again when the soundings grew by this factor."""
@@ -91,7 +95,6 @@ class MapBuilder:
         if not self._nodes.any():
             self._nodes = self.mask.copy()
         self._nodes_xy = self.grid.centres_m[self._nodes.ravel()]
-        self._accurate = np.zeros(len(self._nodes_xy), dtype=bool)
         self.arrivals = Arrivals()
         self._soundings = np.zeros((0, 4))
         # Those that an operator restored: they are no outliers whatever their neighbours say.
@@ -192,9 +195,16 @@ class MapBuilder:
             bathymetry = measured if bathymetry is None else fuse(measured, bathymetry)
         if bathymetry is None:
             raise ValueError("there is no sounding to make a map of")
+        bathymetry = self._with_margin(bathymetry)
         digest = hashlib.sha256(bathymetry.depth_m.tobytes()).hexdigest()
         self._version += 1
         return BuiltMap(self._version, len(self._soundings), bathymetry, digest, thorough)
+
+    def _with_margin(self, bathymetry: BathymetricMap) -> BathymetricMap:
+        """Ask more of cells that were not known in the newest map."""
+        before = None if self._newest is None else self._newest.map.known(self._accuracy_m)
+        margin = np.where(False if before is None else before, 1.0, CLAIM_MARGIN)
+        return replace(bathymetry, bound_sd_m=bathymetry.claim_sd_m * margin)
 
     def _measured(self) -> BathymetricMap:
         """Return the map of the mission's own soundings."""
@@ -257,21 +267,22 @@ class MapBuilder:
         return measured if prior is None else fuse(measured, prior)
 
     def coverage_pct(self) -> float:
-        """Return the share of the area's cells that are known to the asked accuracy."""
+        """Return the share of the area's cells that are known to the asked accuracy: now, supported by soundings."""
         return self._counted()[1]
 
     def remaining_pct(self) -> float:
-        """Return the share of the landmarks that were never known to the asked accuracy, in a belief or now."""
+        """Return the share of the landmarks that are not known to the asked accuracy."""
         return self._counted()[2]
 
     def _counted(self) -> tuple[BuiltMap | None, float, float]:
         """Return both shares of the newest map: they are asked for with every look at the mission."""
         built = self._newest
-        if built is not None and built is not self._shares[0]:
-            accurate = built.map.sd_m <= self._accuracy_m
-            remaining = ~(self._accurate | accurate[self._nodes])
-            self._shares = built, float(100.0 * accurate[self.mask].mean()), float(100.0 * remaining.mean())
-        return (None, 0.0, float(100.0 * (~self._accurate).mean())) if built is None else self._shares
+        if built is None:
+            return None, 0.0, 100.0
+        if built is not self._shares[0]:
+            known = built.map.known(self._accuracy_m)
+            self._shares = built, float(100.0 * known[self.mask].mean()), float(100.0 * (~known[self._nodes]).mean())
+        return self._shares
 
     def belief(self) -> Belief:
         """Return what is known at the landmarks (a lattice of the grid's cells)."""
@@ -287,14 +298,12 @@ class MapBuilder:
                 correlation_length_m=extent / 5,
             )
         bathymetry = self._newest.map
-        sd = bathymetry.sd_m[self._nodes]
-        # AURO15: what was once accurately estimated stays so.
-        self._accurate |= sd <= self._accuracy_m
         return Belief(
             xy_m=self._nodes_xy,
             depth_m=bathymetry.depth_m[self._nodes],
-            sd_m=sd,
-            accurate=self._accurate.copy(),
+            sd_m=bathymetry.planning_sd_m[self._nodes],
+            # Not latched as in AURO15: more soundings may show that a map was too sure of itself.
+            accurate=bathymetry.known(self._accuracy_m)[self._nodes],
             weight=bathymetry.roughness[self._nodes],
             correlation_length_m=bathymetry.correlation_length_m,
         )

@@ -37,7 +37,8 @@ SCALES = {
 BASE = ("depth", "uncertainty", "count", "flags")
 FURTHER = ("slope", "tvu_fraction", "difference")
 SOUNDED, PRIOR, ACCURATE, VISIBLE = 1, 2, 4, 8
-"""Bits of the layer ``flags``: sounded; imported soundings in it; known to the asked accuracy; near a sounding."""
+"""Bits of the layer ``flags``: sounded; imported soundings in it; known to the asked accuracy and supported by
+soundings; near a sounding."""
 
 KEPT_VERSIONS = 12
 KEPT_ANSWERS = 24
@@ -134,7 +135,7 @@ def _flags(bathymetry: BathymetricMap, accuracy_m: float) -> NDArray[np.int32]:
     flags = np.where(bathymetry.sounded, SOUNDED, 0)
     if bathymetry.prior is not None:
         flags |= np.where(bathymetry.prior, PRIOR, 0)
-    flags |= np.where(bathymetry.sd_m <= accuracy_m, ACCURATE, 0)
+    flags |= np.where(bathymetry.known(accuracy_m), ACCURATE, 0)
     flags |= np.where(_near(measured, bathymetry.correlation_length_m / bathymetry.grid.cell_m), VISIBLE, 0)
     return np.where(inside, flags, UNKNOWN).astype(np.int32)
 

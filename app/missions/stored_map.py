@@ -15,6 +15,7 @@ Doubted = list[tuple[NDArray[np.float64], str]]
 """Soundings, rows of shape (4,), that a map leaves out, each with the reason."""
 
 LAYERS = ("depth_m", "sd_m", "count", "sounded", "roughness")
+OPTIONAL = ("prior", "process_sd_m", "bound_sd_m")
 FASTEST = 1
 """Depths hardly get smaller; what lies outside of the area does at any level."""
 
@@ -34,8 +35,7 @@ def pack(bathymetry: BathymetricMap, doubted: Doubted) -> bytes:
         "reasons": [reason for _, reason in doubted],
     }
     arrays = {name: getattr(bathymetry, name) for name in LAYERS}
-    if bathymetry.prior is not None:
-        arrays["prior"] = bathymetry.prior
+    arrays |= {name: layer for name in OPTIONAL if (layer := getattr(bathymetry, name)) is not None}
     arrays["doubted"] = np.array([row for row, _ in doubted], dtype=float).reshape(-1, 4)
     arrays["facts"] = np.frombuffer(json.dumps(facts).encode(), dtype=np.uint8)
     content = io.BytesIO()
