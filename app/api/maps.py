@@ -71,6 +71,7 @@ class LayerName(StrEnum):
     SLOPE = "slope"
     TVU_FRACTION = "tvu_fraction"
     DIFFERENCE = "difference"
+    LIVE = "live"
 
 
 class OverlayLayer(StrEnum):
@@ -82,6 +83,7 @@ class OverlayLayer(StrEnum):
     SLOPE = "slope"
     TVU_FRACTION = "tvu_fraction"
     DIFFERENCE = "difference"
+    LIVE = "live"
 
 
 _NOT_MODIFIED: dict[int | str, dict[str, Any]] = {
@@ -312,7 +314,9 @@ _add_files(TRACKS, "getTracksFile", "Download the tracks", "Return where the veh
 
 
 def _layer(snapshot: MapSnapshot, name: str, order: Order) -> Layer:
-    """Return a layer. Raises ProblemError when there is no reference grid to differ from."""
+    """Return a layer. Raises ProblemError where the mission has none of that name."""
+    if name == LayerName.LIVE:
+        return _live_layer(snapshot)
     found = next((layer for layer in layers_of(snapshot, order) if layer.name == name), None)
     if found is None:
         raise ProblemError(
@@ -323,8 +327,23 @@ def _layer(snapshot: MapSnapshot, name: str, order: Order) -> Layer:
     return found
 
 
+def _live_layer(snapshot: MapSnapshot) -> Layer:
+    live = None if snapshot.interpolation is None else snapshot.interpolation.map()
+    if live is None:
+        raise ProblemError(
+            "invalid-request",
+            "nothing was sounded since the service has this mission in memory",
+            remedy="Ask for the depth of the map itself, which holds every sounding",
+        )
+    return Layer(
+        "live", "depth by the papers' Gaussian interpolation of every sounding", "metre", live.depth_m
+    )
+
+
 def _tag(state: EdgeState, snapshot: MapSnapshot, *variant: object) -> str:
     shown = "".join(f"-{part}" for part in variant)
+    if LayerName.LIVE in variant and snapshot.interpolation is not None:
+        shown += f"{snapshot.interpolation.version}"
     return f'"{snapshot.facts.mission_id}-{state.run_id}-{snapshot.version}.{snapshot.revision}{shown}"'
 
 

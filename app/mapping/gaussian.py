@@ -19,6 +19,8 @@ REACH = 4.0
 MANY_SOUNDINGS = 20_000
 """From so many on, threads share the rows of the grid."""
 
+MODEL = "Gaussian interpolation"
+
 BANDS = 8
 BLOCK_CELLS = 16
 PADDING = 8
@@ -121,6 +123,15 @@ class GaussianInterpolator:
         weight = self._moments[..., 0]
         return np.sqrt(_divide(np.ones_like(weight), weight) + self._scatter() * _divide(self._squares, weight**2))
 
+    def values_at(self, cells: BoolArray) -> tuple[FloatArray, FloatArray, IntArray]:
+        """Return depth, standard deviation and count, (k,) each, where ``cells`` (rows, cols) is True, row by row."""
+        weight, first, second = self._moments[cells].T
+        squares = self._squares[cells]
+        mean = _divide(first, weight)
+        scatter = np.maximum(_divide(second, weight) - mean**2, 0.0)
+        sd = np.sqrt(_divide(np.ones_like(weight), weight) + scatter * _divide(squares, weight**2))
+        return np.asarray((self._reference or 0.0) + mean), sd, self._count[cells]
+
     def _scatter(self) -> FloatArray:
         weight, first, second = self._moments.transpose(2, 0, 1)
         return np.maximum(_divide(second, weight) - _divide(first, weight) ** 2, 0.0)
@@ -148,7 +159,7 @@ class GaussianInterpolator:
             sounded=self._count > 0,
             roughness=np.where(wanted, roughness, np.nan),
             correlation_length_m=self.width_m,
-            model="Gaussian interpolation",
+            model=MODEL,
         )
 
 

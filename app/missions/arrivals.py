@@ -38,6 +38,8 @@ class Arrivals:
         The mission's soundings are not in memory: nothing can be made of them before they are read.
     replaced
         How often soundings that were there were put in place of others.
+    came, taken
+        How many soundings came one by one, and how many of them were taken.
     """
 
     def __init__(self) -> None:
@@ -45,6 +47,7 @@ class Arrivals:
         self._lock = threading.Lock()
         self.at_rest = False
         self.replaced = 0
+        self.came = self.taken = 0
 
     def __bool__(self) -> bool:
         """Tell whether anything came."""
@@ -53,7 +56,9 @@ class Arrivals:
     def add(self, soundings: Rows) -> None:
         """Note soundings."""
         if len(soundings):
-            self._queue.append(soundings)
+            with self._lock:
+                self._queue.append(soundings)
+                self.came += len(soundings)
 
     def replace(self, soundings: Rows, prior: Rows, trusted: BoolArray | None = None) -> None:
         """Take these in place of all soundings so far; ``prior`` are those that were imported."""
@@ -100,6 +105,7 @@ class Arrivals:
                 return None
             taken = [item for item in self._queue if not isinstance(item, Coming)]
             self._queue.clear()
+            self.taken = self.came
             return taken, self.replaced
 
     def noted(self) -> list[Rows]:

@@ -4,7 +4,7 @@ import asyncio
 import math
 from collections.abc import Callable
 from concurrent.futures import Executor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, TypeVar
 
@@ -32,9 +32,10 @@ from app.missions.fleet import (
 from app.missions.gate import Gate
 from app.missions.hub import FleetHub
 from app.missions.journal import Counts, Journal
+from app.missions.live_grid import map_of
 from app.missions.map_builder import BuiltMap, MapBuilder
 from app.missions.map_tiles import TileCache
-from app.missions.maps import MapSnapshot, MissionFacts
+from app.missions.maps import NOT_MADE, MapSnapshot, MissionFacts
 from app.missions.members import Member, Team
 from app.missions.messages import StateMessage
 from app.missions.range_journal import RangeJournal
@@ -120,7 +121,7 @@ class LiveMission:
         self.search = search
         """What a mission of kind search knows of its site."""
         take_scans = None if self.search is None else partial(take, self.search, row.id, self.changed.set)
-        self.journal = Journal(database, row.id, self.gate, counts, self.broadcaster, self.builder.add, take_scans)
+        self.journal = Journal(database, row.id, self.gate, counts, self.broadcaster, self._take_soundings, take_scans)
         self.journal.on_trouble = self.publish_summary
         self.whole = WholeSet(database, row.id, self.builder, self.journal)
         """All its soundings, and its map as it is stored."""
@@ -274,7 +275,24 @@ class LiveMission:
     def snapshot(self, built: BuiltMap) -> MapSnapshot:
         """Return a map with what is needed to understand it."""
         step = self.whole.step_of(built, self.header.step)
-        return MapSnapshot(self.facts, built, step, self.reference_m, self.revision)
+        return MapSnapshot(self.facts, built, step, self.reference_m, self.revision, interpolation=self.builder.live)
+
+    def live_snapshot(self) -> MapSnapshot | None:
+        """Return the newest map with what was sounded since; None before the first sounding. For a worker thread."""
+        live = None if self.builder.live is None else self.builder.live.fresh()
+        built = self.builder.newest
+        if built is not None:
+            return replace(self.snapshot(built), live=live)
+        if live is None:
+            return None
+        # No map was made yet: there is nothing but what was just sounded.
+        first = BuiltMap(NOT_MADE, int(live.count.sum()), map_of(self.builder.grid, live), "")
+        return MapSnapshot(self.facts, first, self.header.step, self.reference_m, self.revision, live)
+
+    def _take_soundings(self, soundings: FloatArray) -> None:
+        """Take in committed soundings, shape (n, 4): east, north, depth, standard deviation."""
+        self.builder.add(soundings)
+        self.telling.of_soundings(len(soundings), self.header.step)
 
     def publish_map(self, built: BuiltMap) -> None:
         """Tell everyone who watches that there is a new map."""
@@ -370,4 +388,4 @@ class LiveMission:
 
 def builder_of(spec: MissionSpec) -> MapBuilder:
     """Return the builder of a mission's map, which knows of no sounding yet."""
-    return MapBuilder(spec.local_area(), spec.cell_m, spec.accuracy_m)
+    return MapBuilder(spec.local_area(), spec.cell_m, spec.accuracy_m, live=True)

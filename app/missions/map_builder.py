@@ -17,6 +17,7 @@ from app.mapping.gp import GaussianProcessMap
 from app.mapping.outliers import flag_outliers
 from app.mapping.types import BathymetricMap, BoolArray, FloatArray, Grid, Soundings
 from app.missions.arrivals import Arrivals, Everything
+from app.missions.live_grid import LiveGrid
 
 MAX_LANDMARKS = 4000
 """More landmarks make planning slower, not better: neighbouring cells are almost the same question."""
@@ -85,9 +86,16 @@ class MapBuilder:
     """Collects soundings and makes maps of them.
 
     ``add`` may be called from the event loop at any time; ``build`` and ``learn`` belong in worker threads.
+
+    Parameters
+    ----------
+    area : (n, 2)
+        Corners of a polygon, east and north.
+    live
+        Also keep the interpolation that takes every sounding in at once.
     """
 
-    def __init__(self, area: FloatArray, cell_m: float, accuracy_m: float) -> None:
+    def __init__(self, area: FloatArray, cell_m: float, accuracy_m: float, *, live: bool = False) -> None:
         self.grid, self.mask = make_grid(area, cell_m)
         self._accuracy_m = accuracy_m
         stride = int(np.ceil(np.sqrt(max(self.mask.sum(), 1) / MAX_LANDMARKS)))
@@ -98,6 +106,8 @@ class MapBuilder:
             self._nodes = self.mask.copy()
         self._nodes_xy = self.grid.centres_m[self._nodes.ravel()]
         self.arrivals = Arrivals()
+        self.live = LiveGrid(self.grid, self.mask) if live else None
+        """What came since the newest map was made; None: nobody asks for it."""
         self._soundings = np.zeros((0, 4))
         # Those that an operator restored: they are no outliers whatever their neighbours say.
         self._trusted = np.zeros(0, dtype=bool)
@@ -116,7 +126,11 @@ class MapBuilder:
 
     def add(self, soundings: NDArray[np.float64]) -> None:
         """Take in soundings, shape (n, 4): east, north, depth, standard deviation in metres."""
-        self.arrivals.add(soundings)
+        if len(soundings):
+            if self.live is not None:
+                # Before it arrives: what a map has taken, the live grid has noted.
+                self.live.note(soundings)
+            self.arrivals.add(soundings)
 
     def show(self, built: BuiltMap, doubted: list[tuple[NDArray[np.float64], str]]) -> None:
         """Begin with a map that was stored, and with what it left out; its soundings stay where they are stored."""
@@ -133,6 +147,8 @@ class MapBuilder:
                     self._doubted = self.doubted()
                     self._soundings, self._trusted = np.zeros((0, 4)), np.zeros(0, dtype=bool)
                     self._prior, self._learned = None, _Learned(_new_model())
+                    if self.live is not None:
+                        self.live.release()
                 self._learning.release()
             self._building.release()
 
@@ -162,7 +178,10 @@ class MapBuilder:
             came = self.arrivals.take()
             if came is None:
                 return self._newest
+            upto, generation = self.arrivals.taken, self._generation
             self._take_in(came[0])
+            if self.live is not None and (generation != self._generation or self.live.outgrown(len(self._soundings))):
+                self.live.begin_anew(self._soundings, upto)
             if not len(self._soundings) and self._prior is None:
                 self._newest = None
                 return None
@@ -171,6 +190,8 @@ class MapBuilder:
             if came[0] or (self._newest is not None and thorough):
                 self._newest = self._build(thorough=thorough)
                 self._replaced_mapped = came[1]
+                if self.live is not None:
+                    self.live.settle(upto)
             return self._newest
 
     def _take_in(self, came: list[NDArray[np.float64] | Everything]) -> None:

@@ -6,7 +6,7 @@ import struct
 import threading
 import zlib
 from collections import OrderedDict
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,8 @@ from app.mapping.layers import make_layers
 from app.mapping.products.overlay import overlay_corners
 from app.mapping.s44 import Order
 from app.mapping.types import BathymetricMap, BoolArray
-from app.missions.maps import MapSnapshot
+from app.missions.live_grid import LiveCells
+from app.missions.maps import NOT_MADE, MapSnapshot
 
 MAGIC = b"BFM1"
 TILE = 32
@@ -95,7 +96,12 @@ class TileCache:
     def _picture(self, snapshot: MapSnapshot, tag: str, further: tuple[str, ...]) -> _Picture:
         known = self._pictures.get(tag)
         if known is None or not set(further) <= known.layers.keys():
-            known = _Picture(tag, _layers(snapshot, further) | (known.layers if known is not None else {}))
+            if snapshot.live is None or snapshot.version == NOT_MADE:
+                made = _layers(snapshot, further)
+            else:
+                considered = replace(snapshot, live=None)
+                made = _with_live_cells(self._picture(considered, considered_tag(tag), further).layers, snapshot.live)
+            known = _Picture(tag, made | (known.layers if known is not None else {}))
             self._pictures[tag] = known
             _shorten(self._pictures, KEPT_VERSIONS)
         return known
@@ -120,6 +126,24 @@ def _layers(snapshot: MapSnapshot, further: tuple[str, ...]) -> dict[str, NDArra
         # There is nothing to differ from: no cell has a value.
         found[name] = np.full(bathymetry.depth_m.shape, UNKNOWN, dtype=np.int32)
     found["flags"] = _flags(bathymetry, accuracy_m)
+    return found
+
+
+def considered_tag(tag: str) -> str:
+    """Return the tag of the map below live cells."""
+    return tag.rpartition("@")[0]
+
+
+def _with_live_cells(layers: dict[str, NDArray[np.int32]], live: LiveCells) -> dict[str, NDArray[np.int32]]:
+    """Return a map's layers with what was sounded since; the others stay as the map has them until it is made anew."""
+    found = dict(layers)
+    for name, values in (("depth", live.depth_m), ("uncertainty", live.sd_m)):
+        found[name] = layers[name].copy()
+        found[name][live.cells] = _whole(values * SCALES[name])
+    found["count"], found["flags"] = layers["count"].copy(), layers["flags"].copy()
+    found["count"][live.cells] = np.maximum(found["count"][live.cells], live.count)
+    flags = np.where(found["flags"][live.cells] == UNKNOWN, 0, found["flags"][live.cells])
+    found["flags"][live.cells] = flags | np.where(live.count > 0, SOUNDED | VISIBLE, VISIBLE)
     return found
 
 

@@ -10,10 +10,14 @@ from app.mapping.layers import Layer
 from app.mapping.products.overlay import overlay_corners
 from app.mapping.types import FloatArray
 from app.mapping.vertical import VerticalDatum
+from app.missions.live_grid import LiveCells, LiveGrid
 from app.missions.map_builder import BuiltMap
 from app.missions.map_views import MapView
 from app.missions.spec import MissionSpec
 from imc_bridge.printable import printable
+
+NOT_MADE = 0
+"""Version of a map that holds nothing but live cells: the first considered map is still being made."""
 
 
 @dataclass(frozen=True)
@@ -46,6 +50,10 @@ class MapSnapshot:
         A reference grid's depths at its cells, if one was given.
     revision
         Grows when what the map is shown with changes: the reference grid, the datum.
+    live
+        What was sounded since the map was made.
+    interpolation
+        The papers' interpolation of every sounding so far, while the mission's soundings are in memory.
     """
 
     facts: MissionFacts
@@ -53,11 +61,18 @@ class MapSnapshot:
     step: int
     reference_m: FloatArray | None = None
     revision: int = 0
+    live: LiveCells | None = None
+    interpolation: LiveGrid | None = None
 
     @property
     def version(self) -> int:
         """Grows with every new map of the mission."""
         return self.built.version
+
+    @property
+    def tag(self) -> str:
+        """Changes with everything that the map shows."""
+        return f"{self.version}.{self.revision}" + ("" if self.live is None else f"@{self.live.version}")
 
     def view(self, layers: Collection[Layer] = ()) -> MapView:
         """Return the map as JSON shows it, with the values of further layers."""

@@ -546,12 +546,15 @@ class MissionService:
         ``run`` tells this process from others, whose versions begin at 1, too.
         """
         live = await self._get(mission_id)
-        if step is None:
-            snapshot = await self.map(mission_id, patient=False)
-        else:
+        snapshot = None
+        if step is not None:
             snapshot = await map_at_step(live, step)
-        at = "" if step is None else f"@{step}"
-        tag = f"{run}.{snapshot.version}.{snapshot.revision}{at}"
+        elif mission_id in self._runs:
+            # Not with the planning threads, which a decision may keep for seconds.
+            snapshot = await asyncio.to_thread(live.live_snapshot)
+        if snapshot is None:
+            snapshot = await self.map(mission_id, patient=False)
+        tag = f"{run}.{snapshot.tag}" + ("" if step is None else f"@{step}")
         return await live.tiles.answer(snapshot, tag, since, tuple(sorted(set(further))))
 
     async def map(self, mission_id: str, *, patient: bool = True) -> MapSnapshot:

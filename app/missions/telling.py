@@ -17,6 +17,8 @@ from app.missions.views import VehicleView
 LIVE_PERIOD_S = 0.2
 CROWD, MOST_PERIODS = 20, 5
 """For so many viewers more the period grows by itself once, so many times at most."""
+LIVE_MAP_S = 0.3
+"""Least time between two times that what was just sounded is told of."""
 CROWD_MAP_S = 4.0
 """Least time between two maps that a crowd is told of."""
 
@@ -42,7 +44,8 @@ class Telling:
         self._targets = targets
         self._search = search
         self._ticker: asyncio.Task[None] | None = None
-        self._map_news: MapMessage | None = None
+        self._map = MapMessage(version=0, step=0, min_depth_m=None, max_depth_m=None)
+        self._map_is_news = self._soundings_are_news = False
         self._map_told_s = -np.inf
         self._search_told = 0
 
@@ -65,13 +68,20 @@ class Telling:
     def of_map(self, built: BuiltMap, step: int) -> None:
         """Tell that there is a new map, made in this step."""
         depth = built.map.depth_m[np.isfinite(built.map.depth_m)]
-        self._map_news = MapMessage(
+        self._map = MapMessage(
             version=built.version,
+            live=self._map.live,
             step=step,
             min_depth_m=float(depth.min()) if depth.size else None,
             max_depth_m=float(depth.max()) if depth.size else None,
         )
+        self._map_is_news = True
         self._tell_of_map()
+
+    def of_soundings(self, count: int, step: int) -> None:
+        """Tell soon that so many soundings came in this step."""
+        self._map = self._map.model_copy(update={"live": self._map.live + count, "step": step})
+        self._soundings_are_news = True
 
     async def _tick(self) -> None:
         while self._broadcaster.watched:
@@ -84,10 +94,13 @@ class Telling:
 
     def _tell_of_map(self) -> None:
         """Publish what is new of the map; to a crowd, who would all fetch it, not before it is time again."""
-        wait_s = 0.0 if self._broadcaster.viewers < CROWD else CROWD_MAP_S
-        if self._map_news is not None and time.monotonic() - self._map_told_s >= wait_s:
-            self._broadcaster.publish(self._map_news)
-            self._map_news, self._map_told_s = None, time.monotonic()
+        crowd = self._broadcaster.viewers >= CROWD
+        wait_s = CROWD_MAP_S if crowd else 0.0 if self._map_is_news else LIVE_MAP_S
+        news = self._map_is_news or self._soundings_are_news
+        if news and time.monotonic() - self._map_told_s >= wait_s:
+            self._broadcaster.publish(self._map)
+            self._map_is_news = self._soundings_are_news = False
+            self._map_told_s = time.monotonic()
 
     def _tell_of_search(self) -> None:
         """Publish how a search stands when a scan changed that."""

@@ -1716,6 +1716,12 @@ export interface components {
             type: "map";
             /** Version */
             version: number;
+            /**
+             * Live
+             * @description Grows with what was sounded since: the tiles show it at once
+             * @default 0
+             */
+            live: number;
             /** Step */
             step: number;
             /** Min Depth M */

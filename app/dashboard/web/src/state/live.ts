@@ -26,6 +26,8 @@ export interface LiveView {
   sampledAt: number;
   events: readonly EventView[];
   mapVersion: number;
+  /** Grows with what was sounded since that map. */
+  liveVersion: number;
   lastEventId: number;
   /** When the vehicles' part was last heard of, page clock in milliseconds; ages grow from here. */
   vehiclesAt: number;
@@ -40,6 +42,7 @@ export const EMPTY_VIEW: LiveView = {
   sampledAt: 0,
   events: [],
   mapVersion: 0,
+  liveVersion: 0,
   lastEventId: 0,
   vehiclesAt: 0,
   progressAt: 0,
@@ -65,6 +68,7 @@ export function reduce(view: LiveView, message: LiveMessage, at: number): LiveVi
         sampledAt: view.sampledAt,
         events: view.mission?.id === message.mission.id ? view.events : [],
         mapVersion: message.map_version,
+        liveVersion: 0,
         lastEventId: message.last_event_id,
         vehiclesAt: at,
         progressAt: at,
@@ -99,7 +103,7 @@ export function reduce(view: LiveView, message: LiveMessage, at: number): LiveVi
       if (!view.mission) return view;
       return { ...view, mission: { ...view.mission, ...message.mission }, progressAt: at };
     case "map":
-      return { ...view, mapVersion: message.version };
+      return { ...view, mapVersion: message.version, liveVersion: message.live };
     case "event":
       return withEvents(view, [message.event]);
   }

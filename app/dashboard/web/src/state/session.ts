@@ -25,7 +25,7 @@ import {
 } from "./store";
 
 const LIST_PERIOD_MS = 5000;
-const LEAST_MAP_PERIOD_MS = 700;
+const LEAST_MAP_PERIOD_MS = 300;
 const REPLAY_MAP_PERIOD_MS = 120;
 
 /** The last command that was refused, until it is dismissed or the next one succeeds. */
@@ -149,8 +149,9 @@ function followMap(id: string, connections: () => number): () => void {
   const wanted = () => {
     const step = replayStep.value;
     const further = furtherLayers.value;
-    const has = step !== null || view.value.mapVersion > 0;
-    const version = step === null ? `${connections()}.${view.value.mapVersion}` : `@${step}`;
+    const { mapVersion, liveVersion } = view.value;
+    const has = step !== null || mapVersion > 0 || liveVersion > 0;
+    const version = step === null ? `${connections()}.${mapVersion}.${liveVersion}` : `@${step}`;
     return has ? `${version} ${further.join()}` : "";
   };
   const stop = effect(() => {
