@@ -93,7 +93,7 @@ def make_constraints(spec: MissionSpec) -> Constraints:
     zones = [spec.to_local(zone) for zone in spec.keep_out]
     margins = [safety.widened(zone, limits.keep_out_margin_m) for zone in zones if limits.keep_out_margin_m > 0]
     return Constraints(
-        area=spec.local_area(),
+        area=spec.local_inner_area(),
         # A vehicle that came too near by turning may leave the margin by any way but one through the zone itself.
         keep_out=(*zones, *margins),
         max_step_m=limits.max_step_m,
@@ -132,15 +132,16 @@ def decide(
     notes: list[str] = []
     team: list[Place] = []
     legs: list[Leg] = []
+    nearby_m = NEARBY_OUTSIDE_M + spec.limits.border_margin_m
     for place in places:
         outside_m = safety.distance_outside_m(polygon, place.en_m)
-        if outside_m > NEARBY_OUTSIDE_M and search is not None:
+        if outside_m > nearby_m and search is not None:
             refusal = (
                 f"it is {outside_m:.0f} m outside the site, and what lies between is not known: bring it to the entry"
             )
             notes.append(f"{place.vehicle}: {refusal}")
             legs.append(Leg(place.vehicle, np.append(place.en_m, 0.0), refusal))
-        elif outside_m > NEARBY_OUTSIDE_M:
+        elif outside_m > nearby_m:
             others = [p.en_m for p in places if p is not place] + [other.target_m[:2] for other in legs]
             leg = _come_in(place, constraints, others)
             what = leg.refusal or "it is sent to the border"
@@ -190,7 +191,7 @@ def decide(
         if not np.isfinite(proposed[i]).all():
             continue  # the check makes the vehicle hold
         proposed[i, 2] = safety.travel_depth_m(
-            place.en_m, proposed[i, :2], place.cruise_depth_m, cautious, constraints.min_altitude_m
+            where[place.vehicle], proposed[i, :2], place.cruise_depth_m, cautious, constraints.min_altitude_m
         )
         if up[i]:
             # It goes on along its leg while it rises; the checks below are the same for it as for everyone.

@@ -90,8 +90,14 @@ class NeptusSettings(Section):
     depth_separation_m: float = Field(default=1.5, gt=0, le=100, description="Depth separation between vehicles")
     bathymeter: Literal["twice", "once", "off"] = Field(
         default="twice",
-        description="Bathymeter figures, used where a step has no beams; twice: the vehicle's depth was subtracted "
-        "twice, as the unmodified panel does; once: by a corrected panel; off: not used",
+        description="Bathymeter figures, which samples are held against and which count where a vehicle has none; "
+        "twice: the vehicle's depth was subtracted twice, as the unmodified panel does; once: by a corrected panel; "
+        "off: not used",
+    )
+    samples: Literal["checked", "off"] = Field(
+        default="checked",
+        description="The panel's samples, one for every range of every sensor; checked: those that agree with the "
+        "nearest vehicle's Bathymeter are used; off: none, for vehicles without a DVL",
     )
     prior_map: Literal["ignore", "depth", "height"] = Field(
         default="ignore",
@@ -103,6 +109,19 @@ class NeptusSettings(Section):
     steps: int = Field(default=500, ge=1, le=100_000, description="Steps of a session's mission")
     max_step_m: float = Field(default=20.0, gt=0, le=2000, description="Largest distance of one step")
     min_altitude_m: float = Field(default=2.0, ge=0, le=1000, description="Least clearance above the sea floor")
+    border_m: float = Field(
+        default=12.5,
+        ge=0,
+        le=1000,
+        description="Waypoints stay this far inside the area, at most a quarter of its side: the panel takes a vehicle "
+        "for arrived from 12.5 m on, and moves what is beyond the border onto it",
+    )
+    repeat_after_s: float = Field(
+        default=5.0,
+        gt=0,
+        le=3600,
+        description="A panel that polls this long for the answer to an upload that was lost or refused is told to stay",
+    )
     lost_after_s: float = Field(
         default=300.0, gt=0, le=86_400, description="A panel that was silent for this long is not waited for"
     )
