@@ -89,7 +89,7 @@ def read_step(
     places = tuple(_place(row, index, area) for index, row in enumerate(rows))
     refused: Counter[str] = Counter()
     samples = _samples(record, area, refused) if conventions.samples != "off" else []
-    whose = sampling.owners(samples, places, before.places if before is not None else (), area.cell_m)
+    whose = sampling.owners(samples, places, area.cell_m)
     samples = [replace(sample, vehicle=index) for sample, index in zip(samples, whose, strict=True)]
     if conventions.bathymeter == "off" or pairs:
         return StepData(session, step, places, tuple(samples), refused, pairs=pairs)

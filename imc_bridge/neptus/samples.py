@@ -25,8 +25,12 @@ SURE = 3.0
 """So many standard deviations of the `Bathymeter` a sample may be off."""
 WHOLE_METRE_M = 0.5
 """How far a depth that was cut to whole metres may be off."""
-METRES_PER_METRE = 10.0
-"""So far beside a vehicle's way a sample is as little likely to be the vehicle's as 1 m above or below it."""
+DEPTH_NOISE_M = 0.25
+"""How much a vehicle's depth changes from one of its samples to the next."""
+NEWEST = 0.3
+"""Weight of a sample in what is known of its vehicle's place."""
+METRES_PER_METRE = 40.0
+"""So far beside a vehicle a sample is as little likely to be the vehicle's as 1 m above or below it."""
 BESIDE_M = 10.0
 """As near to a vehicle as this its samples are compared with its own altitude."""
 ASSUMED_SLANT = math.cos(math.radians(22.5))
@@ -34,27 +38,35 @@ ASSUMED_SLANT = math.cos(math.radians(22.5))
 SLANT_TOLERANCE = 0.03
 
 
-def owners(samples: Sequence[CellSounding], now: Sequence[Place], before: Sequence[Place], cell_m: float) -> list[int]:
-    """Return the index of each sample's vehicle: the one that came by there, at that depth.
+def owners(samples: Sequence[CellSounding], now: Sequence[Place], cell_m: float) -> list[int]:
+    """Return the index of each sample's vehicle: from one to the next a vehicle moves and dives little.
+
+    Samples come in the order in which they were taken, so they are followed back from where the vehicles are now.
 
     Parameters
     ----------
-    now, before
-        Where the vehicles are, and where they were a step ago; empty when that is not known.
+    now
+        Where the vehicles are, their depths cut to whole metres.
     """
-    if not samples:
-        return []
-    where = np.array([[s.row, s.col] for s in samples]) * cell_m
-    depth_m = np.array([s.vehicle_depth_m for s in samples])
-    cost = np.empty((len(now), len(samples)))
-    for index, place in enumerate(now):
-        # Before the first step it came down from the surface.
-        origin = before[index] if before else replace(place, depth_m=0.0)
-        a, b = (np.array([p.row, p.col]) * cell_m for p in (origin, place))
-        low, high = sorted((origin.depth_m, place.depth_m))
-        above = np.maximum(low - WHOLE_METRE_M - depth_m, depth_m - high - WHOLE_METRE_M)
-        cost[index] = _beside_m(where, a, b) + METRES_PER_METRE * np.maximum(above, 0.0)
-    return [int(index) for index in cost.argmin(axis=0)]
+    tracks = [[place.row, place.col, place.depth_m, WHOLE_METRE_M + DEPTH_NOISE_M] for place in now]
+    found: list[int] = []
+    for sample in reversed(samples):
+        costs = [
+            math.hypot(row - sample.row, col - sample.col) * cell_m
+            + METRES_PER_METRE * max(abs(depth_m - sample.vehicle_depth_m) - unsure_m, 0.0)
+            for row, col, depth_m, unsure_m in tracks
+        ]
+        nearest = costs.index(min(costs))
+        row, col, *_ = tracks[nearest]
+        # Beams lie all round the vehicle.
+        tracks[nearest] = [
+            row + NEWEST * (sample.row - row),
+            col + NEWEST * (sample.col - col),
+            sample.vehicle_depth_m,
+            DEPTH_NOISE_M,
+        ]
+        found.append(nearest)
+    return found[::-1]
 
 
 def exact_depths(places: Sequence[Place], samples: Sequence[CellSounding]) -> list[tuple[Place, bool]]:
@@ -124,14 +136,6 @@ def altitude_ratios(
 def looks_slanted(ratio: float) -> bool:
     """Tell whether samples are short as ranges straight down are that the panel took for slanted beams."""
     return abs(ratio - ASSUMED_SLANT) <= SLANT_TOLERANCE
-
-
-def _beside_m(where: FloatArray, a: FloatArray, b: FloatArray) -> FloatArray:
-    """Return the distance of places (n, 2) from the straight way between two (2,)."""
-    along = b - a
-    length = float(along @ along)
-    part = np.clip((where - a) @ along / length, 0.0, 1.0) if length > 0.0 else np.zeros(len(where))
-    return np.asarray(np.hypot(*(where - (a + part[:, None] * along)).T))
 
 
 def _span(values: FloatArray) -> str:

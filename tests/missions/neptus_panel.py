@@ -93,6 +93,7 @@ class RealPanel:
     time_step: int = 1
     label: str = "---"
     samples: list[list[float]] = field(default_factory=list)
+    polls: int = 0
     held: list[http.client.HTTPConnection] = field(default_factory=list)
     answers: list[list[list[float]]] = field(default_factory=list)
     """`Location` of every answer that was taken."""
@@ -184,6 +185,7 @@ class RealPanel:
             "127.0.0.1", self.http_port, 20, source_address=(self.source, 0)
         )
         self._connection = None
+        self.polls += 1
         try:
             connection.request("GET", path)
             response = connection.getresponse()
