@@ -15,7 +15,7 @@ from app.exploration.problem import Belief, Planner, Situation
 from app.exploration.search import SearchTask
 from app.missions import safety
 from app.missions.search.course import hold_before_hazards
-from app.missions.spec import MissionSpec, SurfacePolicy
+from app.missions.spec import MissionSpec, SurfacePolicy, VehicleKind
 
 FloatArray = NDArray[np.float64]
 
@@ -202,8 +202,12 @@ def decide(
         notes += held
     checked = safety.check_step(names, origin, proposed, constraints, bottom)
     notes += [f"{name}: {reason}" for name, reason in (checked.corrections | checked.refusals).items()]
+    layered = {vehicle.name for vehicle in spec.vehicles if vehicle.kind is VehicleKind.NEPTUS}
     for i, place in enumerate(team):
         refusal = checked.refusals.get(place.vehicle, "")
+        if not refusal and place.vehicle in layered:
+            refusal = safety.too_deep(place.cruise_depth_m, float(checked.positions[i, 2]))
+            notes += [f"{place.vehicle}: {refusal}"] if refusal else []
         legs.append(Leg(place.vehicle, checked.positions[i], refusal, bool(up[i])))
     pursuits = {name: spec.targets[number].name for name, number in proposal.errands.items() if number >= 0}
     return Decision(

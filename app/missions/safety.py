@@ -23,6 +23,8 @@ WAY_SPACING_M = 5.0
 LEAST_LEG_M = 0.5
 ENTRY_POINTS = 400
 LEAD_CLEARANCE_M = 0.5
+DEPTH_TOLERANCE_M = 0.25
+"""A vehicle that keeps its layer may be this much deeper than asked."""
 UNCERTAINTY_FACTOR = 2.0
 """The bottom is taken to be this many standard deviations shallower than estimated."""
 
@@ -64,6 +66,16 @@ def travel_depth_m(
     if len(known) == 0:
         return wanted_m
     return float(min(wanted_m, max(known.min() - min_altitude_m, 0.0)))
+
+
+def too_deep(layer_m: float, safe_m: float) -> str:
+    """Return why a vehicle whose console sends it at its layer's depth, whatever it is told, has to stay; '' if not."""
+    if safe_m >= layer_m - DEPTH_TOLERANCE_M:
+        return ""
+    return (
+        f"its console sends it at {layer_m:g} m whatever it is told, and there {safe_m:.1f} m is the deepest that is "
+        "safe: it stays where it is"
+    )
 
 
 def bottom_on_way(way: FloatArray, bottom: Bottom) -> FloatArray:

@@ -428,7 +428,7 @@ async def test_a_panel_that_waits_is_answered_after_a_restart(gateway: Gateway) 
     assert mission.progress.step >= 3
 
 
-async def test_a_place_too_shallow_for_the_depth_the_panel_flies_at_is_not_answered(
+async def test_where_the_depth_the_panel_flies_at_is_not_safe_the_answer_is_to_stay(
     make_gateway: Callable[..., Gateway], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     gateway = make_gateway(min_altitude_m=2.0, first_depth_m=4.0)
@@ -438,17 +438,19 @@ async def test_a_place_too_shallow_for_the_depth_the_panel_flies_at_is_not_answe
         panel = panel_of(gateway, places=[(30.0, 25.0)])
         await asyncio.to_thread(panel.connect)
         # 5 m of water everywhere: under a vehicle that flies at 4 m only 1 m is left.
+        heights = [MAX_DEPTH_M - 4.0 - 5.0]
         cells = [[32.0, 25.0, 4.0], [28.0, 25.0, 4.0], [30.0, 27.0, 4.0], [30.0, 23.0, 4.0]]
-        reply = await asyncio.to_thread(lambda: panel.send(MBSamples=[5.0] * 4, SampleLocations=cells))
+        reply = await asyncio.to_thread(
+            lambda: panel.send(Bathymeter=heights, MBSamples=[5.0] * 4, SampleLocations=cells)
+        )
         assert reply.startswith("226")
 
         async def said() -> bool:
-            return any("sends it at 4 m whatever it is told" in line for line in await gateway.log("vehicle"))
+            return any("sends it at 4 m whatever it is told" in line for line in await gateway.log("waiting"))
 
         await until(said, "the log says why")
-        answer = await asyncio.to_thread(panel.read)
-        assert answer is not None
-        assert answer["timeStep"] == 0, "without an answer the vehicle stays where it is"
+        assert (await panel.await_answer())[0][:2] == [30.0, 25.0], "it stays where it is"
+        assert (await gateway.mission()).progress.step == 0, "which is no step"
     finally:
         await gateway.close()
 

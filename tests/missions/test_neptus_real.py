@@ -127,7 +127,8 @@ async def test_where_no_depth_is_safe_the_vehicles_stay_and_the_panel_is_answere
         panel = gateway.real(lambda _row, _col: 5.0, auvs, pace=20.0)
         await fly(gateway, panel, 4)
         assert max(math.dist(place[:2], (30.0, 25.0)) for answer in panel.answers for place in answer) < NEAR_M
-        assert any("sends it at 4 m whatever it is told" in line for line in await gateway.log("vehicle"))
+        assert any("sends it at 4 m whatever it is told" in line for line in await gateway.log("waiting"))
+        assert (await gateway.mission()).progress.step == 0, "nobody flew a step"
     finally:
         await gateway.close()
 

@@ -12,6 +12,7 @@ from collections.abc import Coroutine, Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from app.missions import safety
 from app.missions.fleet import (
     EventSink,
     LinkState,
@@ -41,9 +42,8 @@ POLLS_STOP_S = 10.0
 """A panel that waits polls ten times a second; one that did not for this long was stopped."""
 GATHER_S = 0.3
 """Orders of one step come within a moment; a vehicle without one by then is told to stay."""
-STAY_AFTER_S = 20.0
+STAY_AFTER_S = 10.0
 """A step without any order, since no waypoint is safe, is answered with where the vehicles are."""
-DEPTH_TOLERANCE_M = 0.25
 PRIOR_SPACING_S = 3600.0
 """Between cells of a prior map, which are no track: far enough apart that no move is a jump."""
 
@@ -186,15 +186,15 @@ class NeptusFleetLink(VisitedLink):
         fleet, craft = self._find(order.vehicle)
         if craft.state is not LinkState.ENGAGED:
             raise VehicleRefusedError(order.vehicle, "does not follow this service now", "press START in the panel")
-        if order.position.depth_m < craft.depth_m - DEPTH_TOLERANCE_M:
+        # Decisions heed it, too; this is the last look before anything is sent.
+        if reason := safety.too_deep(craft.depth_m, order.position.depth_m):
             craft.order, craft.published, craft.status = None, False, None
             craft.refused_step = fleet.time_step
             self._publish_soon(fleet)
             raise VehicleRefusedError(
                 order.vehicle,
-                f"the panel sends it at {craft.depth_m:g} m whatever it is told, and there "
-                f"{order.position.depth_m:.1f} m is the deepest that is safe",
-                "It stays where it is; make First Depth in the panel smaller, or the area without that place",
+                reason,
+                "Make First Depth in the panel smaller, or the area without that place",
             )
         same = craft.order is not None and (craft.order.mission_id, craft.order.step) == (order.mission_id, order.step)
         if not same or craft.status is None:

@@ -1565,6 +1565,12 @@ export interface components {
              */
             keep_out_margin_m: number;
             /**
+             * Border Margin M
+             * @description Waypoints stay this far inside the area: vehicles turn in circles at them and drift
+             * @default 0
+             */
+            border_margin_m: number;
+            /**
              * Com Range M
              * @description Every vehicle keeps another one within this range; null: unlimited
              */
