@@ -61,6 +61,9 @@ class Waypoint:
     ``lead_lat_deg``, ``lead_lon_deg``: a point on the leg's line beyond the waypoint, where it may be sent in order
     to pass the waypoint straight. DUNE flies straight to a reference only until some 7 m before it, and circles
     at once around one that is closer than 15 m.
+
+    ``circle_lat_deg``, ``circle_lon_deg``: centre of a circle with :data:`imc_bridge.plans.CIRCLE_RADIUS_M` in which it
+    may descend before it goes there; without one it does not circle.
     """
 
     mission_id: str
@@ -73,6 +76,8 @@ class Waypoint:
     min_altitude_m: float = 3.0
     lead_lat_deg: float | None = None
     lead_lon_deg: float | None = None
+    circle_lat_deg: float | None = None
+    circle_lon_deg: float | None = None
     bottom: tuple[BottomPoint, ...] = ()
     """What is mapped of the bottom on the way there; no reference goes deeper than the clearance above it."""
 

@@ -351,8 +351,22 @@ class Node:
             return self._settings.release_after_s
         if not self.references_needed:
             return math.inf
+        return self._settings.follow_timeout_s + self.ascent_s
+
+    @property
+    def ascent_s(self) -> float:
+        """How long it takes, at the most, to float up from where it was last heard and to be heard again."""
         depth = self.report.depth_m if self.report is not None else 0.0
-        return self._settings.follow_timeout_s + max(depth, 0.0) / SLOWEST_ASCENT_MPS + CONTACT_AGAIN_S
+        return max(depth, 0.0) / SLOWEST_ASCENT_MPS + CONTACT_AGAIN_S
+
+    @property
+    def maneuvering_blocked(self) -> bool:
+        """Whether plan control calls itself blocked while a maneuver goes on.
+
+        DUNE does so when its own VehicleState is late, and stays so: the vehicle goes on with what it does, takes no
+        STOP, and takes an Abort or another plan.
+        """
+        return self.plan_state == PlanState.BLOCKED and self.operation_mode == OperationMode.MANEUVER
 
     def can_start(self, now: float) -> bool:
         """In service and ready for a plan, by messages that are not old."""
