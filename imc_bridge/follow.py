@@ -19,6 +19,8 @@ from imc_bridge.references import SentReference
 from imc_bridge.texts import text
 
 START_RETRY_S = 2.0
+BLOCKED_S = 1.0
+"""A plan that is blocked for longer, while its maneuver goes on, is started anew."""
 STARVED_S = 4.0
 """A plan that ended this long after the last echo ended for want of references."""
 GUARD_STEP_M = 0.2
@@ -42,6 +44,8 @@ class Follower(Control):
     _answered_at = 0.0
     _unanswered = 0
     _gap_counted = False
+    _blocked_since: float | None = None
+    """Since when plan control has called itself blocked while the maneuver goes on."""
 
     def engage(self, now: float) -> bool:
         """Begin to make the vehicle follow."""
@@ -84,9 +88,13 @@ class Follower(Control):
         ours = node.executing(self._settings.plan_id)
         if self.phase is Phase.STARTING and node.plan_state == PlanState.EXECUTING and ours:
             self._running(now)
+        elif self.phase is Phase.FOLLOWING and node.maneuvering_blocked and node.plan_id == self._settings.plan_id:
+            self._blocked_since = now if self._blocked_since is None else self._blocked_since
         elif self.phase is Phase.FOLLOWING and not ours:
             self._evidence.blocked = node.plan_state == PlanState.BLOCKED
             self._plan_ended(now)
+        elif self.phase is Phase.FOLLOWING:
+            self._blocked_since = None
         elif self.phase is Phase.ENDED and ours and self._evidence == Evidence():
             # A plan state that overtook or was delayed: the plan runs on.
             self._enter(Phase.FOLLOWING, now)
@@ -163,6 +171,7 @@ class Follower(Control):
         self._unanswered = 0
         self._last_sent = None
         self._hold = None
+        self._blocked_since = None
         self._tick_following(now)
 
     def _tick_following(self, now: float) -> None:
@@ -178,6 +187,11 @@ class Follower(Control):
                 now,
             )
             return
+        if self._blocked_since is not None and now - self._blocked_since > BLOCKED_S and now >= self._request_due:
+            # The maneuver goes on; a plan of its own brings plan control back to it.
+            self._request_due = now + START_RETRY_S
+            self._request_id = self._next_request_id()
+            self._send(plan_control(OPERATION_START, self._request_id, settings))
         reference = self._reference(now)
         if reference is None:
             return

@@ -79,6 +79,9 @@ class Engaging:
             await self._advise(member, info)
             if member.report is None:
                 member.report = info.report
+            if member.engaged and member.unsent and member.busy:
+                # It was out of reach when its waypoint was to be sent.
+                await self._send(member)
             if not member.engaged and member.name not in self._asking and self._due(member):
                 task = asyncio.create_task(self._ask(member))
                 self._asking[member.name] = task
@@ -138,7 +141,7 @@ class Engaging:
         member.report = info.report or member.report
         await live.journal.log(Level.INFO, "vehicle", f"{member.name} follows", vehicle=member.name)
         live.changed.set()
-        if member.busy and member.order is not None:
+        if member.ordered:
             await self._send(member)
 
     async def _note(self, member: Member, error: VehicleRefusedError) -> None:

@@ -151,6 +151,9 @@ class WaypointOrder:
     leave off flying straight well before their target (DUNE circles from 15 m on) are sent there to pass the waypoint
     itself; the waypoint stays the place where they arrive.
 
+    ``circle`` is the centre of a circle, inside the area and apart from everything else, in which a vehicle that is led
+    by whole legs may descend before it goes there; the radius is :data:`imc_bridge.plans.CIRCLE_RADIUS_M`.
+
     ``bottom`` is what the map knows of the sea floor on that way, below the surface as it is now and on the safe side.
     """
 
@@ -162,6 +165,7 @@ class WaypointOrder:
     arrival_radius_m: float
     min_altitude_m: float
     lead: Position | None = None
+    circle: Position | None = None
     bottom: tuple[Position, ...] = ()
 
 

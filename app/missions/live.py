@@ -131,6 +131,8 @@ class LiveMission:
         """Held while corrections change, one after the other."""
         self.halted = False
         """Set while vehicles are being stopped: the step loop must not send them off again as it ends."""
+        self.standstill = ""
+        """Why no vehicle may be sent anywhere now; empty while at least one may."""
         self.seconds_per_step: float | None = None
         self.running_since_s: float | None = None
         self.database = database
@@ -321,7 +323,8 @@ class LiveMission:
     def _why_it_waits(self) -> str:
         trouble = self.journal.storage.trouble
         if not trouble:
-            return ""
+            stands = self.standstill and self.header.state is MissionState.RUNNING
+            return f"no vehicle can be sent anywhere: {self.standstill}" if stands else ""
         waits = "; the vehicles wait at their waypoints" if self.header.state is MissionState.RUNNING else ""
         return f"nothing can be written down: {trouble}{waits}"
 

@@ -149,6 +149,8 @@ class ImcFleetLink:
             min_altitude_m=order.min_altitude_m,
             lead_lat_deg=order.lead.lat_deg if order.lead else None,
             lead_lon_deg=order.lead.lon_deg if order.lead else None,
+            circle_lat_deg=order.circle.lat_deg if order.circle else None,
+            circle_lon_deg=order.circle.lon_deg if order.circle else None,
             bottom=tuple(BottomPoint(place.lat_deg, place.lon_deg, place.depth_m) for place in order.bottom),
         )
         try:
