@@ -175,7 +175,27 @@ class LinkChange:
     """When, by our wall clock (Unix seconds)."""
 
 
-BridgeEvent = StateReport | Sounding | SoundingRefused | TargetRange | WaypointChange | LinkChange
+@dataclass(frozen=True, slots=True)
+class Restarted:
+    """DUNE on board a vehicle has begun anew: whatever it was doing is forgotten.
+
+    ``submerged``: the vehicle was under water when it was last heard before.
+    """
+
+    vehicle: str
+    submerged: bool
+
+
+@dataclass(frozen=True, slots=True)
+class PacketsDropped:
+    """This machine threw ``count`` packets away within the last second because our socket was full."""
+
+    count: int
+
+
+BridgeEvent = (
+    StateReport | Sounding | SoundingRefused | TargetRange | WaypointChange | LinkChange | Restarted | PacketsDropped
+)
 EventCallback = Callable[[BridgeEvent], None]
 
 
@@ -231,6 +251,8 @@ class NodeView:
     history: tuple[LinkChange, ...] = ()
     """The last changes of its link, oldest first."""
     rate_limiters: str = ""
+    restarts: int = 0
+    """How often DUNE on board has begun anew while we listened."""
     radio_gaps: int = 0
     """How often radio ended under water while it was led by references, which ends their plan each time."""
 

@@ -43,7 +43,9 @@ class Follower(Control):
     _last_sent: SentReference | None = None
     _answered_at = 0.0
     _unanswered = 0
-    _gap_counted = False
+    _gap_boots = 0
+    _gap_open = False
+    """Whether it has been silent under water, and has not been heard since."""
     _blocked_since: float | None = None
     """Since when plan control has called itself blocked while the maneuver goes on."""
 
@@ -84,6 +86,10 @@ class Follower(Control):
         """PlanControlState has been taken in by the node."""
         if self._outdated():
             return
+        if self._gap_open:
+            self._gap_open = False
+            # A vehicle whose DUNE died was not silent for want of radio.
+            self.node.radio_gaps += self.node.boots == self._gap_boots
         node = self.node
         ours = node.executing(self._settings.plan_id)
         if self.phase is Phase.STARTING and node.plan_state == PlanState.EXECUTING and ours:
@@ -210,9 +216,8 @@ class Follower(Control):
 
     def _note_gap(self, *, long: bool) -> None:
         """The radio ended under water, so its plan ends for want of references, which is nobody's fault."""
-        if long and not self._gap_counted:
-            self._gap_counted = True
-            self.node.radio_gaps += 1
+        if long and not self._gap_open:
+            self._gap_open, self._gap_boots = True, self.node.boots
         self._gap = True
         if self._order is not None and self._order.status is WaypointStatus.ACKNOWLEDGED:
             self._order.unseen = True

@@ -57,6 +57,7 @@ class Engaging:
         self._refused: dict[str, _Refused] = {}
         self._lost: set[str] = set()
         self._advised: set[str] = set()
+        self._machine_advised = False
 
     async def keep(self) -> None:
         """Go on until cancelled."""
@@ -106,6 +107,9 @@ class Engaging:
             self._advised.add(member.name)
             message = f"{member.name}: {info.advice}"
             await self._live.journal.log(Level.WARNING, "vehicle", message, vehicle=member.name)
+        if info.machine_advice and not self._machine_advised:
+            self._machine_advised = True
+            await self._live.journal.log(Level.WARNING, "service", info.machine_advice)
 
     def _done(self, name: str, _task: asyncio.Task[None]) -> None:
         self._asking.pop(name, None)

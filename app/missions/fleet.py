@@ -189,7 +189,15 @@ class LinkReport:
     reason: str = ""
 
 
-FleetEvent = VehicleReport | SoundingReport | RangeReport | ScanReport | WaypointReport | LinkReport
+@dataclass(frozen=True, slots=True)
+class RestartReport:
+    """What runs on board a vehicle has begun anew; ``reason`` says what was seen of that."""
+
+    vehicle: str
+    reason: str
+
+
+FleetEvent = VehicleReport | SoundingReport | RangeReport | ScanReport | WaypointReport | LinkReport | RestartReport
 EventSink = Callable[[FleetEvent], None]
 
 
@@ -208,6 +216,8 @@ class VehicleInfo:
     details: dict[str, str] = field(default_factory=dict)
     advice: str = ""
     """What the operator should change about how it is used; told once in the mission's log."""
+    machine_advice: str = ""
+    """What is wrong on this machine with the way to it, and what to do; told once in the log of each mission."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,6 +21,7 @@ from app.missions.fleet import (
     LinkReport,
     LinkState,
     RangeReport,
+    RestartReport,
     ScanReport,
     SoundingReport,
     VehicleReport,
@@ -46,7 +47,7 @@ from app.missions.telling import Telling
 from app.missions.tracking import Tracking
 from app.missions.trails import Trails
 from app.missions.vehicle_showing import VehicleShowing, local_place
-from app.missions.views import MissionSummary, Progress
+from app.missions.views import Level, MissionSummary, Progress
 from app.missions.waypoint_board import WaypointBoard
 from app.missions.whole_set import WholeSet
 from app.storage import events as event_queries
@@ -212,6 +213,9 @@ class LiveMission:
                 if event.state in (LinkState.HEARD, LinkState.READY):
                     # It can be reached but follows nothing of ours (any more): the loop engages it again.
                     member.engaged = False
+            case RestartReport():
+                words = f"{event.vehicle}: {event.reason}"
+                self.journal.note_line(self.journal.line(Level.ALARM, "vehicle", words, vehicle=event.vehicle))
             case WaypointReport():
                 self._receive_waypoint(member, event)
         self.changed.set()
