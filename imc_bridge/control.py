@@ -165,6 +165,7 @@ class Control(ABC):
         ):
             return
         self._order = self._make_order(waypoint)
+        self.node.ordered_depth_m = waypoint.depth_m
         self._ordered(now)
         if self.phase is Phase.FOLLOWING:
             self.tick(now)

@@ -281,8 +281,12 @@ class LegFollower(Control):
         return self._heard_lately(now) and (not self.node.submerged or wet)
 
     def _expect_up(self, now: float) -> None:
-        """Note that a vehicle without a plan, heard under water, is silent until it has floated up."""
-        self.node.expected_back = now + self.node.ascent_s if self.node.submerged else None
+        """Note that a vehicle without a plan, last heard under water, is silent until it has floated up."""
+        node = self.node
+        node.expected_back = now + node.ascent_s if node.submerged else None
+        if node.expected_back is not None and self._evidence.rebooted:
+            # It has to start up, and to hear of us again.
+            node.expected_back += self._settings.engage_timeout_s + self._settings.announce_period_s
 
     def _watch_idle(self, now: float) -> None:
         if self.sound is not None and self._by_sound(now):

@@ -127,6 +127,10 @@ class Node:
         self.conflict: str | None = None
         self.boots = 0
         """How often it has restarted."""
+        self.started_at: float | None = None
+        """When it announced a restart."""
+        self.ordered_depth_m = 0.0
+        """How deep it may be by our orders: it goes on down after it was last heard."""
         self._restart_seen = False
         """Whether its last restart showed before it announced itself anew."""
 
@@ -200,6 +204,7 @@ class Node:
             return False
         if rebooted:
             self.boots += 1
+            self.started_at = now
             self._forget_plan()
         return rebooted
 
@@ -384,7 +389,7 @@ class Node:
     def ascent_s(self) -> float:
         """How long it takes, at the most, to float up from where it was last heard and to be heard again."""
         depth = self.report.depth_m if self.report is not None else 0.0
-        return max(depth, 0.0) / SLOWEST_ASCENT_MPS + CONTACT_AGAIN_S
+        return max(depth, self.ordered_depth_m, 0.0) / SLOWEST_ASCENT_MPS + CONTACT_AGAIN_S
 
     @property
     def maneuvering_blocked(self) -> bool:
@@ -479,8 +484,9 @@ class Node:
                 NodeState.EXPECTED_OFFLINE,
                 f"silent for {seconds:.0f} s, under water in {whose}: radio ends at the surface{comes_up}",
             )
-        afloat = self.plan_state in (PlanState.READY, PlanState.BLOCKED)
-        if afloat and self.submerged and silence <= self.ascent_s:
+        afloat = self.plan_state not in (PlanState.INITIALIZING, PlanState.EXECUTING)
+        since_start = math.inf if self.started_at is None else now - self.started_at
+        if afloat and self.submerged and min(silence, since_start) <= self.ascent_s:
             words = f"silent for {seconds:.0f} s, under water without a plan: it floats up"
             return Status(NodeState.EXPECTED_OFFLINE, words)
         where = "under water" if self.submerged else "at the surface"
