@@ -70,7 +70,7 @@ class Leg:
 class Decision:
     """A step's waypoints, the planner's figures, and what the operator has to know.
 
-    ``bottom`` is the pessimistic sea floor that the depths of travel were chosen by.
+    ``bottom`` is the pessimistic sea floor that the depths of travel were chosen by, below the surface as it is now.
     """
 
     legs: list[Leg]
@@ -156,7 +156,7 @@ def decide(
         return Decision(legs, None, {}, planner.snapshot(), notes, origin_m=where)
 
     names = tuple(place.vehicle for place in team)
-    below_level_m = belief.depth_m + min(water_level_m, 0.0)
+    below_level_m = safety.below_surface_m(belief.depth_m, water_level_m)
     bottom = Bottom.from_landmarks(belief.xy_m, below_level_m)
     cautious = Bottom.from_landmarks(
         belief.xy_m,

@@ -53,6 +53,10 @@ class Counts:
     rejected: int = 0
 
 
+class _NotNow(Exception):
+    """Earlier lines wait to be written: later ones wait with them."""
+
+
 class Journal:
     """Writes one mission's records.
 
@@ -234,6 +238,36 @@ class Journal:
         except Exception as error:
             self.storage.note(error)
             self.note_line(self.line(level, kind, message, **data))
+
+    async def log_all(self, rows: Sequence[EventRow]) -> None:
+        """Write lines of the mission's log together and show them; what cannot be written is noted, as by :meth:`log`.
+
+        Parameters
+        ----------
+        rows
+            Made by :meth:`line`.
+        """
+        if not rows:
+            return
+        made = [(row.time, Level(row.level), row.kind, row.message, dict(row.data)) for row in rows]
+        try:
+            if self._lines or self.storage.trouble:
+                raise _NotNow
+            await to_the_end(self._add_all(rows))
+        except Exception as error:
+            if not isinstance(error, _NotNow):
+                self.storage.note(error)
+            for time, level, kind, message, data in made:
+                again = self.line(level, kind, message, **data)
+                again.time = time
+                self.note_line(again)
+            return
+        for row in rows:
+            self.tell(row)
+
+    async def _add_all(self, rows: Sequence[EventRow]) -> None:
+        async with self._database.writing() as session:
+            session.add_all(rows)
 
     def note_line(self, row: EventRow) -> None:
         """Note a line; it is written within a moment, or when that is possible again."""

@@ -56,10 +56,12 @@ class ImcSettings(Section):
         default=5000,
         ge=100,
         le=1_000_000,
-        description="Most IMC packets a second from one vehicle; all strangers at one address get a quarter of that",
+        description="Most IMC packets a second from one vehicle, multiplied by time_scale; all strangers at one "
+        "address get a quarter of that",
     )
     rate_limiters: str = Field(
-        default="Distance:5, EstimatedState:10",
+        default="Distance:5, EstimatedState:10, "
+        "ServoPosition:0.1, EulerAngles:0.1, AngularVelocity:0.1, Acceleration:0.1",
         description="Rates in Hz asked of every engaged vehicle and taken back at the end; empty: as they are",
     )
     unknown_bottom_depth_m: float = Field(
