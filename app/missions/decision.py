@@ -200,7 +200,13 @@ def decide(
     if search is not None:
         proposed, held = hold_before_hazards(search, names, origin, proposed)
         notes += held
-    checked = safety.check_step(names, origin, proposed, constraints, bottom)
+    start = np.column_stack([np.array([where[name] for name in names]), origin[:, 2]])
+    for i in np.flatnonzero((start[:, :2] != origin[:, :2]).any(axis=1)):
+        # It was planned for from the border, and comes from beyond it: there first where both is too far.
+        if np.linalg.norm(proposed[i] - start[i]) > constraints.max_step_m:
+            proposed[i, :2] = origin[i, :2]
+        proposed[i] = _within_step(start[i], proposed[i], constraints.max_step_m)
+    checked = safety.check_step(names, start, proposed, constraints, bottom)
     notes += [f"{name}: {reason}" for name, reason in (checked.corrections | checked.refusals).items()]
     layered = {vehicle.name for vehicle in spec.vehicles if vehicle.kind is VehicleKind.NEPTUS}
     for i, place in enumerate(team):

@@ -398,19 +398,6 @@ async def test_answers_are_only_for_the_host_that_logged_in(gateway: Gateway) ->
             await asyncio.to_thread(urllib.request.urlopen, f"http://127.0.0.1:{gateway.ports[1]}{path}")
 
 
-async def test_a_new_session_of_a_console_ends_the_one_before(gateway: Gateway) -> None:
-    panel = panel_of(gateway)
-    await asyncio.to_thread(panel.connect)
-    await panel.fly()
-    again = panel_of(gateway, session="Neptus_User_12")
-    await asyncio.to_thread(again.connect)
-    old = await gateway.mission()
-    assert old.state is MissionState.FINISHED
-    assert "began session Neptus_User_12" in old.reason
-    await again.fly()
-    assert (await gateway.mission("Neptus_User_12")).state is MissionState.RUNNING
-
-
 async def test_a_panel_that_waits_is_answered_after_a_restart(gateway: Gateway) -> None:
     panel = panel_of(gateway)
     await asyncio.to_thread(panel.connect)
