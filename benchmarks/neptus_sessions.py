@@ -15,7 +15,7 @@ import numpy as np
 
 from app.missions.settings import ImcSettings, ServiceSettings
 from app.missions.sounding_views import Verdict
-from app.storage.upgrading import prepare_database
+from app.storage.prepare import prepare_database
 from simulator.terrain import Terrain
 from simulator.terrain_files import load_terrain
 from tests.missions.neptus_gateway import SESSION, Gateway
@@ -43,7 +43,7 @@ async def fly(asked: argparse.Namespace) -> dict[str, object]:
     terrain = load_terrain(asked.terrain)
     with tempfile.TemporaryDirectory() as folder:
         gateway = _gateway(Path(folder))
-        await prepare_database(gateway.settings.database_url)
+        await prepare_database(gateway.settings.database_url, may_upgrade=True)
         await gateway.open()
         panel = RealPanel(
             *gateway.ports,
