@@ -107,7 +107,8 @@ class _Session:
     """Of the last answer."""
     last: StepData | None = None
     polls_since_s: float = 0.0
-    """When the panel began to poll without a break, or its last step was answered; the event loop's time."""
+    """When the panel began to poll without a break, or was served the newest answer first; the event loop's time."""
+    served: int = -1
     polled_s: float = float("-inf")
     stepping: asyncio.Lock = field(default_factory=asyncio.Lock)
 
@@ -195,7 +196,6 @@ class NeptusGateway:
         known = self._sessions.get(session)
         if known is not None:
             known.places, known.answered = places, max(time_step, known.answered)
-            known.polls_since_s = self._now_s()
 
     # The HTTP side, on the event loop
 
@@ -207,8 +207,8 @@ class NeptusGateway:
         if host not in known.hosts:
             return None
         now_s = self._now_s()
-        if now_s - known.polled_s > POLLS_STOP_S:
-            known.polls_since_s = now_s
+        if now_s - known.polled_s > POLLS_STOP_S or known.served != known.answered:
+            known.polls_since_s, known.served = now_s, known.answered
         known.polled_s = now_s
         self._keeper.polled(session, answered=0 < known.time_step <= known.answered)
         if self._waits_in_vain(known, now_s):
