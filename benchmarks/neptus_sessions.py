@@ -35,7 +35,7 @@ def main() -> None:
     parser.add_argument("--lost", type=int, nargs="*", default=[], help="steps whose upload is lost")
     parser.add_argument("--spoilt", type=int, nargs="*", default=[], help="steps whose upload is refused")
     parser.add_argument("--restart", type=int, default=0, help="step at which the service is restarted")
-    print(json.dumps(asyncio.run(fly(parser.parse_args())), indent=1))
+    print(json.dumps(asyncio.run(fly(parser.parse_args()))))
 
 
 async def fly(asked: argparse.Namespace) -> dict[str, object]:
@@ -103,6 +103,7 @@ async def _figures(gateway: Gateway, panel: RealPanel, terrain: Terrain, took_s:
         "rejected": reasons,
         "bias_m": round(float(errors.mean()), 4),
         "rms_m": round(float(np.sqrt((errors**2).mean())), 4),
+        "over_5_m": int((np.abs(errors) > 5.0).sum()),
         "largest_m": round(float(np.abs(errors).max()), 2),
         "samples": sum(len(upload["MBSamples"]) for upload in panel.uploads),
         "refused": (await gateway.log("neptus"))[-1],

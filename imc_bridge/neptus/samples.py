@@ -21,6 +21,8 @@ REACH_M = 60.0
 """Farther than this from every place whose bottom is known, a sample cannot be judged."""
 SLOPE = 0.3
 """Of the sea floor between a sample and the place that it is held against."""
+MOST_M = 6.0
+"""So much of that at most, or far from a vehicle an echo sounder's range would pass for a depth."""
 SURE = 3.0
 """So many standard deviations of the `Bathymeter` a sample may be off."""
 WHOLE_METRE_M = 0.5
@@ -99,7 +101,7 @@ def checked(
     nearest = away_m.argmin(axis=0)
     nearest_m = away_m.min(axis=0)
     expected_m = np.array([b.depth_m for b in known])[nearest]
-    allowed_m = SURE * np.array([b.sd_m for b in known])[nearest] + SLOPE * nearest_m
+    allowed_m = SURE * np.array([b.sd_m for b in known])[nearest] + np.minimum(SLOPE * nearest_m, MOST_M)
     far = nearest_m > REACH_M
     wrong = ~far & (np.abs(depth_m - expected_m) > allowed_m)
     if far.any():

@@ -223,8 +223,13 @@ def test_a_sample_far_from_every_bathymeter_cannot_be_judged():
     assert data.refused == {"more than 60 m from where a vehicle knows the bottom": 1}
 
 
+def test_far_from_the_vehicle_a_range_ahead_passes_for_no_depth():
+    content = of([2.0], [12.0], [(20, 20)], [[20, 56, 2.0, 20.0], [20, 56, 2.0, 17.0], [20, 20, 2.0, 12.0]])
+    assert [s.bottom_depth_m for s in step(content, 1).soundings] == [17.0, 12.0]
+
+
 def test_a_slope_is_allowed_for_where_a_sample_is_away_from_the_vehicle():
-    content = of([2.0], [12.0], [(20, 20)], [[20, 40, 2.0, 19.0], [20, 22, 2.0, 19.0]])
+    content = of([2.0], [12.0], [(20, 20)], [[20, 40, 2.0, 17.0], [20, 22, 2.0, 17.0]])
     assert [s.col for s in step(content, 1).soundings] == [40]
 
 
