@@ -293,7 +293,9 @@ class LegFollower(Control):
             self.sound.ask(now)
             return
         silence = self._silence(now)
-        if not self._expected_away(now) and silence > max(self._settings.release_after_s, self._settings.lost_after_wall_s * self._settings.time_scale):
+        if not self._expected_away(now) and silence > max(
+            self._settings.release_after_s, self._settings.lost_after_wall_s * self._settings.time_scale
+        ):
             self._release(
                 f"silent for {silence / self._settings.time_scale:.0f} s between two legs",
                 "Engage it again when it is heard",

@@ -25,7 +25,9 @@ async def test_a_crash_under_water_is_told_as_a_restart_and_the_vehicle_goes_on(
         [judged] = judge(sea.bridge, 1.0).nodes
         [finding] = [f for f in judged.findings if f.cause is Cause.RESTARTED]
         assert "restarted once" in finding.text
-        assert not [c for c in sea.of(LinkChange) if c.state is NodeState.LOST], [(c.state.value, c.reason, c.at_s) for c in sea.of(LinkChange)]
+        assert not [c for c in sea.of(LinkChange) if c.state is NodeState.LOST], [
+            (c.state.value, c.reason, c.at_s) for c in sea.of(LinkChange)
+        ]
 
 
 async def test_the_silence_of_a_crash_is_no_gap_of_the_radio():
