@@ -208,9 +208,12 @@ async def summary(
         "waypoints": statuses,
         "waypoints_per_minute": round(60.0 * statuses.get("reached", 0) / (time.monotonic() - begun), 1),
         "dropped_packets": sum(metric.value for metric in PACKETS_DROPPED.collect()[0].samples[:1]),
-        "lost": sum(
-            change.state is NodeState.LOST for vehicle in service.doctor().vehicles for change in vehicle.history
-        ),
+        "lost": [
+            f"{vehicle.name} {'engaged' if change.engaged else 'not engaged'}: {change.reason}"
+            for vehicle in service.doctor().vehicles
+            for change in vehicle.history
+            if change.state is NodeState.LOST
+        ],
         "reasons": sorted({waypoint.reason for waypoint in view.waypoints if waypoint.reason}),
         "soundings": len(errors),
         "rejected": rejected,
