@@ -30,7 +30,7 @@ class DropMeter:
         self._lately: deque[tuple[float, int]] = deque()
 
     def look(self, now_s: float) -> int:
-        """Look at the count once a second, ``now_s`` of the wall clock; returns how many were lost since the last look."""
+        """Look at the count, once a second; returns how many were lost since the last look. ``now_s``: wall clock."""
         if now_s - self._looked_s < LOOK_WALL_S:
             return 0
         self._looked_s = now_s

@@ -188,7 +188,7 @@ class Restarted:
 
 @dataclass(frozen=True, slots=True)
 class PacketsDropped:
-    """This machine threw ``count`` packets away within the last second because our socket was full."""
+    """Within the last second this machine threw ``count`` packets away because our socket was full."""
 
     count: int
 

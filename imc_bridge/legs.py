@@ -351,13 +351,14 @@ class LegFollower(Control):
         aim = order.place
         if not descend and order.lead is not None and ahead_m > 0.0:
             share = ahead_m / distance_m(order.place, order.lead)
-            aim = tuple(a + share * (b - a) for a, b in zip(order.place, order.lead, strict=True))
+            (lat, lon), (lead_lat, lead_lon) = order.place, order.lead
+            aim = lat + share * (lead_lat - lat), lon + share * (lead_lon - lon)
         words = f"{length_m:.0f} m are too short to get to {depth_m:.1f} m, and there is no room to circle down"
         return Leg(
             depth_m,
             leg_time_s(length_m, depth_m, waypoint.speed_mps),
             descend,
-            (aim[0], aim[1]),
+            aim,
             words if steep and not descend else "",
             sent_at=now,
         )

@@ -53,10 +53,6 @@ class Counts:
     rejected: int = 0
 
 
-class _NotNow(Exception):
-    """Earlier lines wait to be written: later ones wait with them."""
-
-
 class Journal:
     """Writes one mission's records.
 
@@ -247,20 +243,19 @@ class Journal:
         rows
             Made by :meth:`line`.
         """
-        if not rows:
+        if self._lines or self.storage.trouble:
+            for row in rows:
+                self.note_line(row)
             return
-        made = [(row.time, Level(row.level), row.kind, row.message, dict(row.data)) for row in rows]
+        copies = [(row.time, self.line(Level(row.level), row.kind, row.message, **row.data)) for row in rows]
         try:
-            if self._lines or self.storage.trouble:
-                raise _NotNow
             await to_the_end(self._add_all(rows))
         except Exception as error:
-            if not isinstance(error, _NotNow):
-                self.storage.note(error)
-            for time, level, kind, message, data in made:
-                again = self.line(level, kind, message, **data)
-                again.time = time
-                self.note_line(again)
+            self.storage.note(error)
+            # Rows of a transaction that failed cannot be written again.
+            for time, row in copies:
+                row.time = time
+                self.note_line(row)
             return
         for row in rows:
             self.tell(row)

@@ -308,7 +308,9 @@ class Runner:
 
     async def _send(self) -> None:
         self._turned_down.clear()
-        await asyncio.gather(*(self._send_to(member) for member in self._live.team if member.engaged and member.ordered))
+        await asyncio.gather(
+            *(self._send_to(member) for member in self._live.team if member.engaged and member.ordered)
+        )
 
     async def _send_to(self, member: Member) -> None:
         if member.order is None or self._live.halted:

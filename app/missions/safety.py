@@ -189,8 +189,9 @@ def circling_room(
     free: BaseGeometry = area
     for zone in zones:
         free = free.difference(zone)
-    for way in taken:
-        free = free.difference((LineString(way) if len(way) > 1 else Point(way[0])).buffer(constraints.min_separation_m))
+    others = [LineString(way) if len(way) > 1 else Point(way[0]) for way in taken]
+    for way in others:
+        free = free.difference(way.buffer(constraints.min_separation_m))
     centres = free.buffer(-radius_m)
     if centres.is_empty:
         return None
@@ -199,7 +200,9 @@ def circling_room(
         return None
     swept = unary_union([centre.buffer(radius_m), Point(start), Point(target)]).convex_hull
     ahead = [zone for zone in zones if not zone.contains(Point(start))]
-    if any(zone.intersects(swept) for zone in ahead) or not area.buffer(START_OUTSIDE_M).contains(swept):
+    if any(barrier.intersects(swept) for barrier in [*ahead, *others]) or not area.buffer(START_OUTSIDE_M).contains(
+        swept
+    ):
         return None
     return np.array([centre.x, centre.y])
 

@@ -4,7 +4,7 @@ import math
 
 import imcpy
 import pytest
-from dune_bench import HOME, Bench, start_request, stop_request
+from dune_bench import HOME, start_request, stop_request
 
 from simulator.navigation import SURFACE_DEPTH_M
 

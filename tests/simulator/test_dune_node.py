@@ -162,7 +162,9 @@ class TestTelemetry:
 
     def test_the_loud_messages_are_sent_as_seldom_as_asked(self):
         bench = Bench(chatter=True).ready()
-        bench.say(rate_limiters("Distance:5, ServoPosition:0.1, EulerAngles:0.1, AngularVelocity:0.1, Acceleration:0.1"))
+        bench.say(
+            rate_limiters("Distance:5, ServoPosition:0.1, EulerAngles:0.1, AngularVelocity:0.1, Acceleration:0.1")
+        )
         rates = self.rates(bench, 10.0)
         assert rates[("ServoPosition", 69)] == pytest.approx(0.1)
         assert rates[("Distance", 58)] == pytest.approx(5.0, rel=0.05)

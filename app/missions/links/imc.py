@@ -209,7 +209,9 @@ def _translate(event: BridgeEvent) -> FleetEvent | None:
             )
         case Restarted():
             where = ", under water when it was last heard before" if event.submerged else ""
-            words = f"DUNE on board has restarted{where}: what it was doing is forgotten, and it is asked to follow again"
+            words = (
+                f"DUNE on board has restarted{where}: what it was doing is forgotten, and it is asked to follow again"
+            )
             return RestartReport(event.vehicle, words)
         case LinkChange():
             return LinkReport(event.vehicle, _link_state(event.state, event.engaged, event.ours), event.reason)
