@@ -235,8 +235,6 @@ def test_a_slope_is_allowed_for_where_a_sample_is_away_from_the_vehicle():
 
 def test_the_bottom_where_the_vehicles_came_from_counts_too():
     before = step(of([2.0], [19.0], [(20, 50)], []), 1)
-    content = of([2.0], [12.0], [(20, 20)], [[20, 50, 2.0, 19.2], [20, 20, 2.0, 12.0]])
-    assert len(read_step(content, SESSION, 1, Conventions(AREA)).soundings) == 2
     steep = of([2.0], [12.0], [(20, 40)], [[20, 50, 2.0, 19.2], [20, 40, 2.0, 12.0]])
     assert len(read_step(steep, SESSION, 1, Conventions(AREA)).soundings) == 1
     assert len(read_step(steep, SESSION, 1, Conventions(AREA), before).soundings) == 2
