@@ -426,8 +426,12 @@ def _with_tokens(database: str | None, run: Any, changing: str = "", target: str
 
 def main() -> None:
     """Run the command line; expected errors are one line and an exit code: 2 for wrong usage, 1 for failure."""
+    from app.storage.private import for_owner_only
+
     try:
-        app()
+        # What a command writes is its user's: maps, logs, copies, also of the programs that it starts.
+        with for_owner_only():
+            app()
     except Exception as error:
         code = _exit_code(error)
         if code is None:

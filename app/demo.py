@@ -29,6 +29,7 @@ from app.exploration.constraints import Constraints
 from app.mapping.compare import difference
 from app.mapping.types import FloatArray, Grid
 from app.settings import Settings
+from app.storage import private
 from simulator.seafloors import generate
 from simulator.terrain import Terrain
 from simulator.terrain_files import load_terrain
@@ -82,7 +83,7 @@ class _Demo:
         self._options = options
         self._console = console
         self._terrain = _sea_floor(options)
-        options.output.mkdir(parents=True, exist_ok=True)
+        private.make_folder(options.output)
         self._folder = options.output
         ports = free_udp_ports(2 * options.vehicles + 2)
         self._console_port = ports[0]
@@ -123,11 +124,12 @@ class _Demo:
     def _write_config(self, settings: Settings) -> None:
         """Leave a settings file with which ``bathyfleet serve`` goes on with the very same mission and vehicles."""
         ports = ", ".join(str(port) for port in self._announce_ports)
-        self._config.write_text(
+        private.write(
+            self._config,
             f"port = {settings.port}\n"
             f"database_url = {json.dumps(settings.database_url)}\n"
             f"time_scale = {settings.time_scale}\n\n"
-            f"[imc]\nport = {self._console_port}\nannounce_ports = [{ports}]\nloopback_only = true\n"
+            f"[imc]\nport = {self._console_port}\nannounce_ports = [{ports}]\nloopback_only = true\n",
         )
 
     @property
@@ -137,7 +139,7 @@ class _Demo:
     def _log_to_file(self) -> None:
         from app.api import logs
 
-        logs.configure("info", "json", (self._folder / "service.log").open("w"))
+        logs.configure("info", "json", private.open_new(self._folder / "service.log"))
 
     def _simulator_command(self) -> list[str]:
         options = self._options
@@ -165,7 +167,7 @@ class _Demo:
     @contextlib.asynccontextmanager
     async def _simulator(self) -> AsyncIterator[None]:
         """Run the vehicles in a process of their own."""
-        log = (self._folder / "vehicles.log").open("wb")
+        log = private.open_new(self._folder / "vehicles.log", "wb")
         process = await asyncio.create_subprocess_exec(
             *self._simulator_command(),
             stdout=asyncio.subprocess.PIPE,
@@ -281,7 +283,7 @@ class _Demo:
         for extension in FILES:
             answer = await api.get(f"/missions/{mission_id}/map.{extension}")
             check(answer)
-            (self._folder / f"map.{extension}").write_bytes(answer.content)
+            private.write(self._folder / f"map.{extension}", answer.content)
         view = (await api.get(f"/missions/{mission_id}/map")).json()
         grid, depth = _grid_of(view)
         ours = difference(depth, self._truth(grid))
@@ -315,7 +317,8 @@ class _Demo:
         ):
             table.add_row(name, *_cells(baseline, ours.rmse_m))
         console.print(table)
-        (self._folder / "result.json").write_text(
+        private.write(
+            self._folder / "result.json",
             json.dumps(
                 {
                     "terrain": self._terrain.name,
@@ -327,7 +330,7 @@ class _Demo:
                     "lawnmower_same_soundings_rmse_m": baselines.same_soundings.rmse_m,
                 },
                 indent=2,
-            )
+            ),
         )
         names = ", ".join(f"map.{extension}" for extension in FILES)
         console.print(f"Files in [bold]{self._folder}[/]: {names}, result.json")

@@ -13,6 +13,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from app.demo_service import DemoError, check, client, get, post, serve_during
 from app.missions.search.examples import example
 from app.settings import Settings
+from app.storage import private
 
 POLL_S = 0.4
 ENDED = ("finished", "failed", "aborted")
@@ -48,8 +49,8 @@ class _SearchDemo:
         from app.missions.settings import ImcSettings
 
         options, folder = self._options, self._options.output
-        folder.mkdir(parents=True, exist_ok=True)
-        logs.configure("info", "json", (folder / "service.log").open("w"))
+        private.make_folder(folder)
+        logs.configure("info", "json", private.open_new(folder / "service.log"))
         for old in folder.glob("search.db*"):
             old.unlink()
         settings = Settings(
@@ -68,7 +69,7 @@ class _SearchDemo:
     async def _search(self, url: str) -> None:
         options, folder = self._options, self._options.output
         spec = example(options.site, seed=options.seed, vehicles=options.vehicles, window_s=options.window_s)
-        (folder / "mission.json").write_text(json.dumps(spec, indent=1))
+        private.write(folder / "mission.json", json.dumps(spec, indent=1))
         async with client(url) as api:
             mission = await post(api, "/missions", spec)
             path = f"/missions/{mission['id']}"
@@ -79,10 +80,10 @@ class _SearchDemo:
                 raise DemoError(f"the mission is {self._state}: {last['reason']}")
             answer = await api.get(f"{path}/search/obstacles.geojson")
             check(answer)
-            (folder / "obstacles.geojson").write_bytes(answer.content)
+            private.write(folder / "obstacles.geojson", answer.content)
         found = last["progress"]["search"]
         result = {key: found[key] for key in ("goal_pct", "explored_pct", "found_cells", "left_s", "back")}
-        (folder / "result.json").write_text(json.dumps(result, indent=2))
+        private.write(folder / "result.json", json.dumps(result, indent=2))
         self._console.print(
             f"Goal area seen: {found['goal_pct']:.1f} %, site: {found['explored_pct']:.1f} %. "
             f"Back at the entry: {', '.join(found['back']) or 'nobody'}, {found['left_s']:.0f} s before the end.\n"

@@ -43,6 +43,7 @@ from app.api.forwarding import ForwardingMiddleware, PeerMiddleware
 from app.api.health import health_router
 from app.api.limits import LimitMiddleware, Limits
 from app.api.middleware import BodyMiddleware, RequestMiddleware
+from app.api.peers import is_own_user
 from app.api.schemas import API
 from app.api.state import EdgeState
 from app.api.tokens import Role, TokenStore
@@ -52,7 +53,9 @@ from app.missions.service import MissionService
 from app.settings import Settings, StartupError, is_loopback, load_settings
 from app.storage.audit import Command
 from app.storage.database import Database
+from app.storage.membership import MembershipLostError
 from app.storage.prepare import prepare_database
+from imc_bridge import PortInUseError
 
 GRACE_S = 5
 """Seconds that open requests get to end when the process is asked to."""
@@ -95,8 +98,10 @@ def create_app(settings: Settings | None = None, *, port: int | None = None) -> 
                 )
             audit = AuditLog(database, settings.audit_days)
 
-            async def log_in(password: str, host: str) -> str | None:
-                name = await console_log_in(tokens, limits, password, host, insecure=settings.insecure)
+            async def log_in(password: str, host: str, own_user: bool) -> str | None:
+                name = await console_log_in(
+                    tokens, limits, password, host, own_user=own_user, insecure=settings.insecure
+                )
                 if name is None:  # who is let in is in the log of his session's mission
                     await audit.write(Command("", "", host, "log in", "Neptus gateway", "refused"))
                 return name
@@ -105,12 +110,13 @@ def create_app(settings: Settings | None = None, *, port: int | None = None) -> 
                 settings.service(),
                 database,
                 log_in,
+                is_own_user=is_own_user,
                 url=settings.peer_url or _own_url(settings, port or settings.port),
                 certificate=settings.tls_certificate.read_text() if settings.tls_certificate else None,
             )
             app.state.edge = EdgeState(settings, service, tokens, limits, audit)
-            await service.startup()
             try:
+                await _begin(service)
                 yield
             finally:
                 app.state.edge.stopping.set()
@@ -170,6 +176,16 @@ def create_app(settings: Settings | None = None, *, port: int | None = None) -> 
     app.add_middleware(PeerMiddleware)
     app.add_middleware(RequestMiddleware)
     return app
+
+
+async def _begin(service: MissionService) -> None:
+    """Start the service; raise StartupError where something outside of it is in the way."""
+    try:
+        await service.startup()
+    except PortInUseError as error:
+        raise StartupError(str(error)) from None
+    except MembershipLostError as error:
+        raise StartupError(f"this process cannot join those on its database: {error}") from None
 
 
 def _own_url(settings: Settings, port: int) -> str:

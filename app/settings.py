@@ -250,6 +250,9 @@ def load_settings(**overrides: Any) -> Settings:
         raise SettingsError(_describe(error, overrides)) from None
     except tomllib.TOMLDecodeError as error:
         raise SettingsError([f"{file} is not TOML: {error}"]) from None
+    except UnicodeDecodeError as error:
+        wrong = f"byte {error.start} is {error.object[error.start]:#04x}"
+        raise SettingsError([f"{file} is not UTF-8, as TOML has to be: {wrong}; save it as UTF-8"]) from None
     except OSError as error:
         raise SettingsError([f"{file} cannot be read: {error.strerror}"]) from None
     except Exception as error:

@@ -11,8 +11,9 @@ from fastapi.security import HTTPBearer
 from starlette.requests import HTTPConnection
 
 from app.api.limits import Limits, host_of
-from app.api.peers import is_another_user
+from app.api.peers import OWN_USER
 from app.api.problems import ProblemError
+from app.api.processes import vouched_for
 from app.api.state import EdgeState, State
 from app.api.tokens import Principal, Role, TokenStore
 from app.settings import is_loopback
@@ -29,7 +30,18 @@ _bearer = HTTPBearer(
     description="A token made by `bathyfleet token create`. Needed as soon as one token exists.",
 )
 
-_PROXY_HEADERS = ("forwarded", "via", "x-forwarded-for", "x-forwarded-host", "x-forwarded-proto", "x-real-ip")
+_PROXY_HEADERS = frozenset(
+    (
+        *("forwarded", "forwarded-for", "via", "proxy-connection", "front-end-https", "x-real-ip", "x-client-ip"),
+        *("x-cluster-client-ip", "x-remote-addr", "x-remote-ip", "true-client-ip", "cdn-loop", "fastly-client-ip"),
+        *("fly-client-ip", "x-appengine-user-ip", "x-originating-ip", "x-scheme", "x-url-scheme", "x-nginx-proxy"),
+        *("x-varnish", "x-bluecoat-via"),
+    )
+)
+_PROXY_PREFIXES = (
+    *("x-forwarded", "x-original-", "x-proxy", "x-proxied", "x-envoy-", "x-amz", "x-azure-", "x-arr-", "cf-"),
+)
+"""What reverse proxies, load balancers and content networks add; names are compared in lower case."""
 
 READERS = frozenset(Role)
 ADMINS = frozenset({Role.ADMIN})
@@ -43,6 +55,10 @@ async def authenticate(connection: HTTPConnection, state: EdgeState, *, query_to
     ``query_token`` also takes the token from ``?token=``, for browsers' sockets, which cannot send headers.
     Raises ProblemError (unauthenticated, forbidden).
     """
+    principal = vouched_for(connection.scope)
+    if principal is not None:
+        # Another process has looked at him; he is for this one who he is there, and no more.
+        return _remember(connection, principal)
     _check_origin(connection, state)
     token = connection.query_params.get("token") if query_token else None
     header = connection.headers.get("authorization")
@@ -85,18 +101,19 @@ async def until_unwelcome(connection: HTTPConnection, state: EdgeState, *, query
 
 
 async def console_log_in(
-    tokens: TokenStore, limits: Limits, password: str, host: str, *, insecure: bool = False
+    tokens: TokenStore, limits: Limits, password: str, host: str, *, own_user: bool, insecure: bool = False
 ) -> str | None:
     """Return the name of an operator who logs in with a token as password; None: not let in.
 
-    As with HTTP, without any token this machine's own user is an operator.
+    As with HTTP, without any token the user who runs the service is an operator: ``own_user`` is what
+    :func:`app.api.peers.is_own_user` said of his connection when it was accepted.
     """
     if limits.locked_out(host):
         return None
     principal = await tokens.principal(password.strip())
     if principal is not None:
         return principal.name if principal.role in OPERATORS else None
-    if not await tokens.any() and (insecure or is_loopback(host)):
+    if not await tokens.any() and (insecure or own_user):
         return LOCAL_OPERATOR.name
     limits.log_in(password.strip(), host, good=False)
     return None
@@ -114,23 +131,22 @@ def _unauthenticated(detail: str) -> ProblemError:
 def _is_local(connection: HTTPConnection, state: EdgeState) -> bool:
     """Tell whether the user asks who runs the service, on this machine.
 
-    Under one of its own names, else a foreign page could rebind its name to us; and not by a proxy, which speaks for
-    whoever reaches it.
+    He is known from his connection, see :func:`app.api.peers.is_own_user`. Under one of the service's own names, else a
+    foreign page could rebind its name to us; and not by a proxy, which speaks for whoever reaches it.
     """
-    if any(name in connection.headers for name in _PROXY_HEADERS):
+    if any(name in _PROXY_HEADERS or name.startswith(_PROXY_PREFIXES) for name in connection.headers):
+        return False
+    if not connection.scope.get("state", {}).get(OWN_USER, False):
+        return False
+    if not is_loopback(connection.url.hostname or "localhost"):
         return False
     if connection.client is None:
         return True  # a Unix socket
-    host, port = connection.client
     try:
-        address = ipaddress.ip_address(host)
+        address = ipaddress.ip_address(connection.client[0])
     except ValueError:
         return False
-    if not address.is_loopback or not is_loopback(connection.url.hostname or "localhost"):
-        return False
-    if any(address in ipaddress.ip_network(proxy) for proxy in state.settings.trusted_proxies):
-        return False
-    return not is_another_user((host, port), connection.scope.get("server"))
+    return not any(address in ipaddress.ip_network(proxy) for proxy in state.settings.trusted_proxies)
 
 
 def _check_origin(connection: HTTPConnection, state: EdgeState) -> None:

@@ -5,6 +5,7 @@ from collections import Counter
 
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 
+from app.api.peers import OWN_USER, is_own_user
 from app.settings import Settings, is_loopback
 
 MAX_HEAD_BYTES = 65_536
@@ -39,6 +40,9 @@ def patient_http(settings: Settings) -> type[asyncio.Protocol]:
                     return
                 held[host] += 1
                 self._counted = host
+            # Now: of who closes or resets his connection the kernel will not know any more whose it was.
+            connection = transport.get_extra_info("socket")
+            self.app_state = {**self.app_state, OWN_USER: connection is not None and is_own_user(connection)}
             self._watch()
 
         def data_received(self, data: bytes) -> None:

@@ -5,7 +5,6 @@ import contextlib
 import re
 from collections.abc import AsyncIterator
 from types import SimpleNamespace
-from urllib.parse import quote
 
 import httpx
 import structlog
@@ -15,9 +14,9 @@ from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed, InvalidHandshake
 from websockets.typing import Subprotocol
 
-from app.api.auth import authenticate
+from app.api.auth import authenticate, until_unwelcome
 from app.api.problems import ProblemError, instance_of, make_problem, problem_response
-from app.api.processes import comes_from_peer, end_to_end, headers_for, recognise, tls_of
+from app.api.processes import Deliveries, comes_from_peer, end_to_end, recognise, target_without_token, tls_of
 from app.api.racing import first_of
 from app.api.schemas import API
 from app.api.state import EdgeState
@@ -32,11 +31,17 @@ RETRY_S = 0.2
 MISDIRECTED = 421
 """What a process answers that does not have the mission (any more)."""
 CLOSE_TRY_AGAIN = 1013
+CLOSE_UNWELCOME = 4401
 NO_CODE = (1005, 1006)
 """Codes of a WebSocket's end that may not be sent."""
 
 _OUR_OWN = frozenset(("date", "server", "x-request-id", "x-content-type-options"))
 """Headers of answers that this process sets itself."""
+
+_SAME_ADDRESS = (
+    "the mission is another process's, which has the same address as this one",
+    "Give each process a peer_url or a port of its own; a process that ended is noticed within seconds",
+)
 
 _ROUTE = SimpleNamespace(path=f"{API}/missions/{{mission_id}} (sent on)")
 
@@ -48,12 +53,16 @@ class PeerMiddleware:
 
     def __init__(self, app: ASGIApp) -> None:
         self.app = app
+        self._deliveries = Deliveries()
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Serve one request or live view."""
-        if scope["type"] in ("http", "websocket"):
-            recognise(scope, scope["app"].state.edge.service.process.secret)
-        await self.app(scope, receive, send)
+        """Serve one request or live view; whoever claims to be a process and cannot show it is told only that."""
+        if scope["type"] not in ("http", "websocket") or recognise(
+            scope, scope["app"].state.edge.service.process.secret, self._deliveries
+        ):
+            await self.app(scope, receive, send)
+            return
+        await _misdirect(scope, receive, send, "it was sent on by a process that does not know this one")
 
 
 class ForwardingMiddleware:
@@ -72,11 +81,9 @@ class ForwardingMiddleware:
         peer = await edge.service.process.owner(found[1]) if found else None
         if found is None or peer is None:
             await self.app(scope, receive, send)
-        elif comes_from_peer(scope) and scope["type"] == "http":
-            problem = make_problem("mission-elsewhere", "it is another process's now", instance=instance_of(scope))
-            answer = problem_response(problem)
-            answer.status_code = MISDIRECTED
-            await answer(scope, receive, send)
+        elif comes_from_peer(scope):
+            # Sent on once is enough: whoever sent it looks again where the mission is.
+            await _misdirect(scope, receive, send, "it is another process's now")
         elif not await _is_known(edge, scope):
             # Our own word for whoever may not ask; nobody is vouched for who was not looked at.
             await self.app(scope, receive, send)
@@ -96,10 +103,13 @@ class ForwardingMiddleware:
             if peer is None:
                 await self.app(scope, _once(body, receive), send)
                 return
+            if peer.url == edge.service.process.url:
+                await _refuse(scope, receive, send, *_SAME_ADDRESS)
+                return
             try:
                 async with _asked(edge, peer, scope, body) as answer:
                     if answer.status_code != MISDIRECTED:
-                        await first_of(_relay(answer, send), _until_left(receive))
+                        await _relay(edge, answer, scope, receive, send)
                         return
             except (httpx.ConnectError, httpx.ConnectTimeout):
                 log.warning("the process that has the mission is not there", url=peer.url, mission=mission_id)
@@ -137,22 +147,15 @@ async def _is_known(edge: EdgeState, scope: Scope) -> bool:
 
 @contextlib.asynccontextmanager
 async def _asked(edge: EdgeState, peer: Peer, scope: Scope, body: bytes) -> AsyncIterator[httpx.Response]:
-    client = edge.peers.to(peer)
-    request = client.build_request(scope["method"], _target(scope), headers=headers_for(peer, scope), content=body)
-    answer = await client.send(request, stream=True)
+    request = edge.peers.request(peer, scope, target_without_token(scope), content=body)
+    answer = await edge.peers.to(peer).send(request, stream=True)
     try:
         yield answer
     finally:
         await answer.aclose()
 
 
-def _target(scope: Scope) -> str:
-    path = scope.get("raw_path") or quote(scope["path"]).encode()
-    query = scope.get("query_string", b"")
-    return (path.split(b"?")[0] + (b"?" + query if query else b"")).decode("latin-1")
-
-
-async def _relay(answer: httpx.Response, send: Send) -> None:
+async def _relay(edge: EdgeState, answer: httpx.Response, scope: Scope, receive: Receive, send: Send) -> None:
     headers = [(name, value) for name, value in end_to_end(answer.headers.multi_items()) if name not in _OUR_OWN]
     length = answer.headers.get("content-length")
     if length is not None:
@@ -165,13 +168,23 @@ async def _relay(answer: httpx.Response, send: Send) -> None:
         }
     )
     try:
-        async for part in answer.aiter_raw():
-            await send({"type": "http.response.body", "body": part, "more_body": True})
+        # The process that has the mission takes our word for who asks: we have to notice when that ends.
+        unwelcome = until_unwelcome(HTTPConnection(scope), edge)
+        ended = await first_of(_pump_answer(answer, send), _until_left(receive), unwelcome)
     except httpx.TransportError as error:
         if length is not None:
             raise ConnectionResetError("the process that has the mission broke off within its answer") from error
         # A stream: its reader connects anew and goes on after the last event it has.
-    await send({"type": "http.response.body", "body": b"", "more_body": False})
+        ended = 0
+    if ended == 2 and length is not None:
+        raise ConnectionResetError("the access token ended within an answer")
+    if ended != 1:
+        await send({"type": "http.response.body", "body": b"", "more_body": False})
+
+
+async def _pump_answer(answer: httpx.Response, send: Send) -> None:
+    async for part in answer.aiter_raw():
+        await send({"type": "http.response.body", "body": part, "more_body": True})
 
 
 async def _until_left(receive: Receive) -> None:
@@ -202,6 +215,16 @@ def _once(body: bytes, receive: Receive) -> Receive:
     return replay
 
 
+async def _misdirect(scope: Scope, receive: Receive, send: Send, detail: str) -> None:
+    """Say that this process is not the one that is meant."""
+    if scope["type"] == "websocket":
+        await send({"type": "websocket.close", "code": CLOSE_TRY_AGAIN, "reason": detail})
+        return
+    answer = problem_response(make_problem("mission-elsewhere", detail, instance=instance_of(scope)))
+    answer.status_code = MISDIRECTED
+    await answer(scope, receive, send)
+
+
 async def _refuse(scope: Scope, receive: Receive, send: Send, detail: str, remedy: str) -> None:
     problem = make_problem("mission-elsewhere", detail, instance=instance_of(scope), remedy=remedy)
     await problem_response(problem, {"Retry-After": "1"})(scope, receive, send)
@@ -210,13 +233,18 @@ async def _refuse(scope: Scope, receive: Receive, send: Send, detail: str, remed
 async def _send_view_on(edge: EdgeState, peer: Peer, scope: Scope, receive: Receive, send: Send) -> None:
     """Show a live view of another process; when that ends, the viewer asks again and finds its successor."""
     assert (await receive())["type"] == "websocket.connect"  # noqa: S101 - the protocol's first message
+    target = target_without_token(scope)
     try:
+        if peer.url == edge.service.process.url:
+            raise OSError(_SAME_ADDRESS[0])
         async with connect(
-            peer.url.replace("http", "ws", 1) + _target(scope),
+            peer.url.replace("http", "ws", 1) + target,
             ssl=tls_of(peer),
             subprotocols=[Subprotocol(name) for name in scope.get("subprotocols", ())] or None,
             additional_headers=[
-                (name, value) for name, value in headers_for(peer, scope) if name != "sec-websocket-protocol"
+                (name, value)
+                for name, value in edge.peers.headers(peer, scope, target)
+                if name != "sec-websocket-protocol"
             ],
             origin=None,
             max_size=None,
@@ -225,9 +253,16 @@ async def _send_view_on(edge: EdgeState, peer: Peer, scope: Scope, receive: Rece
             proxy=None,
         ) as upstream:
             await send({"type": "websocket.accept", "subprotocol": upstream.subprotocol})
-            await first_of(_pump_down(upstream, send), _pump_up(upstream, receive), edge.stopping.wait())
+            ended = await first_of(
+                _pump_down(upstream, send),
+                _pump_up(upstream, receive),
+                edge.stopping.wait(),
+                until_unwelcome(HTTPConnection(scope), edge, query_token=True),
+            )
             code = upstream.close_code or CLOSE_TRY_AGAIN
             reason = upstream.close_reason or ""
+            if ended == 3:
+                code, reason = CLOSE_UNWELCOME, "the access token is not valid any more"
     except (OSError, TimeoutError, InvalidHandshake) as error:
         log.warning("live view cannot be had from another process", url=peer.url, error=str(error))
         await send({"type": "websocket.accept"})

@@ -8,14 +8,14 @@ from datetime import UTC, datetime
 from enum import StrEnum
 from pathlib import Path
 
-from app.storage import tokens
+from app.storage import private, tokens
 from app.storage.at_once import AtOnce
 from app.storage.database import Database
 from app.storage.models import TokenRow
+from app.storage.prepare import FIRST_TOKEN_FILE
 from app.storage.sharing import Shared
 
 TOKEN_PREFIX = "bf_"  # noqa: S105 - makes leaked tokens easy to search for
-FIRST_TOKEN_FILE = "operator.token"  # noqa: S105 - the file's name
 
 
 class Role(StrEnum):
@@ -73,9 +73,7 @@ class TokenStore:
             if await tokens.all_tokens(session):
                 return None
             file = folder / FIRST_TOKEN_FILE
-            file.unlink(missing_ok=True)
-            file.touch(0o600, exist_ok=False)
-            file.write_text(token + "\n")
+            private.write(file, token + "\n")
             session.add(row)
         return file
 

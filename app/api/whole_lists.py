@@ -8,7 +8,7 @@ import structlog
 from pydantic import TypeAdapter
 from starlette.requests import Request
 
-from app.api.processes import comes_from_peer, headers_for
+from app.api.processes import comes_from_peer
 from app.api.state import EdgeState
 from app.missions.ownership import Peer
 
@@ -27,9 +27,8 @@ async def from_peers(request: Request, edge: EdgeState, kind: TypeAdapter[list[T
 
     async def ask(peer: Peer) -> list[T]:
         try:
-            answer = await edge.peers.to(peer).get(
-                request.url.path, headers=headers_for(peer, request.scope), timeout=ANSWER_S
-            )
+            asked = edge.peers.request(peer, request.scope, request.url.path, timeout=ANSWER_S)
+            answer = await edge.peers.to(peer).send(asked)
             answer.raise_for_status()
         except httpx.HTTPError as error:
             log.warning("another process does not answer", url=peer.url, error=str(error) or type(error).__name__)

@@ -51,6 +51,7 @@ def export(
     from app.mapping.s44 import Order
     from app.missions.products import PRODUCTS, Product, ProductOptions
     from app.missions.service import MissionService
+    from app.storage import private
 
     if format not in PRODUCTS:
         raise typer.BadParameter(f"{format!r} is not one of {', '.join(PRODUCTS)}", param_hint="--format")
@@ -67,8 +68,8 @@ def export(
         return
     path = out or settings.output_dir / product.filename
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_bytes(product.content)
+        private.make_folder(path.parent)
+        private.write(path, product.content)
     except OSError as error:
         raise CommandError(f"{path} cannot be written: {error.strerror}") from None
     typer.echo(f"{path}: {len(product.content)} bytes")

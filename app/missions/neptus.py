@@ -1,5 +1,6 @@
 """Sessions of Neptus' ConvCAO panel as missions: begun by its CONNECT, started by its START, fed by its steps."""
 
+import socket
 from collections.abc import Awaitable, Callable
 from statistics import median
 from typing import Protocol
@@ -20,8 +21,8 @@ from app.storage.database import Database
 from imc_bridge.neptus import Area, Restored, SessionRefusedError, StepData
 from imc_bridge.neptus.samples import looks_slanted
 
-LogIn = Callable[[str, str], Awaitable[str | None]]
-"""Who logs in with a password from a host; None: not let in."""
+LogIn = Callable[[str, str, bool], Awaitable[str | None]]
+"""Who logs in with a password from a host, and whether he runs this process himself; None: not let in."""
 
 ARRIVAL_RADIUS_M = 1.0
 """The panel says itself when its vehicles have arrived; nothing is judged by distance here."""
@@ -54,24 +55,32 @@ class Missions(Protocol):
 class NeptusSessions:
     """Turns what the panel uploads into missions' lives; see :class:`imc_bridge.neptus.SessionKeeper`."""
 
-    def __init__(self, service: Missions, database: Database, settings: NeptusSettings, log_in: LogIn) -> None:
+    def __init__(
+        self,
+        service: Missions,
+        database: Database,
+        settings: NeptusSettings,
+        log_in: LogIn,
+        is_own_user: Callable[[socket.socket], bool],
+    ) -> None:
         self._service = service
         self._database = database
         self._settings = settings
         self._log_in = log_in
+        self.is_own_user = is_own_user
         self._missions: dict[str, str] = {}
         self._users: dict[str, str] = {}
         self._warned: set[str] = set()
         self._ratios: dict[str, list[float]] = {}
         self.link = NeptusFleetLink(settings, self)
 
-    async def log_in(self, user: str, password: str, host: str) -> str | None:
+    async def log_in(self, user: str, password: str, host: str, *, own_user: bool) -> str | None:
         """Return who that is; the user's name is the panel's, only the password counts.
 
         Raises SessionRefusedError with the reason where there is more to say than that the password is wrong.
         """
         try:
-            return await self._log_in(password, host)
+            return await self._log_in(password, host, own_user)
         except MissionError as error:
             raise SessionRefusedError(f"{error}. {error.remedy}") from error
 

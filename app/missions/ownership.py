@@ -71,6 +71,11 @@ class Ownership:
         self._peers: dict[int, Peer] = {}
 
     @property
+    def url(self) -> str:
+        """Where the others reach this process."""
+        return self._url
+
+    @property
     def number(self) -> int:
         """What this process is called among the others; 0 before it entered."""
         return self._number

@@ -2,6 +2,7 @@
 
 import asyncio
 import inspect
+import socket
 import uuid
 from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -116,6 +117,8 @@ class MissionService:
         Migrated and open; the caller closes it after ``shutdown``.
     log_in
         Who may use the Neptus gateway with a password from a host; without it nobody.
+    is_own_user
+        Whether a connection that the gateway accepts is of the user who runs this process.
     url, certificate
         Where other processes on the same database reach this one, and the certificate (PEM) that it shows them.
     """
@@ -124,8 +127,9 @@ class MissionService:
         self,
         settings: ServiceSettings,
         database: Database,
-        log_in: Callable[[str, str], Awaitable[str | None]] | None = None,
+        log_in: Callable[[str, str, bool], Awaitable[str | None]] | None = None,
         *,
+        is_own_user: Callable[[socket.socket], bool] = lambda _connection: False,
         url: str = "",
         certificate: str | None = None,
     ) -> None:
@@ -149,7 +153,7 @@ class MissionService:
         if settings.neptus.enabled:
             from app.missions.neptus import NeptusSessions
 
-            links.append(NeptusSessions(self, database, settings.neptus, log_in or _nobody).link)
+            links.append(NeptusSessions(self, database, settings.neptus, log_in or _nobody, is_own_user).link)
         self._hub = FleetHub(links)
         self._executor = ThreadPoolExecutor(WORKERS, thread_name_prefix="planning")
         self._claims = Claims(self._hub, self._sim, lead, show_area)
@@ -614,7 +618,7 @@ class MissionService:
         return await self._memory.get(mission_id)
 
 
-async def _nobody(_password: str, _host: str) -> str | None:
+async def _nobody(_password: str, _host: str, _own_user: bool) -> str | None:
     return None
 
 

@@ -11,8 +11,12 @@ from pathlib import Path
 
 from sqlalchemy import URL, make_url
 
+from app.storage import private
+
 SQLITE_MAGIC = b"SQLite format 3\0"
 ARCHIVE_MAGIC = b"PGDMP"
+_WITHOUT_PROCESSES = ("--exclude-table-data=mission_owners", "--exclude-table-data=processes")
+"""Which processes live is true of no other moment, and their secrets are nobody's business."""
 
 
 class BackupError(Exception):
@@ -50,7 +54,7 @@ def back_up(url: str, target: Path) -> tuple[Path, Contents]:
         raise BackupError(f"{target} exists", "Name another file: backups are not overwritten")
     part = target.with_name(target.name + ".part")
     try:
-        target.parent.mkdir(parents=True, exist_ok=True)
+        private.make_folder(target.parent)
         os.close(os.open(part, os.O_CREAT | os.O_TRUNC | os.O_WRONLY, 0o600))
         if suffix == "db":
             expected = _copy_sqlite(parsed, part)
@@ -58,7 +62,7 @@ def back_up(url: str, target: Path) -> tuple[Path, Contents]:
             if contents.rows != expected:
                 raise BackupError(f"the copy has other rows than the database: {contents.rows}, not {expected}")
         else:
-            _run_postgres("pg_dump", parsed, "--format=custom", f"--file={part}")
+            _run_postgres("pg_dump", parsed, "--format=custom", *_WITHOUT_PROCESSES, f"--file={part}")
             contents = contents_of(part)
         _to_disk(part)
         part.rename(target)
@@ -123,11 +127,12 @@ def restore_to(url: str, file: Path, *, replace: bool) -> tuple[Contents, Path |
         _close_for_good(path)
         aside = path.with_name(f"{path.name}.before-{datetime.now(UTC):%Y%m%dT%H%M%SZ}")
         path.rename(aside)
-    path.parent.mkdir(parents=True, exist_ok=True)
+        private.mend([aside])
+    private.make_folder(path.parent)
     part = path.with_name(path.name + ".part")
     try:
-        shutil.copyfile(file, part)
-        part.chmod(0o600)
+        with file.open("rb") as source, private.open_new(part, "wb") as copy:
+            shutil.copyfileobj(source, copy)
         _to_disk(part)
         part.rename(path)
     except OSError as error:
@@ -149,6 +154,11 @@ def _copy_sqlite(url: URL, target: Path) -> dict[str, int]:
         rows = _count(source)
         source.backup(copy)
         source.execute("ROLLBACK")
+        if "processes" in rows:
+            # By the secret of a process that lives its holder could speak in anybody's name.
+            copy.execute("PRAGMA secure_delete=ON")
+            copy.execute("UPDATE processes SET secret = ''")
+            copy.commit()
         # One file, whole in itself: no journal has to go with it.
         copy.execute("PRAGMA journal_mode=DELETE")
     return rows

@@ -5,11 +5,13 @@ import time
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager, nullcontext
 from copy import copy
+from pathlib import Path
 from typing import Any
 
 from sqlalchemy import Connection, event, make_url, text
 from sqlalchemy.ext.asyncio import AsyncConnection, AsyncEngine, AsyncSession, create_async_engine
 
+from app.storage import private
 from app.storage.shielding import to_the_end
 from app.storage.trouble import trouble_of
 
@@ -37,6 +39,13 @@ def make_engine(url: str) -> AsyncEngine:
     if parsed.get_backend_name() != "sqlite":
         return create_async_engine(url, pool_pre_ping=True)
     engine = create_async_engine(url)
+    file = Path(parsed.database) if parsed.database and parsed.database != ":memory:" else None
+
+    @event.listens_for(engine.sync_engine, "do_connect")
+    def _make_private(*_arguments: Any) -> None:
+        # The library would make the file as the umask has it; its journals get the rights of the file itself.
+        if file is not None and file.parent.is_dir():
+            private.create(file)
 
     @event.listens_for(engine.sync_engine, "connect")
     def _configure(connection: Any, _record: Any) -> None:

@@ -10,11 +10,12 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any, Protocol
 
-from filelock import FileLock, Timeout
 from sqlalchemy import make_url
 from sqlalchemy.exc import SQLAlchemyError
 from sqlalchemy.ext.asyncio import AsyncConnection, create_async_engine
 from sqlalchemy.pool import NullPool
+
+from app.storage.process_lock import LockHeldError, ProcessLock, is_held
 
 LOCKS = 0x62617468
 """The first half of our advisory locks' names in PostgreSQL; the second is the process's number."""
@@ -61,35 +62,33 @@ class FileMembership:
     def __init__(self, database: Path) -> None:
         self._database = database
         self._number = 0
-        self._lock: FileLock | None = None
+        self._lock: ProcessLock | None = None
 
     async def enter(self, number: int) -> None:
         """Hold the lock of this number."""
-        if self._lock is not None and self._number == number:
+        if self._lock is not None and self._number == number and self._lock.is_ours:
             return
         await self.leave()
-        lock = FileLock(self._path(number))
         try:
-            # A process that looks whether we live holds it for a moment.
-            await asyncio.to_thread(lock.acquire, timeout=ANSWER_S)
-        except (Timeout, OSError) as error:
+            self._lock = ProcessLock(self._path(number), number, self._owner())
+        except (LockHeldError, OSError) as error:
             raise MembershipLostError(f"{self._path(number)} cannot be locked: {error}") from error
-        self._number, self._lock = number, lock
+        self._number = number
 
     async def alive(self, numbers: Iterable[int]) -> set[int]:
-        """Return the numbers whose files are locked."""
-        return {number for number in numbers if number == self._number or self._is_held(number)}
+        """Return the numbers whose files are locked by processes that live; ours only while others can see it."""
+        return {number for number in numbers if self._lives(number)}
 
-    def _is_held(self, number: int) -> bool:
-        path = self._path(number)
-        lock = FileLock(path)
+    def _lives(self, number: int) -> bool:
+        if number == self._number:
+            return self._lock is not None and self._lock.is_ours
+        return is_held(self._path(number), self._owner())
+
+    def _owner(self) -> int | None:
         try:
-            lock.acquire(timeout=0)
-        except Timeout:
-            return True
-        path.unlink(missing_ok=True)
-        lock.release()
-        return False
+            return self._database.stat().st_uid
+        except OSError:
+            return None
 
     def _path(self, number: int) -> Path:
         return self._database.with_name(f"{self._database.name}-process-{number}")
@@ -100,7 +99,6 @@ class FileMembership:
     async def leave(self) -> None:
         """Give the lock up."""
         if self._lock is not None:
-            self._path(self._number).unlink(missing_ok=True)
             self._lock.release()
             self._lock = None
 

@@ -7,7 +7,7 @@ from alembic import command
 from alembic.config import Config
 from alembic.runtime.migration import MigrationContext
 from alembic.script import ScriptDirectory
-from sqlalchemy import Connection
+from sqlalchemy import Connection, inspect
 from sqlalchemy.exc import IntegrityError
 
 from app.storage.database import make_engine
@@ -29,6 +29,21 @@ def head() -> str:
     if revision is None:
         raise RuntimeError(f"no migrations in {MIGRATIONS}: the installation is incomplete")
     return revision
+
+
+def is_known(revision: str) -> bool:
+    """Tell whether this version of the program knows a revision."""
+    return revision in {script.revision for script in ScriptDirectory.from_config(_config()).walk_revisions()}
+
+
+async def tables(url: str) -> list[str]:
+    """Return the names of all tables in a database."""
+    engine = make_engine(url)
+    try:
+        async with engine.connect() as connection:
+            return await connection.run_sync(lambda sync: sorted(inspect(sync).get_table_names()))
+    finally:
+        await engine.dispose()
 
 
 async def current(url: str) -> str | None:

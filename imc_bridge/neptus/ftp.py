@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import logging
 import re
+import socket
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -54,12 +55,14 @@ class LogInRefusedError(Exception):
 class FtpCalls:
     """What the server asks; called from its thread.
 
-    ``log_in(user, password, host)``: who that is, None when not let in; raises :class:`LogInRefusedError`
+    ``is_own_user(connection)``: whether it was made by the user who runs this process, asked when it is accepted.
+    ``log_in(user, password, host, own_user)``: who that is, None when not let in; raises :class:`LogInRefusedError`
     to say why. ``make(user, host, session)`` and
     ``receive(upload)``: why not, empty when done. ``knows(session)``: whether there is such a session.
     """
 
-    log_in: Callable[[str, str, str], str | None]
+    is_own_user: Callable[[socket.socket], bool]
+    log_in: Callable[[str, str, str, bool], str | None]
     make: Callable[[str, str, str], str]
     receive: Callable[[Upload], str]
     knows: Callable[[str], bool]
@@ -204,7 +207,7 @@ class _Doorkeeper:
 
     def validate_authentication(self, username: str, password: str, handler: Any) -> None:
         try:
-            principal = handler.calls.log_in(username, password, handler.remote_ip)
+            principal = handler.calls.log_in(username, password, handler.remote_ip, handler.own_user)
         except LogInRefusedError as refused:
             handler.refusal = str(refused)
             raise AuthenticationFailed(handler.refusal) from None
@@ -255,6 +258,11 @@ class _Handler(FTPHandler):  # type: ignore[misc]
     timeout = 60
     max_login_attempts = 3
     auth_failed_timeout = 1
+
+    def __init__(self, connection: socket.socket, *arguments: Any, **options: Any) -> None:
+        # Before anything is waited for: of who has hung up nobody knows any more whose connection it was.
+        self.own_user = self.calls.is_own_user(connection)
+        super().__init__(connection, *arguments, **options)
 
     def ftp_QUIT(self, line: str) -> None:  # noqa: N802 - pyftpdlib's name
         """Say last what was refused: of all replies, the panel shows only this one."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import socket
 import time
 from collections.abc import Callable, Coroutine
 from concurrent.futures import CancelledError as FutureCancelledError
@@ -58,7 +59,11 @@ class Restored:
 class SessionKeeper(Protocol):
     """Who knows what sessions are for; called from the event loop."""
 
-    async def log_in(self, user: str, password: str, host: str) -> str | None:
+    def is_own_user(self, connection: socket.socket) -> bool:
+        """Tell of a connection that was just accepted whether the user made it who runs this process; any thread."""
+        ...
+
+    async def log_in(self, user: str, password: str, host: str, *, own_user: bool) -> str | None:
         """Return who that is; None: not let in. Raises SessionRefusedError to say why."""
         ...
 
@@ -156,7 +161,13 @@ class NeptusGateway:
         """
         settings = self._settings
         self._loop = asyncio.get_running_loop()
-        calls = FtpCalls(self._log_in, self._make, self._receive, lambda session: session in self._sessions)
+        calls = FtpCalls(
+            self._keeper.is_own_user,
+            self._log_in,
+            self._make,
+            self._receive,
+            lambda session: session in self._sessions,
+        )
         try:
             listening = listening_socket(settings.host, settings.http_port)
         except OSError as error:
@@ -267,9 +278,9 @@ class NeptusGateway:
 
     # The FTP side, from its thread
 
-    def _log_in(self, user: str, password: str, host: str) -> str | None:
+    def _log_in(self, user: str, password: str, host: str, own_user: bool) -> str | None:
         try:
-            principal: str | None = self._ask(self._keeper.log_in(user, password, host))
+            principal: str | None = self._ask(self._keeper.log_in(user, password, host, own_user=own_user))
         except SessionRefusedError as refused:
             raise LogInRefusedError(" ".join(str(refused).split())) from None
         except Exception:

@@ -34,8 +34,8 @@ class Service:
         What is wrong with its world, see ``launch.py``; changes of the clock can be made later by :meth:`set_clock`.
     prefix
         Words before the command, for example ``ip netns exec NAME``.
-    host
-        Address it serves on.
+    host, port
+        Address it serves on; without a port any free one.
     """
 
     def __init__(
@@ -48,11 +48,12 @@ class Service:
         world: dict[str, str] | None = None,
         prefix: Sequence[str] = (),
         host: str = "127.0.0.1",
+        port: int | None = None,
     ) -> None:
         self.folder = folder
         self.database = database or folder / "fleet.db"
         self.database_url = database_url or f"sqlite+aiosqlite:///{self.database}"
-        self.host, self.port = host, free_ports(1)[0]
+        self.host, self.port = host, port or free_ports(1)[0]
         self.process: asyncio.subprocess.Process | None = None
         self._settings = {"IMC__ENABLED": "false"} | (settings or {})
         self._world = world

@@ -6,6 +6,7 @@ from typing import Any
 
 from app.api.auth import console_log_in
 from app.api.limits import Limits
+from app.api.peers import is_own_user
 from app.api.tokens import Role, TokenStore
 from app.missions.links.neptus import gateway_settings
 from app.missions.service import MissionService
@@ -34,11 +35,11 @@ class Gateway:
         self.database = Database(self.settings.database_url)
         store = TokenStore(self.database)
 
-        async def log_in(*asked: Any) -> str | None:
+        async def log_in(password: str, host: str, own_user: bool) -> str | None:
             judge = self.door or console_log_in
-            return await judge(store, Limits(0, 1000), *asked)
+            return await judge(store, Limits(0, 1000), password, host, own_user=own_user)
 
-        self.service = MissionService(self.settings, self.database, log_in)
+        self.service = MissionService(self.settings, self.database, log_in, is_own_user=is_own_user)
         await self.service.startup()
 
     async def close(self) -> None:

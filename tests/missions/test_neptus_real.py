@@ -281,7 +281,7 @@ async def test_the_panel_shows_why_it_is_not_let_in(make_gateway: Callable[..., 
         await asyncio.to_thread(stranger.connect)
         assert "the password must be an access token of role operator" in stranger.label
 
-        async def refuse(*_: Any) -> str:
+        async def refuse(*_: Any, **__: Any) -> str:
             raise SessionRefusedError("Too many wrong tokens came from here: wait 60 s")
 
         gateway.door = refuse

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from app.missions import metrics
+from app.missions.errors import InvalidRequestError
 from app.missions.fleet import (
     BeamGeometry,
     EventSink,
@@ -101,9 +102,15 @@ class ImcFleetLink:
         return "imc"
 
     async def start(self, sink: EventSink) -> None:
-        """Bind the ports and listen. Raises ``imc_bridge.PortInUseError`` when a port is taken."""
+        """Bind the ports and listen.
+
+        Raises ``imc_bridge.PortInUseError`` when a port is taken, InvalidRequestError when an interface is not there.
+        """
         self._sink = sink
-        await self._bridge.start(self._forward)
+        try:
+            await self._bridge.start(self._forward)
+        except ValueError as error:
+            raise InvalidRequestError("imc", str(error), "See docs/settings.md") from None
 
     async def close(self) -> None:
         """Stop every engaged vehicle, then release sockets and tasks."""
