@@ -2,7 +2,9 @@
 
 The mission service, its database and planner run as they do for real vehicles; two fake DUNE nodes in processes of
 their own are the vehicles. ``--radio-range 5000`` ends their radio at the surface, as in the recorded session
-``wifi_gap_x5``, for which ``--guidance legs`` is made; ``--kill-at`` kills one vehicle's DUNE at that step and starts
+``wifi_gap_x5``, for which ``--guidance legs`` is made; ``--max-step 10 --speed 1`` are the short legs in real time
+that need it most, ``dives_m`` says how deep each was. ``--stops`` pauses and aborts in the middle while a process keeps
+a core busy, and times the answers; ``--kill-at`` kills one vehicle's DUNE at that step and starts
 it again where it was. Afterwards the vehicles' own logs are imported, as an operator does: ``soundings`` came by
 radio, ``soundings_with_logs`` is what the map has in the end, and ``measured_on_board`` what the vehicles measured in
 all. Printed is one JSON object, ``--write`` puts it into a page; exit code 1 when the mission did not complete, a
@@ -26,6 +28,7 @@ from imc_report import write_section
 from app.api import logs
 from app.mapping.georeference import LocalFrame
 from app.missions.fleet import WaypointStatus
+from app.missions.metrics import PACKETS_DROPPED
 from app.missions.service import MissionService
 from app.missions.settings import ImcSettings, ServiceSettings
 from app.missions.spec import MissionSpec
@@ -33,7 +36,7 @@ from app.missions.states import ENDED
 from app.storage.database import Database
 from app.storage.missions import waypoints_of_step
 from app.storage.prepare import prepare_database
-from imc_bridge import BridgeSettings, Sounding
+from imc_bridge import BridgeSettings, NodeState, Sounding, StateReport
 from imc_bridge.logs import VehicleLog
 from simulator.seafloors import generate
 from simulator.terrain import Terrain
@@ -41,7 +44,8 @@ from simulator.terrain import Terrain
 ORIGIN = (41.185, -8.705)
 SIDE_M = 120.0
 PORT, ANNOUNCE_PORTS = 32210, (32200, 32201, 32202, 32203, 32204)
-NAMES = ("lauv-xplore-1", "lauv-xplore-2")
+NAMES = ("lauv-xplore-1", "lauv-xplore-2", "lauv-xplore-3", "lauv-xplore-4")
+UNDER_WATER_M = 0.5
 BACK_AFTER_WALL_S = 1.0
 
 
@@ -50,7 +54,7 @@ class Vehicle:
 
     def __init__(self, number: int, options: argparse.Namespace, logs: Path) -> None:
         self.name = NAMES[number]
-        self._start_m = (SIDE_M * (number + 1) / 3.0, 10.0)
+        self._start_m = (SIDE_M * (number + 1) / (options.vehicles + 1.0), 10.0)
         self._command = [
             *(sys.executable, "-m", "simulator", "--vehicles", "1", "--names", self.name, "--ids", f"{0x1E + number}"),
             *("--family", options.family, "--size", f"{SIDE_M:g}", "--seed", f"{options.seed}"),
@@ -84,8 +88,9 @@ class Vehicle:
 
 
 def mission(options: argparse.Namespace) -> MissionSpec:
-    """Two vehicles that map a square of 100 m."""
+    """Vehicles that map a square of 100 m."""
     led = {"guidance": options.guidance}
+    names = NAMES[: options.vehicles]
     frame = LocalFrame(*ORIGIN)
     corners = [(10, 10), (110, 10), (110, 110), (10, 110), (10, 10)]
     ring = [[float(x) for x in reversed(frame.to_geographic(float(e), float(n)))] for e, n in corners]
@@ -93,10 +98,10 @@ def mission(options: argparse.Namespace) -> MissionSpec:
         {
             "name": "IMC benchmark",
             "area": {"type": "Polygon", "coordinates": [ring]},
-            "vehicles": [{"name": name, "kind": "imc", "depth_m": 2.0 + k} | led for k, name in enumerate(NAMES)],
+            "vehicles": [{"name": name, "kind": "imc", "depth_m": 2.0 + k} | led for k, name in enumerate(names)],
             "steps": options.steps,
             "cell_m": 2.0,
-            "limits": {"max_step_m": 20.0, "min_vertical_separation_m": 1.0, "min_altitude_m": 2.0},
+            "limits": {"max_step_m": options.max_step, "min_vertical_separation_m": 1.0, "min_altitude_m": 2.0},
             "planner": {"name": options.planner},
         }
     )
@@ -106,7 +111,7 @@ async def fly(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
     """Fly the mission; what came of it."""
     floor = generate(options.family, options.seed, width_m=SIDE_M, height_m=SIDE_M, origin=ORIGIN)
     logs = folder / "logs"
-    vehicles = [Vehicle(number, options, logs) for number in range(len(NAMES))]
+    vehicles = [Vehicle(number, options, logs) for number in range(options.vehicles)]
     url = f"sqlite+aiosqlite:///{folder / 'mission.db'}"
     imc = ImcSettings(port=PORT, announce_ports=ANNOUNCE_PORTS, loopback_only=True)
     await prepare_database(url, may_upgrade=True)
@@ -118,11 +123,14 @@ async def fly(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
     await service.startup()
     try:
         identity = (await service.create(mission(options))).id
-        while sum(view.link == "ready" for view in await service.vehicles()) < len(NAMES):  # noqa: ASYNC110
+        while sum(view.link == "ready" for view in await service.vehicles()) < options.vehicles:  # noqa: ASYNC110
             await asyncio.sleep(0.1)
         await service.act(identity, "start", actor="benchmark")
         killed = options.kill_at is None
+        answers: dict[str, float] = {}
         while (view := await service.mission(identity)).state not in ENDED:
+            if options.stops and not answers and view.progress.step >= options.steps // 2:
+                answers = await stopped(service, identity)
             if not killed and view.progress.step >= options.kill_at:
                 killed = True
                 [place] = [v for v in view.vehicles if v.name == vehicles[0].name]
@@ -136,6 +144,7 @@ async def fly(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
         result["idle_at_the_end"] = all(view.link == "ready" for view in await service.vehicles())
         for vehicle in vehicles:
             vehicle.end()
+        result |= answers
         result["collisions"] = sum(vehicle.collisions for vehicle in vehicles)
         return result | await with_logs(service, identity, floor, sorted(logs.glob("*/*/Data.lsf")))
     finally:
@@ -143,6 +152,40 @@ async def fly(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
         await database.close()
         for vehicle in vehicles:
             vehicle.kill()
+
+
+async def stopped(service: MissionService, identity: str) -> dict[str, float]:
+    """Pause, resume and abort while another process keeps a core busy; how long the answers took, seconds."""
+    busy = await asyncio.create_subprocess_exec(sys.executable, "-c", "while True: pass")
+    answers: dict[str, float] = {}
+    try:
+        await asyncio.sleep(2.0)
+        for action in ("pause", "resume", "abort"):
+            begun = time.monotonic()
+            view = await service.act(identity, action, actor="benchmark")
+            answers[f"{action}_answered_s"] = round(time.monotonic() - begun, 2)
+            if view.stops:
+                answers[f"{action}_acknowledged"] = sum(stop.acknowledged for stop in view.stops)
+            await asyncio.sleep(5.0)
+    finally:
+        busy.kill()
+        await busy.wait()
+    return answers
+
+
+def dives_m(log: VehicleLog) -> list[float]:
+    """How deep each dive of a vehicle was."""
+    dives, deepest = [], 0.0
+    for event in log.events():
+        depth = event.depth_m if isinstance(event, StateReport) else None
+        if depth is None:
+            continue
+        if depth > UNDER_WATER_M:
+            deepest = max(deepest, depth)
+        elif deepest:
+            dives.append(round(deepest, 2))
+            deepest = 0.0
+    return dives
 
 
 async def summary(
@@ -163,6 +206,15 @@ async def summary(
         "steps": view.progress.step,
         "wall_s": round(time.monotonic() - begun, 1),
         "waypoints": statuses,
+        "waypoints_per_minute": round(60.0 * statuses.get("reached", 0) / (time.monotonic() - begun), 1),
+        "dropped_packets": sum(metric.value for metric in PACKETS_DROPPED.collect()[0].samples[:1]),
+        "lost": [
+            f"{vehicle.name} {'engaged' if change.engaged else 'not engaged'}: {change.reason}"
+            for vehicle in service.doctor().vehicles
+            for change in vehicle.history
+            if change.state is NodeState.LOST
+        ],
+        "reasons": sorted({waypoint.reason for waypoint in view.waypoints if waypoint.reason}),
         "soundings": len(errors),
         "rejected": rejected,
         "mean_error_m": round(float(np.mean(errors)), 4) if errors else None,
@@ -186,14 +238,16 @@ async def errors_m(service: MissionService, identity: str, floor: Terrain) -> tu
 
 async def with_logs(service: MissionService, identity: str, floor: Terrain, logs: list[Path]) -> dict[str, Any]:
     """What the mission has once the vehicles' own logs are in it, beside what they measured."""
-    measured = 0
+    measured, dives = 0, {}
     for path in logs:
         await service.import_log(identity, path, actor="benchmark")
         log = VehicleLog(path, BridgeSettings())
+        dives[path.parent.parent.name] = dives_m(VehicleLog(path, BridgeSettings()))
         measured += sum(isinstance(event, Sounding) for event in log.events())
     errors, rejected = await errors_m(service, identity, floor)
     return {
         "measured_on_board": measured,
+        "dives_m": dives,
         "soundings_with_logs": len(errors),
         "rejected_with_logs": rejected,
         "mean_abs_error_with_logs_m": round(statistics.mean(map(abs, errors)), 4) if errors else None,
@@ -206,6 +260,9 @@ def title(options: argparse.Namespace) -> str:
     parts += [f"{100 * options.loss:g} % of the packets lost"] if options.loss else []
     parts += [f"one vehicle killed at step {options.kill_at}"] if options.kill_at is not None else []
     parts += ["radio ends at the surface"] if options.radio_range else []
+    parts += [f"{options.vehicles} vehicles"] if options.vehicles != 2 else []
+    parts += [f"legs of {options.max_step:g} m at {options.speed:g}x"] if options.max_step != 20.0 else []
+    parts += ["servo and attitude messages at full rate"] if options.chatter else []
     parts += [f"led by {options.guidance}"] if options.guidance != "follow" else []
     return ", ".join(parts)
 
@@ -219,6 +276,9 @@ def main() -> None:
     parser.add_argument("--kill-at", type=int)
     parser.add_argument("--radio-range", type=float, default=0.0, help="above 0 radio ends there and at the surface")
     parser.add_argument("--chatter", action="store_true", help="send attitude and servo messages at full rate, too")
+    parser.add_argument("--vehicles", type=int, default=2, choices=range(1, len(NAMES) + 1))
+    parser.add_argument("--max-step", type=float, default=20.0, help="metres of a leg, at the most")
+    parser.add_argument("--stops", action="store_true", help="pause and abort in the middle, with a busy core")
     parser.add_argument("--planner", default="cao")
     parser.add_argument("--family", default="harbour")
     parser.add_argument("--seed", type=int, default=0)
@@ -234,8 +294,8 @@ def main() -> None:
         write_section(options.write, title(options), result, {})
     accurate = result["mean_abs_error_m"] is not None and result["mean_abs_error_m"] <= 0.2
     astray = [result["waypoints"].get(status, 0) for status in (WaypointStatus.REFUSED, WaypointStatus.MISSED)]
-    whole = result["steps"] == options.steps and not any(astray)
-    sys.exit(0 if accurate and whole else 1)
+    whole = result["steps"] == options.steps or options.stops
+    sys.exit(0 if accurate and whole and not any(astray) else 1)
 
 
 if __name__ == "__main__":

@@ -11,11 +11,14 @@ from collections.abc import Callable
 
 from imc_bridge.control import Phase
 from imc_bridge.crew import Crew
+from imc_bridge.drops import DropMeter
 from imc_bridge.events import (
     BridgeEvent,
     EventCallback,
     Guidance,
+    NodeState,
     NodeView,
+    PacketsDropped,
     RefusedError,
     StopResult,
     Waypoint,
@@ -34,6 +37,8 @@ TICK_S = 0.2
 MIN_TICK_WALL_S = 0.02
 STOP_ESCALATION = 0.5
 """Share of a stop's patience after which Abort is sent too."""
+SILENT_STOP_WALL_S = 0.5
+"""So long at the most a vehicle that is silent is waited for when it is stopped."""
 CLOSE_TIMEOUT_WALL_S = 3.0
 HELD_UP_WALL_S = 0.4
 """A tick that is later than this shows that we were held up ourselves."""
@@ -102,6 +107,8 @@ class Bridge:
         """Count what arrived at the traffic and at the announce socket."""
         self.admission = self._hearing.admission
         """Counts what was refused, and why."""
+        self.drops = DropMeter(self.transport.dropped)
+        """Counts what this machine threw away before we could read it."""
         self._task: asyncio.Task[None] | None = None
         self._started_at: float | None = None
         self._turn = asyncio.Event()
@@ -269,6 +276,9 @@ class Bridge:
         if not self._commanding:
             return StopResult(vehicle, False, "this bridge only listens")
         control = self._crew.of(node)
+        if node.status(self._now()).state in (NodeState.LOST, NodeState.EXPECTED_OFFLINE):
+            # It does not hear us now, and is stopped when it is heard again.
+            timeout_s = min(timeout_s, SILENT_STOP_WALL_S)
         control.begin_stop(self._now())
         begun = self._clock()
         while control.phase is Phase.STOPPING:
@@ -335,6 +345,9 @@ class Bridge:
 
     def _tick(self, now: float) -> None:
         self._speaker.tick(now)
+        lost = self.drops.look(self._clock())
+        if lost:
+            self._tell(PacketsDropped(lost))
         for node in self._roster:
             if node.is_vehicle and self._speaker.talks_to(node):
                 self._crew.tick(node, now)

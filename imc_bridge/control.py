@@ -165,6 +165,7 @@ class Control(ABC):
         ):
             return
         self._order = self._make_order(waypoint)
+        self.node.ordered_depth_m = waypoint.depth_m
         self._ordered(now)
         if self.phase is Phase.FOLLOWING:
             self.tick(now)
@@ -200,6 +201,12 @@ class Control(ABC):
         """Send Abort beside STOP from now on: the vehicle does not answer."""
         self._abort = True
 
+    def _abort_now(self, now: float) -> None:
+        if not self._abort:
+            self._abort = True
+            self._request_due = now
+            self._tick_stopping(now)
+
     def give_up_stop(self, now: float) -> None:
         """Stop waiting for the acknowledgement. STOP is still sent whenever the plan shows up again."""
         if self.phase is Phase.STOPPING:
@@ -212,24 +219,32 @@ class Control(ABC):
         """PlanControl of the vehicle to us: whether it has stopped."""
         kind = int(message.type)
         if (
-            self.phase is Phase.STOPPING
-            and int(message.op) == OPERATION_STOP
-            and int(message.request_id) == self._request_id
-            and kind in (PLAN_CONTROL_SUCCESS, PLAN_CONTROL_FAILURE)
-            and (kind == PLAN_CONTROL_SUCCESS or not self.node.executing(self._settings.plan_id))
+            self.phase is not Phase.STOPPING
+            or int(message.op) != OPERATION_STOP
+            or int(message.request_id) != self._request_id
+        ):
+            return
+        if kind == PLAN_CONTROL_FAILURE and self.node.maneuvering_blocked:
+            # It says that no plan runs, and goes on with its maneuver: only an abort ends that.
+            self._abort_now(now)
+        elif kind == PLAN_CONTROL_SUCCESS or (
+            kind == PLAN_CONTROL_FAILURE and not self.node.executing(self._settings.plan_id)
         ):
             self._stopped(text(message, "info") or "plan stopped", now)
 
     def plan_state_changed(self, now: float) -> None:
         """PlanControlState has been taken in by the node."""
         if self.phase is Phase.ENDED:
-            self._evidence.blocked |= self.node.plan_state == PlanState.BLOCKED
+            self._evidence.blocked |= self.node.plan_state == PlanState.BLOCKED and not self.node.maneuvering_blocked
         elif (
             self.phase is Phase.STOPPING
             and not self.node.executing(self._settings.plan_id)
             and not self._started_unseen
         ):
-            self._stopped("its plan has ended", now)
+            if self.node.maneuvering_blocked:
+                self._abort_now(now)
+            else:
+                self._stopped("its plan has ended", now)
 
     def _outdated(self) -> bool:
         """Whether the last PlanControlState waited in some queue while our plan was loaded, and tells of before."""
@@ -338,10 +353,14 @@ class Control(ABC):
 
     def _tick_idle(self, now: float) -> None:
         # A vehicle that came back still following after its stop went unanswered must not be left so.
-        if self._abandoned and self.node.executing(self._settings.plan_id) and now >= self._request_due:
+        node, plan_id = self.node, self._settings.plan_id
+        blocked = node.maneuvering_blocked and node.plan_id == plan_id
+        if self._abandoned and (blocked or node.executing(plan_id)) and now >= self._request_due:
             self._request_due = now + ABANDONED_STOP_RETRY_S
             self._request_id = self._next_request_id()
             self._send(plan_control(OPERATION_STOP, self._request_id, self._settings))
+            if blocked:
+                self._send(imcpy.Abort())
 
     def excuse(self, seconds: float, now: float) -> None:
         """Take out of every wait the time in which we were held up ourselves and could hear nothing."""

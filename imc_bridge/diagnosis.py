@@ -49,6 +49,10 @@ class Cause(StrEnum):
     SILENT = "silent"
     RADIO_GAPS = "radio_gaps"
     """Radio ends under water, and the vehicle is led by references, which need it."""
+    RESTARTED = "restarted"
+    """DUNE on board has begun anew while we listened."""
+    PACKETS_DROPPED = "packets_dropped"
+    """This machine threw packets away because our socket was full."""
     LOW_RATE = "low_rate"
     NO_ENTITIES = "no_entities"
     NO_SOUNDINGS = "no_soundings"
@@ -130,6 +134,25 @@ def radio_gap_words(gaps: int) -> tuple[str, str]:
         f"radio ended {times} while it was under water and led by references, which ends its plan on board each time",
         "Take it out of the mission and add it again with guidance 'legs', which needs no radio under water; "
         "what it measures there is in its own log (import-log)",
+    )
+
+
+def restart_words(restarts: int) -> tuple[str, str]:
+    """What is said of a vehicle whose DUNE has begun anew, and what to do about it."""
+    times = "once" if restarts == 1 else f"{restarts} times"
+    return (
+        f"DUNE on board has restarted {times} since we listen; what it was doing is forgotten each time",
+        "Look into its own log for the reason before it goes under water again: while DUNE is away the vehicle drifts",
+    )
+
+
+def drop_words(count: int, buffer_bytes: int) -> tuple[str, str]:
+    """What is said of packets that this machine threw away, and what to do about it."""
+    return (
+        f"this machine threw {count} packets away because it did not read its IMC socket in time "
+        f"(room for {buffer_bytes / 1e6:.1f} MB); what is missing of vehicles may be among them",
+        "Let vehicles send less (imc.rate_limiters, empty leaves 700 packets a second each), give the machine less to "
+        "do or time_scale a lower value, or allow a larger buffer (sysctl net.core.rmem_max)",
     )
 
 

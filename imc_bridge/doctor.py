@@ -13,10 +13,12 @@ from imc_bridge.diagnosis import (
     Finding,
     NodeDiagnosis,
     Severity,
+    drop_words,
     note,
     ok,
     problem,
     radio_gap_words,
+    restart_words,
 )
 from imc_bridge.events import NodeState, NodeView
 from imc_bridge.ports import holder_of_udp_port
@@ -38,6 +40,11 @@ MIN_STATE_RATE_HZ = 1.0
 SILENT_HEARTBEAT_S = 5.0
 CROWD_GONE_S = 60.0
 """Wall clock: so long after the last one, made-up systems are history."""
+REFUSED_REMEDY = "Somebody may pretend to be a vehicle, or settings that begin with allowed_ leave one out"
+FLOOD_REMEDY = (
+    "Where that address is a vehicle of yours it sends more than is allowed for: let it send less (imc.rate_limiters), "
+    "or raise imc.max_packets_per_s, which is multiplied by time_scale. Otherwise keep it out by imc.allowed_addresses"
+)
 
 
 async def diagnose(settings: BridgeSettings, seconds: float = 15.0) -> Diagnosis:
@@ -113,7 +120,7 @@ def judge(
         if not wanted or node.name in wanted or node.state is NodeState.HEARD
     )
     missing = [name for name in wanted if name not in {node.name for node in vehicles}]
-    own = _socket_findings(bridge) if live else []
+    own = _socket_findings(bridge, heard=any(node.age_s is not None for node in vehicles)) if live else []
     return Diagnosis(seconds, (*own, *_network_findings(bridge, nodes, missing)), nodes)
 
 
@@ -126,7 +133,7 @@ def _port_in_use(error: PortInUseError, settings: BridgeSettings) -> Finding:
     )
 
 
-def _socket_findings(bridge: Bridge) -> list[Finding]:
+def _socket_findings(bridge: Bridge, *, heard: bool) -> list[Finding]:
     settings, transport = bridge.settings, bridge.transport
     where = "loopback only" if settings.loopback_only else ", ".join(transport.own_addresses())
     findings = [
@@ -136,13 +143,17 @@ def _socket_findings(bridge: Bridge) -> list[Finding]:
         )
     ]
     if not settings.loopback_only and not transport.interfaces:
+        alone = "this machine has no network interface besides loopback"
         findings.append(
-            problem(
-                Cause.NO_INTERFACE,
-                "this machine has no network interface besides loopback",
-                "Connect it to the vehicles' network",
-            )
+            # Vehicles on this machine need none.
+            note(Cause.NO_INTERFACE, f"{alone}; vehicles on this machine are heard")
+            if heard
+            else problem(Cause.NO_INTERFACE, alone, "Connect it to the vehicles' network")
         )
+    drops = bridge.drops
+    if drops.total:
+        say = problem if drops.recent else note
+        findings.append(say(Cause.PACKETS_DROPPED, *drop_words(drops.total, transport.receive_buffer_bytes)))
     for reason, count in transport.send_errors.items():
         findings.append(
             problem(
@@ -197,7 +208,7 @@ def _packet_findings(bridge: Bridge) -> list[Finding]:
         note(
             Cause.REFUSED,
             f"{count} packets were not taken in: {reason}; the last one came from {bridge.admission.last[reason]}",
-            "Somebody may pretend to be a vehicle, or settings that begin with allowed_ leave one out",
+            FLOOD_REMEDY if reason is Refused.FLOOD else REFUSED_REMEDY,
         )
         for reason, count in bridge.admission.refused.most_common()
         if reason is not Refused.CROWDED
@@ -251,7 +262,9 @@ def _node_findings(node: NodeView, bridge: Bridge, answers: Mapping[int, Answer]
         return [*findings, _silence_finding(node, bridge, answers.get(node.imc_id))]
     if node.age_s * settings.time_scale > SILENT_HEARTBEAT_S:
         findings.append(problem(Cause.SILENT, f"last packet {node.age_s:.0f} s ago", node.reason))
-    findings += _state_findings(node)
+    findings += _state_findings(node, bridge.drops.recent)
+    if node.restarts:
+        findings.append(note(Cause.RESTARTED, *restart_words(node.restarts)))
     if node.radio_gaps:
         findings.append(problem(Cause.RADIO_GAPS, *radio_gap_words(node.radio_gaps)))
     findings += _sounding_findings(node, live=live)
@@ -341,10 +354,13 @@ def _addresses(node: NodeView) -> str:
     return ", ".join(f"{host}:{port}" for host, port in node.addresses)
 
 
-def _state_findings(node: NodeView) -> list[Finding]:
+def _state_findings(node: NodeView, dropped: int) -> list[Finding]:
     rate = node.rates_hz.get("EstimatedState", 0.0)
     if rate >= MIN_STATE_RATE_HZ:
         return [ok(f"EstimatedState at {rate:.1f} Hz from {node.address}; rates: {node.rate_limiters}")]
+    if dropped:
+        text = f"EstimatedState at {rate:.1f} Hz, as far as it was read: this machine threw {dropped} packets away"
+        return [note(Cause.PACKETS_DROPPED, text, "See what is said of this machine above; the vehicle may be fine")]
     return [
         problem(
             Cause.LOW_RATE,

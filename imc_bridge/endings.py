@@ -24,6 +24,7 @@ class Evidence:
     taken_by: int | None = None
     error: str | None = None
     blocked: bool = False
+    """Plan control was blocked, and no maneuver went on meanwhile."""
     rebooted: bool = False
     unanswered: bool = False
 

@@ -61,6 +61,9 @@ class Waypoint:
     ``lead_lat_deg``, ``lead_lon_deg``: a point on the leg's line beyond the waypoint, where it may be sent in order
     to pass the waypoint straight. DUNE flies straight to a reference only until some 7 m before it, and circles
     at once around one that is closer than 15 m.
+
+    ``circle_lat_deg``, ``circle_lon_deg``: centre of a circle with :data:`imc_bridge.plans.CIRCLE_RADIUS_M` in which it
+    may descend before it goes there; without one it does not circle.
     """
 
     mission_id: str
@@ -73,6 +76,8 @@ class Waypoint:
     min_altitude_m: float = 3.0
     lead_lat_deg: float | None = None
     lead_lon_deg: float | None = None
+    circle_lat_deg: float | None = None
+    circle_lon_deg: float | None = None
     bottom: tuple[BottomPoint, ...] = ()
     """What is mapped of the bottom on the way there; no reference goes deeper than the clearance above it."""
 
@@ -170,7 +175,27 @@ class LinkChange:
     """When, by our wall clock (Unix seconds)."""
 
 
-BridgeEvent = StateReport | Sounding | SoundingRefused | TargetRange | WaypointChange | LinkChange
+@dataclass(frozen=True, slots=True)
+class Restarted:
+    """DUNE on board a vehicle has begun anew: whatever it was doing is forgotten.
+
+    ``submerged``: the vehicle was under water when it was last heard before.
+    """
+
+    vehicle: str
+    submerged: bool
+
+
+@dataclass(frozen=True, slots=True)
+class PacketsDropped:
+    """Within the last second this machine threw ``count`` packets away because our socket was full."""
+
+    count: int
+
+
+BridgeEvent = (
+    StateReport | Sounding | SoundingRefused | TargetRange | WaypointChange | LinkChange | Restarted | PacketsDropped
+)
 EventCallback = Callable[[BridgeEvent], None]
 
 
@@ -226,6 +251,8 @@ class NodeView:
     history: tuple[LinkChange, ...] = ()
     """The last changes of its link, oldest first."""
     rate_limiters: str = ""
+    restarts: int = 0
+    """How often DUNE on board has begun anew while we listened."""
     radio_gaps: int = 0
     """How often radio ended under water while it was led by references, which ends their plan each time."""
 

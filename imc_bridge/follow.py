@@ -19,6 +19,8 @@ from imc_bridge.references import SentReference
 from imc_bridge.texts import text
 
 START_RETRY_S = 2.0
+BLOCKED_S = 1.0
+"""A plan that is blocked for longer, while its maneuver goes on, is started anew."""
 STARVED_S = 4.0
 """A plan that ended this long after the last echo ended for want of references."""
 GUARD_STEP_M = 0.2
@@ -41,7 +43,11 @@ class Follower(Control):
     _last_sent: SentReference | None = None
     _answered_at = 0.0
     _unanswered = 0
-    _gap_counted = False
+    _gap_boots = 0
+    _gap_open = False
+    """Whether it has been silent under water, and has not been heard since."""
+    _blocked_since: float | None = None
+    """Since when plan control has called itself blocked while the maneuver goes on."""
 
     def engage(self, now: float) -> bool:
         """Begin to make the vehicle follow."""
@@ -80,13 +86,21 @@ class Follower(Control):
         """PlanControlState has been taken in by the node."""
         if self._outdated():
             return
+        if self._gap_open:
+            self._gap_open = False
+            # A vehicle whose DUNE died was not silent for want of radio.
+            self.node.radio_gaps += self.node.boots == self._gap_boots
         node = self.node
         ours = node.executing(self._settings.plan_id)
         if self.phase is Phase.STARTING and node.plan_state == PlanState.EXECUTING and ours:
             self._running(now)
+        elif self.phase is Phase.FOLLOWING and node.maneuvering_blocked and node.plan_id == self._settings.plan_id:
+            self._blocked_since = now if self._blocked_since is None else self._blocked_since
         elif self.phase is Phase.FOLLOWING and not ours:
             self._evidence.blocked = node.plan_state == PlanState.BLOCKED
             self._plan_ended(now)
+        elif self.phase is Phase.FOLLOWING:
+            self._blocked_since = None
         elif self.phase is Phase.ENDED and ours and self._evidence == Evidence():
             # A plan state that overtook or was delayed: the plan runs on.
             self._enter(Phase.FOLLOWING, now)
@@ -163,6 +177,7 @@ class Follower(Control):
         self._unanswered = 0
         self._last_sent = None
         self._hold = None
+        self._blocked_since = None
         self._tick_following(now)
 
     def _tick_following(self, now: float) -> None:
@@ -178,6 +193,11 @@ class Follower(Control):
                 now,
             )
             return
+        if self._blocked_since is not None and now - self._blocked_since > BLOCKED_S and now >= self._request_due:
+            # The maneuver goes on; a plan of its own brings plan control back to it.
+            self._request_due = now + START_RETRY_S
+            self._request_id = self._next_request_id()
+            self._send(plan_control(OPERATION_START, self._request_id, settings))
         reference = self._reference(now)
         if reference is None:
             return
@@ -196,9 +216,8 @@ class Follower(Control):
 
     def _note_gap(self, *, long: bool) -> None:
         """The radio ended under water, so its plan ends for want of references, which is nobody's fault."""
-        if long and not self._gap_counted:
-            self._gap_counted = True
-            self.node.radio_gaps += 1
+        if long and not self._gap_open:
+            self._gap_open, self._gap_boots = True, self.node.boots
         self._gap = True
         if self._order is not None and self._order.status is WaypointStatus.ACKNOWLEDGED:
             self._order.unseen = True

@@ -11,7 +11,7 @@ from imc_bridge.codec import BROADCAST_ID, Decoder, Header, Message, without_arg
 from imc_bridge.control import Control
 from imc_bridge.crew import Crew
 from imc_bridge.discovery import Announcement, read_announce
-from imc_bridge.events import BridgeEvent, Sounding
+from imc_bridge.events import BridgeEvent, Restarted, Sounding
 from imc_bridge.links import Links
 from imc_bridge.nodes import Node
 from imc_bridge.ranges import MESSAGES as RANGE_MESSAGES
@@ -175,6 +175,7 @@ class Hearing:
         self.double = f"{announcement.name!r} at {address[0]}"
 
     def _reboot(self, node: Node, now: float) -> None:
+        self._tell(Restarted(node.name, node.submerged))
         control = self._crew.get(node)
         if control is not None:
             control.rebooted(now)
@@ -294,11 +295,15 @@ class Hearing:
             case _ if name in RANGE_MESSAGES:
                 node.ranges.offer(name, message)
             case "PlanControlState" if node.in_order(name, message.timestamp):
-                node.take_plan_state(message, now)
+                if node.take_plan_state(message, now):
+                    node.restarted()
+                    self._reboot(node, now)
                 if control is not None:
                     control.plan_state_changed(now)
             case "VehicleState" if node.in_order(name, message.timestamp):
-                node.take_vehicle_state(message, now)
+                if node.take_vehicle_state(message, now):
+                    node.restarted()
+                    self._reboot(node, now)
                 if control is not None:
                     control.vehicle_state_changed(now)
             case "FollowRefState" if control is not None:

@@ -63,6 +63,8 @@ class PlanState(IntEnum):
     EXECUTING = 3
 
 
+NO_OUTCOME = 0
+"""PlanControlState.last_outcome of a plan control that has had no plan yet."""
 MEDIUM_UNDERWATER = 3
 ANY_CONSOLE = 0xFFFF
 
@@ -129,6 +131,13 @@ class Node:
         """Where its announces may come from: the host of the last one that counted, and those it announced."""
         self.conflict: str | None = None
         self.boots = 0
+        """How often it has restarted."""
+        self.started_at: float | None = None
+        """When it announced a restart."""
+        self.ordered_depth_m = 0.0
+        """How deep it may be by our orders: it goes on down after it was last heard."""
+        self._restart_seen = False
+        """Whether its last restart showed before it announced itself anew."""
 
         self.packets = 0
         self.heard_at: float | None = None
@@ -194,10 +203,22 @@ class Node:
             and announcement.uid is not None
             and previous.uid != announcement.uid
         )
+        if rebooted and self._restart_seen:
+            # Its telemetry told of that already.
+            self._restart_seen = False
+            return False
         if rebooted:
             self.boots += 1
+            self.started_at = now
             self._forget_plan()
         return rebooted
+
+    def restarted(self) -> None:
+        """Note that its telemetry shows a restart, of which its announce will tell later."""
+        self.boots += 1
+        self._restart_seen = True
+        self.entities = None
+        self.entities_asked_at = -math.inf
 
     def _forget_plan(self) -> None:
         self.entities = None
@@ -308,15 +329,25 @@ class Node:
         if 0.0 <= value <= 100.0:
             self.battery_pct = value
 
-    def take_vehicle_state(self, message: Message, now: float) -> None:
-        """VehicleState: the operation mode and the errors that explain it."""
+    def take_vehicle_state(self, message: Message, now: float) -> bool:
+        """VehicleState: the operation mode and the errors that explain it; True when it has just begun to boot."""
+        boots = int(message.op_mode) == OperationMode.BOOT
+        restarted = boots and self.operation_mode not in (None, OperationMode.BOOT) and not self._restart_seen
         self.operation_mode = int(message.op_mode)
         self.operation_mode_at = now
         errors = ", ".join(filter(None, (text(message, "error_ents"), text(message, "last_error"))))
         self.error_text = printable(errors, most=MAX_TEXT)
+        return restarted
 
-    def take_plan_state(self, message: Message, now: float) -> None:
-        """PlanControlState."""
+    def take_plan_state(self, message: Message, now: float) -> bool:
+        """PlanControlState; True when it shows a restart: a plan was in execution, and now there never was one."""
+        restarted = (
+            self.plan_state in (PlanState.EXECUTING, PlanState.INITIALIZING)
+            and bool(self.plan_id)
+            and int(message.state) in (PlanState.READY, PlanState.BLOCKED)
+            and not text(message, "plan_id")
+            and int(message.last_outcome) == NO_OUTCOME
+        )
         self.plan_state = int(message.state)
         self.plan_state_at = now
         self.plan_id = printable(text(message, "plan_id"), most=MAX_TEXT)
@@ -324,6 +355,7 @@ class Node:
         self.plan_state_time_s = float(message.timestamp)
         if self.plan_state not in (PlanState.EXECUTING, PlanState.INITIALIZING):
             self.controller = None
+        return restarted
 
     @property
     def foreign_controller(self) -> int | None:
@@ -357,8 +389,22 @@ class Node:
             return self._settings.release_after_s
         if not self.references_needed:
             return math.inf
+        return self._settings.follow_timeout_s + self.ascent_s
+
+    @property
+    def ascent_s(self) -> float:
+        """How long it takes, at the most, to float up from where it was last heard and to be heard again."""
         depth = self.report.depth_m if self.report is not None else 0.0
-        return self._settings.follow_timeout_s + max(depth, 0.0) / SLOWEST_ASCENT_MPS + CONTACT_AGAIN_S
+        return max(depth, self.ordered_depth_m, 0.0) / SLOWEST_ASCENT_MPS + CONTACT_AGAIN_S
+
+    @property
+    def maneuvering_blocked(self) -> bool:
+        """Whether plan control calls itself blocked while a maneuver goes on.
+
+        DUNE does so when its own VehicleState is late, and stays so: the vehicle goes on with what it does, takes no
+        STOP, and takes an Abort or another plan.
+        """
+        return self.plan_state == PlanState.BLOCKED and self.operation_mode == OperationMode.MANEUVER
 
     def can_start(self, now: float) -> bool:
         """In service and ready for a plan, by messages that are not old."""
@@ -444,6 +490,11 @@ class Node:
                 NodeState.EXPECTED_OFFLINE,
                 f"silent for {seconds:.0f} s, under water in {whose}: radio ends at the surface{comes_up}",
             )
+        afloat = self.plan_state not in (PlanState.INITIALIZING, PlanState.EXECUTING)
+        since_start = math.inf if self.started_at is None else now - self.started_at
+        if afloat and self.submerged and min(silence, since_start) <= self.ascent_s:
+            words = f"silent for {seconds:.0f} s, under water without a plan: it floats up"
+            return Status(NodeState.EXPECTED_OFFLINE, words)
         where = "under water" if self.submerged else "at the surface"
         return Status(NodeState.LOST, f"silent for {seconds:.0f} s, last heard {where}")
 

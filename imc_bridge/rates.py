@@ -1,4 +1,4 @@
-"""Asks a vehicle for more frequent Distances and states, and gives it back its own rates afterwards."""
+"""Asks a vehicle to send often what is needed and seldom what is not, and gives it its own rates back afterwards."""
 
 from __future__ import annotations
 
@@ -14,8 +14,11 @@ PARAMETER = "Rate Limiters"
 RETRY_S = 2.0
 MAX_TRIES = 5
 QUERY_TRIES = 5
-"""Without the former list ours would stand alone, and servo positions come unlimited: worth some patience."""
-DUNE_DEFAULTS = "Distance:0.2, EstimatedState:2"
+"""A list takes the place of the one before: without the former one, what only that limits comes unlimited."""
+DUNE_DEFAULTS = (
+    "CpuUsage:0.2, Distance:0.2, EntityState:1, EstimatedState:2, FuelLevel:0.1, Rpm:1, SimulatedState:0.5, "
+    "StorageUsage:0.05, Temperature:0.1, Voltage:0.1"
+)
 """What a vehicle that never told its rates most likely had."""
 RESTORE_TRIES = 3
 RESTORE_RETRY_S = 1.0
@@ -38,7 +41,7 @@ class RateRequest:
     Parameters
     ----------
     wanted
-        ``"Distance:5, EstimatedState:10"``; empty asks for nothing.
+        :data:`imc_bridge.settings.DEFAULT_RATE_LIMITERS` or the like; empty asks for nothing.
     send
         Sends a message to the vehicle.
     """
@@ -100,7 +103,7 @@ class RateRequest:
             query.scope = "global"
             self._send(query)
             return
-        self._set = merge_limiters(self._former or "", self._wanted)
+        self._set = merge_limiters(self._former or DUNE_DEFAULTS, self._wanted)
         self._send(_set_message(self._set))
 
     def answered(self, message: Message, now: float) -> None:
@@ -129,7 +132,7 @@ class RateRequest:
     def restore(self) -> None:
         """Give the vehicle its former rates back; said again later, for a packet can be lost."""
         if self._active and self._set is not None:
-            self._former = self._former or merge_limiters(self._set, DUNE_DEFAULTS)
+            self._former = self._former or DUNE_DEFAULTS
             self._send(_set_message(self._former))
             self._restores = RESTORE_TRIES - 1
             self._due = 0.0

@@ -24,7 +24,12 @@ Address = tuple[str, int]
 PacketHandler = Callable[[bytes, Address], None]
 
 LOOPBACK = "127.0.0.1"
-_RECEIVE_BUFFER_BYTES = 4 << 20
+_RECEIVE_BUFFER_BYTES = 16 << 20
+_SO_RCVBUFFORCE = 33
+"""Linux: a receive buffer beyond what the system allows everybody, for programs that may have it."""
+_SO_MEMINFO = 55
+_MEMINFO = struct.Struct("=9I")
+"""Linux: what a socket holds; the last figure counts packets that it had no room for."""
 _PACKETS_PER_TURN = 512
 """Then other tasks get their turn, however fast packets come."""
 _MAX_UNREACHABLE = 64
@@ -177,6 +182,21 @@ class Transport:
         self._join_groups(self._announces)
         return True
 
+    def dropped(self) -> int:
+        """How many packets the system threw away because our sockets were full; 0 where it does not tell."""
+        count = 0
+        for sock in (self._traffic, self._announces):
+            if sock is None:
+                continue
+            with contextlib.suppress(OSError, struct.error):
+                count += _MEMINFO.unpack(sock.getsockopt(socket.SOL_SOCKET, _SO_MEMINFO, _MEMINFO.size))[-1]
+        return count
+
+    @property
+    def receive_buffer_bytes(self) -> int:
+        """Room for packets that wait for us, as the system gave it; 0 when closed."""
+        return 0 if self._traffic is None else self._traffic.getsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF)
+
     async def close_streams(self) -> None:
         """Close the TCP connections."""
         await self.streams.close()
@@ -275,6 +295,8 @@ def _bound_socket(host: str, port: int) -> socket.socket:
     try:
         sock.setblocking(False)
         sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _RECEIVE_BUFFER_BYTES)
+        with contextlib.suppress(OSError):
+            sock.setsockopt(socket.SOL_SOCKET, _SO_RCVBUFFORCE, _RECEIVE_BUFFER_BYTES)
         sock.bind((host, port))
     except OSError:
         sock.close()

@@ -48,5 +48,6 @@ def view_of(
         clock_rate=node.clock.rate(scale),
         history=history,
         rate_limiters=rate_limiters,
+        restarts=node.boots,
         radio_gaps=node.radio_gaps,
     )

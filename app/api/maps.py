@@ -335,9 +335,7 @@ def _live_layer(snapshot: MapSnapshot) -> Layer:
             "nothing was sounded since the service has this mission in memory",
             remedy="Ask for the depth of the map itself, which holds every sounding",
         )
-    return Layer(
-        "live", "depth by the papers' Gaussian interpolation of every sounding", "metre", live.depth_m
-    )
+    return Layer("live", "depth by the papers' Gaussian interpolation of every sounding", "metre", live.depth_m)
 
 
 def _tag(state: EdgeState, snapshot: MapSnapshot, *variant: object) -> str:

@@ -1,6 +1,7 @@
 """Makes a step durable, and turns what is stored of it into the vehicles' orders."""
 
 import numpy as np
+from numpy.typing import NDArray
 from sqlalchemy.orm import make_transient
 
 from app.exploration.bottom import Bottom
@@ -11,13 +12,23 @@ from app.missions.decision import Decision, Leg
 from app.missions.fleet import Position, WaypointOrder, WaypointStatus
 from app.missions.live import RISES, LiveMission
 from app.missions.members import Member
+from app.missions.spec import Guidance
 from app.missions.views import Level
 from app.storage import missions as mission_queries
 from app.storage.models import StepRow, WaypointRow
 from app.storage.shielding import to_the_end
+from imc_bridge.plans import CIRCLE_RADIUS_M
 
 LEAD_M = 25.0
 """How far beyond a waypoint a vehicle may be sent to pass it straight; more than the 15 m from which DUNE circles."""
+
+CIRCLE_M = CIRCLE_RADIUS_M + 2.5
+"""Radius of the room for a circle: it is not flown on rails."""
+
+UNIT_SQUARE = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0]])
+"""About a circle of radius 1: what lies apart from the square lies apart from the circle."""
+
+FloatArray = NDArray[np.float64]
 
 
 class Committing:
@@ -36,6 +47,8 @@ class Committing:
         self._constraints = constraints
         self._leads = leads
         self._bottom = Bottom.unknown()
+        self._targets: dict[str, FloatArray] = {}
+        """Where every vehicle of the step is sent, (2,)."""
 
     async def commit(self, decision: Decision) -> None:
         """Make a step durable, decision, waypoints and memory together; then order the vehicles to fly it."""
@@ -62,6 +75,7 @@ class Committing:
         metrics.STEPS.inc()
         live.set_step(number, decision.objective, decision.terms)
         self._bottom = decision.bottom
+        self._targets = {leg.vehicle: leg.target_m[:2] for leg in decision.legs}
         for member in live.team:
             member.order = None
             member.status = None
@@ -79,15 +93,16 @@ class Committing:
     def order(self, row: WaypointRow, member: Member) -> None:
         """Give a vehicle the order that belongs to a stored waypoint."""
         lead: Position | None = None
+        circle: Position | None = None
         bottom: tuple[Position, ...] = ()
         spec = self._live.spec
         if member.report is not None and self._leads:
             start, target = member.place_m(self._live.frame), np.array([row.east_m, row.north_m])
             beyond = safety.lead_point(self._constraints, start, target, LEAD_M)
             lead = self._position(beyond[0], beyond[1], row.depth_m)
-            tide_m = spec.tide.level_m
             known = safety.bottom_on_way(np.array([start, target, beyond]), self._bottom)
-            bottom = tuple(self._position(east, north, depth + tide_m) for east, north, depth in known)
+            bottom = tuple(self._position(east, north, depth) for east, north, depth in known)
+            circle = self._circle(member, start, target)
         member.order = WaypointOrder(
             mission_id=self._live.id,
             step=row.step,
@@ -97,9 +112,31 @@ class Committing:
             arrival_radius_m=spec.arrival_radius_m,
             min_altitude_m=spec.limits.min_altitude_m,
             lead=lead,
+            circle=circle,
             bottom=bottom,
         )
         member.status = WaypointStatus.PLANNED
+
+    def _circle(self, member: Member, start: FloatArray, target: FloatArray) -> Position | None:
+        """Return where a vehicle that is led by legs may circle down, apart from the others' ways and circles."""
+        if member.spec.guidance is Guidance.FOLLOW:
+            return None
+        taken: list[FloatArray] = []
+        for other in self._live.team:
+            if other is member or other.report is None:
+                continue
+            way = [other.place_m(self._live.frame)]
+            if other.name in self._targets:
+                way.append(self._targets[other.name])
+            if other.order is not None and other.order.circle is not None:
+                taken.append(CIRCLE_M * UNIT_SQUARE + self._local(other.order.circle))
+            taken.append(np.array(way))
+        centre_m = safety.circling_room(self._constraints, start, target, CIRCLE_M, taken)
+        return None if centre_m is None else self._position(centre_m[0], centre_m[1], 0.0)
+
+    def _local(self, position: Position) -> FloatArray:
+        east, north = self._live.frame.to_local(np.array(position.lat_deg), np.array(position.lon_deg))
+        return np.array([float(east), float(north)])
 
     async def _store(self, step: StepRow, waypoints: list[WaypointRow]) -> None:
         async with self._live.database.writing() as session:

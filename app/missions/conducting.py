@@ -25,7 +25,7 @@ from app.storage.shielding import to_the_end
 
 PATIENCE_S = 0.5
 """How long a stop waits for the database, so that a restart knows of it too; vehicles wait no longer for a disk."""
-ANSWER_S = 2.0
+ANSWER_S = 0.5
 """How long whoever stops a mission waits for that to be written down, once its vehicles were stopped."""
 NOT_WRITTEN = "not written down yet, a restart of the service would go on with the mission"
 
@@ -58,6 +58,8 @@ class Conductor:
         self._time_scale = time_scale
         self.runs: dict[str, asyncio.Task[None]] = {}
         self._acting: dict[str, asyncio.Lock] = {}
+        self._ending: dict[str, asyncio.Task[list[StopReceipt]]] = {}
+        """Step loops that were cancelled and have not ended yet."""
         self._unwritten: dict[str, asyncio.Task[None]] = {}
         """States that are in force and will be written down when that is possible again."""
 
@@ -81,6 +83,8 @@ class Conductor:
     async def _supervise(self, live: LiveMission, run: Callable[[], Awaitable[str]]) -> None:
         """Run a mission to its end; whatever happens, its vehicles are stopped."""
         try:
+            if (ending := self._ending.get(live.id)) is not None:
+                await asyncio.wait([ending])
             # Compiling what planning needs takes seconds on a new machine; vehicles must not wait for it.
             await self._compilation.planner(live.spec.planner.name, live.planning_sensor)
             reason = await run()
@@ -143,6 +147,7 @@ class Conductor:
 
     async def close(self) -> None:
         """Give up what could not be written down."""
+        await asyncio.gather(*self._ending.values(), return_exceptions=True)
         unwritten = list(self._unwritten.values())
         for task in unwritten:
             task.cancel()
@@ -159,8 +164,7 @@ class Conductor:
         written = self._begin_state(live, state, reason, actor)
         await asyncio.wait([written], timeout=PATIENCE_S)
         stops = await self.halt(live)
-        await self._settle(live, written, state, reason)
-        await self.log_stops(live, stops)
+        await asyncio.gather(self._settle(live, written, state, reason), self.log_stops(live, stops))
         return stops
 
     def dismiss(self, live: LiveMission) -> None:
@@ -176,12 +180,27 @@ class Conductor:
             task.cancel()
         stops = await self.stop_team(live)
         if task is not None:
-            await asyncio.gather(task, return_exceptions=True)
-            # A vehicle that was just being engaged when the loop was cancelled follows now.
-            again = {stop.vehicle: stop for stop in await self.stop_team(live, only_engaged=True)}
-            stops = [again.get(stop.vehicle, stop) for stop in stops]
+            # Where the machine is busy the loop takes its time to end: vehicles and operators do not wait for it.
+            ended = asyncio.create_task(self._ended(live, task), name=f"end of {live.id}")
+            self._ending[live.id] = ended
+            ended.add_done_callback(partial(self._forget_ending, live.id))
+            await asyncio.wait([ended], timeout=PATIENCE_S)
+            if ended.done():
+                again = {stop.vehicle: stop for stop in ended.result()}
+                stops = [again.get(stop.vehicle, stop) for stop in stops]
         await self._write_down(live)
         return stops
+
+    async def _ended(self, live: LiveMission, task: asyncio.Task[None]) -> list[StopReceipt]:
+        """Wait for a cancelled step loop to end; a vehicle that was just being engaged follows then, and is stopped."""
+        await asyncio.gather(task, return_exceptions=True)
+        return await self.stop_team(live, only_engaged=True)
+
+    def _forget_ending(self, mission_id: str, done: asyncio.Task[list[StopReceipt]]) -> None:
+        if self._ending.get(mission_id) is done:
+            del self._ending[mission_id]
+        if not done.cancelled() and done.exception() is not None:
+            log.error("a mission's vehicles could not be stopped again", mission=mission_id, exc_info=done.exception())
 
     async def _write_down(self, live: LiveMission) -> None:
         """Write what vehicles measured until now, unless that takes long: then the journal goes on by itself."""
@@ -210,15 +229,23 @@ class Conductor:
         return list(await asyncio.gather(*(self._hub.stop(member.key) for member in mine)))
 
     async def log_stops(self, live: LiveMission, stops: Sequence[StopReceipt]) -> None:
-        """Write down what vehicles answered to a stop; a missing answer is an alarm."""
+        """Write down, together, what vehicles answered to a stop; a missing answer is an alarm.
+
+        Nobody waits for that longer than for any other stop to be written; the vehicles have stopped.
+        """
+        lines = []
         for stop in stops:
             level = Level.INFO if stop.acknowledged else Level.ALARM
             words = "acknowledged the stop" if stop.acknowledged else "has NOT acknowledged the stop"
             text = f"{stop.vehicle} {words}: {stop.detail}"
-            if live.id in self._unwritten:
-                live.journal.note_line(live.journal.line(level, "stop", text, **receipt(stop)))
-            else:
-                await live.journal.log(level, "stop", text, **receipt(stop))
+            lines.append(live.journal.line(level, "stop", text, **receipt(stop)))
+        if live.id in self._unwritten:
+            for line in lines:
+                live.journal.note_line(line)
+            return
+        writing = asyncio.ensure_future(live.journal.log_all(lines))
+        writing.add_done_callback(partial(_log_failure, live.id))
+        await asyncio.wait([writing], timeout=PATIENCE_S)
 
     async def set_state(
         self,

@@ -15,7 +15,7 @@ from app.exploration.problem import Belief, Planner, Situation
 from app.exploration.search import SearchTask
 from app.missions import safety
 from app.missions.search.course import hold_before_hazards
-from app.missions.spec import MissionSpec, SurfacePolicy
+from app.missions.spec import MissionSpec, SurfacePolicy, VehicleKind
 
 FloatArray = NDArray[np.float64]
 
@@ -70,7 +70,7 @@ class Leg:
 class Decision:
     """A step's waypoints, the planner's figures, and what the operator has to know.
 
-    ``bottom`` is the pessimistic sea floor that the depths of travel were chosen by.
+    ``bottom`` is the pessimistic sea floor that the depths of travel were chosen by, below the surface as it is now.
     """
 
     legs: list[Leg]
@@ -94,7 +94,7 @@ def make_constraints(spec: MissionSpec) -> Constraints:
     margin_m = safety.zone_margin_m(limits.keep_out_margin_m, circles=spec.search is None)
     margins = [safety.widened(zone, margin_m) for zone in zones if margin_m > 0]
     return Constraints(
-        area=spec.local_area(),
+        area=spec.local_inner_area(),
         # A vehicle that came too near by turning may leave the margin by any way but one through the zone itself.
         keep_out=(*zones, *margins),
         max_step_m=limits.max_step_m,
@@ -133,15 +133,16 @@ def decide(
     notes: list[str] = []
     team: list[Place] = []
     legs: list[Leg] = []
+    nearby_m = NEARBY_OUTSIDE_M + spec.limits.border_margin_m
     for place in places:
         outside_m = safety.distance_outside_m(polygon, place.en_m)
-        if outside_m > NEARBY_OUTSIDE_M and search is not None:
+        if outside_m > nearby_m and search is not None:
             refusal = (
                 f"it is {outside_m:.0f} m outside the site, and what lies between is not known: bring it to the entry"
             )
             notes.append(f"{place.vehicle}: {refusal}")
             legs.append(Leg(place.vehicle, np.append(place.en_m, 0.0), refusal))
-        elif outside_m > NEARBY_OUTSIDE_M:
+        elif outside_m > nearby_m:
             others = [p.en_m for p in places if p is not place] + [other.target_m[:2] for other in legs]
             leg = _come_in(place, constraints, others)
             what = leg.refusal or "it is sent to the border"
@@ -156,7 +157,7 @@ def decide(
         return Decision(legs, None, {}, planner.snapshot(), notes, origin_m=where)
 
     names = tuple(place.vehicle for place in team)
-    below_level_m = belief.depth_m + min(water_level_m, 0.0)
+    below_level_m = safety.below_surface_m(belief.depth_m, water_level_m)
     bottom = Bottom.from_landmarks(belief.xy_m, below_level_m)
     cautious = Bottom.from_landmarks(
         belief.xy_m,
@@ -191,7 +192,7 @@ def decide(
         if not np.isfinite(proposed[i]).all():
             continue  # the check makes the vehicle hold
         proposed[i, 2] = safety.travel_depth_m(
-            place.en_m, proposed[i, :2], place.cruise_depth_m, cautious, constraints.min_altitude_m
+            where[place.vehicle], proposed[i, :2], place.cruise_depth_m, cautious, constraints.min_altitude_m
         )
         if up[i]:
             # It goes on along its leg while it rises; the checks below are the same for it as for everyone.
@@ -200,10 +201,20 @@ def decide(
     if search is not None:
         proposed, held = hold_before_hazards(search, names, origin, proposed)
         notes += held
-    checked = safety.check_step(names, origin, proposed, constraints, bottom)
+    start = np.column_stack([np.array([where[name] for name in names]), origin[:, 2]])
+    for i in np.flatnonzero((start[:, :2] != origin[:, :2]).any(axis=1)):
+        # It was planned for from the border, and comes from beyond it: there first where both is too far.
+        if np.linalg.norm(proposed[i] - start[i]) > constraints.max_step_m:
+            proposed[i, :2] = origin[i, :2]
+        proposed[i] = _within_step(start[i], proposed[i], constraints.max_step_m)
+    checked = safety.check_step(names, start, proposed, constraints, bottom)
     notes += [f"{name}: {reason}" for name, reason in (checked.corrections | checked.refusals).items()]
+    layered = {vehicle.name for vehicle in spec.vehicles if vehicle.kind is VehicleKind.NEPTUS}
     for i, place in enumerate(team):
         refusal = checked.refusals.get(place.vehicle, "")
+        if not refusal and place.vehicle in layered:
+            refusal = safety.too_deep(place.cruise_depth_m, float(checked.positions[i, 2]))
+            notes += [f"{place.vehicle}: {refusal}"] if refusal else []
         legs.append(Leg(place.vehicle, checked.positions[i], refusal, bool(up[i])))
     pursuits = {name: spec.targets[number].name for name, number in proposal.errands.items() if number >= 0}
     return Decision(

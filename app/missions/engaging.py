@@ -57,6 +57,7 @@ class Engaging:
         self._refused: dict[str, _Refused] = {}
         self._lost: set[str] = set()
         self._advised: set[str] = set()
+        self._machine_advised = False
 
     async def keep(self) -> None:
         """Go on until cancelled."""
@@ -79,6 +80,9 @@ class Engaging:
             await self._advise(member, info)
             if member.report is None:
                 member.report = info.report
+            if member.engaged and member.unsent and member.busy:
+                # It was out of reach when its waypoint was to be sent.
+                await self._send(member)
             if not member.engaged and member.name not in self._asking and self._due(member):
                 task = asyncio.create_task(self._ask(member))
                 self._asking[member.name] = task
@@ -103,6 +107,9 @@ class Engaging:
             self._advised.add(member.name)
             message = f"{member.name}: {info.advice}"
             await self._live.journal.log(Level.WARNING, "vehicle", message, vehicle=member.name)
+        if info.machine_advice and not self._machine_advised:
+            self._machine_advised = True
+            await self._live.journal.log(Level.WARNING, "service", info.machine_advice)
 
     def _done(self, name: str, _task: asyncio.Task[None]) -> None:
         self._asking.pop(name, None)
@@ -138,7 +145,7 @@ class Engaging:
         member.report = info.report or member.report
         await live.journal.log(Level.INFO, "vehicle", f"{member.name} follows", vehicle=member.name)
         live.changed.set()
-        if member.busy and member.order is not None:
+        if member.ordered:
             await self._send(member)
 
     async def _note(self, member: Member, error: VehicleRefusedError) -> None:

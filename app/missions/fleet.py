@@ -151,6 +151,9 @@ class WaypointOrder:
     leave off flying straight well before their target (DUNE circles from 15 m on) are sent there to pass the waypoint
     itself; the waypoint stays the place where they arrive.
 
+    ``circle`` is the centre of a circle, inside the area and apart from everything else, in which a vehicle that is led
+    by whole legs may descend before it goes there; the radius is :data:`imc_bridge.plans.CIRCLE_RADIUS_M`.
+
     ``bottom`` is what the map knows of the sea floor on that way, below the surface as it is now and on the safe side.
     """
 
@@ -162,6 +165,7 @@ class WaypointOrder:
     arrival_radius_m: float
     min_altitude_m: float
     lead: Position | None = None
+    circle: Position | None = None
     bottom: tuple[Position, ...] = ()
 
 
@@ -185,7 +189,15 @@ class LinkReport:
     reason: str = ""
 
 
-FleetEvent = VehicleReport | SoundingReport | RangeReport | ScanReport | WaypointReport | LinkReport
+@dataclass(frozen=True, slots=True)
+class RestartReport:
+    """What runs on board a vehicle has begun anew; ``reason`` says what was seen of that."""
+
+    vehicle: str
+    reason: str
+
+
+FleetEvent = VehicleReport | SoundingReport | RangeReport | ScanReport | WaypointReport | LinkReport | RestartReport
 EventSink = Callable[[FleetEvent], None]
 
 
@@ -204,6 +216,8 @@ class VehicleInfo:
     details: dict[str, str] = field(default_factory=dict)
     advice: str = ""
     """What the operator should change about how it is used; told once in the mission's log."""
+    machine_advice: str = ""
+    """What is wrong on this machine with the way to it, and what to do; told once in the log of each mission."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -235,6 +235,35 @@ class Journal:
             self.storage.note(error)
             self.note_line(self.line(level, kind, message, **data))
 
+    async def log_all(self, rows: Sequence[EventRow]) -> None:
+        """Write lines of the mission's log together and show them; what cannot be written is noted, as by :meth:`log`.
+
+        Parameters
+        ----------
+        rows
+            Made by :meth:`line`.
+        """
+        if self._lines or self.storage.trouble:
+            for row in rows:
+                self.note_line(row)
+            return
+        copies = [(row.time, self.line(Level(row.level), row.kind, row.message, **row.data)) for row in rows]
+        try:
+            await to_the_end(self._add_all(rows))
+        except Exception as error:
+            self.storage.note(error)
+            # Rows of a transaction that failed cannot be written again.
+            for time, row in copies:
+                row.time = time
+                self.note_line(row)
+            return
+        for row in rows:
+            self.tell(row)
+
+    async def _add_all(self, rows: Sequence[EventRow]) -> None:
+        async with self._database.writing() as session:
+            session.add_all(rows)
+
     def note_line(self, row: EventRow) -> None:
         """Note a line; it is written within a moment, or when that is possible again."""
         self._lines.append(row)

@@ -24,6 +24,7 @@ from app.missions.fleet import (
     LinkReport,
     LinkState,
     RangeReport,
+    RestartReport,
     ScanReport,
     SoundingReport,
     VehicleReport,
@@ -50,7 +51,7 @@ from app.missions.telling import Telling
 from app.missions.tracking import Tracking
 from app.missions.trails import Trails
 from app.missions.vehicle_showing import VehicleShowing, local_place
-from app.missions.views import MissionSummary, Progress
+from app.missions.views import Level, MissionSummary, Progress
 from app.missions.waypoint_board import WaypointBoard
 from app.missions.whole_set import WholeSet
 from app.storage import events as event_queries
@@ -135,6 +136,8 @@ class LiveMission:
         """Held while corrections change, one after the other."""
         self.halted = False
         """Set while vehicles are being stopped: the step loop must not send them off again as it ends."""
+        self.standstill = ""
+        """Why no vehicle may be sent anywhere now; empty while at least one may."""
         self.seconds_per_step: float | None = None
         self.running_since_s: float | None = None
         self.database = database
@@ -217,6 +220,9 @@ class LiveMission:
                 if event.state in (LinkState.HEARD, LinkState.READY):
                     # It can be reached but follows nothing of ours (any more): the loop engages it again.
                     member.engaged = False
+            case RestartReport():
+                words = f"{event.vehicle}: {event.reason}"
+                self.journal.note_line(self.journal.line(Level.ALARM, "vehicle", words, vehicle=event.vehicle))
             case WaypointReport():
                 self._receive_waypoint(member, event)
         self.changed.set()
@@ -358,7 +364,8 @@ class LiveMission:
     def _why_it_waits(self) -> str:
         trouble = self.journal.storage.trouble
         if not trouble:
-            return ""
+            stands = self.standstill and self.header.state is MissionState.RUNNING
+            return f"no vehicle can be sent anywhere: {self.standstill}" if stands else ""
         waits = "; the vehicles wait at their waypoints" if self.header.state is MissionState.RUNNING else ""
         return f"nothing can be written down: {trouble}{waits}"
 

@@ -63,9 +63,19 @@ class Member:
         return self.engaged and self.report is not None and self.link not in OUT_OF_REACH
 
     @property
+    def ordered(self) -> bool:
+        """Whether it has a waypoint that is not settled, whether or not it can be reached now."""
+        return self.order is not None and self.status not in SETTLED
+
+    @property
     def busy(self) -> bool:
         """Whether it is on its way to a waypoint."""
-        return self.order is not None and self.status not in SETTLED and self.link not in OUT_OF_REACH
+        return self.ordered and self.link not in OUT_OF_REACH
+
+    @property
+    def unsent(self) -> bool:
+        """Whether it has a waypoint that was never sent, as when its link was lost just then."""
+        return self.order is not None and self.status is WaypointStatus.PLANNED
 
     def cruise_depth_m(self, limits: Limits) -> float:
         """Return the depth it travels at where the bottom leaves room: as asked for, or its place in the stack."""

@@ -11,3 +11,6 @@ PLANNING_SECONDS = Histogram(
 )
 RUNNING = Gauge("bathyfleet_missions_running", "Missions whose step loop runs in this process")
 EVENTS = Counter("bathyfleet_mission_events_total", "Lines written to mission logs by level", ["level"])
+PACKETS_DROPPED = Counter(
+    "bathyfleet_imc_packets_dropped_total", "IMC packets that this machine threw away because its socket was full"
+)

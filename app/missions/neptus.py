@@ -2,8 +2,12 @@
 
 import socket
 from collections.abc import Awaitable, Callable
+from statistics import median
 from typing import Protocol
 
+import numpy as np
+
+from app.mapping.georeference import LocalFrame
 from app.missions.errors import MissionError
 from app.missions.links.neptus import NeptusFleetLink
 from app.missions.settings import NeptusSettings
@@ -15,6 +19,7 @@ from app.storage import events as event_queries
 from app.storage import missions as mission_queries
 from app.storage.database import Database
 from imc_bridge.neptus import Area, Restored, SessionRefusedError, StepData
+from imc_bridge.neptus.samples import looks_slanted
 
 LogIn = Callable[[str, str, bool], Awaitable[str | None]]
 """Who logs in with a password from a host, and whether he runs this process himself; None: not let in."""
@@ -23,7 +28,11 @@ ARRIVAL_RADIUS_M = 1.0
 """The panel says itself when its vehicles have arrived; nothing is judged by distance here."""
 STEP_DEADLINE_S = 86_400.0
 """The panel waits for its vehicles; a silent one is lost to us long before."""
+WIDEST_BORDER = 0.25
+"""Part of a small area's side that is left free at each border at most."""
 EVENT = "neptus"
+ENOUGH_RATIOS = 5
+"""Steps whose samples are compared with the vehicle's own altitude."""
 FLYING = (MissionState.RUNNING, MissionState.PAUSED)
 
 
@@ -62,16 +71,24 @@ class NeptusSessions:
         self._missions: dict[str, str] = {}
         self._users: dict[str, str] = {}
         self._warned: set[str] = set()
+        self._ratios: dict[str, list[float]] = {}
         self.link = NeptusFleetLink(settings, self)
 
     async def log_in(self, user: str, password: str, host: str, *, own_user: bool) -> str | None:
-        """Return who that is; the user's name is the panel's, only the password counts."""
-        return await self._log_in(password, host, own_user)
+        """Return who that is; the user's name is the panel's, only the password counts.
+
+        Raises SessionRefusedError with the reason where there is more to say than that the password is wrong.
+        """
+        try:
+            return await self._log_in(password, host, own_user)
+        except MissionError as error:
+            raise SessionRefusedError(f"{error}. {error.remedy}") from error
 
     async def begin(self, session: str, vehicles: int, user: str, host: str) -> None:
-        """Make the session's mission. What its console flew before is over."""
-        for old in self.link.supersede(session, host):
-            await self._finish(old, f"its console began session {session}", user)
+        """Make the session's mission. What its console flew before ends when nothing is heard of it any more."""
+        for old in self.link.sessions_of(host):
+            if old != session and self._users.get(old) == user:
+                self.link.begin(self._end_when_silent(old, f"its console began session {session}", user))
         spec = session_spec(self._settings, self.link.gateway.area, session, vehicles)
         try:
             mission = await self._service.create(spec, actor=user)
@@ -112,7 +129,7 @@ class NeptusSessions:
             words = f"{len(taken)} cells of a sparse map with {len(cells)} known ones are used as depths"
         await self._service.note(self._missions[session], Level.INFO, EVENT + "-map", words)
 
-    async def step(self, data: StepData, user: str, host: str) -> None:
+    async def step(self, data: StepData, user: str, host: str, *, answered: bool) -> None:
         """Hand a step to the mission, and start it with the first one."""
         mission_id = self._missions[data.session]
         try:
@@ -125,19 +142,36 @@ class NeptusSessions:
         except MissionError as error:
             raise SessionRefusedError(f"{error}. {error.remedy}") from error
         await self._warn_of_border(data)
+        await self._warn_of_slants(data)
         refused = "; ".join(f"{count} {reason}" for reason, count in sorted(data.refused.items()))
         words = f"step {data.time_step}: {len(data.soundings)} soundings" + (f", refused {refused}" if refused else "")
         await self._note(data.session, Level.INFO, words, data.time_step, host)
-        self.link.take(data)
+        self.link.take(data, answered=answered)
 
     async def refused(self, session: str, reason: str) -> None:
         """Write into the mission's log what the panel was told, which it shows to nobody."""
         if session in self._missions:
             await self._service.note(self._missions[session], Level.WARNING, EVENT + "-refused", reason)
 
-    def fetched(self, session: str) -> None:
-        """Note that the newest answer was fetched."""
-        self.link.fetched(session)
+    def polled(self, session: str, *, answered: bool) -> None:
+        """Note that the panel polled, and whether it got the answer to its last step."""
+        self.link.polled(session, answered=answered)
+
+    async def may_repeat(self, session: str, time_step: int) -> bool:
+        """Tell whether a panel that waits for the answer to a step that never came is to be told to stay."""
+        mission_id = self._missions.get(session)
+        if mission_id is None:
+            return True  # its own file was lost: it begins with the next step
+        if (await self._service.mission(mission_id)).state in ENDED:
+            return False
+        await self._service.note(
+            mission_id,
+            Level.WARNING,
+            EVENT + "-repeat",
+            f"the panel waits for the answer to step {time_step}, which was lost or refused: its vehicles stay where "
+            "they are, and it goes on with the next one",
+        )
+        return True
 
     async def _warn_of_border(self, data: StepData) -> None:
         area = self.link.gateway.area
@@ -153,6 +187,31 @@ class NeptusSessions:
                     "is Area Center the same here and there?",
                     vehicle=name,
                 )
+
+    async def _warn_of_slants(self, data: StepData) -> None:
+        """Say when samples look like those of an altimeter, which the panel takes for a slanted beam."""
+        for index, ratio in enumerate(data.altitude_ratios):
+            name = vehicle_name(data.session, index)
+            ratios = self._ratios.setdefault(name, [])
+            if ratio is None or len(ratios) >= ENOUGH_RATIOS:
+                continue
+            ratios.append(ratio)
+            if len(ratios) == ENOUGH_RATIOS and looks_slanted(median(ratios)):
+                await self._service.note(
+                    self._missions[data.session],
+                    Level.WARNING,
+                    EVENT + "-samples",
+                    f"the samples of {name} have it {100 * (1 - median(ratios)):.0f} % nearer to the bottom than it "
+                    "has itself: the panel takes an altimeter for a slanted beam. Without a DVL set neptus.samples "
+                    "to off",
+                    vehicle=name,
+                )
+
+    async def _end_when_silent(self, session: str, reason: str, user: str) -> None:
+        """Finish what a console flew that has begun another session; a second console's goes on while it flies."""
+        await self.link.until_silent(session)
+        self.link.supersede(session)
+        await self._finish(session, reason, user)
 
     async def _finish(self, session: str, reason: str, user: str) -> None:
         mission_id = self._missions.get(session)
@@ -181,7 +240,7 @@ def vehicle_name(session: str, index: int) -> str:
 
 def session_spec(settings: NeptusSettings, area: Area, session: str, vehicles: int) -> MissionSpec:
     """The mission of a session, as the settings describe it."""
-    ring = [(lon, lat) for lat, lon in area.corners()]
+    ring = [(lon, lat) for lat, lon in _corners(area)]
     depths = [settings.first_depth_m + index * settings.depth_separation_m for index in range(vehicles)]
     return MissionSpec(
         name=session,
@@ -194,6 +253,7 @@ def session_spec(settings: NeptusSettings, area: Area, session: str, vehicles: i
         cell_m=settings.cell_m,
         limits=Limits(
             max_step_m=settings.max_step_m,
+            border_margin_m=min(settings.border_m, WIDEST_BORDER * settings.cell_m * min(settings.rows, settings.cols)),
             min_depth_m=depths[0],
             max_depth_m=max(depths[-1], 0.1),
             min_altitude_m=settings.min_altitude_m,
@@ -204,3 +264,18 @@ def session_spec(settings: NeptusSettings, area: Area, session: str, vehicles: i
         step_deadline_s=STEP_DEADLINE_S,
         tide=Tide(level_m=0.0, source="subtracted by Neptus, by its own tide table"),
     )
+
+
+def _corners(area: Area) -> list[tuple[float, float]]:
+    """Return the area's corners in degrees, drawn in so little that its map has the panel's rows and columns.
+
+    The panel's axes are those of its centre, the map's those of a corner, a little turned: by millimetres more than a
+    whole number of cells, the map would have one more.
+    """
+    corners = area.corners()
+    frame = LocalFrame(min(lat for lat, _ in corners), min(lon for _, lon in corners))
+    east, north = frame.to_local(*(np.array(values) for values in zip(*corners, strict=True)))
+    excess_m = max(np.ptp(east) - area.cols * area.cell_m, np.ptp(north) - area.rows * area.cell_m, 0.0)
+    in_by = excess_m / area.cell_m / 2
+    rows, cols = (in_by, area.rows - in_by), (in_by, area.cols - in_by)
+    return [area.to_geographic(rows[i], cols[j]) for i, j in ((0, 0), (0, 1), (1, 1), (1, 0))]

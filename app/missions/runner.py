@@ -48,6 +48,9 @@ EXPECTED_DECISION_S = 0.3
 SOUND_S = 60.0
 """What commands and reports take by sound, at the most."""
 
+DECIDE_AGAIN_S = 5.0
+"""How long vehicles wait, by their clock, when nobody may go anywhere, until that is looked at again."""
+
 REPORT_DELAY_S = 0.1
 """How old a vehicle's last report is at most, on the wall clock."""
 
@@ -71,6 +74,8 @@ class Runner:
         self._spec = live.spec
         self._constraints = make_constraints(live.spec)
         self._decision_s = EXPECTED_DECISION_S
+        self._turned_down: set[str] = set()
+        """Vehicles that refused the step's waypoint when it was sent."""
         self._maps = StepMaps(live, executor, time_scale)
         self._lookout = Lookout(live, time_scale, self._wait)
         self._committing = Committing(live, self._constraints, leads=not self._lookout.needed)
@@ -93,9 +98,10 @@ class Runner:
                 if decision is None:
                     await self._gather_team(patient=live.header.step == 0)
                     await self._lookout.look_round()
-                    decision = await self._decide(planner, self._places())
+                    decision = await self._decide_to_fly(planner)
                 await self._committing.commit(decision)
                 await self._send()
+                await self._send_until_flown()
                 taken = decision
                 # The map is made and its model refined while the vehicles travel.
                 self._maps.begin()
@@ -113,6 +119,7 @@ class Runner:
             await self._maps.end()
             await to_the_end(save_elapsed(live))
             live.running_since_s = None
+            live.standstill = ""
 
     async def _recover(self) -> Planner:
         """Take up the last committed step: the planner's memory, and the waypoints that were not settled."""
@@ -179,7 +186,8 @@ class Runner:
             decision = await deciding
         finally:
             deciding.cancel()
-        if self._came_true(expected) and self._lookout.still_clear(decision):
+        flown = not all(leg.refusal for leg in decision.legs)
+        if flown and self._came_true(expected) and self._lookout.still_clear(decision):
             return decision
         planner.restore(memory)
         return None
@@ -254,8 +262,53 @@ class Runner:
         self._decision_s = max(took_s, PACE_MEMORY * self._decision_s + (1 - PACE_MEMORY) * took_s)
         return decision
 
+    async def _decide_to_fly(self, planner: Planner) -> Decision:
+        """Decide a step that at least one vehicle flies: one in which nobody may go anywhere is no step.
+
+        While there is none, it is told why, and decided anew when something has changed, at least once a while.
+        """
+        told: list[str] = []
+        while True:
+            memory = planner.snapshot()
+            decision = await self._decide(planner, self._places())
+            refusals = [f"{leg.vehicle}: {leg.refusal}" for leg in decision.legs]
+            if not refusals or not all(leg.refusal for leg in decision.legs):
+                self._live.standstill = ""
+                return decision
+            planner.restore(memory)
+            if refusals != told:
+                told = refusals
+                self._live.standstill = "; ".join(refusals)
+                self._live.publish_summary()
+                await self._live.journal.log(
+                    Level.ALARM,
+                    "waiting",
+                    f"no vehicle can be sent anywhere: {self._live.standstill}; they stay, and the step does not count",
+                    vehicles=[leg.vehicle for leg in decision.legs],
+                )
+            await asyncio.sleep(DECIDE_AGAIN_S / self._time_scale)
+            await self._gather_team(patient=False)
+
+    async def _send_until_flown(self) -> None:
+        """Send the step again for as long as every vehicle refused it: what nobody took on is not over."""
+        live = self._live
+        while not live.halted:
+            ordered = [member for member in live.team if member.order is not None]
+            if not ordered or not all(member.name in self._turned_down for member in ordered):
+                return
+            await asyncio.sleep(DECIDE_AGAIN_S / self._time_scale)
+            await self._gather_team(patient=False)
+            for member in live.team.present:
+                if member.order is not None:
+                    member.status = WaypointStatus.PLANNED
+                    self._turned_down.discard(member.name)
+                    await self._send_to(member)
+
     async def _send(self) -> None:
-        await asyncio.gather(*(self._send_to(member) for member in self._live.team if member.engaged and member.busy))
+        self._turned_down.clear()
+        await asyncio.gather(
+            *(self._send_to(member) for member in self._live.team if member.engaged and member.ordered)
+        )
 
     async def _send_to(self, member: Member) -> None:
         if member.order is None or self._live.halted:
@@ -264,6 +317,7 @@ class Runner:
             await self._hub.order(member.key, member.order)
         except VehicleRefusedError as error:
             member.engaged = False
+            self._turned_down.add(member.name)
             self._settle(member, WaypointStatus.REFUSED, str(error))
             await self._live.journal.log(Level.WARNING, "vehicle", str(error), vehicle=member.name)
 

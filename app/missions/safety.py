@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from shapely.geometry import LineString, Point, Polygon
 from shapely.geometry.base import BaseGeometry
 from shapely.geometry.polygon import orient
-from shapely.ops import nearest_points
+from shapely.ops import nearest_points, unary_union
 
 from app.exploration.bottom import Bottom
 from app.exploration.constraints import Constraints
@@ -25,6 +25,12 @@ ENTRY_POINTS = 400
 LEAD_CLEARANCE_M = 0.5
 WAITING_CIRCLE_M = 10.0
 """How far from its waypoint a vehicle comes that waits there in circles: 7.5 m of radius, and what it overshoots."""
+DEPTH_TOLERANCE_M = 0.25
+"""A vehicle that keeps its layer may be this much deeper than asked."""
+CIRCLE_WITHIN = 2.5
+"""A circle farther from the target than so many radii is none of its leg's."""
+START_OUTSIDE_M = 2.0
+"""A vehicle drifts at the surface: so far outside the area it may be when its leg begins."""
 UNCERTAINTY_FACTOR = 2.0
 """The bottom is taken to be this many standard deviations shallower than estimated."""
 
@@ -66,6 +72,16 @@ def travel_depth_m(
     if len(known) == 0:
         return wanted_m
     return float(min(wanted_m, max(known.min() - min_altitude_m, 0.0)))
+
+
+def too_deep(layer_m: float, safe_m: float) -> str:
+    """Return why a vehicle whose console sends it at its layer's depth, whatever it is told, has to stay; '' if not."""
+    if safe_m >= layer_m - DEPTH_TOLERANCE_M:
+        return ""
+    return (
+        f"its console sends it at {layer_m:g} m whatever it is told, and there {safe_m:.1f} m is the deepest that is "
+        "safe: it stays where it is"
+    )
 
 
 def bottom_on_way(way: FloatArray, bottom: Bottom) -> FloatArray:
@@ -164,6 +180,63 @@ def zone_margin_m(asked_m: float, *, circles: bool) -> float:
         Whether vehicles wait at their waypoints in circles, none of which may enter a zone.
     """
     return max(asked_m, WAITING_CIRCLE_M) if circles else asked_m
+
+
+def circling_room(
+    constraints: Constraints, start: FloatArray, target: FloatArray, radius_m: float, taken: Sequence[FloatArray]
+) -> FloatArray | None:
+    """Return the centre of a circle near a leg's target in which a vehicle may descend; None where there is no room.
+
+    The circle lies inside the area, clear of keep-outs and of other vehicles, and so does every straight way from the
+    leg's start to it and from it to the target, but for a start at the border.
+
+    Parameters
+    ----------
+    start, target : (2,)
+        Ends of the leg.
+    radius_m
+        Of the circle as it is flown.
+    taken : sequence of (n, 2)
+        Ways of other vehicles, from which the circle keeps the least separation.
+    """
+    area = Polygon(constraints.area)
+    zones = [Polygon(zone).buffer(LEAD_CLEARANCE_M) for zone in constraints.keep_out]
+    free: BaseGeometry = area
+    for zone in zones:
+        free = free.difference(zone)
+    others = [LineString(way) if len(way) > 1 else Point(way[0]) for way in taken]
+    for way in others:
+        free = free.difference(way.buffer(constraints.min_separation_m))
+    centres = free.buffer(-radius_m)
+    if centres.is_empty:
+        return None
+    centre, _ = nearest_points(centres, Point(target))
+    if centre.distance(Point(target)) > CIRCLE_WITHIN * radius_m:
+        return None
+    swept = unary_union([centre.buffer(radius_m), Point(start), Point(target)]).convex_hull
+    ahead = [zone for zone in zones if not zone.contains(Point(start))]
+    if any(barrier.intersects(swept) for barrier in [*ahead, *others]) or not area.buffer(START_OUTSIDE_M).contains(
+        swept
+    ):
+        return None
+    return np.array([centre.x, centre.y])
+
+
+def below_surface_m(depth_m: FloatArray, water_level_m: float) -> FloatArray:
+    """Return depths below the datum as depths below the water's surface now, on the safe side.
+
+    Vehicles count their depth from the surface. Water below the datum leaves them less room; the room that water above
+    it would give is not used, for it goes again.
+
+    Parameters
+    ----------
+    depth_m
+        Below the datum, positive down.
+    water_level_m
+        How high the water stands above the datum: :meth:`app.missions.corrections.Corrections.water_level_m`, which
+        knows of tide tables and datum offsets.
+    """
+    return depth_m + min(water_level_m, 0.0)
 
 
 def widened(zone: FloatArray, margin_m: float) -> FloatArray:

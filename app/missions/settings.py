@@ -56,10 +56,12 @@ class ImcSettings(Section):
         default=5000,
         ge=100,
         le=1_000_000,
-        description="Most IMC packets a second from one vehicle; all strangers at one address get a quarter of that",
+        description="Most IMC packets a second from one vehicle, multiplied by time_scale; all strangers at one "
+        "address get a quarter of that",
     )
     rate_limiters: str = Field(
-        default="Distance:5, EstimatedState:10",
+        default="Distance:5, EstimatedState:10, "
+        "ServoPosition:0.1, EulerAngles:0.1, AngularVelocity:0.1, Acceleration:0.1",
         description="Rates in Hz asked of every engaged vehicle and taken back at the end; empty: as they are",
     )
     unknown_bottom_depth_m: float = Field(
@@ -90,8 +92,14 @@ class NeptusSettings(Section):
     depth_separation_m: float = Field(default=1.5, gt=0, le=100, description="Depth separation between vehicles")
     bathymeter: Literal["twice", "once", "off"] = Field(
         default="twice",
-        description="Bathymeter figures, used where a step has no beams; twice: the vehicle's depth was subtracted "
-        "twice, as the unmodified panel does; once: by a corrected panel; off: not used",
+        description="Bathymeter figures, which samples are held against and which count where a vehicle has none; "
+        "twice: the vehicle's depth was subtracted twice, as the unmodified panel does; once: by a corrected panel; "
+        "off: not used",
+    )
+    samples: Literal["checked", "off"] = Field(
+        default="checked",
+        description="The panel's samples, one for every range of every sensor; checked: those that agree with the "
+        "nearest vehicle's Bathymeter are used; off: none, for vehicles without a DVL",
     )
     prior_map: Literal["ignore", "depth", "height"] = Field(
         default="ignore",
@@ -103,6 +111,19 @@ class NeptusSettings(Section):
     steps: int = Field(default=500, ge=1, le=100_000, description="Steps of a session's mission")
     max_step_m: float = Field(default=20.0, gt=0, le=2000, description="Largest distance of one step")
     min_altitude_m: float = Field(default=2.0, ge=0, le=1000, description="Least clearance above the sea floor")
+    border_m: float = Field(
+        default=12.5,
+        ge=0,
+        le=1000,
+        description="Waypoints stay this far inside the area, at most a quarter of its side: the panel takes a vehicle "
+        "for arrived from 12.5 m on, and moves what is beyond the border onto it",
+    )
+    repeat_after_s: float = Field(
+        default=5.0,
+        gt=0,
+        le=3600,
+        description="A panel that polls this long for the answer to an upload that was lost or refused is told to stay",
+    )
     lost_after_s: float = Field(
         default=300.0, gt=0, le=86_400, description="A panel that was silent for this long is not waited for"
     )

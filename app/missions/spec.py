@@ -11,6 +11,7 @@ from typing import Annotated, Any, Self
 import numpy as np
 from pydantic import Field, field_validator, model_validator
 from shapely.geometry import Point, Polygon
+from shapely.geometry.polygon import orient
 
 from app.exploration.options import PlannerOptions
 from app.mapping.georeference import LocalFrame
@@ -121,6 +122,12 @@ class Limits(Model):
         le=1000,
         description="Legs stay this far from keep-out zones: vehicles turn in circles and drift. In surveys at least "
         "10 m, the circle in which they wait for their next waypoint",
+    )
+    border_margin_m: float = Field(
+        default=0.0,
+        ge=0,
+        le=1000,
+        description="Waypoints stay this far inside the area: vehicles turn in circles at them and drift",
     )
     com_range_m: float | None = Field(
         default=None, gt=0, description="Every vehicle keeps another one within this range; null: unlimited"
@@ -395,6 +402,12 @@ class MissionSpec(Model):
             raise ValueError(
                 f"the area is nowhere wide enough for cells of {self.cell_m} m: enlarge it or make cell_m smaller"
             )
+        within = Polygon(area).buffer(-self.limits.border_margin_m, join_style="mitre")
+        if within.is_empty or not isinstance(within, Polygon):
+            raise ValueError(
+                f"limits.border_margin_m is {self.limits.border_margin_m} m, which leaves no area in one piece: "
+                "make it smaller"
+            )
         if cells > MAX_GRID_CELLS:
             raise ValueError(
                 f"the area of {size[0]:.0f} m x {size[1]:.0f} m has {cells:.0f} cells of {self.cell_m} m, "
@@ -410,6 +423,14 @@ class MissionSpec(Model):
     def local_area(self) -> np.ndarray[Any, np.dtype[np.float64]]:
         """The area's vertices in the local frame, shape (n, 2): east, north in metres."""
         return self.to_local(self.area)
+
+    def local_inner_area(self) -> np.ndarray[Any, np.dtype[np.float64]]:
+        """Where waypoints may be: the area without its margin, vertices as in :meth:`local_area`."""
+        area = self.local_area()
+        if self.limits.border_margin_m == 0.0:
+            return area
+        inner = Polygon(area).buffer(-self.limits.border_margin_m, join_style="mitre")
+        return np.asarray(orient(inner).exterior.coords)[:-1]
 
     def to_local(self, polygon: PolygonGeometry) -> np.ndarray[Any, np.dtype[np.float64]]:
         """Vertices of a polygon in the local frame, counter-clockwise, shape (n, 2)."""

@@ -11,7 +11,7 @@ from imc_bridge.neptus.gateway import (
     SessionKeeper,
     SessionRefusedError,
 )
-from imc_bridge.neptus.protocol import Area, CellSounding, Conventions, Place, StepData
+from imc_bridge.neptus.values import Area, CellSounding, Conventions, Place, StepData
 
 __all__ = [
     "Area",

@@ -25,11 +25,12 @@ MAX_CONNECTIONS = 32
 MAX_CONNECTIONS_PER_HOST = 8
 POLL_S = 0.25
 COMMANDS = (
-    *("USER", "PASS", "REIN", "QUIT", "NOOP", "HELP", "FEAT", "OPTS", "SYST"),
+    *("USER", "PASS", "REIN", "QUIT", "NOOP", "HELP", "FEAT", "OPTS", "SYST", "STAT"),
     *("CWD", "PWD", "MKD", "TYPE", "MODE", "STRU", "ALLO", "STOR", "ABOR"),
     *("PASV", "EPSV", "PORT", "EPRT"),
 )
 """Nothing that reads, lists, deletes or renames."""
+NOT_LET_IN = "Not let in: the password must be an access token of role operator"
 FILE_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,79}\.txt")
 
 log = logging.getLogger(__name__)
@@ -46,12 +47,17 @@ class Upload:
     content: bytes
 
 
+class LogInRefusedError(Exception):
+    """Somebody is not let in; ``str()`` says why."""
+
+
 @dataclass(frozen=True, slots=True)
 class FtpCalls:
     """What the server asks; called from its thread.
 
     ``is_own_user(connection)``: whether it was made by the user who runs this process, asked when it is accepted.
-    ``log_in(user, password, host, own_user)``: who that is, None when not let in. ``make(user, host, session)`` and
+    ``log_in(user, password, host, own_user)``: who that is, None when not let in; raises :class:`LogInRefusedError`
+    to say why. ``make(user, host, session)`` and
     ``receive(upload)``: why not, empty when done. ``knows(session)``: whether there is such a session.
     """
 
@@ -115,7 +121,8 @@ class FtpEndpoint:
     def _serve(self) -> None:
         while not self._stopping.is_set():
             try:
-                self._server.serve_forever(timeout=POLL_S, blocking=False, handle_exit=False)
+                # Its serve_forever would write into the log each time that it serves.
+                self._server.ioloop.loop(POLL_S, blocking=False)
             except Exception:
                 log.exception("The FTP server stumbled and goes on")
         self._server.close_all()
@@ -154,6 +161,7 @@ class _NoFiles(AbstractedFS):  # type: ignore[misc]
             raise FilesystemError(f"Only {FOLDER}/SESSION can be made, SESSION of letters, digits, _ and -")
         problem = self._channel.calls.make(self._channel.principal, self._channel.remote_ip, session)
         if problem:
+            self._channel.refusal = problem
             raise FilesystemError(problem)
 
     def open(self, filename: str, mode: str) -> Any:
@@ -189,6 +197,7 @@ class _Transfer(DTPHandler):  # type: ignore[misc]
             upload = Upload(channel.principal, channel.remote_ip, file.folder, file.name, file.getvalue())
             problem = channel.calls.receive(upload)
             if problem:
+                channel.refusal = problem
                 self._resp = (f"550 {problem}", log.warning)
         super().close()
 
@@ -197,10 +206,15 @@ class _Doorkeeper:
     """Lets in whom the gateway lets in; nobody may do more than make a folder and store."""
 
     def validate_authentication(self, username: str, password: str, handler: Any) -> None:
-        principal = handler.calls.log_in(username, password, handler.remote_ip, handler.own_user)
+        try:
+            principal = handler.calls.log_in(username, password, handler.remote_ip, handler.own_user)
+        except LogInRefusedError as refused:
+            handler.refusal = str(refused)
+            raise AuthenticationFailed(handler.refusal) from None
         if principal is None:
-            raise AuthenticationFailed("Not let in: the password must be an access token of role operator.")
-        handler.principal = principal
+            handler.refusal = NOT_LET_IN
+            raise AuthenticationFailed(f"{NOT_LET_IN}.")
+        handler.principal, handler.refusal = principal, ""
 
     def get_home_dir(self, username: str) -> str:
         return "/"
@@ -230,11 +244,16 @@ class _Doorkeeper:
 class _Handler(FTPHandler):  # type: ignore[misc]
     calls: FtpCalls
     principal = ""
+    refusal = ""
+    """Why something was refused on this connection, last."""
     authorizer = _Doorkeeper()
     abstracted_fs = _NoFiles
     dtp_handler = _Transfer
     banner = "bathyfleet"
-    proto_cmds = {name: FTPHandler.proto_cmds[name] for name in COMMANDS}  # noqa: RUF012 - pyftpdlib's own form
+    proto_cmds = {name: FTPHandler.proto_cmds[name] for name in COMMANDS} | {
+        # Of the connection only, since there are no files.
+        "STAT": FTPHandler.proto_cmds["STAT"] | {"arg": False, "perm": None}
+    }
     use_sendfile = False
     timeout = 60
     max_login_attempts = 3
@@ -244,3 +263,9 @@ class _Handler(FTPHandler):  # type: ignore[misc]
         # Before anything is waited for: of who has hung up nobody knows any more whose connection it was.
         self.own_user = self.calls.is_own_user(connection)
         super().__init__(connection, *arguments, **options)
+
+    def ftp_QUIT(self, line: str) -> None:  # noqa: N802 - pyftpdlib's name
+        """Say last what was refused: of all replies, the panel shows only this one."""
+        if self.refusal:
+            self.push(f"221-{self.refusal}\r\n")
+        super().ftp_QUIT(line)

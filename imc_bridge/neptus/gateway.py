@@ -9,33 +9,27 @@ import time
 from collections.abc import Callable, Coroutine
 from concurrent.futures import CancelledError as FutureCancelledError
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any, Protocol
 
-from imc_bridge.neptus.ftp import FtpCalls, FtpEndpoint, Upload
+from imc_bridge.neptus.ftp import FtpCalls, FtpEndpoint, LogInRefusedError, Upload
 from imc_bridge.neptus.http import HttpEndpoint, listening_socket
-from imc_bridge.neptus.protocol import (
-    Area,
-    Conventions,
-    NeptusDataError,
-    Place,
-    StepData,
-    read_map,
-    read_session,
-    read_step,
-    write_actions,
-)
+from imc_bridge.neptus.protocol import NeptusDataError, count_vehicles, read_map, read_session, read_step, write_actions
+from imc_bridge.neptus.values import Area, Conventions, Place, StepData
 from imc_bridge.transport import PortInUseError
 
 MAX_SESSIONS = 100
 ANSWER_WITHIN_S = 20.0
 LOOK_AGAIN_S = 2.0
 MAX_LOOKED_FOR = 64
+POLLS_STOP_S = 2.0
+"""The panel polls ten times a second; after such a gap it was flying, or the network was gone."""
 
 log = logging.getLogger(__name__)
 
 
 class SessionRefusedError(Exception):
-    """A session or a step is not taken; ``str()`` says why and what to do."""
+    """A log-in, a session or a step is not taken; ``str()`` says why and what to do."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,6 +42,8 @@ class GatewaySettings:
     http_port: int = 80
     passive_ports: tuple[int, int] | None = None
     public_address: str | None = None
+    repeat_after_s: float = 5.0
+    """A panel that polls for this long while no step of its own is to be answered is freed; see NeptusGateway."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +64,7 @@ class SessionKeeper(Protocol):
         ...
 
     async def log_in(self, user: str, password: str, host: str, *, own_user: bool) -> str | None:
-        """Return who that is; None: not let in."""
+        """Return who that is; None: not let in. Raises SessionRefusedError to say why."""
         ...
 
     async def begin(self, session: str, vehicles: int, user: str, host: str) -> None:
@@ -83,16 +79,23 @@ class SessionKeeper(Protocol):
         """Take the sparse map that the panel sends with its session."""
         ...
 
-    async def step(self, data: StepData, user: str, host: str) -> None:
-        """Take a step; its answer is given with :meth:`NeptusGateway.answer`. Raises SessionRefusedError."""
+    async def step(self, data: StepData, user: str, host: str, *, answered: bool) -> None:
+        """Take a step; its answer is given with :meth:`NeptusGateway.answer`. Raises SessionRefusedError.
+
+        ``answered``: it came so late that the panel was told to stay meanwhile, and waits for nothing.
+        """
         ...
 
     async def refused(self, session: str, reason: str) -> None:
         """Hear that an upload of a session was refused."""
         ...
 
-    def fetched(self, session: str) -> None:
-        """Hear that the newest answer was fetched."""
+    def polled(self, session: str, *, answered: bool) -> None:
+        """Hear that the panel polled, and whether it got the answer to its last step."""
+        ...
+
+    async def may_repeat(self, session: str, time_step: int) -> bool:
+        """Tell whether a panel that waits for the answer to a step that never came is to be told to stay."""
         ...
 
 
@@ -105,7 +108,13 @@ class _Session:
     time_step: int = 0
     pairs: bool = False
     answered: int = 0
-    actions: bytes | None = None
+    places: list[Place] = field(default_factory=list)
+    """Of the last answer."""
+    last: StepData | None = None
+    polls_since_s: float = 0.0
+    """When the panel began to poll without a break, or was served the newest answer first; the event loop's time."""
+    served: int = -1
+    polled_s: float = float("-inf")
     stepping: asyncio.Lock = field(default_factory=asyncio.Lock)
 
 
@@ -114,6 +123,10 @@ class NeptusGateway:
 
     A session belongs to who made its folder; its answers are served only to hosts that logged in for it, because the
     panel sends no password with HTTP.
+
+    The panel uploads each step once, looks at no reply, and polls until an answer comes whose ``timeStep`` is not less
+    than its own. An upload that was lost or refused would leave it waiting for ever. So after some seconds of polls
+    that wait for nothing we know of, the last places are laid out once more, as the answer to the next step.
 
     Parameters
     ----------
@@ -193,8 +206,7 @@ class NeptusGateway:
         """Lay out where the vehicles shall go, in the panel's order; nothing happens for an unknown session."""
         known = self._sessions.get(session)
         if known is not None:
-            known.actions = write_actions(session, time_step, places, self.area, pairs=known.pairs)
-            known.answered = time_step
+            known.places, known.answered = places, max(time_step, known.answered)
 
     # The HTTP side, on the event loop
 
@@ -205,12 +217,32 @@ class NeptusGateway:
             return None
         if host not in known.hosts:
             return None
-        if known.actions is None:
-            # A file that is not there makes the panel write an error into its log ten times a second.
-            return write_actions(session, 0, [], self.area, pairs=known.pairs)
-        if known.answered >= known.time_step:
-            self._keeper.fetched(session)
-        return known.actions
+        now_s = self._now_s()
+        if now_s - known.polled_s > POLLS_STOP_S or known.served != known.answered:
+            known.polls_since_s, known.served = now_s, known.answered
+        known.polled_s = now_s
+        self._keeper.polled(session, answered=0 < known.time_step <= known.answered)
+        if self._waits_in_vain(known, now_s):
+            known.polls_since_s = now_s
+            self._begin(self._repeat(known))
+        # A file that is not there makes the panel write an error into its log ten times a second.
+        return write_actions(session, known.answered, known.places, self.area, pairs=known.pairs)
+
+    def _waits_in_vain(self, known: _Session, now_s: float) -> bool:
+        """Tell whether the panel waits for the answer to a step that we have not."""
+        nothing_due = known.answered >= known.time_step and not known.stepping.locked()
+        return nothing_due and now_s - known.polls_since_s >= self._settings.repeat_after_s
+
+    async def _repeat(self, known: _Session) -> None:
+        """Free the panel: the last places once more, as the answer to the step after the last one."""
+        async with known.stepping:
+            time_step = known.answered + 1
+            if known.time_step < time_step and await self._keeper.may_repeat(known.name, time_step):
+                known.answered = time_step
+
+    @staticmethod
+    def _now_s() -> float:
+        return asyncio.get_running_loop().time()
 
     def _look_for(self, session: str, host: str) -> None:
         """See whether a session is one of an earlier run, for which the panel is still waiting."""
@@ -226,7 +258,10 @@ class NeptusGateway:
             if restored is not None and host in restored.hosts:
                 self._take_up(session, restored)
 
-        task = asyncio.create_task(look())
+        self._begin(look())
+
+    def _begin(self, work: Coroutine[Any, Any, None]) -> None:
+        task = asyncio.create_task(work)
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
 
@@ -236,6 +271,8 @@ class NeptusGateway:
             known = self._sessions[session] = _Session(session, restored.user, set(restored.hosts))
             known.vehicles = restored.vehicles
             known.time_step = restored.time_step
+            # What its last step was answered, if it was, is said again by the mission when that goes on.
+            known.answered = max(restored.time_step - 1, 0)
             self._forget_some()
         return known
 
@@ -244,6 +281,8 @@ class NeptusGateway:
     def _log_in(self, user: str, password: str, host: str, own_user: bool) -> str | None:
         try:
             principal: str | None = self._ask(self._keeper.log_in(user, password, host, own_user=own_user))
+        except SessionRefusedError as refused:
+            raise LogInRefusedError(" ".join(str(refused).split())) from None
         except Exception:
             log.exception("A log-in could not be judged")
             return None
@@ -318,18 +357,22 @@ class NeptusGateway:
 
     async def _take_step(self, known: _Session, upload: Upload) -> None:
         if not known.vehicles:
-            raise SessionRefusedError(f"session {known.name} has not begun: its file {known.name}.txt comes first")
+            # Its own file was lost, which the panel does not know.
+            vehicles = await asyncio.to_thread(count_vehicles, upload.content, known.name)
+            await self._keeper.begin(known.name, vehicles, upload.user, upload.host)
+            known.vehicles = vehicles
         # A step may hold thousands of samples: read beside the loop.
         conventions = self._settings.conventions
-        data = await asyncio.to_thread(read_step, upload.content, known.name, known.vehicles, conventions)
+        read = partial(read_step, upload.content, known.name, known.vehicles, conventions, known.last)
+        data = await asyncio.to_thread(read)
         if data.time_step < known.time_step:
             raise NeptusDataError("timeStep", f"{data.time_step} came after {known.time_step}: steps count up")
         if data.time_step == known.time_step:
             # The panel did not hear that it was stored, and sends it again; the answer stays.
             return
         known.pairs = data.pairs
-        await self._keeper.step(data, upload.user, upload.host)
-        known.time_step = data.time_step
+        await self._keeper.step(data, upload.user, upload.host, answered=data.time_step <= known.answered)
+        known.time_step, known.last = data.time_step, data
 
     async def _take_map(self, known: _Session, upload: Upload) -> None:
         cells = await asyncio.to_thread(read_map, upload.content)

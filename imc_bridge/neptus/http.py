@@ -67,17 +67,15 @@ def _app(answer: Answer) -> Any:
         content = answer(found[1], host) if found and allowed else None
         status = 200 if content is not None else 404 if allowed else 405
         body = content if content is not None else b"there is no such file for you\n"
-        await send(
-            {
-                "type": "http.response.start",
-                "status": status,
-                "headers": [
-                    (b"content-type", b"text/plain; charset=utf-8"),
-                    (b"content-length", str(len(body)).encode()),
-                    (b"cache-control", b"no-store"),
-                ],
-            }
-        )
+        headers = [
+            (b"content-type", b"text/plain; charset=utf-8"),
+            (b"content-length", str(len(body)).encode()),
+            (b"cache-control", b"no-store"),
+        ]
+        if content is None:
+            # The panel leaves the connection of a refusal open, and makes another one with its next poll.
+            headers.append((b"connection", b"close"))
+        await send({"type": "http.response.start", "status": status, "headers": headers})
         await send({"type": "http.response.body", "body": b"" if scope["method"] == "HEAD" else body})
 
     return app

@@ -1,19 +1,17 @@
-"""What Neptus' ConvCAO panel writes and reads, as values: depths in metres, positive down; places in cells.
-
-Cells are counted from the south-western corner: rows to the north, columns to the east. The panel counts the depth of
-a vehicle as a height above ``max_depth_m``; the depths of its multibeam samples are plain depths.
-"""
+"""What Neptus' ConvCAO panel writes and reads, from bytes to :mod:`imc_bridge.neptus.values` and back."""
 
 from __future__ import annotations
 
 import math
 import re
 from collections import Counter
-from dataclasses import dataclass
-from typing import Any, Literal
+from dataclasses import replace
+from typing import Any
 
 import orjson
-from imcpy.coordinates import WGS84
+
+from imc_bridge.neptus import samples as sampling
+from imc_bridge.neptus.values import Area, Bottom, CellSounding, Conventions, Place, StepData
 
 SESSION_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,47}")
 MAX_VEHICLES = 20
@@ -25,7 +23,7 @@ WHOLE_METRE_SD = 1.0 / math.sqrt(12.0)
 ALTITUDE_SD_M = 0.32
 """Of the altitude that a vehicle estimates, which the panel's ``Bathymeter`` is made of."""
 
-BathymeterRule = Literal["twice", "once", "off"]
+BORDER = "on the border of the area, where the panel puts what lies outside"
 
 
 class NeptusDataError(ValueError):
@@ -34,108 +32,6 @@ class NeptusDataError(ValueError):
     def __init__(self, field: str, message: str) -> None:
         super().__init__(f"{field}: {message}")
         self.field = field
-
-
-@dataclass(frozen=True, slots=True)
-class Place:
-    """Where a vehicle is: row and column in cells, depth in metres."""
-
-    row: float
-    col: float
-    depth_m: float
-
-
-@dataclass(frozen=True, slots=True)
-class Area:
-    """The rectangle of the panel's settings (``conf/noptcoords.properties`` of Neptus).
-
-    ``max_depth_m`` is the depth from which the panel counts heights.
-    """
-
-    centre_lat_deg: float
-    centre_lon_deg: float
-    rows: int = 240
-    cols: int = 240
-    cell_m: float = 1.0
-    max_depth_m: float = 50.0
-
-    def to_geographic(self, row: float, col: float) -> tuple[float, float]:
-        """Latitude and longitude (degrees) of a place."""
-        lat, lon = WGS84.displace(
-            math.radians(self.centre_lat_deg),
-            math.radians(self.centre_lon_deg),
-            (row - self.rows / 2) * self.cell_m,
-            (col - self.cols / 2) * self.cell_m,
-        )
-        return math.degrees(lat), math.degrees(lon)
-
-    def to_cells(self, lat_deg: float, lon_deg: float) -> tuple[float, float]:
-        """Row and column of a place."""
-        north, east, _ = WGS84.displacement(
-            math.radians(self.centre_lat_deg),
-            math.radians(self.centre_lon_deg),
-            0.0,
-            math.radians(lat_deg),
-            math.radians(lon_deg),
-            0.0,
-        )
-        return float(north) / self.cell_m + self.rows / 2, float(east) / self.cell_m + self.cols / 2
-
-    def corners(self) -> list[tuple[float, float]]:
-        """Latitude and longitude (degrees): south-west, south-east, north-east, north-west."""
-        return [
-            self.to_geographic(row, col)
-            for row, col in ((0, 0), (0, self.cols), (self.rows, self.cols), (self.rows, 0))
-        ]
-
-    def depth_of(self, height_m: float) -> float:
-        """Depth of a vehicle whose height the panel gave: cut to whole metres, so the middle of that metre."""
-        whole = float(height_m).is_integer()
-        return max(self.max_depth_m - height_m - (0.5 if whole and height_m < self.max_depth_m else 0.0), 0.0)
-
-    def on_border(self, row: float, col: float) -> bool:
-        """Whether the panel may have moved a place here that was outside: it puts those on the border, silently."""
-        return not (0.0 < row < self.rows - 1 and 0.0 < col < self.cols - 1)
-
-
-@dataclass(frozen=True, slots=True)
-class Conventions:
-    """How the panel's figures are meant.
-
-    ``bathymeter``: ``twice``: the unmodified panel, which subtracts the vehicle's depth and the bottom's depth, which
-    holds the vehicle's depth already, from ``max_depth_m``; ``once``: a panel that was corrected, ``max_depth_m`` minus
-    the bottom's depth; ``off``: not used.
-    """
-
-    area: Area
-    bathymeter: BathymeterRule = "twice"
-
-
-@dataclass(frozen=True, slots=True)
-class CellSounding:
-    """A measurement of the bottom at a place in cells."""
-
-    row: float
-    col: float
-    vehicle_depth_m: float
-    bottom_depth_m: float
-    source: str
-    vehicle: int | None = None
-    """Index of the vehicle that measured; None where the panel does not tell."""
-    depth_sd_m: float | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class StepData:
-    """One step: where the vehicles are and what was sounded since the last step."""
-
-    session: str
-    time_step: int
-    places: tuple[Place, ...]
-    soundings: tuple[CellSounding, ...]
-    refused: Counter[str]
-    pairs: bool = False
-    """Written by a panel of 2013, which knows whole cells only and no depth, and cannot read anything else."""
 
 
 def read_session(content: bytes, session: str) -> int:
@@ -153,11 +49,31 @@ def read_session(content: bytes, session: str) -> int:
     return count
 
 
-def read_step(content: bytes, session: str, vehicles: int, conventions: Conventions) -> StepData:
+def count_vehicles(content: bytes, session: str) -> int:
+    """Number of vehicles that a step tells of.
+
+    Raises
+    ------
+    NeptusDataError
+    """
+    places = _record(content, session).get("Location")
+    if not isinstance(places, list) or not 1 <= len(places) <= MAX_VEHICLES:
+        raise NeptusDataError("Location", f"it must be a list of the places of 1 to {MAX_VEHICLES} vehicles")
+    return len(places)
+
+
+def read_step(
+    content: bytes, session: str, vehicles: int, conventions: Conventions, before: StepData | None = None
+) -> StepData:
     """Read ``{SessionID, timeStep, Bathymeter[n], Location[n][3], MBSamples[m], SampleLocations[m][3]}``.
 
     Every place and number is checked before anything is made of them. A sample that means no depth is refused by
-    itself; a place that cannot be refuses all.
+    itself; a place that cannot be refuses all. Of samples beyond :data:`MAX_SAMPLES` the oldest are refused.
+
+    Parameters
+    ----------
+    before
+        The step before, from where the vehicles came: it helps to judge the samples of the way.
 
     Raises
     ------
@@ -172,10 +88,25 @@ def read_step(content: bytes, session: str, vehicles: int, conventions: Conventi
     area = conventions.area
     places = tuple(_place(row, index, area) for index, row in enumerate(rows))
     refused: Counter[str] = Counter()
-    samples = _samples(record, area, refused)
-    if not samples and conventions.bathymeter != "off" and not pairs:
-        samples = _bathymeter(record, places, conventions, refused)
-    return StepData(session, step, places, tuple(samples), refused, pairs)
+    samples = _samples(record, area, refused) if conventions.samples != "off" else []
+    whose = sampling.owners(samples, places, area.cell_m)
+    samples = [replace(sample, vehicle=index) for sample, index in zip(samples, whose, strict=True)]
+    if conventions.bathymeter == "off" or pairs:
+        return StepData(session, step, places, tuple(samples), refused, pairs=pairs)
+    exact = sampling.exact_depths(places, samples)
+    bottoms, unknown = _bottoms(record, exact, conventions)
+    samples = sampling.checked(
+        samples, (*bottoms, *(before.bottoms if before is not None else ())), area.cell_m, refused
+    )
+    ratios = sampling.altitude_ratios(samples, bottoms, area.cell_m)
+    for index in set(range(vehicles)) - {sample.vehicle for sample in samples}:
+        bottom, (place, _) = bottoms[index], exact[index]
+        refused[unknown[index]] += bottom is None
+        if bottom is not None:
+            samples.append(_under(index, place, bottom))
+    return StepData(
+        session, step, tuple(place for place, _ in exact), tuple(samples), +refused, bottoms, ratios, pairs=pairs
+    )
 
 
 def write_actions(session: str, time_step: int, places: list[Place], area: Area, *, pairs: bool) -> bytes:
@@ -272,18 +203,24 @@ def _place(values: list[float], index: int, area: Area) -> Place:
 
 
 def _samples(record: dict[str, Any], area: Area, refused: Counter[str]) -> list[CellSounding]:
-    depths = record.get("MBSamples") or []
-    if not isinstance(depths, list) or len(depths) > MAX_SAMPLES:
-        raise NeptusDataError("MBSamples", f"it must be a list of at most {MAX_SAMPLES} numbers")
+    depths, places = record.get("MBSamples") or [], record.get("SampleLocations") or []
+    if not isinstance(depths, list):
+        raise NeptusDataError("MBSamples", "it must be a list of numbers")
+    if not isinstance(places, list) or len(places) != len(depths):
+        found = f"{len(places)} entries" if isinstance(places, list) else repr(places)[:40]
+        raise NeptusDataError("SampleLocations", f"{found}: it must have one entry for each of {len(depths)}")
+    if len(depths) > MAX_SAMPLES:
+        # The panel collects from the moment when the console was opened.
+        refused[f"beyond the newest {MAX_SAMPLES}"] += len(depths) - MAX_SAMPLES
+        depths, places = depths[-MAX_SAMPLES:], places[-MAX_SAMPLES:]
     depths = _numbers(depths, "MBSamples", len(depths))
     if not depths:
         return []
     samples = []
-    for depth, (row, col, vehicle_depth) in zip(
-        depths, _table(record, "SampleLocations", len(depths), (3,)), strict=True
-    ):
+    table = _table({"SampleLocations": places}, "SampleLocations", len(depths), (3,))
+    for depth, (row, col, vehicle_depth) in zip(depths, table, strict=True):
         if area.on_border(row, col):
-            refused["on the border of the area, where the panel puts what lies outside"] += 1
+            refused[BORDER] += 1
         elif reason := _no_depth(depth, vehicle_depth):
             refused[reason] += 1
         else:
@@ -291,26 +228,29 @@ def _samples(record: dict[str, Any], area: Area, refused: Counter[str]) -> list[
     return samples
 
 
-def _bathymeter(
-    record: dict[str, Any], places: tuple[Place, ...], conventions: Conventions, refused: Counter[str]
-) -> list[CellSounding]:
+def _bottoms(
+    record: dict[str, Any], places: list[tuple[Place, bool]], conventions: Conventions
+) -> tuple[tuple[Bottom | None, ...], list[str]]:
+    """Return the bottom under each vehicle, None where it is not known, and why it is not."""
     area = conventions.area
-    samples = []
-    for index, (height, place) in enumerate(
-        zip(_numbers(record.get("Bathymeter"), "Bathymeter", len(places)), places, strict=True)
-    ):
+    bottoms: list[Bottom | None] = []
+    reasons = []
+    heights = _numbers(record.get("Bathymeter"), "Bathymeter", len(places))
+    for height, (place, exact) in zip(heights, places, strict=True):
         depth, sd = area.max_depth_m - height, ALTITUDE_SD_M
         if conventions.bathymeter == "twice":
-            depth, sd = depth - place.depth_m, math.hypot(ALTITUDE_SD_M, WHOLE_METRE_SD)
-        if area.on_border(place.row, place.col):
-            refused["on the border of the area, where the panel puts what lies outside"] += 1
-        elif reason := _no_depth(depth, place.depth_m):
-            refused[reason] += 1
-        else:
-            samples.append(
-                CellSounding(place.row, place.col, place.depth_m, depth, "neptus bathymeter", index, depth_sd_m=sd)
-            )
-    return samples
+            depth, sd = depth - place.depth_m, sd if exact else math.hypot(sd, WHOLE_METRE_SD)
+        reason = BORDER if area.on_border(place.row, place.col) else _no_depth(depth, place.depth_m)
+        bottoms.append(None if reason else Bottom(place.row, place.col, depth, sd))
+        reasons.append(reason)
+    return tuple(bottoms), reasons
+
+
+def _under(index: int, place: Place, bottom: Bottom) -> CellSounding:
+    """Return the `Bathymeter` of a vehicle as a sounding."""
+    return CellSounding(
+        bottom.row, bottom.col, place.depth_m, bottom.depth_m, "neptus bathymeter", index, depth_sd_m=bottom.sd_m
+    )
 
 
 def _no_depth(depth_m: float, vehicle_depth_m: float) -> str:

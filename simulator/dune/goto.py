@@ -41,7 +41,7 @@ class GotoManeuver:
             return "Goto maneuver error: maneuver timed out", False
         return None
 
-    def done(self) -> bool:
+    def done(self, now_s: float) -> bool:
         """Whether the path controller calls the target near: it does so ahead in time, whatever the depth."""
         speed = max(self._vehicle.vehicle.motion.surge_mps, 0.1)
         distance = self._vehicle.position.horizontal_distance_m(self._east_m, self._north_m)

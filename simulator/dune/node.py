@@ -38,9 +38,16 @@ DEFAULT_ANNOUNCE_PORTS = (30100, 30101, 30102, 30103, 30104)
 ANNOUNCE_PERIOD_S = 10.0
 BOOT_S = 5.0
 IMC_VERSION = "5.4.31"
+RESTART_S = 5.0
+"""How long DUNE is away when it crashes."""
 UDP_ENTITY = "UDP"
 RATE_LIMITERS = "Rate Limiters"
 FORWARD_RANGE_M = 30.0
+CHATTER_HZ = 94.0
+OTHER_CHATTER = tuple(SIMULATION)[:32]
+"""Entities whose states make up the rest of some 710 packets a second."""
+
+RATE_TEXT = ", ".join(f"{name}:{rate:g}" for name, rate in DEFAULT_LIMITS_HZ.items())
 
 Handler = Callable[[imcpy.Message, float], None]
 
@@ -70,7 +77,7 @@ class DuneOptions:
     faults
         Of the network, in both directions.
     chatter
-        Also send servo positions and attitude at full rate, as a real vehicle does.
+        Also send servo positions, attitude and states of entities at full rate, as a real vehicle does.
     boot_s
         Vehicle time from start to service.
     static_destinations
@@ -180,7 +187,9 @@ class FakeDune:
         self._announce = Periodic(ANNOUNCE_PERIOD_S, self._now_s)
         self._refresh = Periodic(REFRESH_PERIOD_S, self._now_s + REFRESH_PERIOD_S)
         self._chatter_owed = 0.0
-        self._rate_text = ", ".join(f"{name}:{rate:g}" for name, rate in DEFAULT_LIMITS_HZ.items())
+        self._offered = ""
+        self._down_until_s: float | None = None
+        self._rate_text = RATE_TEXT
         self._schedule: list[tuple[Periodic, Callable[[], None]]] = []
         self._handlers: dict[int, Handler] = {
             _HEARTBEAT: lambda message, now_s: None,
@@ -234,8 +243,13 @@ class FakeDune:
 
     def attach(self, endpoint: Endpoint, announcer: Endpoint, offered: str = "") -> None:
         """Use these sockets, which :meth:`start` opens: for telemetry and commands, and for announces."""
-        self._endpoint, self._announcer = endpoint, announcer
-        host, port = endpoint.address
+        self._endpoint, self._announcer, self._offered = endpoint, announcer, offered
+        self._begin()
+
+    def _begin(self) -> None:
+        """Begin anew with everything that a start of DUNE begins with; every start has a uid of its own."""
+        host, port = self.address
+        offered = self._offered
         services = (
             f"dune://0.0.0.0/uid/{round(1000.0 * self._now_s)};dune://0.0.0.0/version/2026.01.0;"
             f"imc+info://0.0.0.0/version/{self._options.imc_version};imc+udp://{host}:{port}/"
@@ -246,6 +260,28 @@ class FakeDune:
         if self._options.log_dir is not None:
             self._log = LogBook(self._options.log_dir / self.name, self._now_s)
             self._report_entities()
+
+    def crash(self, down_s: float = RESTART_S) -> None:
+        """Let DUNE die, and start again ``down_s`` of vehicle time later: whatever it did or knew is forgotten.
+
+        The vehicle floats up meanwhile, and is nobody's.
+        """
+        self._down_until_s = self._now_s + down_s
+        self.vehicle.stop()
+        self.contacts = Contacts()
+        self.limiter = RateLimiter(DEFAULT_LIMITS_HZ)
+        self._rate_text = RATE_TEXT
+        self._radio.forget()
+        ready_s = self._down_until_s + self._options.boot_s
+        self.plan = PlanEngine(self.vehicle, self.imc_id, self.vehicle.terrain.frame, self.send, ready_s)
+
+    def _start_again(self) -> None:
+        self._down_until_s = None
+        self._announce = Periodic(ANNOUNCE_PERIOD_S, self._now_s)
+        self._refresh = Periodic(REFRESH_PERIOD_S, self._now_s + REFRESH_PERIOD_S)
+        if self._log is not None:
+            self._log.close()
+        self._begin()
 
     def stop(self) -> None:
         """Release the sockets."""
@@ -301,6 +337,8 @@ class FakeDune:
 
     def on_announce(self, data: bytes, sender: Address) -> None:
         """Learn a system from a packet on an announce port."""
+        if self._down_until_s is not None:
+            return
         message = self._decode(data)
         if isinstance(message, imcpy.Announce) and message.src != self.imc_id:
             self.contacts.announced(message.src, message.sys_name, message.services)
@@ -310,6 +348,10 @@ class FakeDune:
         """Advance by one step of vehicle time, to ``now_s``, and send what is due."""
         self._now_s = now_s
         ping = self.vehicle.step()
+        if self._down_until_s is not None:
+            if now_s < self._down_until_s:
+                return
+            self._start_again()
         self.plan.tick(now_s)
         here = self.vehicle.position
         lat, lon = self.vehicle.terrain.frame.to_geodetic(here.east_m, here.north_m)
@@ -410,9 +452,10 @@ class FakeDune:
         return float(found) if math.isfinite(found) else FORWARD_RANGE_M
 
     def _send_chatter(self) -> None:
-        """Attitude of an AHRS at 94 Hz and four servos each as often."""
-        self._chatter_owed += 94.0 * STEP_S
+        """Attitude of an AHRS at 94 Hz and four servos each as often: 660 packets a second, unless they are limited."""
+        self._chatter_owed += CHATTER_HZ * STEP_S
         m = self.vehicle.vehicle.motion
+        ahrs, servos = self._entities["AHRS"], self._entities["Servos"]
         while self._chatter_owed >= 1.0:
             self._chatter_owed -= 1.0
             euler = imcpy.EulerAngles()
@@ -420,14 +463,22 @@ class FakeDune:
             rates = imcpy.AngularVelocity()
             rates.z = m.turn_rate_radps
             for message in (euler, rates, imcpy.Acceleration()):
-                self.send(message, self._entities["AHRS"])
+                self._send_limited(message, ahrs)
             for servo in range(4):
                 position = imcpy.ServoPosition()
                 position.id = servo
-                self.send(position, self._entities["Servos"])
+                self._send_limited(position, servos)
+        for label in OTHER_CHATTER:
+            self._send_limited(imcpy.EntityState(), self._entities[label])
+
+    def _send_limited(self, message: imcpy.Message, entity: int) -> None:
+        if self.limiter.passes(message.msg_name, entity, self._now_s):
+            self.send(message, entity)
 
     def receive(self, data: bytes, sender: Address) -> None:
         """Take a packet from the network."""
+        if self._down_until_s is not None:
+            return
         header = _read_header(data)
         if header is None:
             self.counts.malformed += 1
@@ -511,7 +562,8 @@ class FakeDune:
             except RateLimiterError as error:
                 self._log_book(str(error))
                 continue
-            self.limiter.update(limits)
+            # What the new list leaves out is not limited any more.
+            self.limiter = RateLimiter(limits)
             self._rate_text = parameter.value
 
     def _on_query_parameters(self, message: imcpy.Message, now_s: float) -> None:

@@ -7,9 +7,12 @@ from enum import IntEnum
 
 import imcpy
 
+from simulator.dune.elevator import ElevatorManeuver
 from simulator.dune.entities import ANY, SIMULATION
 from simulator.dune.follow_reference import FollowReference
 from simulator.dune.goto import GotoManeuver
+from simulator.dune.pop_up import PopUpManeuver
+from simulator.dune.station_keeping import StationKeepingManeuver
 from simulator.geodesy import LocalFrame
 from simulator.world import SimulatedVehicle
 
@@ -25,8 +28,13 @@ SUPERVISOR = SIMULATION["Vehicle Supervisor"]
 FOLLOW_REFERENCE = SIMULATION["Follow Reference Maneuver"]
 IS_DONE = "ManeuverIsDone"
 
-Maneuver = FollowReference | GotoManeuver
-SPECIFICATIONS = (imcpy.FollowReference, imcpy.Goto)
+UNATTENDED_S = 1.0
+"""How long a maneuver that is done waits for the plan engine; then the supervisor ends it."""
+
+Timed = GotoManeuver | ElevatorManeuver | StationKeepingManeuver | PopUpManeuver
+"""Maneuvers that end by themselves."""
+Maneuver = FollowReference | Timed
+SPECIFICATIONS = (imcpy.FollowReference, imcpy.Goto, imcpy.Elevator, imcpy.StationKeeping, imcpy.PopUp)
 """Of the maneuvers that are flown."""
 
 Send = Callable[..., None]
@@ -62,7 +70,7 @@ class Outcome(IntEnum):
 
 
 class PlanEngine:
-    """Executes one plan at a time: a FollowReference, or Gotos one after the other.
+    """Executes one plan at a time: a FollowReference, or maneuvers that end by themselves, one after the other.
 
     Parameters
     ----------
@@ -94,6 +102,7 @@ class PlanEngine:
         self._last_error_s = -1.0
         self._error_entity = ""
         self._request: tuple[int, int, int] = (0, ANY, 0)
+        self._done_s: float | None = None
         self._command_id = 0
         self._last_command = imcpy.VehicleCommand.CommandEnum.STOP_MANEUVER
 
@@ -134,6 +143,14 @@ class PlanEngine:
         self._send_vehicle_state()
         self._service_at_s = now_s + ERROR_RECOVERY_S
 
+    def miss_vehicle_state(self) -> None:
+        """Have had no state of the supervisor for too long: the engine calls itself blocked, the maneuver goes on.
+
+        So it stays until the vehicle is in service again or another plan is started; a STOP has no effect meanwhile.
+        """
+        self.plan_state = PlanState.BLOCKED
+        self._send_plan_state()
+
     def tick(self, now_s: float) -> None:
         """Let time pass: start-up, recovery, time-outs."""
         if self._service_at_s is not None and now_s >= self._service_at_s:
@@ -143,8 +160,8 @@ class PlanEngine:
             return
         failure = self.maneuver.failure(now_s)
         if failure is None:
-            if isinstance(self.maneuver, GotoManeuver) and self.maneuver.done():
-                self._next(now_s)
+            if not isinstance(self.maneuver, FollowReference) and self.maneuver.done(now_s):
+                self._maneuver_done(now_s)
             return
         text, is_error = failure
         if not is_error and isinstance(self.maneuver, FollowReference):
@@ -227,13 +244,36 @@ class PlanEngine:
         self.op_mode = OpMode.MANEUVER
         self._started_s = now_s
         self._last_error, self._last_error_s = "", -1.0
-        if isinstance(maneuver, imcpy.Goto):
-            self.maneuver = GotoManeuver(maneuver, self._vehicle, self._frame, now_s)
-        else:
-            self.maneuver = FollowReference(maneuver, self._vehicle, self._frame, now_s)
+        self._done_s = None
+        self.maneuver = self._begun(maneuver, now_s)
+        if isinstance(self.maneuver, FollowReference):
             self._send(self.maneuver.state_message(), FOLLOW_REFERENCE)
         self._send_vehicle_state()
         self._answer_command(f"{maneuver.msg_name} maneuver started")
+
+    def _begun(self, spec: imcpy.Message, now_s: float) -> Maneuver:
+        of = self._vehicle, self._frame, now_s
+        match spec:
+            case imcpy.Goto():
+                return GotoManeuver(spec, *of)
+            case imcpy.Elevator():
+                return ElevatorManeuver(spec, *of)
+            case imcpy.StationKeeping():
+                return StationKeepingManeuver(spec, *of)
+            case imcpy.PopUp():
+                return PopUpManeuver(spec, *of)
+            case _:
+                return FollowReference(spec, *of)
+
+    def _maneuver_done(self, now_s: float) -> None:
+        """Go on; an engine that calls itself blocked does not, and the supervisor ends the maneuver."""
+        if self.plan_state is not PlanState.BLOCKED:
+            self._next(now_s)
+        elif self._done_s is None:
+            self._done_s = now_s
+        elif now_s - self._done_s >= UNATTENDED_S:
+            self._halt()
+            self._into_service()
 
     def _next(self, now_s: float) -> None:
         """A maneuver is done: go on with the one that follows it, or end the plan."""
@@ -244,7 +284,7 @@ class PlanEngine:
             self._execute(following, now_s)
 
     def _stop(self, message: imcpy.PlanControl, request: tuple[int, int, int]) -> None:
-        if self.maneuver is None:
+        if self.maneuver is None or self.plan_state is PlanState.BLOCKED:
             self._reply(message.op, request, "", "no plan is running, request ignored", ok=False)
             return
         self._halt()

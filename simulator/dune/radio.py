@@ -35,6 +35,11 @@ class Radio:
         self._places.setdefault(imc_id, (lat_rad, lon_rad))
         self._reached[imc_id] = self._in_reach((lat_rad, lon_rad))
 
+    def forget(self) -> None:
+        """Know of nobody any more, as after a start."""
+        self._places.clear()
+        self._reached.clear()
+
     def moved(self, lat_rad: float, lon_rad: float, depth_m: float, now_s: float) -> None:
         """Take the vehicle's own position in; reaches are looked at every few seconds."""
         if self.range_m <= 0.0 or now_s < self._due_s:

@@ -9,14 +9,15 @@ DEFAULT_LIMITS_HZ: Mapping[str, float] = {
     "Distance": 0.2,
     "EstimatedState": 2.0,
     "SimulatedState": 0.5,
-    "ServoPosition": 0.2,
-    "EulerAngles": 0.2,
-    "AngularVelocity": 0.2,
-    "Acceleration": 0.2,
-    "Temperature": 0.2,
-    "Depth": 0.1,
+    "CpuUsage": 0.2,
+    "EntityState": 1.0,
+    "FuelLevel": 0.1,
+    "Rpm": 1.0,
+    "StorageUsage": 0.05,
+    "Temperature": 0.1,
+    "Voltage": 0.1,
 }
-"""What a LAUV sends over UDP unless asked for more."""
+"""What a LAUV limits unless asked otherwise. Servo positions and attitude are not among it: they come at full rate."""
 
 
 class RateLimiterError(ValueError):
@@ -48,15 +49,8 @@ class RateLimiter:
     """Decides which messages pass, per message name and sending entity."""
 
     def __init__(self, limits: Mapping[str, float]) -> None:
-        self._periods: dict[str, float] = {}
+        self._periods = {name: 1.0 / rate for name, rate in limits.items()}
         self._due: dict[tuple[str, int], float] = {}
-        self.update(limits)
-
-    def update(self, limits: Mapping[str, float]) -> None:
-        """Change the rates of some messages (Hz); the others keep theirs."""
-        for name, rate in limits.items():
-            self._periods[name] = 1.0 / rate
-        self._due = {key: at for key, at in self._due.items() if key[0] not in limits}
 
     def passes(self, name: str, entity: int, now_s: float) -> bool:
         """Whether a message may be sent now; counts it as sent if so."""

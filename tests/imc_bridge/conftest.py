@@ -127,9 +127,8 @@ async def open_sea(
     With ``connected`` false nobody listens on the bridge's ports yet.
     """
     *announce_ports, port, base_port = free_ports(7)
-    settings = BridgeSettings(
-        port=port, loopback_only=True, announce_ports=tuple(announce_ports), time_scale=speed, **(bridge or {})
-    )
+    changes = {"loopback_only": True} | (bridge or {})
+    settings = BridgeSettings(port=port, announce_ports=tuple(announce_ports), time_scale=speed, **changes)
     floor = seafloors.generate(family, 0, width_m=100.0, height_m=100.0)
     sea = Sea(floor, settings, base_port, vehicles, NetworkFaults(loss=loss), sensor, options, clock_offset_s)
     sea.bridge = Bridge(settings)

@@ -255,3 +255,27 @@ def test_file_that_is_no_recording_is_refused_with_its_line(tmp_path, content, w
     path.write_text(content)
     with pytest.raises(RecordingError, match=words):
         diagnose_recording(str(path), BridgeSettings())
+
+
+async def test_a_machine_without_a_network_is_well_when_its_vehicles_live_on_it(monkeypatch):
+    monkeypatch.setattr("imc_bridge.transport.list_interfaces", list)
+    async with open_sea(bridge={"loopback_only": False}) as sea:
+        await sea.ready()
+        await until(lambda: judge(sea.bridge, 1.0).healthy, "nothing is wrong")
+        assert "no network interface besides loopback" in judge(sea.bridge, 1.0).text()
+        await sea.vanish()
+
+
+async def test_a_machine_without_a_network_that_hears_nobody_is_told_to_connect(monkeypatch):
+    monkeypatch.setattr("imc_bridge.transport.list_interfaces", list)
+    *announce_ports, port = free_ports(3)
+    diagnosis = await diagnose(BridgeSettings(port=port, announce_ports=tuple(announce_ports)), 0.1)
+    assert Cause.NO_INTERFACE in diagnosis.causes
+
+
+async def test_an_honest_vehicle_that_sends_much_is_not_called_a_stranger():
+    async with open_sea(chatter=True, speed=10.0, bridge={"max_packets_per_s": 100}) as sea:
+        await until(lambda: any(f.cause is Cause.REFUSED for f in judge(sea.bridge, 1.0).own), "it sends too much")
+        [finding] = [f for f in judge(sea.bridge, 1.0).own if "max_packets_per_s" in f.text]
+        assert "a vehicle of yours" in finding.remedy
+        assert "multiplied by time_scale" in finding.remedy

@@ -1,6 +1,7 @@
 """Vehicles led by whole legs: where radio ends at the surface, silence is part of the plan."""
 
 import math
+from itertools import pairwise
 
 import imcpy
 import pytest
@@ -33,16 +34,40 @@ def states(sea: Sea, name: str) -> list[NodeState]:
     return [change.state for change in sea.of(LinkChange) if change.vehicle == name]
 
 
-def test_a_leg_is_two_gotos_joined_by_a_transition():
-    plan = leg_plan(BridgeSettings(), Waypoint("m", 1, 41.185, -8.705, 3.0, speed_mps=1.1), 2.5)
+def maneuvers(plan):
     again = imcpy.Packet.deserialize(imcpy.Packet.serialize(plan))
-    assert again.start_man_id == "there"
-    gotos = [
-        (m.maneuver_id, m.data.z, int(m.data.z_units), m.data.speed, int(m.data.speed_units)) for m in again.maneuvers
-    ]
-    assert gotos == [("there", 2.5, 1, pytest.approx(1.1), 0), ("up", 0.0, 1, pytest.approx(1.1), 0)]
-    assert {m.data.lat for m in again.maneuvers} == {math.radians(41.185)}
-    assert [(t.source_man, t.dest_man, t.conditions) for t in again.transitions] == [("there", "up", "ManeuverIsDone")]
+    links = [(t.source_man, t.dest_man, t.conditions) for t in again.transitions]
+    names = [m.maneuver_id for m in again.maneuvers]
+    assert again.start_man_id == names[0]
+    assert links == [(before, after, "ManeuverIsDone") for before, after in pairwise(names)]
+    return {m.maneuver_id: m.data for m in again.maneuvers}
+
+
+def test_a_leg_goes_there_floats_up_and_ends_at_the_surface():
+    waypoint = Waypoint("m", 1, 41.185, -8.705, 3.0, speed_mps=1.1)
+    found = maneuvers(leg_plan(BridgeSettings(), waypoint, 2.4, descend=False, aim=(41.1851, -8.7051)))
+    assert list(found) == ["there", "up", "surface"]
+    there, up, surface = found.values()
+    assert (there.z, int(there.z_units), int(there.speed_units)) == (pytest.approx(2.4), 1, 0)
+    assert (there.lat, there.lon) == (math.radians(41.1851), math.radians(-8.7051))
+    assert (up.z, up.duration, up.lat) == (0.0, 16, math.radians(41.185))
+    # Where it is, until it knows itself at the surface, whatever satellites it sees.
+    assert (surface.z, surface.flags) == (0.0, 0b111)
+
+
+def test_a_short_leg_circles_down_first():
+    waypoint = Waypoint("m", 1, 41.185, -8.705, 3.0, circle_lat_deg=41.1852, circle_lon_deg=-8.7052)
+    found = maneuvers(leg_plan(BridgeSettings(), waypoint, 3.0, descend=True, aim=(41.185, -8.705)))
+    assert list(found) == ["down", "there", "up", "surface"]
+    down = found["down"]
+    assert (down.lat, down.lon, down.flags) == (math.radians(41.1852), math.radians(-8.7052), 0)
+    assert (down.start_z, down.end_z, down.radius) == (3.0, 3.0, 10.0)
+
+
+def test_a_leg_at_the_surface_has_nowhere_to_float_up_from():
+    waypoint = Waypoint("m", 1, 41.185, -8.705, 0.0)
+    found = maneuvers(leg_plan(BridgeSettings(), waypoint, 0.0, descend=False, aim=(41.185, -8.705)))
+    assert list(found) == ["there", "surface"]
 
 
 async def test_legs_are_flown_out_of_radio_contact_and_reported_when_heard_again():

@@ -192,3 +192,88 @@ def test_a_sparse_map_gives_its_known_cells():
 def test_a_sparse_map_that_is_none_is_refused(content):
     with pytest.raises(NeptusDataError):
         read_map(content)
+
+
+def of(
+    depths: list[float], bottoms: list[float], places: list[tuple[float, float]], samples: list[list[float]]
+) -> bytes:
+    """A step with samples of row, column, depth of the vehicle, depth."""
+    return as_the_panel_writes(
+        depths,
+        bottoms,
+        places,
+        MBSamples=[sample[3] for sample in samples],
+        SampleLocations=[sample[:3] for sample in samples],
+    )
+
+
+def test_a_sample_that_disagrees_with_the_nearest_bathymeter_is_refused_with_both_figures():
+    content = of(
+        [2.0, 4.0], [12.0, 20.0], [(20, 20), (80, 20)], [[21, 20, 2.0, 29.7], [21, 20, 2.0, 12.1], [79, 20, 4.0, 19.9]]
+    )
+    data = step(content)
+    assert [(s.vehicle, s.bottom_depth_m) for s in data.soundings] == [(0, 12.1), (1, 19.9)]
+    assert data.refused == {"other than the Bathymeter of the nearest vehicle (29.7 m, where it has 12.0 m)": 1}
+
+
+def test_a_sample_far_from_every_bathymeter_cannot_be_judged():
+    content = of([2.0], [12.0], [(20, 20)], [[100, 60, 2.0, 12.0], [20, 21, 2.0, 12.0]])
+    data = step(content, 1)
+    assert len(data.soundings) == 1
+    assert data.refused == {"more than 60 m from where a vehicle knows the bottom": 1}
+
+
+def test_far_from_the_vehicle_a_range_ahead_passes_for_no_depth():
+    content = of([2.0], [12.0], [(20, 20)], [[20, 56, 2.0, 20.0], [20, 56, 2.0, 17.0], [20, 20, 2.0, 12.0]])
+    assert [s.bottom_depth_m for s in step(content, 1).soundings] == [17.0, 12.0]
+
+
+def test_a_slope_is_allowed_for_where_a_sample_is_away_from_the_vehicle():
+    content = of([2.0], [12.0], [(20, 20)], [[20, 40, 2.0, 17.0], [20, 22, 2.0, 17.0]])
+    assert [s.col for s in step(content, 1).soundings] == [40]
+
+
+def test_the_bottom_where_the_vehicles_came_from_counts_too():
+    before = step(of([2.0], [19.0], [(20, 50)], []), 1)
+    steep = of([2.0], [12.0], [(20, 40)], [[20, 50, 2.0, 19.2], [20, 40, 2.0, 12.0]])
+    assert len(read_step(steep, SESSION, 1, Conventions(AREA)).soundings) == 1
+    assert len(read_step(steep, SESSION, 1, Conventions(AREA), before).soundings) == 2
+
+
+def test_a_vehicle_without_a_sample_that_counts_has_its_bathymeter():
+    data = step(of([2.0, 4.0], [12.0, 13.0], [(20, 20), (80, 20)], [[80, 21, 4.0, 13.1]]))
+    assert [(s.vehicle, s.source) for s in data.soundings] == [(1, "neptus DVL"), (0, "neptus bathymeter")]
+
+
+def test_samples_can_be_left_out_and_then_the_bathymeter_counts():
+    data = step(of([2.0], [12.0], [(20, 20)], [[20, 21, 2.0, 12.0]]), 1, samples="off")
+    assert [s.source for s in data.soundings] == ["neptus bathymeter"]
+
+
+def test_samples_belong_to_the_vehicle_that_was_there_also_where_both_are_at_the_surface():
+    track = [[10 + k, 20.0, 0.0, 12.0] for k in range(10)]
+    other = [[60.0, 20 + k, 0.0, 12.0] for k in range(10)]
+    mixed = [sample for pair in zip(track, other, strict=True) for sample in pair]
+    data = step(of([0.0, 0.0], [12.0, 12.0], [(19, 20), (60, 29)], mixed))
+    assert [s.vehicle for s in data.soundings] == [0, 1] * 10
+
+
+def test_samples_belong_to_the_layer_in_which_they_were_taken():
+    mixed = [[20 + k % 2, 20.0, depth, 12.0] for k in range(6) for depth in (1.52, 3.04)]
+    data = step(of([1.5, 3.0], [12.0, 12.0], [(20, 20), (21, 20)], mixed))
+    assert [s.vehicle for s in data.soundings] == [0, 1] * 6
+
+
+def test_the_newest_sample_says_how_deep_a_vehicle_is():
+    data = step(of([2.2], [12.0], [(20, 20)], [[20, 20, 2.2, 12.0]]), 1)
+    assert data.places[0].depth_m == 2.2
+    assert data.bottoms[0] is not None
+    assert data.bottoms[0].depth_m == pytest.approx(12.0), "not half a metre off"
+
+
+def test_of_more_samples_than_are_taken_the_oldest_are_left_out():
+    samples = [[20, 20, 2.0, 12.0]] * 50_000 + [[20, 21, 2.0, 12.0]]
+    data = step(of([2.0], [12.0], [(20, 20)], samples), 1)
+    assert len(data.soundings) == 50_000
+    assert data.soundings[-1].col == 21
+    assert data.refused == {"beyond the newest 50000": 1}

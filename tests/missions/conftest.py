@@ -1,4 +1,5 @@
 from collections.abc import AsyncIterator, Callable
+from typing import Any
 
 import pytest
 
@@ -7,6 +8,8 @@ from app.missions.settings import ImcSettings, ServiceSettings
 from app.storage.database import Database
 from tests.imc_bridge.conftest import captures
 from tests.missions.fleet import Harbour
+from tests.missions.neptus_gateway import COLS, ROWS, Gateway
+from tests.ports import free_ports
 
 __all__ = ["captures"]
 
@@ -44,3 +47,33 @@ async def database(database_url: str) -> AsyncIterator[Database]:
     database = Database(database_url)
     yield database
     await database.close()
+
+
+@pytest.fixture
+def make_gateway(make_settings: Callable[..., ServiceSettings]) -> Callable[..., Gateway]:
+    """A service with the gateway for Neptus' panel, not open yet."""
+
+    def make(**changes: Any) -> Gateway:
+        ports = free_ports(2)
+        values = {
+            "enabled": True,
+            "ftp_port": ports[0],
+            "http_port": ports[1],
+            "centre_lat_deg": 41.1855,
+            "centre_lon_deg": -8.7045,
+            "rows": ROWS,
+            "cols": COLS,
+            "planner": "random",
+            "max_step_m": 8.0,
+        }
+        return Gateway(make_settings(neptus=values | changes, time_scale=1.0), ports)
+
+    return make
+
+
+@pytest.fixture
+async def gateway(make_gateway: Callable[..., Gateway]) -> AsyncIterator[Gateway]:
+    gateway = make_gateway()
+    await gateway.open()
+    yield gateway
+    await gateway.close()

@@ -15,21 +15,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from app.api.auth import console_log_in
-from app.api.limits import Limits
-from app.api.peers import is_own_user
 from app.api.tokens import Role, TokenStore
 from app.missions.links.neptus import GATHER_S, gateway_settings
-from app.missions.service import MissionService
-from app.missions.settings import NeptusSettings, ServiceSettings
+from app.missions.settings import NeptusSettings
 from app.missions.states import MissionState
-from app.missions.views import MissionView
-from app.storage.database import Database
 from tests.missions.fleet import until
-from tests.ports import free_ports
+from tests.missions.neptus_gateway import COLS, ROWS, SESSION, Gateway
 
-ROWS, COLS, MAX_DEPTH_M = 60, 50, 50.0
-SESSION = "Neptus_User_4711"
+MAX_DEPTH_M = 50.0
 FIRST_DEPTH_M, SEPARATION_M = 1.5, 1.5
 
 
@@ -149,73 +142,12 @@ class Panel:
         return answer["Location"]
 
 
-@dataclass
-class Gateway:
-    """A service with the gateway on, and ways to restart it."""
-
-    settings: ServiceSettings
-    ports: list[int]
-    tokens: bool = False
-    service: MissionService = field(init=False)
-    database: Database = field(init=False)
-
-    async def open(self) -> None:
-        self.database = Database(self.settings.database_url)
-        store = TokenStore(self.database)
-
-        async def log_in(password: str, host: str, own_user: bool) -> str | None:
-            return await console_log_in(store, Limits(0, 1000), password, host, own_user=own_user)
-
-        self.service = MissionService(self.settings, self.database, log_in, is_own_user=is_own_user)
-        await self.service.startup()
-
-    async def close(self) -> None:
-        await self.service.shutdown()
-        await self.database.close()
-
-    def panel(self, **changes: Any) -> Panel:
-        return Panel(*self.ports, **changes)
-
-    async def mission(self, name: str = SESSION) -> MissionView:
-        found = [summary for summary in await self.service.missions() if summary.name == name]
-        assert len(found) == 1
-        return await self.service.mission(found[0].id)
-
-    async def log(self, kind: str, name: str = SESSION) -> list[str]:
-        mission = await self.mission(name)
-        return [event.message for event in await self.service.events(mission.id) if event.kind == kind]
-
-
-@pytest.fixture
-def make_gateway(make_settings: Callable[..., ServiceSettings]) -> Callable[..., Gateway]:
-    def make(**changes: Any) -> Gateway:
-        ports = free_ports(2)
-        values = {
-            "enabled": True,
-            "ftp_port": ports[0],
-            "http_port": ports[1],
-            "centre_lat_deg": 41.1855,
-            "centre_lon_deg": -8.7045,
-            "rows": ROWS,
-            "cols": COLS,
-            "planner": "random",
-            "max_step_m": 8.0,
-        }
-        return Gateway(make_settings(neptus=values | changes, time_scale=1.0), ports)
-
-    return make
-
-
-@pytest.fixture
-async def gateway(make_gateway: Callable[..., Gateway]):
-    gateway = make_gateway()
-    await gateway.open()
-    yield gateway
-    await gateway.close()
+def panel_of(gateway: Gateway, **changes: Any) -> Panel:
+    return Panel(*gateway.ports, **changes)
 
 
 async def test_an_unmodified_panel_maps_an_area_step_by_step(gateway: Gateway) -> None:
-    panel = gateway.panel()
+    panel = panel_of(gateway)
     await asyncio.to_thread(panel.connect)
     assert [reply[:3] for reply in panel.replies] == ["226", "226"]
     mission = await gateway.mission()
@@ -249,7 +181,7 @@ async def test_an_unmodified_panel_maps_an_area_step_by_step(gateway: Gateway) -
 
 
 async def test_a_paused_mission_answers_nothing_and_a_resumed_one_goes_on(gateway: Gateway) -> None:
-    panel = gateway.panel()
+    panel = panel_of(gateway)
     await asyncio.to_thread(panel.connect)
     await panel.fly()
     mission = await gateway.mission()
@@ -267,7 +199,7 @@ async def test_a_paused_mission_answers_nothing_and_a_resumed_one_goes_on(gatewa
 
 
 async def test_waypoints_are_sent_fetched_and_reached_in_that_order(gateway: Gateway) -> None:
-    panel = gateway.panel()
+    panel = panel_of(gateway)
     await asyncio.to_thread(panel.connect)
     await panel.fly()
     mission = await gateway.mission()
@@ -311,7 +243,7 @@ BAD = {
 
 
 async def test_bad_uploads_move_no_vehicle_and_say_why(gateway: Gateway) -> None:
-    panel = gateway.panel()
+    panel = panel_of(gateway)
     await asyncio.to_thread(panel.connect)
     await panel.fly()
     await panel.fly()
@@ -333,7 +265,7 @@ async def test_bad_uploads_move_no_vehicle_and_say_why(gateway: Gateway) -> None
 
 
 async def test_the_same_step_uploaded_twice_is_one_step(gateway: Gateway) -> None:
-    panel = gateway.panel()
+    panel = panel_of(gateway)
     await asyncio.to_thread(panel.connect)
     await panel.fly()
     panel.time_step -= 1
@@ -357,7 +289,7 @@ OTHER_FILES = [
 
 
 async def test_no_other_files_can_be_stored(gateway: Gateway) -> None:
-    panel = gateway.panel()
+    panel = panel_of(gateway)
     await asyncio.to_thread(panel.connect)
     for folder, name in OTHER_FILES:
         reply = await asyncio.to_thread(panel.upload, folder, name, b"{}")
@@ -366,7 +298,7 @@ async def test_no_other_files_can_be_stored(gateway: Gateway) -> None:
 
 
 async def test_nothing_can_be_read_listed_or_deleted_and_no_folder_is_real(gateway: Gateway) -> None:
-    panel = gateway.panel()
+    panel = panel_of(gateway)
     await asyncio.to_thread(panel.connect)
 
     def try_everything() -> list[str]:
@@ -406,7 +338,7 @@ async def test_nothing_can_be_read_listed_or_deleted_and_no_folder_is_real(gatew
 
 async def test_a_file_that_is_too_large_is_cut_off(gateway: Gateway, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("imc_bridge.neptus.ftp.MAX_FILE_BYTES", 100_000)
-    panel = gateway.panel()
+    panel = panel_of(gateway)
     await asyncio.to_thread(panel.connect)
 
     def too_much() -> str:
@@ -429,10 +361,10 @@ async def test_with_tokens_only_an_operators_token_lets_a_panel_in(make_gateway:
         other_id, other = await store.create("other", Role.OPERATOR)
         for password in ("FTPUser123", viewer, ""):
             with pytest.raises(ftplib.error_perm, match="530"):
-                await asyncio.to_thread(gateway.panel(password=password).connect)
-        panel = gateway.panel(password=operator)
+                await asyncio.to_thread(panel_of(gateway, password=password).connect)
+        panel = panel_of(gateway, password=operator)
         await asyncio.to_thread(panel.connect)
-        stranger = gateway.panel(password=other)
+        stranger = panel_of(gateway, password=other)
         reply = await asyncio.to_thread(stranger.send)
         assert "belongs to someone else" in reply
         await panel.fly()
@@ -445,7 +377,7 @@ async def test_with_tokens_only_an_operators_token_lets_a_panel_in(make_gateway:
 
 
 async def test_answers_are_only_for_the_host_that_logged_in(gateway: Gateway) -> None:
-    panel = gateway.panel()
+    panel = panel_of(gateway)
     await asyncio.to_thread(panel.connect)
     await panel.fly()
     url = f"http://127.0.0.1:{gateway.ports[1]}/caoagile/FilesFromAgent/NEPTUS/{SESSION}_NewActions.txt"
@@ -466,21 +398,8 @@ async def test_answers_are_only_for_the_host_that_logged_in(gateway: Gateway) ->
             await asyncio.to_thread(urllib.request.urlopen, f"http://127.0.0.1:{gateway.ports[1]}{path}")
 
 
-async def test_a_new_session_of_a_console_ends_the_one_before(gateway: Gateway) -> None:
-    panel = gateway.panel()
-    await asyncio.to_thread(panel.connect)
-    await panel.fly()
-    again = gateway.panel(session="Neptus_User_12")
-    await asyncio.to_thread(again.connect)
-    old = await gateway.mission()
-    assert old.state is MissionState.FINISHED
-    assert "began session Neptus_User_12" in old.reason
-    await again.fly()
-    assert (await gateway.mission("Neptus_User_12")).state is MissionState.RUNNING
-
-
 async def test_a_panel_that_waits_is_answered_after_a_restart(gateway: Gateway) -> None:
-    panel = gateway.panel()
+    panel = panel_of(gateway)
     await asyncio.to_thread(panel.connect)
     await panel.fly()
     await panel.fly()
@@ -496,27 +415,29 @@ async def test_a_panel_that_waits_is_answered_after_a_restart(gateway: Gateway) 
     assert mission.progress.step >= 3
 
 
-async def test_a_place_too_shallow_for_the_depth_the_panel_flies_at_is_not_answered(
+async def test_where_the_depth_the_panel_flies_at_is_not_safe_the_answer_is_to_stay(
     make_gateway: Callable[..., Gateway], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     gateway = make_gateway(min_altitude_m=2.0, first_depth_m=4.0)
     await gateway.open()
     monkeypatch.setattr(f"{__name__}.FIRST_DEPTH_M", 4.0)
     try:
-        panel = gateway.panel(places=[(30.0, 25.0)])
+        panel = panel_of(gateway, places=[(30.0, 25.0)])
         await asyncio.to_thread(panel.connect)
         # 5 m of water everywhere: under a vehicle that flies at 4 m only 1 m is left.
+        heights = [MAX_DEPTH_M - 4.0 - 5.0]
         cells = [[32.0, 25.0, 4.0], [28.0, 25.0, 4.0], [30.0, 27.0, 4.0], [30.0, 23.0, 4.0]]
-        reply = await asyncio.to_thread(lambda: panel.send(MBSamples=[5.0] * 4, SampleLocations=cells))
+        reply = await asyncio.to_thread(
+            lambda: panel.send(Bathymeter=heights, MBSamples=[5.0] * 4, SampleLocations=cells)
+        )
         assert reply.startswith("226")
 
         async def said() -> bool:
-            return any("sends it at 4 m whatever it is told" in line for line in await gateway.log("vehicle"))
+            return any("sends it at 4 m whatever it is told" in line for line in await gateway.log("waiting"))
 
         await until(said, "the log says why")
-        answer = await asyncio.to_thread(panel.read)
-        assert answer is not None
-        assert answer["timeStep"] == 0, "without an answer the vehicle stays where it is"
+        assert (await panel.await_answer())[0][:2] == [30.0, 25.0], "it stays where it is"
+        assert (await gateway.mission()).progress.step == 0, "which is no step"
     finally:
         await gateway.close()
 
@@ -528,7 +449,7 @@ async def test_the_panels_sparse_map_is_used_as_it_was_set_up(
     gateway = make_gateway(prior_map=use)
     await gateway.open()
     try:
-        panel = gateway.panel()
+        panel = panel_of(gateway)
         line = " ".join(["-1"] * (COLS - 2) + [str(value), "-1"])
         await asyncio.to_thread(panel.connect, f"{ROWS} {COLS} 1 0 0\n\n{chr(10).join([line] * ROWS)}\n".encode())
         await panel.fly()

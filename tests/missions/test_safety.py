@@ -324,3 +324,35 @@ def test_without_a_margin_legs_may_pass_along_a_zone() -> None:
     constraints = make_constraints(spec)
     assert len(constraints.keep_out) == 1
     assert constraints.feasible(np.array([[19.5, 28.0, 2.0]]), np.array([[[19.5, 33.0, 2.0]]]))[0]
+
+
+def test_a_circle_lies_inside_clear_of_keep_outs_and_apart_from_others():
+    start, target, radius = np.array([45.0, 5.0]), np.array([50.0, 12.0]), 8.0
+    centre = safety.circling_room(LIMITS, start, target, radius, [np.array([[40.0, 30.0], [30.0, 40.0]])])
+    assert centre is not None
+    circle = Point(centre).buffer(radius - 0.1)
+    assert Polygon(AREA).contains(circle)
+    assert not Polygon(KEEP_OUT).intersects(circle)
+    assert LineString([[40.0, 30.0], [30.0, 40.0]]).distance(circle) >= LIMITS.min_separation_m
+    assert Point(target).distance(Point(centre)) <= 2.5 * radius
+
+
+@pytest.mark.parametrize(
+    ("start", "target", "radius", "taken"),
+    [
+        ((10.0, 24.0), (16.0, 25.0), 40.0, []),
+        ((16.0, 12.0), (25.0, 16.0), 12.0, [[[40.0, 5.0], [40.0, 55.0]], [[5.0, 40.0], [55.0, 40.0]]]),
+        ((50.0, 12.0), (50.0, 20.0), 8.0, [[[50.0, 20.0]], [[44.0, 8.0], [44.0, 50.0]], [[52.0, 2.0], [52.0, 50.0]]]),
+    ],
+    ids=["area", "keep-out and others", "others"],
+)
+def test_where_there_is_no_room_for_a_circle_none_is_given(start, target, radius, taken):
+    ways = [np.array(way) for way in taken]
+    assert safety.circling_room(LIMITS, np.array(start), np.array(target), radius, ways) is None
+
+
+@pytest.mark.parametrize(
+    ("water_level_m", "below_m"), [(0.0, 10.0), (-1.5, 8.5), (2.0, 10.0)], ids=["datum", "low water", "high water"]
+)
+def test_depths_below_the_surface_are_on_the_safe_side(water_level_m, below_m):
+    assert safety.below_surface_m(np.array([10.0]), water_level_m) == pytest.approx(below_m)

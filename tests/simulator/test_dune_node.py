@@ -134,7 +134,7 @@ class TestTelemetry:
             assert rates[key] == pytest.approx(rate, rel=0.06), key
 
     def test_the_rates_can_be_raised(self, bench):
-        bench.say(rate_limiters("Distance:5, EstimatedState:10"))
+        bench.say(rate_limiters("Distance:5, EstimatedState:10, SimulatedState:0.5"))
         rates = self.rates(bench)
         assert rates[("Distance", 58)] == pytest.approx(5.0, rel=0.02)
         assert rates[("EstimatedState", 49)] == pytest.approx(10.0, rel=0.02)
@@ -156,6 +156,20 @@ class TestTelemetry:
         rates = self.rates(bench, 10.0)
         assert rates[("ServoPosition", 69)] == pytest.approx(376, rel=0.03)
         assert rates[("EulerAngles", 63)] == pytest.approx(94, rel=0.03)
+        loud = ("ServoPosition", "EulerAngles", "AngularVelocity", "Acceleration")
+        assert sum(rates.values()) == pytest.approx(710, rel=0.03)
+        assert sum(rate for (name, _), rate in rates.items() if name in loud) > 0.9 * sum(rates.values())
+
+    def test_the_loud_messages_are_sent_as_seldom_as_asked(self):
+        bench = Bench(chatter=True).ready()
+        bench.say(
+            rate_limiters("Distance:5, ServoPosition:0.1, EulerAngles:0.1, AngularVelocity:0.1, Acceleration:0.1")
+        )
+        rates = self.rates(bench, 10.0)
+        assert rates[("ServoPosition", 69)] == pytest.approx(0.1)
+        assert rates[("Distance", 58)] == pytest.approx(5.0, rel=0.05)
+        # A new list takes the place of the old one: what it leaves out is not limited.
+        assert rates[("EstimatedState", 49)] == pytest.approx(10.0, rel=0.05)
 
     def test_the_state_is_an_origin_and_offsets(self, bench):
         bench.run(1.0)

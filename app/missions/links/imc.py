@@ -2,7 +2,9 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
+from app.missions import metrics
 from app.missions.errors import InvalidRequestError
 from app.missions.fleet import (
     BeamGeometry,
@@ -12,6 +14,7 @@ from app.missions.fleet import (
     LinkState,
     Position,
     RangeReport,
+    RestartReport,
     SoundingReport,
     StopReceipt,
     VehicleInfo,
@@ -31,7 +34,9 @@ from imc_bridge import (
     LinkChange,
     NodeState,
     NodeView,
+    PacketsDropped,
     RefusedError,
+    Restarted,
     Sounding,
     StateReport,
     TargetRange,
@@ -39,7 +44,7 @@ from imc_bridge import (
     WaypointChange,
 )
 from imc_bridge.consoles import Mark
-from imc_bridge.diagnosis import radio_gap_words
+from imc_bridge.diagnosis import drop_words, radio_gap_words
 from imc_bridge.doctor import Diagnosis, judge
 
 _UNENGAGED = {
@@ -114,7 +119,13 @@ class ImcFleetLink:
     def vehicles(self) -> Sequence[VehicleInfo]:
         """Every vehicle heard of, by IMC id."""
         wanted = self._bridge.settings.vehicles
-        return [_info(node) for node in self._bridge.nodes() if node.is_vehicle and (not wanted or node.name in wanted)]
+        lost = self._bridge.drops.recent
+        trouble = ". ".join(drop_words(lost, self._bridge.transport.receive_buffer_bytes)) if lost else ""
+        return [
+            replace(_info(node), machine_advice=trouble)
+            for node in self._bridge.nodes()
+            if node.is_vehicle and (not wanted or node.name in wanted)
+        ]
 
     def lead(self, vehicle: str, guidance: str, gateway: str | None) -> None:
         """Say how a vehicle shall be led from its next engagement on, as its mission describes it."""
@@ -159,6 +170,8 @@ class ImcFleetLink:
             min_altitude_m=order.min_altitude_m,
             lead_lat_deg=order.lead.lat_deg if order.lead else None,
             lead_lon_deg=order.lead.lon_deg if order.lead else None,
+            circle_lat_deg=order.circle.lat_deg if order.circle else None,
+            circle_lon_deg=order.circle.lon_deg if order.circle else None,
             bottom=tuple(BottomPoint(place.lat_deg, place.lon_deg, place.depth_m) for place in order.bottom),
         )
         try:
@@ -181,6 +194,8 @@ class ImcFleetLink:
         return judge(self._bridge, self._bridge.listening_s)
 
     def _forward(self, event: BridgeEvent) -> None:
+        if isinstance(event, PacketsDropped):
+            metrics.PACKETS_DROPPED.inc(event.count)
         translated = _translate(event)
         if translated is not None:
             self._sink(translated)
@@ -202,6 +217,12 @@ def _translate(event: BridgeEvent) -> FleetEvent | None:
                 status=WaypointStatus(event.status.value),
                 reason=event.reason,
             )
+        case Restarted():
+            where = ", under water when it was last heard before" if event.submerged else ""
+            words = (
+                f"DUNE on board has restarted{where}: what it was doing is forgotten, and it is asked to follow again"
+            )
+            return RestartReport(event.vehicle, words)
         case LinkChange():
             return LinkReport(event.vehicle, _link_state(event.state, event.engaged, event.ours), event.reason)
         case _:

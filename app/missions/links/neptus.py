@@ -1,17 +1,18 @@
 """Vehicles that a Neptus console commands: its ConvCAO panel tells where they are and asks where they shall go.
 
 The panel works in steps: it uploads a step, waits for the answer, flies it, and uploads the next one when every vehicle
-was within its own 12.5 m. So an upload is the arrival at the places of the last answer. It knows no stop: what is not
-answered any more flies its last leg and circles at its end, until someone presses STOP in the panel.
+was within its own 12.5 m. So an upload is the arrival at the places of the last answer. Where nothing can be answered
+that is safe the vehicles are told to stay, or the panel would wait for ever. It knows no stop: what is not answered any
+more flies its last leg and circles at its end, until someone presses STOP in the panel.
 """
 
 import asyncio
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Coroutine, Iterable, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
-import numpy as np
-
+from app.missions import safety
 from app.missions.fleet import (
     EventSink,
     LinkState,
@@ -37,9 +38,12 @@ from imc_bridge.neptus import (
     StepData,
 )
 
+POLLS_STOP_S = 10.0
+"""A panel that waits polls ten times a second; one that did not for this long was stopped."""
 GATHER_S = 0.3
 """Orders of one step come within a moment; a vehicle without one by then is told to stay."""
-DEPTH_TOLERANCE_M = 0.25
+STAY_AFTER_S = 10.0
+"""A step without any order, since no waypoint is safe, is answered with where the vehicles are."""
 PRIOR_SPACING_S = 3600.0
 """Between cells of a prior map, which are no track: far enough apart that no move is a jump."""
 
@@ -57,12 +61,13 @@ def gateway_settings(settings: NeptusSettings) -> GatewaySettings:
         settings.max_depth_m,
     )
     return GatewaySettings(
-        Conventions(area, settings.bathymeter),
+        Conventions(area, settings.bathymeter, settings.samples),
         settings.host,
         settings.ftp_port,
         settings.http_port,
         (settings.passive_ports[0], settings.passive_ports[1]) if settings.passive_ports else None,
         settings.public_address,
+        settings.repeat_after_s,
     )
 
 
@@ -72,6 +77,10 @@ class _Craft(Visitor):
     """At which the panel sends it, whatever it is told."""
     place: Place | None = None
     published: bool = False
+    sent_to: Place | None = None
+    """Where the last answer sent it."""
+    refused_step: int = 0
+    """The panel's step in which it was given an order that is not safe at its depth."""
 
 
 @dataclass
@@ -87,7 +96,26 @@ class _Fleet:
     superseded: bool = False
     prior: Sequence[tuple[int, int, float]] = ()
     """Cells of a prior map that the mission will hear of when it has begun."""
+    polled_s: float = 0.0
     timer: asyncio.TimerHandle | None = field(default=None, repr=False)
+    stay: asyncio.TimerHandle | None = field(default=None, repr=False)
+
+    @property
+    def last_s(self) -> float:
+        """When anything was heard of its panel, by the wall clock."""
+        return max(self.heard_s, self.polled_s)
+
+    @property
+    def waits(self) -> bool:
+        """Whether the panel waits for an answer."""
+        return self.pending is not None
+
+    def still(self) -> None:
+        """Forget what was to be answered later."""
+        for timer in (self.timer, self.stay):
+            if timer is not None:
+                timer.cancel()
+        self.timer = self.stay = None
 
 
 class NeptusFleetLink(VisitedLink):
@@ -100,6 +128,13 @@ class NeptusFleetLink(VisitedLink):
         self._settings = settings
         self.gateway = NeptusGateway(gateway_settings(settings), keeper)
         self._fleets: dict[str, _Fleet] = {}
+        self._tasks: set[asyncio.Task[None]] = set()
+
+    def begin(self, work: Coroutine[Any, Any, None]) -> None:
+        """Do something beside, until the link is closed."""
+        task = asyncio.create_task(work)
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
 
     async def start(self, sink: EventSink) -> None:
         """Bind both ports and answer. Raises ``imc_bridge.PortInUseError`` when one cannot be had."""
@@ -111,10 +146,12 @@ class NeptusFleetLink(VisitedLink):
     async def close(self) -> None:
         """Answer nothing more, then release the ports."""
         await self._end()
+        for task in self._tasks:
+            task.cancel()
+        await asyncio.gather(*self._tasks, return_exceptions=True)
         await self.gateway.close()
         for fleet in self._fleets.values():
-            if fleet.timer is not None:
-                fleet.timer.cancel()
+            fleet.still()
 
     def vehicles(self) -> Sequence[VehicleInfo]:
         """Every vehicle of a session since the service started."""
@@ -124,7 +161,7 @@ class NeptusFleetLink(VisitedLink):
                 kind=self.kind,
                 state=craft.state,
                 reason=self._reason(craft.state),
-                age_s=time.time() - fleet.heard_s,
+                age_s=time.time() - fleet.last_s,
                 address=fleet.host,
                 report=craft.report,
                 details={"session": fleet.session, "time step": str(fleet.time_step)},
@@ -143,17 +180,21 @@ class NeptusFleetLink(VisitedLink):
     async def order(self, order: WaypointOrder) -> None:
         """Lay a waypoint out for the next answer.
 
-        Raises VehicleRefusedError when the depth at which the panel will send it is not safe there.
+        Raises VehicleRefusedError when the depth at which the panel will send it is not safe there; the vehicle is told
+        to stay.
         """
         fleet, craft = self._find(order.vehicle)
         if craft.state is not LinkState.ENGAGED:
             raise VehicleRefusedError(order.vehicle, "does not follow this service now", "press START in the panel")
-        if order.position.depth_m < craft.depth_m - DEPTH_TOLERANCE_M:
+        # Decisions heed it, too; this is the last look before anything is sent.
+        if reason := safety.too_deep(craft.depth_m, order.position.depth_m):
+            craft.order, craft.published, craft.status = None, False, None
+            craft.refused_step = fleet.time_step
+            self._publish_soon(fleet)
             raise VehicleRefusedError(
                 order.vehicle,
-                f"the panel sends it at {craft.depth_m:g} m whatever it is told, and there "
-                f"{order.position.depth_m:.1f} m is the deepest that is safe",
-                "It stays where it is; make First Depth in the panel smaller, or the area without that place",
+                reason,
+                "Make First Depth in the panel smaller, or the area without that place",
             )
         same = craft.order is not None and (craft.order.mission_id, craft.order.step) == (order.mission_id, order.step)
         if not same or craft.status is None:
@@ -193,18 +234,31 @@ class NeptusFleetLink(VisitedLink):
         crafts = [_Craft(name, LinkState.HEARD, depth_m=depth) for name, depth in zip(vehicles, depths, strict=True)]
         fleet = self._fleets[session] = _Fleet(session, crafts, host, time.time(), time_step)
         if time_step:
-            fleet.pending = time_step
+            self._await_orders(fleet, time_step)
             for craft in crafts:
                 self._set_state(craft, LinkState.READY)
 
-    def supersede(self, session: str, host: str) -> list[str]:
-        """Return the sessions of a console that has begun another one now."""
-        old = [fleet for fleet in self._fleets.values() if fleet.host == host and fleet.session != session]
-        for fleet in old:
-            fleet.superseded = True
-            for craft in fleet.crafts:
-                self._set_state(craft, LinkState.LOST)
-        return [fleet.session for fleet in old]
+    def sessions_of(self, host: str) -> list[str]:
+        """Return the sessions that a host has, those of which nothing will be heard any more left out."""
+        return [fleet.session for fleet in self._fleets.values() if fleet.host == host and not fleet.superseded]
+
+    async def until_silent(self, session: str) -> None:
+        """Wait until a session's panel must have been stopped: one that waits polls, one whose vehicles fly uploads."""
+        fleet = self._fleets[session]
+        while True:
+            limit_s = min(POLLS_STOP_S, self._lost_after_s) if fleet.waits else self._lost_after_s
+            left_s = fleet.last_s + limit_s - time.time()
+            if left_s <= 0:
+                return
+            await asyncio.sleep(min(left_s, POLLS_STOP_S))
+
+    def supersede(self, session: str) -> None:
+        """Give a session up whose console has begun another one."""
+        fleet = self._fleets[session]
+        fleet.superseded = True
+        fleet.still()
+        for craft in fleet.crafts:
+            self._set_state(craft, LinkState.LOST)
 
     def knows(self, session: str) -> bool:
         """Whether a session was taken up in this run."""
@@ -220,15 +274,20 @@ class NeptusFleetLink(VisitedLink):
             craft.place = place
             craft.report = VehicleReport(craft.name, now_s, Position(lat, lon, place.depth_m))
 
-    def take(self, data: StepData) -> None:
-        """Tell of a step: what was sounded, where the vehicles are, and that they arrived."""
+    def take(self, data: StepData, *, answered: bool = False) -> None:
+        """Tell of a step: what was sounded, where the vehicles are, and that they arrived.
+
+        ``answered``: it came so late that the panel was told to stay meanwhile, and waits for nothing.
+        """
         fleet = self._fleets[data.session]
         now_s, since_s = time.time(), fleet.heard_s
         for sounding in self._prior_soundings(fleet):
             self._sink(sounding)
         for sounding in self._soundings(fleet, data.soundings, since_s, now_s):
             self._sink(sounding)
-        fleet.heard_s, fleet.time_step, fleet.pending = now_s, data.time_step, data.time_step
+        fleet.heard_s, fleet.time_step = now_s, data.time_step
+        if not answered:
+            self._await_orders(fleet, data.time_step)
         for craft in fleet.crafts:
             if craft.report is not None:
                 self._sink(craft.report)
@@ -245,10 +304,16 @@ class NeptusFleetLink(VisitedLink):
         """Keep the known cells of a prior map, values being depths, to be taken in as soundings with the first step."""
         self._fleets[session].prior = cells
 
-    def fetched(self, session: str) -> None:
-        """Note that the panel has read the newest answer, which acknowledges its waypoints."""
+    def polled(self, session: str, *, answered: bool) -> None:
+        """Note that the panel polled; when it read the answer to its last step, that acknowledges its waypoints."""
         fleet = self._fleets.get(session)
-        for craft in fleet.crafts if fleet is not None else ():
+        if fleet is None:
+            return
+        fleet.polled_s = time.time()
+        for craft in fleet.crafts:
+            if craft.state is LinkState.LOST and fleet.time_step and not fleet.superseded:
+                self._set_state(craft, LinkState.READY)
+        for craft in fleet.crafts if answered else ():
             if craft.published and craft.status is WaypointStatus.SENT:
                 self._report(craft, WaypointStatus.ACKNOWLEDGED)
 
@@ -261,7 +326,7 @@ class NeptusFleetLink(VisitedLink):
         area = self.gateway.area
         reports = []
         for index, sample in enumerate(samples):
-            craft = fleet.crafts[sample.vehicle if sample.vehicle is not None else self._nearest(fleet, sample)]
+            craft = fleet.crafts[sample.vehicle if sample.vehicle is not None else 0]
             lat, lon = area.to_geographic(sample.row, sample.col)
             reports.append(
                 SoundingReport(
@@ -293,40 +358,63 @@ class NeptusFleetLink(VisitedLink):
             for index, ((lat, lon), (_, _, depth_m)) in enumerate(zip(places, cells, strict=True))
         ]
 
-    @staticmethod
-    def _nearest(fleet: _Fleet, sample: CellSounding) -> int:
-        """Return the vehicle that flies at the sample's depth, or nearest to it."""
-        return int(np.argmin([abs(craft.depth_m - sample.vehicle_depth_m) for craft in fleet.crafts]))
+    def _await_orders(self, fleet: _Fleet, time_step: int) -> None:
+        """Note that the panel waits for an answer, and see to it that one comes."""
+        fleet.pending = time_step
+        if fleet.stay is not None:
+            fleet.stay.cancel()
+        fleet.stay = asyncio.get_running_loop().call_later(STAY_AFTER_S, self._stay, fleet)
+
+    def _stay(self, fleet: _Fleet) -> None:
+        """Answer a step that nobody gave orders for; not while the mission is paused or over."""
+        fleet.stay = None
+        if fleet.pending is None:
+            return
+        if any(craft.state is LinkState.ENGAGED for craft in fleet.crafts):
+            self._publish(fleet)
+        else:
+            fleet.stay = asyncio.get_running_loop().call_later(STAY_AFTER_S, self._stay, fleet)
 
     def _publish_soon(self, fleet: _Fleet) -> None:
         if fleet.pending is None:
             return
         engaged = [craft for craft in fleet.crafts if craft.state is LinkState.ENGAGED]
-        complete = len(engaged) == len(fleet.crafts) and all(
-            craft.order is not None and not craft.published for craft in engaged
-        )
-        if complete:
+        decided = [
+            (craft.order is not None and not craft.published) or craft.refused_step == fleet.pending
+            for craft in engaged
+        ]
+        if len(engaged) == len(fleet.crafts) and all(decided):
             self._publish(fleet)
         elif fleet.timer is None:
             fleet.timer = asyncio.get_running_loop().call_later(GATHER_S, self._publish, fleet)
 
     def _publish(self, fleet: _Fleet) -> None:
+        """Answer the panel's step: who has no order stays where the last answer sent it, or where it is."""
         if fleet.timer is not None:
             fleet.timer.cancel()
             fleet.timer = None
-        placed = all(craft.place is not None or craft.order is not None for craft in fleet.crafts)
-        if fleet.pending is None or not placed or not any(craft.order is not None for craft in fleet.crafts):
+        if fleet.pending is None:
             return
-        places = []
+        places: list[Place] = []
         for craft in fleet.crafts:
             if craft.order is not None:
                 position = craft.order.position
-                places.append(Place(*self.gateway.area.to_cells(position.lat_deg, position.lon_deg), position.depth_m))
-                craft.published = True
-            elif craft.place is not None:
-                places.append(craft.place)
+                place: Place | None = Place(
+                    *self.gateway.area.to_cells(position.lat_deg, position.lon_deg), position.depth_m
+                )
+            else:
+                place = craft.sent_to or craft.place
+            if place is not None:
+                places.append(place)
+        if len(places) < len(fleet.crafts):
+            # Of an earlier run of the service, and nothing was heard since: without places all stay where they are.
+            places = []
+        else:
+            for craft, place in zip(fleet.crafts, places, strict=True):
+                craft.sent_to, craft.published = place, craft.order is not None
         self.gateway.answer(fleet.session, fleet.pending, places)
         fleet.pending = None
+        fleet.still()
 
     def _find(self, vehicle: str) -> tuple[_Fleet, _Craft]:
         for fleet in self._fleets.values():
@@ -342,4 +430,4 @@ class NeptusFleetLink(VisitedLink):
 
     def _silent(self) -> Iterable[Visitor]:
         limit_s = time.time() - self._lost_after_s
-        return [craft for fleet in self._fleets.values() if fleet.heard_s < limit_s for craft in fleet.crafts]
+        return [craft for fleet in self._fleets.values() if fleet.last_s < limit_s for craft in fleet.crafts]

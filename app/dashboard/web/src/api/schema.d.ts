@@ -1203,7 +1203,7 @@ export interface components {
          * @description What a finding is about; the first of a node's problems is the one to look at.
          * @enum {string}
          */
-        Cause: "sound" | "switched_off" | "port_in_use" | "no_interface" | "no_vehicle" | "not_heard" | "no_announce" | "no_service" | "announces_ceased" | "no_traffic" | "unreachable" | "blocked_port" | "stale_port" | "foreign_address" | "wrong_version" | "same_id_twice" | "our_id_taken" | "clock_off" | "clock_rate" | "silent" | "radio_gaps" | "low_rate" | "no_entities" | "no_soundings" | "soundings_refused" | "foreign_control" | "not_ready" | "send_errors" | "bad_packets" | "refused" | "unknown_messages";
+        Cause: "sound" | "switched_off" | "port_in_use" | "no_interface" | "no_vehicle" | "not_heard" | "no_announce" | "no_service" | "announces_ceased" | "no_traffic" | "unreachable" | "blocked_port" | "stale_port" | "foreign_address" | "wrong_version" | "same_id_twice" | "our_id_taken" | "clock_off" | "clock_rate" | "silent" | "radio_gaps" | "restarted" | "packets_dropped" | "low_rate" | "no_entities" | "no_soundings" | "soundings_refused" | "foreign_control" | "not_ready" | "send_errors" | "bad_packets" | "refused" | "unknown_messages";
         /**
          * CheckStatus
          * @description How a line of the checklist stands.
@@ -1644,6 +1644,12 @@ export interface components {
              * @default 10
              */
             keep_out_margin_m: number;
+            /**
+             * Border Margin M
+             * @description Waypoints stay this far inside the area: vehicles turn in circles at them and drift
+             * @default 0
+             */
+            border_margin_m: number;
             /**
              * Com Range M
              * @description Every vehicle keeps another one within this range; null: unlimited
