@@ -38,14 +38,18 @@ from app.api import (
 )
 from app.api.audit_log import AuditLog, AuditMiddleware
 from app.api.auth import console_log_in
+from app.api.bodies import BodyMiddleware
+from app.api.budget import Budget
 from app.api.connections import patient_http
 from app.api.forwarding import ForwardingMiddleware, PeerMiddleware
 from app.api.health import health_router
+from app.api.intake import Intakes
 from app.api.limits import LimitMiddleware, Limits
-from app.api.middleware import BodyMiddleware, RequestMiddleware
+from app.api.middleware import RequestMiddleware
 from app.api.schemas import API
 from app.api.state import EdgeState
 from app.api.tokens import Role, TokenStore
+from app.api.unread import UnreadBodyMiddleware
 from app.dashboard.serve import mount_dashboard
 from app.memory import keep_memory_together
 from app.missions.service import MissionService
@@ -134,7 +138,7 @@ def create_app(settings: Settings | None = None, *, port: int | None = None) -> 
         openapi_tags=openapi.TAGS,
         lifespan=lifespan,
     )
-    for router in (
+    routers = (
         missions.router,
         forecasts.router,
         measurements.router,
@@ -148,27 +152,32 @@ def create_app(settings: Settings | None = None, *, port: int | None = None) -> 
         fleet.router,
         auditing.router,
         health_router(API),
-    ):
+    )
+    for router in routers:
         app.include_router(router)
     app.include_router(health_router(""), include_in_schema=False)
     mount_dashboard(app, charts=settings.charts)
     problems.install(app)
     openapi.install(app)
-    if settings.allowed_origins:
-        app.add_middleware(
-            CORSMiddleware, allow_origins=settings.allowed_origins, allow_methods=["*"], allow_headers=["*"]
-        )
     app.add_middleware(ForwardingMiddleware)
     app.add_middleware(
         BodyMiddleware,
+        intakes=Intakes(routers),
+        budget=Budget(settings.bytes_in_flight),
         max_bytes=settings.max_body_bytes,
         max_file_bytes=settings.max_import_bytes,
         patience_s=settings.slow_client_s,
     )
+    if settings.allowed_origins:
+        # Outside of the former, so that pages of these origins can read why they were refused.
+        app.add_middleware(
+            CORSMiddleware, allow_origins=settings.allowed_origins, allow_methods=["*"], allow_headers=["*"]
+        )
     app.add_middleware(AuditMiddleware)
     app.add_middleware(LimitMiddleware, limits=limits)
     app.add_middleware(PeerMiddleware)
     app.add_middleware(RequestMiddleware)
+    app.add_middleware(UnreadBodyMiddleware)
     return app
 
 
