@@ -51,7 +51,7 @@ from app.api.state import EdgeState
 from app.api.tokens import Role, TokenStore
 from app.api.unread import UnreadBodyMiddleware
 from app.dashboard.serve import mount_dashboard
-from app.memory import keep_memory_together
+from app.memory import keep_memory_together, settled
 from app.missions.service import MissionService
 from app.settings import Settings, StartupError, is_loopback, load_settings
 from app.storage.audit import Command
@@ -328,7 +328,8 @@ async def serve(
         app = create_app(settings, port=listening.getsockname()[1])
         async with app.router.lifespan_context(app):
             first_token = await _first_token(app.state.edge) if with_first_token else None
-            await Server(app, listening, started, first_token).serve(sockets=[listening])
+            with settled():
+                await Server(app, listening, started, first_token).serve(sockets=[listening])
     finally:
         listening.close()
 

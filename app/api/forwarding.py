@@ -10,16 +10,18 @@ from urllib.parse import quote
 import httpx
 import structlog
 from starlette.requests import HTTPConnection
-from starlette.types import ASGIApp, Message, Receive, Scope, Send
+from starlette.types import ASGIApp, Receive, Scope, Send
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed, InvalidHandshake
 from websockets.typing import Subprotocol
 
 from app.api.auth import authenticate
+from app.api.bodies import READING
 from app.api.problems import ProblemError, instance_of, make_problem, problem_response
 from app.api.processes import comes_from_peer, end_to_end, headers_for, recognise, tls_of
 from app.api.racing import first_of
 from app.api.schemas import API
+from app.api.spool import Spool, spool_folder
 from app.api.state import EdgeState
 from app.missions.ownership import Peer
 
@@ -70,7 +72,7 @@ class ForwardingMiddleware:
         edge: EdgeState = scope["app"].state.edge
         found = _OF_A_MISSION.match(scope["path"])
         peer = await edge.service.process.owner(found[1]) if found else None
-        if found is None or peer is None:
+        if found is None or peer is None or not _is_of_a_route(scope):
             await self.app(scope, receive, send)
         elif comes_from_peer(scope) and scope["type"] == "http":
             problem = make_problem("mission-elsewhere", "it is another process's now", instance=instance_of(scope))
@@ -85,16 +87,20 @@ class ForwardingMiddleware:
         else:
             scope["route"] = _ROUTE
             scope["state"]["sent_on"] = True
-            await self._send_on(edge, found[1], scope, receive, send)
+            with contextlib.closing(Spool(spool_folder(edge.settings.database_url))) as body:
+                if "intake" in scope:
+                    await body.fill(receive)
+                await self._send_on(edge, found[1], body, scope, receive, send)
 
-    async def _send_on(self, edge: EdgeState, mission_id: str, scope: Scope, receive: Receive, send: Send) -> None:
-        body = await _body(receive)
+    async def _send_on(
+        self, edge: EdgeState, mission_id: str, body: Spool, scope: Scope, receive: Receive, send: Send
+    ) -> None:
         loop = asyncio.get_running_loop()
         deadline_s = loop.time() + TAKEOVER_S
         while loop.time() < deadline_s:
             peer = await edge.service.process.owner(mission_id)
             if peer is None:
-                await self.app(scope, _once(body, receive), send)
+                await self.app(scope, body.replayed(receive) if "intake" in scope else receive, send)
                 return
             try:
                 async with _asked(edge, peer, scope, body) as answer:
@@ -126,6 +132,11 @@ class ForwardingMiddleware:
         )
 
 
+def _is_of_a_route(scope: Scope) -> bool:
+    """Tell whether there is such a route: the body of a request that may change something was let in for one only."""
+    return scope["type"] == "websocket" or scope["method"] in READING or "intake" in scope
+
+
 async def _is_known(edge: EdgeState, scope: Scope) -> bool:
     view = scope["type"] == "websocket"
     try:
@@ -136,9 +147,11 @@ async def _is_known(edge: EdgeState, scope: Scope) -> bool:
 
 
 @contextlib.asynccontextmanager
-async def _asked(edge: EdgeState, peer: Peer, scope: Scope, body: bytes) -> AsyncIterator[httpx.Response]:
+async def _asked(edge: EdgeState, peer: Peer, scope: Scope, body: Spool) -> AsyncIterator[httpx.Response]:
     client = edge.peers.to(peer)
-    request = client.build_request(scope["method"], _target(scope), headers=headers_for(peer, scope), content=body)
+    headers = [*headers_for(peer, scope), *([("content-length", str(body.size))] if body.size else [])]
+    content = body.parts() if body.size else b""
+    request = client.build_request(scope["method"], _target(scope), headers=headers, content=content)
     answer = await client.send(request, stream=True)
     try:
         yield answer
@@ -177,29 +190,6 @@ async def _relay(answer: httpx.Response, send: Send) -> None:
 async def _until_left(receive: Receive) -> None:
     while (await receive())["type"] != "http.disconnect":
         pass
-
-
-async def _body(receive: Receive) -> bytes:
-    parts = []
-    more = True
-    while more:
-        message = await receive()
-        parts.append(message.get("body", b""))
-        more = message.get("more_body", False)
-    return b"".join(parts)
-
-
-def _once(body: bytes, receive: Receive) -> Receive:
-    given = False
-
-    async def replay() -> Message:
-        nonlocal given
-        if given:
-            return await receive()
-        given = True
-        return {"type": "http.request", "body": body, "more_body": False}
-
-    return replay
 
 
 async def _refuse(scope: Scope, receive: Receive, send: Send, detail: str, remedy: str) -> None:

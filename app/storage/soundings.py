@@ -16,7 +16,7 @@ from app.storage.models import BatchRow, ImportRow, MissionRow, ReferenceRow, So
 LOG_KEY = "log-1"
 """What the keys of batches of vehicles' logs begin with."""
 
-ROWS_AT_ONCE = 500
+ROWS_AT_ONCE = 200
 
 Identity = tuple[str, float, int]
 """What makes a sounding the same sounding within a mission: vehicle, vehicle's time, beam."""
