@@ -59,9 +59,9 @@ def parse(body: bytes) -> Any:
     """
     text = body.decode("utf-8-sig")
     begin = _BLANKS.match(text).end()  # type: ignore[union-attr]
-    if len(text) <= WINDOW or text[begin : begin + 1] != "{":
+    if len(text) <= WINDOW:
         return _decoder.decode(text)
-    found, end = JSONObject((text, begin + 1), True, _member, None, None, {})
+    found, end = _member(text, begin)
     end = _BLANKS.match(text, end).end()  # type: ignore[union-attr]
     if end != len(text):
         raise JSONDecodeError("Extra data", text, end)
@@ -104,17 +104,17 @@ class _Window:
         last = self._first + size == len(text)
         try:
             value, end = _decoder.scan_once(self._piece, inside)
-        except StopIteration:
-            if last or inside + _LONGEST_WORD < size:
-                raise
+        except StopIteration as stop:
+            if last or stop.value + _LONGEST_WORD < size:
+                raise StopIteration(self._first + stop.value) from None
             return None
         except JSONDecodeError as error:
             whole = error.pos + _LONGEST_WORD < size and not error.msg.startswith("Unterminated")
             if last or whole:
                 raise JSONDecodeError(error.msg, text, self._first + error.pos) from None
             return None
-        # A number at the end of a piece may go on in the next one.
-        return (value, self._first + end) if last or end < size else None
+        # A number near the end of a piece may go on in the next one.
+        return (value, self._first + end) if last or end + _LONGEST_WORD < size else None
 
 
 class EntryTooLongError(ValueError):

@@ -279,7 +279,7 @@ def field_problem(
     elif kind == "extra_forbidden":
         known = sorted(_fields_at(model, path[:-1]))
         name = str(path[-1])
-        close = difflib.get_close_matches(name, known, n=1) if len(name) <= MAX_SUGGESTED else []
+        close = difflib.get_close_matches(name, known, n=1) if known and len(name) <= MAX_SUGGESTED else []
         message = "There is no such field"
         expected = f"did you mean {close[0]}?" if close else "one of " + ", ".join(known) if known else "no such field"
     elif kind == "value_error":

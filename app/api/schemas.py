@@ -1,5 +1,6 @@
 """Bodies and parameters that only the HTTP edge knows; everything else is the missions' own models."""
 
+from contextvars import ContextVar
 from typing import Annotated, ClassVar
 
 from fastapi import Path
@@ -15,7 +16,7 @@ from pydantic import (
 )
 
 from app.api.json_text import Bounds
-from app.api.problems import field_problem
+from app.api.problems import MAX_ERRORS, field_problem
 from app.missions.measurement import Measurement
 from app.missions.search.posted import Scan
 from app.missions.search.scanning import MAX_SCANS
@@ -26,6 +27,9 @@ API = "/api/v1"
 MAX_BATCH = 10_000
 MAX_FAULTS = 5
 """Of one item so many are explained."""
+
+_suggestions = ContextVar("suggestions", default=MAX_ERRORS)
+"""For how many more faults of a batch a field is looked for that may have been meant."""
 
 MissionId = Annotated[
     str,
@@ -63,11 +67,22 @@ def _item(value: object) -> Measurement | str:
     try:
         return Measurement.model_validate(value)
     except ValidationError as error:
-        faults = [
-            field_problem(entry, location="body", path=entry["loc"], model=Measurement)
-            for entry in error.errors(include_url=False)[:MAX_FAULTS]
-        ]
+        entries = error.errors(include_url=False)[:MAX_FAULTS]
+        # What a name may have been meant for is looked for in the first ones only: it takes far longer than the rest.
+        left = _suggestions.get()
+        _suggestions.set(left - len(entries))
+        model = Measurement if left >= len(entries) else None
+        faults = [field_problem(entry, location="body", path=entry["loc"], model=model) for entry in entries]
         return "; ".join(f"{f.field}: {f.message}; expected {f.expected}" for f in faults)
+
+
+def _each_item(items: object, check: ValidatorFunctionWrapHandler) -> list[Measurement | str]:
+    token = _suggestions.set(MAX_ERRORS)
+    try:
+        checked: list[Measurement | str] = check(items)
+        return checked
+    finally:
+        _suggestions.reset(token)
 
 
 def _excess(value: object, model: type[BaseModel]) -> str:
@@ -115,7 +130,7 @@ class MeasurementBatch(BaseModel):
 
     json_bounds: ClassVar = Bounds(values=500_000, texts=250_000)
 
-    items: list[BatchItem] = Field(min_length=1, max_length=MAX_BATCH)
+    items: Annotated[list[BatchItem], WrapValidator(_each_item)] = Field(min_length=1, max_length=MAX_BATCH)
 
 
 class ScanBatch(BaseModel):
