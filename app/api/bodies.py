@@ -84,6 +84,7 @@ class BodyMiddleware:
         declared = declared_bytes(headers)
         if declared is not None and declared > limit:
             raise self._too_large(intake, limit)
+        intake.check_media_type(headers)
         with self.budget.lease(principal.name if principal else "") as lease:
             if declared is not None and declared > SMALL_BYTES:
                 lease.cover(declared)

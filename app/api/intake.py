@@ -44,10 +44,9 @@ class Intake:
         Raises
         ------
         ProblemError, MissionNotFoundError
-            When the request is not one to read on: from whom it comes, what it declares, where it goes.
+            When the request is not one to read on: by whom it is, or where it goes.
         """
         principal = None if self.role is None else await self.role.admit(HTTPConnection(scope), edge)
-        self._check_media_type(Headers(scope=scope))
         mission_id = scope.get("path_params", {}).get("mission_id", "")
         # Other ids than these the route itself refuses, and says why.
         if _MISSION_ID.fullmatch(mission_id):
@@ -59,7 +58,8 @@ class Intake:
         limits = {BodyKind.JSON: max_bytes, BodyKind.FILE: max_file_bytes, BodyKind.NONE: MAX_IGNORED_BYTES}
         return limits[self.kind]
 
-    def _check_media_type(self, headers: Headers) -> None:
+    def check_media_type(self, headers: Headers) -> None:
+        """Raise ProblemError where a body is declared as something that the route does not take."""
         if self.kind is not BodyKind.JSON or not has_body(headers):
             return
         if not _is_json(headers.get("content-type", "")):

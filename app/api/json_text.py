@@ -61,7 +61,10 @@ def parse(body: bytes) -> Any:
     begin = _BLANKS.match(text).end()  # type: ignore[union-attr]
     if len(text) <= WINDOW:
         return _decoder.decode(text)
-    found, end = _member(text, begin)
+    try:
+        found, end = _member(text, begin)
+    except StopIteration as stop:
+        raise JSONDecodeError("Expecting value", text, stop.value) from None
     end = _BLANKS.match(text, end).end()  # type: ignore[union-attr]
     if end != len(text):
         raise JSONDecodeError("Extra data", text, end)
