@@ -40,11 +40,14 @@ from app.api import (
 )
 from app.api.audit_log import AuditLog, AuditMiddleware
 from app.api.auth import console_log_in
+from app.api.bodies import BodyMiddleware
+from app.api.budget import Budget
 from app.api.connections import Sockets, is_shared_host, patient_http
 from app.api.forwarding import ForwardingMiddleware, PeerMiddleware
 from app.api.health import health_router
+from app.api.intake import Intakes
 from app.api.limits import LimitMiddleware, Limits
-from app.api.middleware import BodyMiddleware, RequestMiddleware
+from app.api.middleware import RequestMiddleware
 from app.api.peers import is_own_user
 from app.api.quotas import Shares
 from app.api.schemas import API
@@ -52,9 +55,10 @@ from app.api.sessions import SessionStore
 from app.api.shares import ShareMiddleware
 from app.api.state import EdgeState
 from app.api.tokens import Role, TokenStore
+from app.api.unread import UnreadBodyMiddleware
 from app.dashboard.serve import mount_dashboard
 from app.descriptors import allow_descriptors
-from app.memory import keep_memory_together
+from app.memory import keep_memory_together, settled
 from app.missions.service import MissionService
 from app.settings import Settings, StartupError, is_loopback, load_settings
 from app.storage.audit import Command
@@ -148,7 +152,7 @@ def create_app(settings: Settings | None = None, *, port: int | None = None) -> 
         openapi_tags=openapi.TAGS,
         lifespan=lifespan,
     )
-    for router in (
+    routers = (
         missions.router,
         forecasts.router,
         measurements.router,
@@ -163,29 +167,34 @@ def create_app(settings: Settings | None = None, *, port: int | None = None) -> 
         auditing.router,
         signing_in.router,
         health_router(API),
-    ):
+    )
+    for router in routers:
         app.include_router(router)
     app.include_router(health_router(""), include_in_schema=False)
     mount_dashboard(app, charts=settings.charts)
     problems.install(app)
     openapi.install(app)
-    if settings.allowed_origins:
-        app.add_middleware(
-            CORSMiddleware, allow_origins=settings.allowed_origins, allow_methods=["*"], allow_headers=["*"]
-        )
     app.add_middleware(ForwardingMiddleware)
     app.add_middleware(
         BodyMiddleware,
+        intakes=Intakes(routers),
+        budget=Budget(settings.bytes_in_flight),
         max_bytes=settings.max_body_bytes,
         max_file_bytes=settings.max_import_bytes,
         patience_s=settings.slow_client_s,
     )
+    if settings.allowed_origins:
+        # Outside of the former, so that pages of these origins can read why they were refused.
+        app.add_middleware(
+            CORSMiddleware, allow_origins=settings.allowed_origins, allow_methods=["*"], allow_headers=["*"]
+        )
     app.add_middleware(AuditMiddleware)
     app.add_middleware(LimitMiddleware, limits=limits)
     app.state.shares = Shares(settings.max_connections)
     app.add_middleware(ShareMiddleware, shares=app.state.shares)
     app.add_middleware(PeerMiddleware)
     app.add_middleware(RequestMiddleware)
+    app.add_middleware(UnreadBodyMiddleware)
     return app
 
 
@@ -350,7 +359,8 @@ async def serve(
         app = create_app(settings, port=listening.getsockname()[1])
         async with app.router.lifespan_context(app):
             first_token = await _first_token(app.state.edge) if with_first_token else None
-            await Server(app, listening, started, first_token).serve(sockets=[listening])
+            with settled():
+                await Server(app, listening, started, first_token).serve(sockets=[listening])
     finally:
         listening.close()
 

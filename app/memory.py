@@ -1,7 +1,10 @@
 """How the process gets its memory from the system."""
 
 import ctypes
+import gc
 import platform
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 ARENAS = 2
 LARGE_BYTES = 512 * 1024
@@ -21,3 +24,17 @@ def keep_memory_together() -> None:
     libc = ctypes.CDLL(None)
     for setting, value in ((_M_ARENA_MAX, ARENAS), (_M_MMAP_THRESHOLD, LARGE_BYTES), (_M_TRIM_THRESHOLD, LARGE_BYTES)):
         libc.mallopt(setting, value)
+
+
+@contextmanager
+def settled() -> Iterator[None]:
+    """Leave what was made so far out of the search for garbage, until the end of the block.
+
+    Modules, models and compiled code are hundreds of thousands of objects; to look through all of them stops every
+    thread for as long as half a second, and happens whenever a large request makes many new ones.
+    """
+    gc.freeze()
+    try:
+        yield
+    finally:
+        gc.unfreeze()

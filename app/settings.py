@@ -134,6 +134,13 @@ class Settings(BaseSettings):
         description="Read imported files also where the kernel has neither Landlock nor seccomp, which keep them from "
         "reading other files",
     )
+    max_bytes_in_flight: int = Field(
+        default=256 * 2**20,
+        ge=1024,
+        le=2**40,
+        description="Most bytes of request bodies and files under way at the same time, of which nobody gets all; at "
+        "least twice the largest of them",
+    )
     max_streams: int = Field(
         default=200,
         ge=1,
@@ -213,6 +220,11 @@ class Settings(BaseSettings):
     def loopback(self) -> bool:
         """Whether only this machine can connect."""
         return is_loopback(self.host)
+
+    @property
+    def bytes_in_flight(self) -> int:
+        """Most bytes of requests under way at the same time: room for two of the largest, whatever is set."""
+        return max(self.max_bytes_in_flight, 2 * self.max_body_bytes, 2 * self.max_import_bytes)
 
     @property
     def migrates_itself(self) -> bool:

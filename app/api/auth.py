@@ -2,7 +2,7 @@
 
 import asyncio
 import ipaddress
-from collections.abc import Awaitable, Callable
+from dataclasses import dataclass
 from typing import Annotated
 from urllib.parse import urlsplit
 
@@ -177,26 +177,36 @@ def _check_origin(connection: HTTPConnection, state: EdgeState) -> None:
         )
 
 
-def _allow(roles: frozenset[Role], doing: str) -> Callable[..., Awaitable[Principal]]:
-    async def dependency(
-        connection: HTTPConnection, state: State, _: Annotated[object, Security(_bearer)]
+@dataclass(frozen=True)
+class RoleCheck:
+    """Lets those ask who have one of ``roles``; a dependency of routes, and asked before their bodies are read."""
+
+    roles: frozenset[Role]
+    doing: str
+
+    async def __call__(
+        self, connection: HTTPConnection, state: State, _: Annotated[object, Security(_bearer)]
     ) -> Principal:
-        principal = await authenticate(connection, state)
-        if principal.role not in roles:
+        """Return who asks."""
+        return await self.admit(connection, state)
+
+    async def admit(self, connection: HTTPConnection, state: EdgeState) -> Principal:
+        """Return who asks, looked up once for a request. Raises ProblemError (unauthenticated, forbidden)."""
+        known: Principal | None = connection.scope.get("state", {}).get("principal")
+        principal = known or await authenticate(connection, state)
+        if principal.role not in self.roles:
             raise ProblemError(
                 "forbidden",
-                f"the token {principal.name!r} has role {principal.role}, which may not {doing}",
-                remedy="Use a token with one of the roles " + ", ".join(sorted(roles)),
+                f"the token {principal.name!r} has role {principal.role}, which may not {self.doing}",
+                remedy="Use a token with one of the roles " + ", ".join(sorted(self.roles)),
             )
         return principal
 
-    return dependency
 
-
-Reader = Annotated[Principal, Depends(_allow(READERS, "look"))]
-VehicleOrOperator = Annotated[Principal, Depends(_allow(VEHICLES, "act as a vehicle"))]
-Admin = Annotated[Principal, Depends(_allow(ADMINS, "see the audit log"))]
-Operator = Annotated[Principal, Depends(_allow(OPERATORS, "command missions"))]
+Reader = Annotated[Principal, Depends(RoleCheck(READERS, "look"))]
+VehicleOrOperator = Annotated[Principal, Depends(RoleCheck(VEHICLES, "act as a vehicle"))]
+Admin = Annotated[Principal, Depends(RoleCheck(ADMINS, "see the audit log"))]
+Operator = Annotated[Principal, Depends(RoleCheck(OPERATORS, "command missions"))]
 
 
 def check_vehicle(principal: Principal, vehicle: str) -> None:

@@ -3,6 +3,7 @@
 from fastapi import APIRouter
 
 from app.api.auth import Operator, Reader
+from app.api.json_route import JsonRoute
 from app.api.problems import problems
 from app.api.schemas import API, MissionId
 from app.api.state import Service
@@ -10,7 +11,10 @@ from app.missions.correction_views import CorrectionsView, TideCorrection
 from app.missions.spec import SoundSpeed
 
 router = APIRouter(
-    prefix=f"{API}/missions/{{mission_id}}", tags=["maps"], responses=problems("unauthenticated", "forbidden")
+    route_class=JsonRoute,
+    prefix=f"{API}/missions/{{mission_id}}",
+    tags=["maps"],
+    responses=problems("unauthenticated", "forbidden"),
 )
 
 _CHANGE = problems("malformed-body", "mission-not-found", "body-too-large", "unsupported-media-type", "invalid-request")

@@ -7,6 +7,7 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Body, Query, Request, Response
 
 from app.api.auth import Operator
+from app.api.json_route import JsonRoute
 from app.api.missions import EXAMPLE_SPEC
 from app.api.problems import problems
 from app.api.schemas import API, MissionId
@@ -14,7 +15,9 @@ from app.api.state import Service
 from app.missions.forecasts import ForecastView
 from app.missions.spec import MissionSpec
 
-router = APIRouter(prefix=API, tags=["missions"], responses=problems("unauthenticated", "forbidden"))
+router = APIRouter(
+    route_class=JsonRoute, prefix=API, tags=["missions"], responses=problems("unauthenticated", "forbidden")
+)
 
 LOOK_S = 0.2
 """How often it is looked whether a client still waits."""

@@ -9,16 +9,18 @@ from types import SimpleNamespace
 import httpx
 import structlog
 from starlette.requests import HTTPConnection
-from starlette.types import ASGIApp, Message, Receive, Scope, Send
+from starlette.types import ASGIApp, Receive, Scope, Send
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed, InvalidHandshake
 from websockets.typing import Subprotocol
 
 from app.api.auth import authenticate, until_unwelcome
+from app.api.bodies import READING
 from app.api.problems import ProblemError, instance_of, make_problem, problem_response
 from app.api.processes import Deliveries, comes_from_peer, end_to_end, recognise, target_without_token, tls_of
 from app.api.racing import first_of
 from app.api.schemas import API
+from app.api.spool import Spool, spool_folder
 from app.api.state import EdgeState
 from app.missions.ownership import Peer
 
@@ -79,7 +81,7 @@ class ForwardingMiddleware:
         edge: EdgeState = scope["app"].state.edge
         found = _OF_A_MISSION.match(scope["path"])
         peer = await edge.service.process.owner(found[1]) if found else None
-        if found is None or peer is None:
+        if found is None or peer is None or not _is_of_a_route(scope):
             await self.app(scope, receive, send)
         elif comes_from_peer(scope):
             # Sent on once is enough: whoever sent it looks again where the mission is.
@@ -92,16 +94,20 @@ class ForwardingMiddleware:
         else:
             scope["route"] = _ROUTE
             scope["state"]["sent_on"] = True
-            await self._send_on(edge, found[1], scope, receive, send)
+            with contextlib.closing(Spool(spool_folder(edge.settings.database_url))) as body:
+                if "intake" in scope:
+                    await body.fill(receive)
+                await self._send_on(edge, found[1], body, scope, receive, send)
 
-    async def _send_on(self, edge: EdgeState, mission_id: str, scope: Scope, receive: Receive, send: Send) -> None:
-        body = await _body(receive)
+    async def _send_on(
+        self, edge: EdgeState, mission_id: str, body: Spool, scope: Scope, receive: Receive, send: Send
+    ) -> None:
         loop = asyncio.get_running_loop()
         deadline_s = loop.time() + TAKEOVER_S
         while loop.time() < deadline_s:
             peer = await edge.service.process.owner(mission_id)
             if peer is None:
-                await self.app(scope, _once(body, receive), send)
+                await self.app(scope, body.replayed(receive) if "intake" in scope else receive, send)
                 return
             if peer.url == edge.service.process.url:
                 await _refuse(scope, receive, send, *_SAME_ADDRESS)
@@ -136,6 +142,11 @@ class ForwardingMiddleware:
         )
 
 
+def _is_of_a_route(scope: Scope) -> bool:
+    """Tell whether there is such a route: the body of a request that may change something was let in for one only."""
+    return scope["type"] == "websocket" or scope["method"] in READING or "intake" in scope
+
+
 async def _is_known(edge: EdgeState, scope: Scope) -> bool:
     try:
         await authenticate(HTTPConnection(scope), edge)
@@ -145,8 +156,9 @@ async def _is_known(edge: EdgeState, scope: Scope) -> bool:
 
 
 @contextlib.asynccontextmanager
-async def _asked(edge: EdgeState, peer: Peer, scope: Scope, body: bytes) -> AsyncIterator[httpx.Response]:
-    request = edge.peers.request(peer, scope, target_without_token(scope), content=body)
+async def _asked(edge: EdgeState, peer: Peer, scope: Scope, body: Spool) -> AsyncIterator[httpx.Response]:
+    content = body.parts() if body.size else b""
+    request = edge.peers.request(peer, scope, target_without_token(scope), content, body.size)
     answer = await edge.peers.to(peer).send(request, stream=True)
     try:
         yield answer
@@ -191,29 +203,6 @@ async def _until_left(receive: Receive) -> None:
         pass
 
 
-async def _body(receive: Receive) -> bytes:
-    parts = []
-    more = True
-    while more:
-        message = await receive()
-        parts.append(message.get("body", b""))
-        more = message.get("more_body", False)
-    return b"".join(parts)
-
-
-def _once(body: bytes, receive: Receive) -> Receive:
-    given = False
-
-    async def replay() -> Message:
-        nonlocal given
-        if given:
-            return await receive()
-        given = True
-        return {"type": "http.request", "body": body, "more_body": False}
-
-    return replay
-
-
 async def _misdirect(scope: Scope, receive: Receive, send: Send, detail: str) -> None:
     """Say that this process is not the one that is meant."""
     if scope["type"] == "websocket":
@@ -256,7 +245,7 @@ async def _send_view_on(edge: EdgeState, peer: Peer, scope: Scope, receive: Rece
                 _pump_down(upstream, send),
                 _pump_up(upstream, receive),
                 edge.stopping.wait(),
-                until_unwelcome(HTTPConnection(scope), edge, query_token=True),
+                until_unwelcome(HTTPConnection(scope), edge),
             )
             code = upstream.close_code or CLOSE_TRY_AGAIN
             reason = upstream.close_reason or ""

@@ -5,6 +5,7 @@ from typing import Annotated
 from fastapi import APIRouter, Header, Query, Request, Response
 
 from app.api.auth import VehicleOrOperator, check_vehicle
+from app.api.json_route import JsonRoute
 from app.api.problems import ProblemError, problems
 from app.api.racing import first_of
 from app.api.schemas import API, MeasurementBatch, MissionId, VehicleName
@@ -14,7 +15,10 @@ from app.missions.sounding_views import BatchVerdict, ItemVerdict, Verdict
 from app.missions.views import WaypointView
 
 router = APIRouter(
-    prefix=f"{API}/missions/{{mission_id}}", tags=["vehicles"], responses=problems("unauthenticated", "forbidden")
+    route_class=JsonRoute,
+    prefix=f"{API}/missions/{{mission_id}}",
+    tags=["vehicles"],
+    responses=problems("unauthenticated", "forbidden"),
 )
 
 MAX_WAIT_S = 60.0

@@ -7,6 +7,7 @@ from fastapi import APIRouter, Body, Query, Request, Response
 from pydantic import TypeAdapter
 
 from app.api.auth import Operator, Reader
+from app.api.json_route import JsonRoute
 from app.api.problems import problems
 from app.api.schemas import API, ActionRequest, MissionId, NoteRequest, VehicleName
 from app.api.state import Service, State
@@ -15,7 +16,12 @@ from app.missions.spec import MissionSpec, VehicleSpec
 from app.missions.telemetry import TelemetryView
 from app.missions.views import ActionView, EventView, MissionSummary, MissionView, PreflightView, StepView
 
-router = APIRouter(prefix=f"{API}/missions", tags=["missions"], responses=problems("unauthenticated", "forbidden"))
+router = APIRouter(
+    route_class=JsonRoute,
+    prefix=f"{API}/missions",
+    tags=["missions"],
+    responses=problems("unauthenticated", "forbidden"),
+)
 
 _summaries = TypeAdapter(list[MissionSummary])
 

@@ -86,7 +86,7 @@ def _complete(schema: dict[str, Any]) -> dict[str, Any]:
                 parameter["schema"] = _without_null(parameter["schema"])
             responses = operation["responses"]
             if "requestBody" in operation:
-                _add(responses, problems("request-timeout"))
+                _add(responses, problems("request-timeout", "too-many-bytes", "overloaded"))
             if "401" in responses:
                 _add(responses, problems("too-many-requests"))
             operation["responses"] = dict(sorted(responses.items()))

@@ -1,13 +1,14 @@
 """Errors as RFC 9457 problem documents: what was wrong with which field, and what would be right."""
 
 import difflib
+import itertools
 import json
 import math
 import sqlite3
 import types
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from http import HTTPStatus
-from typing import Annotated, Any, Union, get_args, get_origin
+from typing import Annotated, Any, TypeVar, Union, get_args, get_origin
 
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
@@ -15,6 +16,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from sqlalchemy.exc import DBAPIError
 from starlette.exceptions import HTTPException
 from starlette.responses import Response
+from starlette.types import Scope
 
 from app.missions.errors import (
     ConflictError,
@@ -32,6 +34,8 @@ from app.missions.errors import (
 from app.missions.states import MoveRefusedError
 from app.storage.trouble import trouble_of
 
+T = TypeVar("T")
+
 MEDIA_TYPE = "application/problem+json"
 URN = "urn:bathyfleet:problem:"
 
@@ -40,6 +44,10 @@ MAX_ERRORS = 50
 RETRY_AFTER_S = 5
 MAX_SHOWN = 200
 """Longer values are shown shortened."""
+MAX_SHOWN_ENTRIES = 5
+"""Of a list or an object only so many are shown, and so many within each."""
+MAX_SUGGESTED = 64
+"""To longer names than any field has none is looked for that is like it."""
 
 
 class FieldProblem(BaseModel):
@@ -88,10 +96,12 @@ TITLES: dict[str, tuple[int, str]] = {
     "invalid-request": (422, "Some values cannot be taken"),
     "too-many-streams": (429, "Too many live views"),
     "too-many-requests": (429, "Too many requests"),
+    "too-many-bytes": (429, "Too much is sent at once"),
     "internal": (500, "Something went wrong inside the service"),
     "too-many-connections": (503, "Too many requests at the same time"),
     "mission-elsewhere": (503, "Another process has the mission"),
     "import-unavailable": (503, "No file can be read now"),
+    "overloaded": (503, "Too much is under way"),
     "not-ready": (503, "The service is not ready"),
     "database-unavailable": (503, "The database cannot be used now"),
 }
@@ -200,7 +210,26 @@ def plain(value: object) -> Any:
         return value if math.isfinite(value) else str(value)
     if isinstance(value, str):
         return _shortened(value)
-    return _shortened(repr(value))
+    return _shortened(_outline(value))
+
+
+def _outline(value: object, depth: int = 3) -> str:
+    """Return the beginning of ``value`` as text: what it costs does not grow with the value."""
+    if isinstance(value, dict):
+        shown = [f"{_outline(k, 0)}: {_outline(v, depth - 1)}" for k, v in _first(value.items())] if depth > 0 else []
+        return "{" + ", ".join(shown + ["…"] * (len(value) > len(shown))) + "}"
+    if isinstance(value, list | tuple):
+        shown = [_outline(entry, depth - 1) for entry in _first(value)] if depth > 0 else []
+        return "[" + ", ".join(shown + ["…"] * (len(value) > len(shown))) + "]"
+    if isinstance(value, str):
+        return repr(_shortened(value))
+    if isinstance(value, bool | float) or value is None:
+        return repr(value)
+    return str(plain(value)) if isinstance(value, int) else type(value).__name__
+
+
+def _first(entries: Iterable[T]) -> Iterator[T]:
+    return itertools.islice(entries, MAX_SHOWN_ENTRIES)
 
 
 def _shortened(text: str) -> str:
@@ -253,7 +282,8 @@ def field_problem(
         expected = _BOUNDS[kind].format_map(error.get("ctx", {}))
     elif kind == "extra_forbidden":
         known = sorted(_fields_at(model, path[:-1]))
-        close = difflib.get_close_matches(str(path[-1]), known, n=1)
+        name = str(path[-1])
+        close = difflib.get_close_matches(name, known, n=1) if known and len(name) <= MAX_SUGGESTED else []
         message = "There is no such field"
         expected = f"did you mean {close[0]}?" if close else "one of " + ", ".join(known) if known else "no such field"
     elif kind == "value_error":
@@ -264,7 +294,7 @@ def field_problem(
         expected = _EXPECTED.get(kind, message)
     return FieldProblem(
         location=location,
-        field=_shortened(".".join(str(part) for part in path)) or location,
+        field=_shortened(".".join(_shortened(str(part)) for part in path)) or location,
         value=None if kind == "missing" else plain(error.get("input")),
         message=_shortened(message),
         expected=_shortened(expected),
@@ -289,18 +319,13 @@ def _fields_at(annotation: object, path: Sequence[str | int]) -> set[str]:
 
 def _validation_problem(request: Request, error: RequestValidationError) -> Response:
     entries = error.errors()
-    if entries and entries[0]["type"] == "json_invalid":
-        position = entries[0]["loc"][-1]
-        return problem_response(
-            make_problem(
-                "malformed-body",
-                f"the body is not JSON: {entries[0].get('ctx', {}).get('error', '')} at character {position}",
-                instance=instance_of(request.scope),
-                remedy="Send the body as valid JSON (RFC 8259)",
-            )
-        )
     body_field = getattr(request.scope.get("route"), "body_field", None)
     body_model = body_field.field_info.annotation if body_field is not None else None
+    return problem_response(validation_problem(entries, body_model, request.scope))
+
+
+def validation_problem(entries: Sequence[Mapping[str, Any]], body_model: object, scope: Mapping[str, Any]) -> Problem:
+    """Explain errors of pydantic, the first :data:`MAX_ERRORS` of them; ``body_model`` is what the body should be."""
     listed = [
         field_problem(
             entry,
@@ -310,7 +335,7 @@ def _validation_problem(request: Request, error: RequestValidationError) -> Resp
         )
         for entry in entries[:MAX_ERRORS]
     ]
-    return problem_response(invalid(listed, len(entries), request.scope))
+    return invalid(listed, len(entries), scope)
 
 
 def invalid(errors: Sequence[FieldProblem], count: int, scope: Mapping[str, Any]) -> Problem:
@@ -410,6 +435,18 @@ def _database_problem(request: Request, error: Exception) -> Response:
     detail, _, remedy = trouble.partition(": ")
     problem = make_problem("database-unavailable", detail, instance=instance_of(request.scope), remedy=remedy)
     return problem_response(problem, {"Retry-After": str(RETRY_AFTER_S)})
+
+
+def answer_to(error: Exception, scope: Scope) -> Response:
+    """Return the answer to an error that arose before a route was reached; raises it where it has none."""
+    request = Request(scope)
+    if isinstance(error, ProblemError):
+        return _edge_problem(request, error)
+    if isinstance(error, MissionNotFoundError):
+        return _mission_problem(request, error)
+    if isinstance(error, DBAPIError | sqlite3.Error):
+        return _database_problem(request, error)
+    raise error
 
 
 def install(app: FastAPI) -> None:

@@ -13,7 +13,7 @@ import json
 import secrets
 import ssl
 from collections import OrderedDict
-from collections.abc import Iterable, Mapping
+from collections.abc import AsyncIterator, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 from urllib.parse import unquote_plus
@@ -154,13 +154,26 @@ class PeerClients:
             )
         return self._clients[peer]
 
-    def request(self, peer: Peer, scope: Scope, target: str, **content: Any) -> httpx.Request:
-        """Return a request that asks a process for ``target`` in the name of whoever asked this one."""
+    def request(
+        self,
+        peer: Peer,
+        scope: Scope,
+        target: str,
+        content: AsyncIterator[bytes] | bytes = b"",
+        length: int = 0,
+        **options: Any,
+    ) -> httpx.Request:
+        """Return a request that asks a process for ``target`` in the name of whoever asked this one.
+
+        ``length`` is how many bytes ``content`` has.
+        """
         url = httpx.URL(peer.url + target)
         # Signed as it goes out: the library may write some characters of the target in another way.
         headers = self.headers(peer, scope, url.raw_path.decode("latin-1"))
         encoded = [(name.encode("latin-1"), value.encode("latin-1")) for name, value in headers]
-        return self.to(peer).build_request(scope["method"], url, headers=encoded, **content)
+        if length:
+            encoded.append((b"content-length", str(length).encode()))
+        return self.to(peer).build_request(scope["method"], url, headers=encoded, content=content, **options)
 
     def headers(self, peer: Peer, scope: Scope, target: str) -> list[tuple[str, str]]:
         """Return the headers with which a request that was authenticated here is sent on, once."""

@@ -1,11 +1,22 @@
 """Bodies and parameters that only the HTTP edge knows; everything else is the missions' own models."""
 
-from typing import Annotated
+from contextvars import ContextVar
+from typing import Annotated, ClassVar
 
 from fastapi import Path
-from pydantic import BaseModel, ConfigDict, Field, PlainValidator, ValidationError
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    FailFast,
+    Field,
+    PlainValidator,
+    ValidationError,
+    ValidatorFunctionWrapHandler,
+    WrapValidator,
+)
 
-from app.api.problems import field_problem
+from app.api.json_text import Bounds
+from app.api.problems import MAX_ERRORS, field_problem
 from app.missions.measurement import Measurement
 from app.missions.search.posted import Scan
 from app.missions.search.scanning import MAX_SCANS
@@ -14,6 +25,11 @@ from app.missions.spec_base import Name
 API = "/api/v1"
 
 MAX_BATCH = 10_000
+MAX_FAULTS = 5
+"""Of one item so many are explained."""
+
+_suggestions = ContextVar("suggestions", default=MAX_ERRORS)
+"""For how many more faults of a batch a field is looked for that may have been meant."""
 
 MissionId = Annotated[
     str,
@@ -45,18 +61,48 @@ class NoteRequest(BaseModel):
 
 
 def _item(value: object) -> Measurement | str:
-    """Return the measurement, or in words why ``value`` is none."""
+    """Return the measurement, or in words why ``value`` is none: of the first faults, whatever their number."""
+    if excess := _excess(value, Measurement):
+        return excess
     try:
         return Measurement.model_validate(value)
     except ValidationError as error:
-        faults = [
-            field_problem(entry, location="body", path=entry["loc"], model=Measurement)
-            for entry in error.errors(include_url=False)
-        ]
-        return "; ".join(f"{f.field}: {f.message}; expected {f.expected}" for f in faults[:5])
+        entries = error.errors(include_url=False)[:MAX_FAULTS]
+        # What a name may have been meant for is looked for in the first ones only: it takes far longer than the rest.
+        left = _suggestions.get()
+        _suggestions.set(left - len(entries))
+        model = Measurement if left >= len(entries) else None
+        faults = [field_problem(entry, location="body", path=entry["loc"], model=model) for entry in entries]
+        return "; ".join(f"{f.field}: {f.message}; expected {f.expected}" for f in faults)
+
+
+def _each_item(items: object, check: ValidatorFunctionWrapHandler) -> list[Measurement | str]:
+    token = _suggestions.set(MAX_ERRORS)
+    try:
+        checked: list[Measurement | str] = check(items)
+        return checked
+    finally:
+        _suggestions.reset(token)
+
+
+def _excess(value: object, model: type[BaseModel]) -> str:
+    """Return in words that an object has far more fields than its model; nothing is made of it then."""
+    known = len(model.model_fields)
+    if not isinstance(value, dict) or len(value) <= known + MAX_FAULTS:
+        return ""
+    return f"{len(value)} fields: there are no more than {known}; expected one of {', '.join(model.model_fields)}"
+
+
+def _scan(value: object, check: ValidatorFunctionWrapHandler) -> Scan:
+    # One after the other here: in one go they would hold up every other thread.
+    if excess := _excess(value, Scan):
+        raise ValueError(excess)
+    scan: Scan = check(value)
+    return scan
 
 
 BatchItem = Annotated[Measurement | str, PlainValidator(_item, json_schema_input_type=Measurement)]
+BatchScan = Annotated[Scan, WrapValidator(_scan)]
 
 
 class MeasurementBatch(BaseModel):
@@ -82,7 +128,9 @@ class MeasurementBatch(BaseModel):
         },
     )
 
-    items: list[BatchItem] = Field(min_length=1, max_length=MAX_BATCH)
+    json_bounds: ClassVar = Bounds(values=500_000, texts=250_000)
+
+    items: Annotated[list[BatchItem], WrapValidator(_each_item)] = Field(min_length=1, max_length=MAX_BATCH)
 
 
 class ScanBatch(BaseModel):
@@ -109,7 +157,9 @@ class ScanBatch(BaseModel):
         },
     )
 
-    items: list[Scan] = Field(min_length=1, max_length=MAX_SCANS)
+    json_bounds: ClassVar = Bounds(values=3_000_000, texts=20_000)
+
+    items: Annotated[list[BatchScan], FailFast()] = Field(min_length=1, max_length=MAX_SCANS)
 
 
 class ComponentHealth(BaseModel):

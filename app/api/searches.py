@@ -5,6 +5,7 @@ from typing import Annotated
 from fastapi import APIRouter, Body, Query, Response
 
 from app.api.auth import Reader, VehicleOrOperator, check_vehicle
+from app.api.json_route import JsonRoute
 from app.api.problems import problems
 from app.api.schemas import API, MissionId, ScanBatch
 from app.api.state import Service
@@ -12,6 +13,7 @@ from app.missions.search.views import SearchGridView
 from app.missions.sounding_views import BatchVerdict
 
 router = APIRouter(
+    route_class=JsonRoute,
     prefix=f"{API}/missions/{{mission_id}}",
     tags=["searches"],
     responses=problems("unauthenticated", "forbidden", "mission-not-found", "invalid-request"),

@@ -3,13 +3,13 @@
 from fastapi import APIRouter, Request, Response
 from pydantic import BaseModel, Field
 
-from app.api.auth import LOCAL_OPERATOR, Reader
+from app.api.auth import Reader
 from app.api.limits import bearer_of
 from app.api.problems import problems
 from app.api.schemas import API
 from app.api.sessions import give_cookie, session_of, take_cookie
 from app.api.state import State
-from app.api.tokens import Principal, Role
+from app.api.tokens import LOCAL_OPERATOR, Principal, Role
 
 router = APIRouter(prefix=f"{API}/session", tags=["session"])
 

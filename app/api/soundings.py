@@ -5,6 +5,7 @@ from typing import Annotated
 from fastapi import APIRouter, Path, Query
 
 from app.api.auth import Operator, Reader
+from app.api.json_route import JsonRoute
 from app.api.problems import problems
 from app.api.schemas import API, ActionRequest, MissionId
 from app.api.state import Service
@@ -12,6 +13,7 @@ from app.missions.sounding_views import Ruling, SoundingPage, SoundingState, Sou
 from app.missions.spec_base import Name
 
 router = APIRouter(
+    route_class=JsonRoute,
     prefix=f"{API}/missions/{{mission_id}}/soundings",
     tags=["maps"],
     responses=problems("unauthenticated", "forbidden", "mission-not-found", "invalid-request"),

@@ -202,7 +202,7 @@ def decide(
         proposed, held = hold_before_hazards(search, names, origin, proposed)
         notes += held
     start = np.column_stack([np.array([where[name] for name in names]), origin[:, 2]])
-    for i in np.flatnonzero((start[:, :2] != origin[:, :2]).any(axis=1)):
+    for i in np.flatnonzero((start[:, :2] != origin[:, :2]).any(axis=1)).tolist():
         # It was planned for from the border, and comes from beyond it: there first where both is too far.
         if np.linalg.norm(proposed[i] - start[i]) > constraints.max_step_m:
             proposed[i, :2] = origin[i, :2]

@@ -23,6 +23,7 @@ from app.missions.corrections import NO_LEVEL
 from app.missions.errors import MissionElsewhereError
 from app.missions.fleet import ScanReport, SoundingReport, VehicleReport, WaypointReport
 from app.missions.gate import Gate, GatedSounding
+from app.missions.large import made_of
 from app.missions.messages import EventMessage
 from app.missions.outlasting import RETRY_S, Outlasting
 from app.missions.sounding_views import ItemVerdict, Verdict
@@ -207,18 +208,7 @@ class Journal:
         The verdicts in the order of the reports, and what to call once the transaction has committed.
         """
         gated, new = await self._store(session, reports, gate)
-        left = set(new)
-        verdicts = []
-        for index, item in enumerate(gated):
-            identity = _identity(item.report)
-            if _storable(item) and identity not in left:
-                verdicts.append(ItemVerdict(index=index, verdict=Verdict.DUPLICATE, reason="already stored"))
-                continue
-            if _storable(item):
-                left.discard(identity)
-            verdict = Verdict.ACCEPTED if item.accepted else Verdict.REJECTED
-            verdicts.append(ItemVerdict(index=index, verdict=verdict, reason=item.reason))
-        return verdicts, lambda: self._count(gated, new)
+        return await made_of(gated, _verdicts, gated, new), lambda: self._count(gated, new)
 
     async def log(self, level: Level, kind: str, message: str, **data: Any) -> None:
         """Write a line of the mission's log and show it to everyone who watches.
@@ -337,10 +327,13 @@ class Journal:
     async def _store(
         self, session: AsyncSession, reports: Sequence[SoundingReport], gate: Gate | None = None
     ) -> tuple[list[GatedSounding], set[sounding_queries.Identity]]:
-        gated = (gate or self._gate).check(reports)
-        received = now()
-        rows = [_row(self._mission_id, self.step, received, item) for item in gated if _storable(item)]
+        gated, rows = await made_of(reports, self._gated, reports, gate or self._gate)
         return gated, await sounding_queries.insert_new(session, rows)
+
+    def _gated(self, reports: Sequence[SoundingReport], gate: Gate) -> tuple[list[GatedSounding], list[dict[str, Any]]]:
+        """Return soundings as the gate judges them, and how they are stored."""
+        gated, received = gate.check(reports), now()
+        return gated, [_row(self._mission_id, self.step, received, item) for item in gated if _storable(item)]
 
     def _count(self, gated: Sequence[GatedSounding], new: set[sounding_queries.Identity]) -> None:
         first = {_identity(item.report): item for item in reversed(gated) if _storable(item)}
@@ -397,12 +390,35 @@ def _identity(report: SoundingReport) -> sounding_queries.Identity:
     return report.vehicle, report.time_s, report.beam
 
 
+def _verdicts(gated: Sequence[GatedSounding], new: set[sounding_queries.Identity]) -> list[ItemVerdict]:
+    """Return the verdicts on soundings of which those in ``new`` were stored."""
+    left = set(new)
+    verdicts = []
+    for index, item in enumerate(gated):
+        identity = _identity(item.report)
+        if _storable(item) and identity not in left:
+            verdicts.append(ItemVerdict(index=index, verdict=Verdict.DUPLICATE, reason="already stored"))
+            continue
+        if _storable(item):
+            left.discard(identity)
+        verdict = Verdict.ACCEPTED if item.accepted else Verdict.REJECTED
+        verdicts.append(ItemVerdict(index=index, verdict=verdict, reason=item.reason))
+    return verdicts
+
+
 def _storable(item: GatedSounding) -> bool:
     # NaN and infinity have no place in a database column that is summed later; the verdict still goes out.
     report = item.report
     place = report.footprint
-    values = (report.time_s, report.range_m, report.vehicle_depth_m, place.lat_deg, place.lon_deg, place.depth_m)
-    return all(math.isfinite(v) for v in values)
+    finite = math.isfinite
+    return (
+        finite(report.time_s)
+        and finite(report.range_m)
+        and finite(report.vehicle_depth_m)
+        and finite(place.lat_deg)
+        and finite(place.lon_deg)
+        and finite(place.depth_m)
+    )
 
 
 def _row(mission_id: str, step: int, received: Any, item: GatedSounding) -> dict[str, Any]:

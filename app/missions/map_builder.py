@@ -226,9 +226,9 @@ class MapBuilder:
     def _with_margin(self, bathymetry: BathymetricMap) -> BathymetricMap:
         """Ask more of cells that were not known in the newest map."""
         bound = bathymetry.claim_sd_m
-        margin = CLAIM_MARGIN + UNSEEN_MARGIN * float(np.isinf(bound[self.mask]).mean())
+        margin = np.full(bound.shape, CLAIM_MARGIN + UNSEEN_MARGIN * float(np.isinf(bound[self.mask]).mean()))
         if self._newest is not None:
-            margin = np.where(self._newest.map.known(self._accuracy_m), 1.0, margin)
+            margin[self._newest.map.known(self._accuracy_m)] = 1.0
         return replace(bathymetry, bound_sd_m=bound * margin)
 
     def _measured(self) -> BathymetricMap:

@@ -16,6 +16,7 @@ from app.missions.clock import now
 from app.missions.errors import ConflictError, InvalidRequestError
 from app.missions.fleet import BeamGeometry, Position, RangeReport, SoundingReport, VehicleReport
 from app.missions.hub import FleetHub
+from app.missions.large import each_of, made_of
 from app.missions.links.rest import RestFleetLink
 from app.missions.live import LiveMission
 from app.missions.measurement import Measurement
@@ -62,9 +63,7 @@ async def measure(
         raise ConflictError("the mission is a draft and takes no measurements yet", "add a vehicle to it first")
     if len(items) > MAX_BATCH:
         raise InvalidRequestError("items", f"{len(items)} items are too many", f"send at most {MAX_BATCH} at once")
-    digest = hashlib.sha256(orjson.dumps([item.model_dump() for item in items])).hexdigest()
-    strangers = {i: _stranger(live, item) for i, item in enumerate(items)}
-    reports = {i: report for i, item in enumerate(items) if not strangers[i] and (report := _sounding(item))}
+    digest, strangers, reports = await made_of(items, _looked_through, live, items)
     ranges = _ranges(live, items, strangers)
     key = _Key.of(sender, idempotency_key) if idempotency_key is not None else None
     batch = _Batch(items, key, digest, strangers, reports, ranges)
@@ -72,6 +71,17 @@ async def measure(
         live.intake = Grouped(partial(_take, live, hub, rest), lambda batch: bool(batch.ranges))
     answer: BatchVerdict = await live.intake(batch)
     return answer
+
+
+def _looked_through(
+    live: LiveMission, items: Sequence[Measurement]
+) -> tuple[str, dict[int, str], dict[int, SoundingReport]]:
+    """Return what a batch is known by, and by item why it is refused and its sounding; changes nothing."""
+    digest = hashlib.sha256(orjson.dumps([item.model_dump() for item in items])).hexdigest()
+    near = _all_near(items, live.frame)
+    strangers = {i: _stranger(live, item, near=near) for i, item in enumerate(items)}
+    reports = {i: report for i, item in enumerate(items) if not strangers[i] and (report := _sounding(item))}
+    return digest, strangers, reports
 
 
 @dataclass(frozen=True)
@@ -128,7 +138,7 @@ async def _take(
     for batch, result in zip(batches, results, strict=True):
         if isinstance(result, BatchVerdict):
             # The first answer may have got lost together with the process that knew where the vehicle is.
-            _hear(hub, rest, batch.known, only_unknown=result.replayed)
+            await _hear(hub, rest, batch.known, only_unknown=result.replayed)
     # Where the vehicle is, and whether it arrived, is on disk as well before it is answered.
     await live.journal.flush()
     return results
@@ -196,40 +206,42 @@ async def _store(
             on_ranges, used = await live.ranges.take(list(batch.ranges.values()), session)
             taken |= dict(zip(batch.ranges, on_ranges, strict=True))
             then.append(used)
-        answers.append(_batch_verdict(len(batch.items), taken, batch.strangers))
+        answers.append(await made_of(batch.items, _batch_verdict, len(batch.items), taken, batch.strangers))
     moment = now()
+    written = [await made_of(answer.items, partial(answer.model_dump, mode="json")) for answer in answers]
     session.add_all(
         BatchRow(
             mission_id=live.id,
             key=batch.key.stored,
             digest=batch.digest,
-            answer=answer.model_dump(mode="json"),
+            answer=answer,
             created_at=moment,
         )
-        for batch, answer in zip(batches, answers, strict=True)
+        for batch, answer in zip(batches, written, strict=True)
         if batch.key is not None
     )
     return answers, then
 
 
-def _hear(hub: FleetHub, rest: RestFleetLink, items: Sequence[Measurement], *, only_unknown: bool = False) -> None:
+async def _hear(
+    hub: FleetHub, rest: RestFleetLink, items: Sequence[Measurement], *, only_unknown: bool = False
+) -> None:
     """Tell the link where vehicles are; ``only_unknown``: of those only whose place it does not know."""
     known: set[str] = set()
     if only_unknown:
         names = {item.vehicle for item in items}
         known = {name for name in names if hub.info((VehicleKind.REST, name)).report is not None}
-    for item in items:
-        if item.vehicle not in known:
-            rest.heard(_vehicle_report(item))
+    fresh = [item for item in items if item.vehicle not in known]
+    await each_of(fresh, lambda item: rest.heard(_vehicle_report(item)))
 
 
-def _stranger(live: LiveMission, item: Measurement) -> str:
+def _stranger(live: LiveMission, item: Measurement, *, near: bool) -> str:
     member = live.team.get(item.vehicle)
     if member is None:
         return f"vehicle: {item.vehicle!r} takes no part in this mission"
     if member.spec.kind is not VehicleKind.REST:
         return f"vehicle: {item.vehicle!r} is of kind {member.spec.kind}; only vehicles of kind rest post measurements"
-    return _impossible_place(item, live.frame) or _useless_range(item, live)
+    return ("" if near else _impossible_place(item, live.frame)) or _useless_range(item, live)
 
 
 def _useless_range(item: Measurement, live: LiveMission) -> str:
@@ -259,6 +271,17 @@ def _ranges(live: LiveMission, items: Sequence[Measurement], strangers: Mapping[
         for i, item in enumerate(items)
         if item.target is not None and item.target_range_m is not None and not strangers[i]
     }
+
+
+def _all_near(items: Sequence[Measurement], frame: LocalFrame) -> bool:
+    """Tell whether every place is possible: at once, which costs far less than one by one."""
+    if not all(-90 <= item.lat_deg <= 90 and -180 <= item.lon_deg <= 180 for item in items):
+        return False
+    try:
+        frame.to_local([item.lat_deg for item in items], [item.lon_deg for item in items])
+    except ValueError:
+        return False
+    return True
 
 
 def _impossible_place(item: Measurement, frame: LocalFrame) -> str:

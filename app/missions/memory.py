@@ -5,6 +5,7 @@ from collections.abc import Awaitable, Callable, Iterator
 from concurrent.futures import Executor
 
 import structlog
+from sqlalchemy import select
 
 from app.missions.errors import MissionElsewhereError, MissionNotFoundError
 from app.missions.hub import FleetHub
@@ -47,6 +48,8 @@ class Memory:
         self._live: dict[str, LiveMission] = {}
         # As they were when they left memory.
         self._left: dict[str, MissionSummary] = {}
+        # Known to exist, whoever has them: missions are never deleted while a service runs.
+        self._seen: set[str] = set()
         self._loading = asyncio.Lock()
 
     def share(
@@ -70,6 +73,15 @@ class Memory:
         """Return a mission as it was when it ended and left memory; None where it is in memory or never was."""
         return None if mission_id in self._live else self._left.get(mission_id)
 
+    async def check_exists(self, mission_id: str) -> None:
+        """Raise MissionNotFoundError where there is no such mission; it is not taken up."""
+        if mission_id in self._live or mission_id in self._left or mission_id in self._seen:
+            return
+        async with self._database.reading() as session:
+            if await session.scalar(select(MissionRow.id).where(MissionRow.id == mission_id)) is None:
+                raise _not_found(mission_id)
+        self._seen.add(mission_id)
+
     async def get(self, mission_id: str) -> LiveMission:
         """Return a mission, taken up if need be. Raises MissionNotFoundError, MissionElsewhereError."""
         live = self._live.get(mission_id)
@@ -81,7 +93,7 @@ class Memory:
             async with self._database.reading() as session:
                 row = await session.get(MissionRow, mission_id)
             if row is None:
-                raise MissionNotFoundError(f"there is no mission {mission_id!r}", "GET /api/v1/missions lists all")
+                raise _not_found(mission_id)
             database = self._database
             if self._ownership is not None:
                 if not (await self._may_take_up(row) and await self._ownership.take(mission_id)):
@@ -134,6 +146,10 @@ class Memory:
             live.abandon()
         self._live.clear()
         self._left.clear()
+
+
+def _not_found(mission_id: str) -> MissionNotFoundError:
+    return MissionNotFoundError(f"there is no mission {mission_id!r}", "GET /api/v1/missions lists all")
 
 
 async def _always(_row: MissionRow) -> bool:

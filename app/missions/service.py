@@ -250,6 +250,10 @@ class MissionService:
         except MissionElsewhereError:
             return None
 
+    async def check_exists(self, mission_id: str) -> None:
+        """Raise MissionNotFoundError where there is no such mission; costs little, whoever has it."""
+        await self._memory.check_exists(mission_id)
+
     async def mission(self, mission_id: str) -> MissionView:
         """Return one mission. Raises MissionNotFoundError."""
         return mission_view(await self._get(mission_id))

@@ -9,7 +9,7 @@ from itertools import pairwise
 from typing import Annotated, Any, Self
 
 import numpy as np
-from pydantic import Field, field_validator, model_validator
+from pydantic import FailFast, Field, field_validator, model_validator
 from shapely.geometry import Point, Polygon
 from shapely.geometry.polygon import orient
 
@@ -248,7 +248,7 @@ class SoundSpeed(Model):
     """Sound speed correction: every beam is followed through the profile for the time that its sonar measured."""
 
     assumed_mps: float = Field(default=1500.0, ge=1300, le=1700, description="Speed that is set in the sonars, m/s")
-    profile: list[tuple[ProfileDepth, ProfileSpeed]] = Field(
+    profile: Annotated[list[tuple[ProfileDepth, ProfileSpeed]], FailFast()] = Field(
         min_length=1,
         max_length=2000,
         description="Measured speeds as [depth in m, speed in m/s], from top to bottom; one pair: the same everywhere",

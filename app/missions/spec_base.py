@@ -2,13 +2,15 @@
 
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator
+from pydantic import BaseModel, BeforeValidator, ConfigDict, FailFast, Field, field_validator
 from shapely.geometry import Polygon
 from shapely.validation import explain_validity
 
 Latitude = Annotated[float, Field(ge=-90, le=90, description="Latitude, WGS84 degrees")]
 Longitude = Annotated[float, Field(ge=-180, le=180, description="Longitude, WGS84 degrees")]
 Name = Annotated[str, Field(min_length=1, max_length=64, pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$")]
+
+MAX_POSITIONS = 1000
 
 
 class Model(BaseModel):
@@ -17,11 +19,21 @@ class Model(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
+def _is_no_longer_than_taken(ring: object) -> object:
+    if isinstance(ring, list | tuple) and len(ring) > MAX_POSITIONS:
+        raise ValueError(f"the ring has {len(ring)} positions, at most {MAX_POSITIONS} are taken: simplify it")
+    return ring
+
+
+# Looked at before its positions are, and no further than to the first that is wrong.
+Ring = Annotated[list[tuple[Longitude, Latitude]], FailFast(), BeforeValidator(_is_no_longer_than_taken)]
+
+
 class PolygonGeometry(Model):
     """A GeoJSON polygon: one closed outer ring of [longitude, latitude] positions, no holes."""
 
     type: Literal["Polygon"] = "Polygon"
-    coordinates: list[list[tuple[Longitude, Latitude]]] = Field(
+    coordinates: list[Ring] = Field(
         min_length=1,
         max_length=1,
         description="One ring of [longitude, latitude]; the last position repeats the first",
@@ -36,8 +48,6 @@ class PolygonGeometry(Model):
             raise ValueError(
                 "the ring needs at least 4 positions and must end where it began: repeat the first position as the last"
             )
-        if len(ring) > 1000:
-            raise ValueError(f"the ring has {len(ring)} positions, at most 1000 are taken: simplify it")
         polygon = Polygon(ring)
         if not polygon.is_valid:
             raise ValueError(f"the ring crosses or touches itself ({explain_validity(polygon)}): draw a simple polygon")

@@ -16,6 +16,8 @@ from app.storage.models import BatchRow, ImportRow, MissionRow, ReferenceRow, So
 LOG_KEY = "log-1"
 """What the keys of batches of vehicles' logs begin with."""
 
+ROWS_AT_ONCE = 200
+
 Identity = tuple[str, float, int]
 """What makes a sounding the same sounding within a mission: vehicle, vehicle's time, beam."""
 
@@ -30,8 +32,12 @@ async def insert_new(session: AsyncSession, rows: Sequence[dict[str, Any]]) -> s
         .on_conflict_do_nothing(index_elements=["mission_id", "vehicle", "time_s", "beam"])
         .returning(SoundingRow.vehicle, SoundingRow.time_s, SoundingRow.beam)
     )
-    result = await session.execute(statement, list(rows))
-    return {(vehicle, time_s, beam) for vehicle, time_s, beam in result}
+    new: set[Identity] = set()
+    # Some at a time: a statement is prepared by the event loop's thread.
+    for first in range(0, len(rows), ROWS_AT_ONCE):
+        result = await session.execute(statement, list(rows[first : first + ROWS_AT_ONCE]))
+        new.update((vehicle, time_s, beam) for vehicle, time_s, beam in result)
+    return new
 
 
 def accepted_query(

@@ -57,7 +57,7 @@ async def test_every_command_is_written_down_before_it_is_answered(
         await client.post("/missions", json={"name": 7}, headers=operator)
         assert (await newest())[2:] == ("createMission", "refused", 422)
         await client.post("/missions", content=b"x" * 10_000_000, headers=operator)
-        assert (await newest())[2:] == ("POST", "refused", 413)
+        assert (await newest())[2:] == ("createMission", "refused", 413)
 
         before = len(await entries(client, admin))
         await client.post(f"{path}/measurements", json={"items": soundings(2)}, headers=tokens["vehicle"])

@@ -1,6 +1,8 @@
 """Scans as they are posted."""
 
-from pydantic import BaseModel, ConfigDict, Field
+from typing import Annotated
+
+from pydantic import BaseModel, ConfigDict, FailFast, Field
 
 from app.missions.spec_base import Latitude, Longitude, Name
 
@@ -24,7 +26,7 @@ class Scan(BaseModel):
         gt=0, le=360, description="By how much further clockwise each next beam looks", examples=[1.0]
     )
     reach_m: float = Field(gt=0, le=1000, description="Within this range it tells of everything", examples=[12.0])
-    ranges_m: list[float | None] = Field(
+    ranges_m: Annotated[list[float | None], FailFast()] = Field(
         min_length=1,
         max_length=MOST_BEAMS,
         description="Range of each beam's first echo; null, or more than reach_m: there was none within reach",

@@ -1,5 +1,6 @@
 """Scans that vehicles, or computers aboard of them, post: judged one by one, stored together."""
 
+import asyncio
 from collections.abc import Sequence
 
 from app.missions.errors import ConflictError, InvalidRequestError
@@ -13,6 +14,8 @@ from app.missions.states import MissionState
 from app.missions.verdicts import batch_verdict
 
 MAX_SCANS = 1000
+SCANS_AT_ONCE = 20
+"""So many are stored in one transaction."""
 
 
 async def scan(live: LiveMission, items: Sequence[Scan]) -> BatchVerdict:
@@ -33,12 +36,16 @@ async def scan(live: LiveMission, items: Sequence[Scan]) -> BatchVerdict:
     if len(items) > MAX_SCANS:
         raise InvalidRequestError("items", f"{len(items)} scans are too many", f"send at most {MAX_SCANS} at once")
     refused = {i: reason for i, item in enumerate(items) if (reason := _stranger(live, item.vehicle))}
-    taken = {i: report_of_posted(item) for i, item in enumerate(items) if i not in refused}
-    async with live.journal.writing, live.database.writing() as session:
-        verdicts, committed = await live.journal.take_scans(list(taken.values()), session)
-    committed()
     answers = [ItemVerdict(index=i, verdict=Verdict.REJECTED, reason=reason) for i, reason in refused.items()]
-    answers += [verdict.model_copy(update={"index": i}) for i, verdict in zip(taken, verdicts, strict=True)]
+    taken = [i for i in range(len(items)) if i not in refused]
+    # Some at a time: adding them to the grid is computing, and nobody else gets his turn meanwhile.
+    for first in range(0, len(taken), SCANS_AT_ONCE):
+        group = taken[first : first + SCANS_AT_ONCE]
+        async with live.journal.writing, live.database.writing() as session:
+            verdicts, committed = await live.journal.take_scans([report_of_posted(items[i]) for i in group], session)
+        committed()
+        answers += [verdict.model_copy(update={"index": i}) for i, verdict in zip(group, verdicts, strict=True)]
+        await asyncio.sleep(0)
     return batch_verdict(sorted(answers, key=lambda answer: answer.index))
 
 
