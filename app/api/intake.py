@@ -85,7 +85,7 @@ class Intakes:
             for route in router.routes:
                 if isinstance(route, APIRoute):
                     intake = Intake(route, _role(route), _kind(route))
-                    for method in route.methods:
+                    for method in route.methods or ():
                         self._by_method.setdefault(method, []).append(intake)
 
     def find(self, scope: Scope) -> Intake | None:

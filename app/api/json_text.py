@@ -1,7 +1,7 @@
 """JSON made into values: first bounded, then read in pieces, so that other threads are not held up."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from json import JSONDecodeError, JSONDecoder
 from json.decoder import JSONArray, JSONObject  # type: ignore[attr-defined]
@@ -19,6 +19,7 @@ _ESCAPE = re.compile(
     rb"\\(?:u[dD][89abAB][0-9a-fA-F]{2}\\u[dD][c-fC-F][0-9a-fA-F]{2}|(?P<bad>u0000|u[dD][89a-fA-F])|.)", re.DOTALL
 )
 _decoder = JSONDecoder()
+_scan_once: Callable[[str, int], tuple[Any, int]] = _decoder.scan_once  # type: ignore[attr-defined]
 
 
 @dataclass(frozen=True)
@@ -78,7 +79,7 @@ def _member(text: str, index: int) -> tuple[Any, int]:
         return JSONObject((text, index + 1), True, _member, None, None, {})  # type: ignore[no-any-return]
     if begin == "[":
         return JSONArray((text, index + 1), _Window().entry)  # type: ignore[no-any-return]
-    return _decoder.scan_once(text, index)  # type: ignore[no-any-return]
+    return _scan_once(text, index)
 
 
 class _Window:
@@ -106,7 +107,7 @@ class _Window:
             return None
         last = self._first + size == len(text)
         try:
-            value, end = _decoder.scan_once(self._piece, inside)
+            value, end = _scan_once(self._piece, inside)
         except StopIteration as stop:
             if last or stop.value + _LONGEST_WORD < size:
                 raise StopIteration(self._first + stop.value) from None
