@@ -18,6 +18,7 @@ from dataclasses import dataclass
 import ifaddr
 
 from imc_bridge.settings import BridgeSettings
+from imc_bridge.sieve import divert
 from imc_bridge.streams import TcpStreams
 
 Address = tuple[str, int]
@@ -25,6 +26,7 @@ PacketHandler = Callable[[bytes, Address], None]
 
 LOOPBACK = "127.0.0.1"
 _RECEIVE_BUFFER_BYTES = 16 << 20
+_SO_REUSEPORT = getattr(socket, "SO_REUSEPORT", 0)
 _SO_RCVBUFFORCE = 33
 """Linux: a receive buffer beyond what the system allows everybody, for programs that may have it."""
 _SO_MEMINFO = 55
@@ -101,6 +103,8 @@ class Transport:
         self._on_announce = on_announce
         self._traffic: socket.socket | None = None
         self._announces: socket.socket | None = None
+        self._unread: socket.socket | None = None
+        """Gets what nobody needs."""
         self._loop: asyncio.AbstractEventLoop | None = None
         self.interfaces: list[Interface] = []
         self.announce_port: int | None = None
@@ -125,7 +129,9 @@ class Transport:
         self.interfaces = choose_interfaces(settings)
         host = LOOPBACK if settings.loopback_only else "0.0.0.0"  # noqa: S104 - vehicles come from any interface
         try:
-            self._traffic = _bound_socket(host, settings.port)
+            # Shared with nobody but our own second socket.
+            _bound_socket(host, settings.port).close()
+            self._traffic = _bound_socket(host, settings.port, shared=True)
         except OSError as error:
             raise PortInUseError(
                 f"UDP port {settings.port} cannot be bound ({error.strerror}): another console or bathyfleet "
@@ -136,6 +142,7 @@ class Transport:
         if _MSG_ERRQUEUE:
             with contextlib.suppress(OSError):
                 self._traffic.setsockopt(socket.IPPROTO_IP, _IP_RECVERR, 1)
+        self._unread = _unread_socket(self._traffic)
         self._announces = self._bind_announces(host)
         self._loop.add_reader(self._traffic, self._drain, self._traffic, self._on_packet)
         self._loop.add_reader(self._announces, self._drain, self._announces, self._on_announce)
@@ -208,7 +215,9 @@ class Transport:
                 if self._loop is not None:
                     self._loop.remove_reader(sock)
                 sock.close()
-        self._traffic = self._announces = None
+        if self._unread is not None:
+            self._unread.close()
+        self._traffic = self._announces = self._unread = None
 
     def _drain(self, sock: socket.socket, handler: PacketHandler) -> None:
         for taken in range(_PACKETS_PER_TURN):
@@ -290,10 +299,12 @@ class Transport:
                 self.send(packet, (interface.broadcast, port))
 
 
-def _bound_socket(host: str, port: int) -> socket.socket:
+def _bound_socket(host: str, port: int, *, shared: bool = False) -> socket.socket:
     sock = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     try:
         sock.setblocking(False)
+        if shared and _SO_REUSEPORT:
+            sock.setsockopt(socket.SOL_SOCKET, _SO_REUSEPORT, 1)
         sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _RECEIVE_BUFFER_BYTES)
         with contextlib.suppress(OSError):
             sock.setsockopt(socket.SOL_SOCKET, _SO_RCVBUFFORCE, _RECEIVE_BUFFER_BYTES)
@@ -302,3 +313,20 @@ def _bound_socket(host: str, port: int) -> socket.socket:
         sock.close()
         raise
     return sock
+
+
+def _unread_socket(traffic: socket.socket) -> socket.socket | None:
+    """A socket on the port of ``traffic`` that gets the messages that nobody needs; None where there can be none."""
+    if not _SO_REUSEPORT:
+        return None
+    host, port = traffic.getsockname()
+    unread = None
+    try:
+        unread = _bound_socket(host, port, shared=True)
+        unread.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 0)
+        divert(traffic)
+    except OSError:
+        if unread is not None:
+            unread.close()
+        return None
+    return unread

@@ -3,19 +3,21 @@
 import socket
 
 import imcpy
+import pytest
 
 from app.missions import metrics
 from app.missions.links.imc import ImcFleetLink
-from imc_bridge import BridgeSettings, PacketsDropped
+from imc_bridge import Bridge, BridgeSettings, PacketsDropped, PortInUseError
 from imc_bridge.doctor import Cause, judge
 from imc_bridge.drops import RECENT_WALL_S, DropMeter
+from imc_bridge.sieve import LOUD
 from tests.imc_bridge.conftest import open_sea, until
 from tests.ports import free_ports
 
 
 def flood(port: int, count: int = 20_000) -> None:
     """Send more than any buffer holds while nobody reads."""
-    packet = bytes(imcpy.ServoPosition().serialize()) + bytes(2000)
+    packet = bytes(imcpy.Rpm().serialize()) + bytes(2000)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
         for _ in range(count):
             sender.sendto(packet, ("127.0.0.1", port))
@@ -75,3 +77,25 @@ async def test_every_engaged_vehicle_is_asked_to_send_seldom_what_is_loud():
         assert "SimulatedState:0.5" in limiter._rate_text, "what it limits by itself stays limited"
         await sea.bridge.stop(name)
         await until(lambda: "ServoPosition" not in limiter._rate_text, "it has its own rates back")
+
+
+async def test_what_nobody_needs_is_neither_read_nor_a_loss():
+    async with open_sea() as sea:
+        await sea.ready()
+        read, loud = sea.bridge.decoder.unwanted["Rpm"], [getattr(imcpy, name)() for name in LOUD]
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+            for _ in range(2000):
+                for message in loud:
+                    sender.sendto(message.serialize(), ("127.0.0.1", sea.settings.port))
+            rpm = imcpy.Rpm()
+            sender.sendto(rpm.serialize(), ("127.0.0.1", sea.settings.port))
+        await until(lambda: sea.bridge.decoder.unwanted["Rpm"] > read, "what came last was read")
+        assert not any(sea.bridge.decoder.unwanted[name] for name in LOUD)
+        sea.bridge.drops.look(1e9)
+        assert sea.bridge.drops.total == 0
+
+
+async def test_the_port_is_nobody_elses_all_the_same():
+    async with open_sea() as sea:
+        with pytest.raises(PortInUseError):
+            await Bridge(sea.settings).start(lambda _event: None)
