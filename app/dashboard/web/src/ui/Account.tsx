@@ -14,7 +14,6 @@ export function AccountButton() {
       type="button"
       class={`tool account${whyNotCommand.value ? " looks-only" : ""}`}
       data-testid="account"
-      aria-label={`Signed in: ${words}`}
       title={`Signed in: ${words}`}
       onClick={() => {
         accountOpen.value = true;
