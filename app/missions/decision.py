@@ -192,7 +192,7 @@ def decide(
         if not np.isfinite(proposed[i]).all():
             continue  # the check makes the vehicle hold
         proposed[i, 2] = safety.travel_depth_m(
-            where[place.vehicle], proposed[i, :2], place.cruise_depth_m, cautious, constraints.min_altitude_m
+            place.en_m, proposed[i, :2], place.cruise_depth_m, cautious, constraints.min_altitude_m
         )
         if up[i]:
             # It goes on along its leg while it rises; the checks below are the same for it as for everyone.
@@ -201,13 +201,18 @@ def decide(
     if search is not None:
         proposed, held = hold_before_hazards(search, names, origin, proposed)
         notes += held
-    start = np.column_stack([np.array([where[name] for name in names]), origin[:, 2]])
-    for i in np.flatnonzero((start[:, :2] != origin[:, :2]).any(axis=1)).tolist():
-        # It was planned for from the border, and comes from beyond it: there first where both is too far.
-        if np.linalg.norm(proposed[i] - start[i]) > constraints.max_step_m:
-            proposed[i, :2] = origin[i, :2]
-        proposed[i] = _within_step(start[i], proposed[i], constraints.max_step_m)
-    checked = safety.check_step(names, start, proposed, constraints, bottom)
+    for i, place in enumerate(team):
+        start = where[place.vehicle]
+        if np.array_equal(start, place.en_m) or not np.isfinite(proposed[i]).all():
+            continue
+        # It was planned for from the border, and comes from beyond it: no farther than there where both is too far.
+        if np.linalg.norm(proposed[i, :2] - start) > constraints.max_step_m:
+            proposed[i] = origin[i]
+        depth_m = safety.travel_depth_m(
+            start, proposed[i, :2], place.cruise_depth_m, cautious, constraints.min_altitude_m
+        )
+        proposed[i, 2] = min(proposed[i, 2], depth_m)
+    checked = safety.check_step(names, origin, proposed, constraints, bottom)
     notes += [f"{name}: {reason}" for name, reason in (checked.corrections | checked.refusals).items()]
     layered = {vehicle.name for vehicle in spec.vehicles if vehicle.kind is VehicleKind.NEPTUS}
     for i, place in enumerate(team):
