@@ -153,19 +153,6 @@ def lead_point(constraints: Constraints, start: FloatArray, target: FloatArray, 
     return np.asarray(ends[np.argmax(np.linalg.norm(ends - target, axis=1))])
 
 
-def zone_margin_m(asked_m: float, *, circles: bool) -> float:
-    """Return how far waypoints and legs stay from keep-out zones.
-
-    Parameters
-    ----------
-    asked_m
-        As the mission's description has it.
-    circles
-        Whether vehicles wait at their waypoints in circles, none of which may enter a zone.
-    """
-    return max(asked_m, WAITING_CIRCLE_M) if circles else asked_m
-
-
 def widened(zone: FloatArray, margin_m: float) -> FloatArray:
     """Return a keep-out zone (n, 2) with a margin around it, (m, 2), counter-clockwise and not closed."""
     wide = orient(Polygon(zone).buffer(margin_m, join_style="mitre"))

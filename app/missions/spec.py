@@ -119,8 +119,8 @@ class Limits(Model):
         default=10.0,
         ge=0,
         le=1000,
-        description="Legs stay this far from keep-out zones: vehicles turn in circles and drift. In surveys at least "
-        "10 m, the circle in which they wait for their next waypoint",
+        description="Legs stay this far from keep-out zones: vehicles turn in circles and drift. With less "
+        "than 10 m the circle in which one waits for its next waypoint can reach into a zone",
     )
     com_range_m: float | None = Field(
         default=None, gt=0, description="Every vehicle keeps another one within this range; null: unlimited"
