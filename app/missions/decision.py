@@ -91,8 +91,7 @@ def make_constraints(spec: MissionSpec) -> Constraints:
     """Return a mission's limits in its local frame."""
     limits = spec.limits
     zones = [spec.to_local(zone) for zone in spec.keep_out]
-    margin_m = safety.zone_margin_m(limits.keep_out_margin_m, circles=spec.search is None)
-    margins = [safety.widened(zone, margin_m) for zone in zones if margin_m > 0]
+    margins = [safety.widened(zone, limits.keep_out_margin_m) for zone in zones if limits.keep_out_margin_m > 0]
     return Constraints(
         area=spec.local_inner_area(),
         # A vehicle that came too near by turning may leave the margin by any way but one through the zone itself.

@@ -11,7 +11,7 @@ from app.missions.fleet import LinkState
 from app.missions.hub import FleetHub
 from app.missions.live import LiveMission
 from app.missions.members import Member
-from app.missions.safety import zone_margin_m
+from app.missions.safety import WAITING_CIRCLE_M
 from app.missions.search.checks import search_checks
 from app.missions.spec import VehicleKind
 from app.missions.vehicle_showing import local_place
@@ -32,6 +32,7 @@ def preflight(live: LiveMission, hub: FleetHub) -> PreflightView:
         *_places(live, hub),
         *_depths(live),
         *_room(live),
+        *_waiting(live),
         *_water_level(live),
         *_known_bottom(live),
         *search_checks(live, hub),
@@ -168,7 +169,7 @@ def _room(live: LiveMission) -> Iterator[CheckView]:
     side, limits = float(min(high - low)), live.spec.limits
     words = f"{high[0] - low[0]:.0f} x {high[1] - low[1]:.0f} m, {area.area / 1e4:.2f} ha"
     if live.spec.keep_out:
-        margin_m = zone_margin_m(limits.keep_out_margin_m, circles=live.search is None)
+        margin_m = limits.keep_out_margin_m
         zones = unary_union([Polygon(live.spec.to_local(zone)).buffer(margin_m) for zone in live.spec.keep_out])
         free = area.difference(zones)
         taken = 100 * (1 - free.area / area.area)
@@ -201,6 +202,20 @@ def _room(live: LiveMission) -> Iterator[CheckView]:
         )
         return
     yield CheckView(id="area", title="Area", status=OK, message=words)
+
+
+def _waiting(live: LiveMission) -> Iterator[CheckView]:
+    margin_m = live.spec.limits.keep_out_margin_m
+    if not live.spec.keep_out or live.search is not None or margin_m >= WAITING_CIRCLE_M:
+        return
+    yield CheckView(
+        id="waiting",
+        title="Waiting",
+        status=WARNING,
+        message=f"vehicles wait for their next waypoint in circles of up to {WAITING_CIRCLE_M:g} m, which a margin of "
+        f"{margin_m:g} m lets into a keep-out zone",
+        remedy=f"Make limits.keep_out_margin_m {WAITING_CIRCLE_M:g} m or more, unless the vehicles can stop",
+    )
 
 
 def _water_level(live: LiveMission) -> Iterator[CheckView]:

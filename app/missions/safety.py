@@ -169,19 +169,6 @@ def lead_point(constraints: Constraints, start: FloatArray, target: FloatArray, 
     return np.asarray(ends[np.argmax(np.linalg.norm(ends - target, axis=1))])
 
 
-def zone_margin_m(asked_m: float, *, circles: bool) -> float:
-    """Return how far waypoints and legs stay from keep-out zones.
-
-    Parameters
-    ----------
-    asked_m
-        As the mission's description has it.
-    circles
-        Whether vehicles wait at their waypoints in circles, none of which may enter a zone.
-    """
-    return max(asked_m, WAITING_CIRCLE_M) if circles else asked_m
-
-
 def circling_room(
     constraints: Constraints, start: FloatArray, target: FloatArray, radius_m: float, taken: Sequence[FloatArray]
 ) -> FloatArray | None:

@@ -120,8 +120,8 @@ class Limits(Model):
         default=10.0,
         ge=0,
         le=1000,
-        description="Legs stay this far from keep-out zones: vehicles turn in circles and drift. In surveys at least "
-        "10 m, the circle in which they wait for their next waypoint",
+        description="Legs stay this far from keep-out zones: vehicles turn in circles and drift. With less "
+        "than 10 m the circle in which one waits for its next waypoint can reach into a zone",
     )
     border_margin_m: float = Field(
         default=0.0,

@@ -10,7 +10,7 @@ from app.missions.safety import WAITING_CIRCLE_M
 from app.missions.service import MissionService
 from app.missions.settings import SimulationSettings
 from app.missions.spec import Sensor, VehicleKind
-from app.missions.views import EventView, Level
+from app.missions.views import CheckStatus, EventView, Level
 from simulator.seafloors import generate
 from simulator.sensors import SensorKind, SonarNoise
 from simulator.world import SimulatedVehicle
@@ -75,11 +75,21 @@ def test_no_vehicle_that_waits_at_its_waypoint_circles_farther_than_the_margin(s
     assert 5.0 < farthest_m < WAITING_CIRCLE_M
 
 
-@pytest.mark.parametrize(("asked_m", "kept_m"), [(0.0, WAITING_CIRCLE_M), (5.0, WAITING_CIRCLE_M), (25.0, 25.0)])
-def test_surveys_keep_their_waypoints_a_waiting_circle_away_from_zones(asked_m: float, kept_m: float) -> None:
-    spec = make_spec(100, keep_out=[rectangle(40, 40, 60, 60)], limits={"max_step_m": 8, "keep_out_margin_m": asked_m})
-    zone, margin = make_constraints(spec).keep_out
-    assert zone[:, 0].min() - margin[:, 0].min() == pytest.approx(kept_m, abs=0.05)
+def test_waypoints_stay_a_waiting_circle_away_from_zones_by_default() -> None:
+    zone, margin = make_constraints(make_spec(100, keep_out=[rectangle(40, 40, 60, 60)])).keep_out
+    assert zone[:, 0].min() - margin[:, 0].min() == pytest.approx(WAITING_CIRCLE_M, abs=0.05)
+
+
+@pytest.mark.parametrize(("margin_m", "warned"), [(5.0, True), (10.0, False), (25.0, False)])
+async def test_the_checklist_warns_of_a_margin_that_waiting_vehicles_overstep(
+    service: MissionService, margin_m: float, warned: bool
+) -> None:
+    limits = {"max_step_m": 8, "keep_out_margin_m": margin_m}
+    mission = await service.create(make_spec(100, keep_out=[rectangle(40, 40, 60, 60)], limits=limits))
+    checks = {check.id: check for check in (await service.preflight(mission.id)).checks}
+    assert ("waiting" in checks) is warned
+    if warned:
+        assert checks["waiting"].status is CheckStatus.WARNING
 
 
 async def test_a_vehicle_reported_in_a_zone_is_an_alarm_of_its_mission(service: MissionService) -> None:

@@ -137,7 +137,7 @@ async def test_pausing_stops_the_vehicles_and_resuming_goes_on(service: MissionS
         paused = await service.act(mission_id, "pause", actor="Ana", note="ship ahead")
         assert (paused.mission.state, paused.mission.reason) == (S.PAUSED, "ship ahead")
         assert {stop.vehicle: stop.acknowledged for stop in paused.stops} == {"a": True, "b": True}
-        assert {v.link for v in (await service.mission(mission_id)).vehicles} == {LinkState.READY}
+        assert {v.link for v in (await service.mission(mission_id)).vehicles} == {LinkState.UNKNOWN}
         await service.act(mission_id, "resume", actor="Ana")
     await until_state(service, mission_id, S.FINISHED)
     assert await step_numbers(database, mission_id) == [1, 2, 3, 4, 5, 6]
@@ -258,7 +258,7 @@ async def test_a_planner_that_fails_ends_the_mission_with_the_reason(
     ended = await until_state(service, mission_id, S.FAILED)
     assert "the estimator diverged" in ended.reason
     assert ended.progress.step == 2
-    assert {v.link for v in ended.vehicles} == {LinkState.READY}
+    assert {v.link for v in ended.vehicles} == {LinkState.UNKNOWN}
     await until_stopped(service, mission_id, 2)
     await until(lambda: service._hub.claimed_by((VehicleKind.SIM, "a")) is None, "its vehicles are free")
     async with database.reading() as session:

@@ -1640,7 +1640,7 @@ export interface components {
             min_altitude_m: number;
             /**
              * Keep Out Margin M
-             * @description Legs stay this far from keep-out zones: vehicles turn in circles and drift. In surveys at least 10 m, the circle in which they wait for their next waypoint
+             * @description Legs stay this far from keep-out zones: vehicles turn in circles and drift. With less than 10 m the circle in which one waits for its next waypoint can reach into a zone
              * @default 10
              */
             keep_out_margin_m: number;

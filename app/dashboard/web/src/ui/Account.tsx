@@ -1,4 +1,5 @@
 import { useSignal } from "@preact/signals";
+import { ServiceError } from "../api/client";
 import { me, signedOut, signIn, signOut, whyNotCommand } from "../state/access";
 import { said } from "../state/session";
 import { accountOpen } from "../state/store";
@@ -85,7 +86,7 @@ export function SignIn() {
     try {
       await signIn(text.value);
     } catch (error) {
-      fault.value = said(error);
+      fault.value = error instanceof ServiceError && error.status === 401 ? `${error.message}.` : said(error);
     } finally {
       sending.value = false;
     }
@@ -100,7 +101,10 @@ export function SignIn() {
       }}
     >
       <p>
-        <b>Sign in.</b> {why?.message}. {why?.status === 403 ? why.remedy : ""}
+        <b>Sign in.</b>{" "}
+        {why?.status === 403
+          ? `${why.message}. ${why.remedy}`
+          : "This service asks who you are: enter your access token. Whoever runs the service makes one."}
       </p>
       <label class="field">
         Access token

@@ -1,4 +1,5 @@
 import { useEffect, useRef } from "preact/hooks";
+import { signedOut } from "../state/access";
 import { dialogOpen, in3d, mission, panelOpen, stripHeight } from "../state/store";
 import { AbortDialog } from "./AbortDialog";
 import { AccountDialog } from "./Account";
@@ -34,7 +35,11 @@ export function App() {
   }, []);
   // What lies under a dialog is out of reach; the top bar with the stop never is.
   const covered = dialogOpen.value;
-  const classes = ["app", panelOpen.value ? "with-missions" : "", mission.value ? "with-mission" : ""];
+  const classes = [
+    "app",
+    panelOpen.value && !signedOut.value ? "with-missions" : "",
+    mission.value ? "with-mission" : "",
+  ];
   return (
     <div
       ref={root}
@@ -52,7 +57,7 @@ export function App() {
         </div>
       </main>
       <div class="around" inert={covered}>
-        {panelOpen.value ? <MissionPanel /> : null}
+        {panelOpen.value && !signedOut.value ? <MissionPanel /> : null}
         <VehicleCards />
         <BottomStrip />
       </div>
