@@ -12,6 +12,7 @@ import ipaddress
 import os
 import socket
 import struct
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -33,7 +34,9 @@ _SO_MEMINFO = 55
 _MEMINFO = struct.Struct("=9I")
 """Linux: what a socket holds; the last figure counts packets that it had no room for."""
 _PACKETS_PER_TURN = 512
-"""Then other tasks get their turn, however fast packets come."""
+_TURN_WALL_S = 0.01
+"""After so many packets, or so long, other tasks get their turn, however fast packets come: a stop must not wait."""
+_PACKETS_PER_LOOK = 16
 _MAX_UNREACHABLE = 64
 _IP_RECVERR = 11
 """Linux: tell the ICMP errors that our packets cause; the socket module does not name it."""
@@ -220,7 +223,10 @@ class Transport:
         self._traffic = self._announces = self._unread = None
 
     def _drain(self, sock: socket.socket, handler: PacketHandler) -> None:
+        end = time.monotonic() + _TURN_WALL_S
         for taken in range(_PACKETS_PER_TURN):
+            if taken % _PACKETS_PER_LOOK == _PACKETS_PER_LOOK - 1 and time.monotonic() > end:
+                return
             try:
                 packet, address = sock.recvfrom(65536)
             except (BlockingIOError, InterruptedError):
