@@ -152,7 +152,12 @@ def test_every_command_explains_its_options(bathyfleet: Run, command: str) -> No
     [
         (["serve", "--host", "0.0.0.0"], {}, 1, "there is no access token: make one with 'bathyfleet token create"),
         (["serve", "--database", "mysql://h"], {}, 2, "database_url (from the command line): use sqlite"),
-        (["serve", "--database", "sqlite:////no/folder/x.db"], {}, 1, "the database cannot be used: there is no folder"),
+        (
+            ["serve", "--database", "sqlite:////no/folder/x.db"],
+            {},
+            1,
+            "the database cannot be used: there is no folder",
+        ),
         (["serve"], {"BATHYFLEET_PROT": "1"}, 2, "did you mean BATHYFLEET_PORT?"),
         (["serve"], {"BATHYFLEET_AUTO_MIGRATE": "false"}, 1, "the database is empty"),
         (["serve", "--time-scale", "0"], {}, 2, "greater than 0"),

@@ -226,10 +226,9 @@ class MapBuilder:
     def _with_margin(self, bathymetry: BathymetricMap) -> BathymetricMap:
         """Ask more of cells that were not known in the newest map."""
         bound = bathymetry.claim_sd_m
-        margin = np.full(bound.shape, CLAIM_MARGIN + UNSEEN_MARGIN * float(np.isinf(bound[self.mask]).mean()))
-        if self._newest is not None:
-            margin[self._newest.map.known(self._accuracy_m)] = 1.0
-        return replace(bathymetry, bound_sd_m=bound * margin)
+        asked = CLAIM_MARGIN + UNSEEN_MARGIN * float(np.isinf(bound[self.mask]).mean())
+        before = np.zeros_like(self.mask) if self._newest is None else self._newest.map.known(self._accuracy_m)
+        return replace(bathymetry, bound_sd_m=bound * np.where(before, 1.0, asked))
 
     def _measured(self) -> BathymetricMap:
         """Return the map of the mission's own soundings."""
