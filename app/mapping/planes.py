@@ -3,7 +3,7 @@
 import numpy as np
 from numba import njit
 
-from app.mapping.selection import median
+from app.mapping.median import median
 from app.mapping.types import BoolArray, FloatArray, IntArray
 
 SUSPICION = 4.0

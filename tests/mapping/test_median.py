@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from app.mapping.selection import median
+from app.mapping.median import median
 
 
 @settings(deadline=None)  # the first call compiles
