@@ -137,7 +137,7 @@ async def test_pausing_stops_the_vehicles_and_resuming_goes_on(service: MissionS
         paused = await service.act(mission_id, "pause", actor="Ana", note="ship ahead")
         assert (paused.mission.state, paused.mission.reason) == (S.PAUSED, "ship ahead")
         assert {stop.vehicle: stop.acknowledged for stop in paused.stops} == {"a": True, "b": True}
-        assert {v.link for v in (await service.mission(mission_id)).vehicles} == {LinkState.UNKNOWN}
+        assert {v.link for v in (await service.mission(mission_id)).vehicles} == {LinkState.READY}
         await service.act(mission_id, "resume", actor="Ana")
     await until_state(service, mission_id, S.FINISHED)
     assert await step_numbers(database, mission_id) == [1, 2, 3, 4, 5, 6]
