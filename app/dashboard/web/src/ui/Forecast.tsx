@@ -49,7 +49,7 @@ export function Forecast({ of, ask }: { of: string; ask: (gone: AbortSignal) => 
       ) : null}
       {waiting.value ? (
         <p class="hint">
-          Simulating the mission, some seconds…{" "}
+          Simulating the mission over several floors, half a minute or so…{" "}
           <button
             type="button"
             class="command"
@@ -100,7 +100,9 @@ function Found({ view }: { view: ForecastView }) {
           <dd>{between(view.mean_sd_m_range, (sd) => metres(sd, 2))}</dd>
         </div>
       </dl>
-      <p class="hint">{view.vehicles.map((v) => `${v.vehicle} ${between(v.distance_m_range, distance)}`).join(" · ")}</p>
+      <p class="hint">
+        {view.vehicles.map((v) => `${v.vehicle} ${between(v.distance_m_range, distance)}`).join(" · ")}
+      </p>
       <ul class="hint assumptions">
         {view.assumptions.map((words) => (
           <li key={words}>{words}</li>
