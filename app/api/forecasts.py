@@ -65,7 +65,7 @@ async def forecast_description(
 ) -> Any:
     """Simulate a mission that nobody has created, over a sea floor that is guessed. Nothing is stored, nothing moves.
 
-    Takes some seconds at most; a client that does not wait any more ends it.
+    Takes half a minute or so, on a busy machine a minute or two; a client that does not wait any more ends it.
     """
     return await _while_connected(request, service.forecast(spec, floor_depth_m=floor_depth_m))
 

@@ -16,10 +16,10 @@ from app.missions.members import Member, Team
 from app.missions.spec import MissionSpec
 from app.missions.view_base import View
 
-BUDGET_S = 6.0
+BUDGET_S = 10.0
 """Seconds of the processor for each floor."""
 
-PATIENCE_S = 45.0
+PATIENCE_S = 60.0
 """After so long by the clock no further floor is begun."""
 
 LOW, HIGH = 0.1, 0.9

@@ -84,6 +84,8 @@ def test_an_area_is_drawn_with_a_keep_out_zone_and_judged_at_once(page: Page, se
     expect(by_id(page, "fault-ring")).to_contain_text("crosses itself")
 
 
+FORECAST_MS = 240_000
+
 KML = """<?xml version="1.0"?><kml xmlns="http://www.opengis.net/kml/2.2"><Placemark><name>Basin</name><Polygon>
 <outerBoundaryIs><LinearRing><coordinates>-8.705,41.185,0 -8.7043,41.185,0 -8.7043,41.1855,0 -8.705,41.185,0
 </coordinates></LinearRing></outerBoundaryIs></Polygon></Placemark></kml>"""
@@ -97,7 +99,8 @@ def test_an_area_comes_from_a_kml_file(page: Page, service: Service) -> None:
     expect(by_id(page, "area-note")).to_contain_text("basin.kml: area of 3 corners")
     expect(by_id(page, "estimate")).to_contain_text("At most")
     by_id(page, "ask-forecast").click()
-    expect(by_id(page, "forecast-duration")).to_contain_text(re.compile(r"\d+ (s|min)"))
+    # It is flown over several floors.
+    expect(by_id(page, "forecast-duration")).to_contain_text(re.compile(r"\d+ (s|min)"), timeout=FORECAST_MS)
     expect(by_id(page, "forecast-coverage")).to_contain_text("%")
     expect(by_id(page, "forecast")).to_contain_text("which is a guess")
     by_id(page, "field-name").fill("From a file")

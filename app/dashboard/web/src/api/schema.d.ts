@@ -347,7 +347,7 @@ export interface paths {
          * Foretell a mission that is being described
          * @description Simulate a mission that nobody has created, over a sea floor that is guessed. Nothing is stored, nothing moves.
          *
-         *     Takes some seconds at most; a client that does not wait any more ends it.
+         *     Takes half a minute or so, on a busy machine a minute or two; a client that does not wait any more ends it.
          */
         post: operations["forecastDescription"];
         delete?: never;

@@ -49,7 +49,7 @@ export function Forecast({ of, ask }: { of: string; ask: (gone: AbortSignal) => 
       ) : null}
       {waiting.value ? (
         <p class="hint">
-          Simulating the mission, some seconds…{" "}
+          Simulating the mission over several floors, half a minute or so…{" "}
           <button
             type="button"
             class="command"
