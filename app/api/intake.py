@@ -5,6 +5,7 @@ import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import Enum, auto
+from functools import lru_cache
 
 from fastapi import APIRouter
 from fastapi.routing import APIRoute
@@ -110,6 +111,7 @@ def declared_bytes(headers: Headers) -> int | None:
     return int(declared) if declared.isdecimal() and declared.isascii() else None
 
 
+@lru_cache(maxsize=64)
 def _is_json(content_type: str) -> bool:
     message = email.message.Message()
     message["content-type"] = content_type
