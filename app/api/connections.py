@@ -2,6 +2,7 @@
 
 import asyncio
 import ipaddress
+from functools import partial
 
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 
@@ -9,6 +10,7 @@ from app.api.auth import OPERATORS
 from app.api.limits import network_of
 from app.api.peers import OWN_USER, is_own_user
 from app.api.sockets import Rank, Sockets
+from app.api.unread import ANSWERED
 from app.settings import Settings, is_loopback
 
 __all__ = ["Sockets", "is_shared_host", "patient_http"]
@@ -51,7 +53,12 @@ def patient_http(settings: Settings, sockets: Sockets[asyncio.Protocol]) -> type
                 leaver.leave()
             # Now: of who closes or resets his connection the kernel will not know any more whose it was.
             connection = transport.get_extra_info("socket")
-            self.app_state = {**self.app_state, OWN_USER: connection is not None and is_own_user(connection)}
+            self.app_state = {
+                **self.app_state,
+                OWN_USER: connection is not None and is_own_user(connection),
+                # Who goes on sending what nobody wants makes room for others as if he were idle.
+                ANSWERED: partial(sockets.idle, self, Rank.STRANGER),
+            }
             self._watch()
 
         def leave(self) -> None:

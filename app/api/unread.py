@@ -8,6 +8,8 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from app.api.intake import has_body
 
+ANSWERED = "connection_answered"
+"""Name in a scope's state of what is called when an answer is out and only an unwanted body is awaited."""
 DRAIN_S = 2.0
 DRAIN_BYTES = 2**26
 """So much of what a client still sends is thrown away: one that is cut off while it sends never sees the answer."""
@@ -43,6 +45,9 @@ class UnreadBodyMiddleware:
 
         await self.app(scope, receive_counted, send_closing)
         if answered:
+            let_go = scope.get("state", {}).get(ANSWERED)
+            if let_go is not None:
+                let_go()
             await _drain(receive)
             await send({"type": "http.response.body", "body": b"", "more_body": False})
 

@@ -1203,7 +1203,7 @@ export interface components {
          * @description What a finding is about; the first of a node's problems is the one to look at.
          * @enum {string}
          */
-        Cause: "sound" | "switched_off" | "port_in_use" | "no_interface" | "no_vehicle" | "not_heard" | "no_announce" | "no_service" | "announces_ceased" | "no_traffic" | "unreachable" | "blocked_port" | "stale_port" | "foreign_address" | "wrong_version" | "same_id_twice" | "our_id_taken" | "clock_off" | "clock_rate" | "silent" | "radio_gaps" | "restarted" | "packets_dropped" | "low_rate" | "no_entities" | "no_soundings" | "soundings_refused" | "foreign_control" | "not_ready" | "send_errors" | "bad_packets" | "refused" | "unknown_messages";
+        Cause: "sound" | "switched_off" | "port_in_use" | "no_interface" | "no_vehicle" | "not_heard" | "no_announce" | "no_service" | "announces_ceased" | "no_traffic" | "unreachable" | "blocked_port" | "stale_port" | "foreign_address" | "wrong_version" | "same_id_twice" | "our_id_taken" | "clock_off" | "clock_rate" | "silent" | "radio_gaps" | "restarted" | "packets_dropped" | "low_rate" | "no_entities" | "no_soundings" | "soundings_refused" | "foreign_control" | "not_ready" | "send_errors" | "bad_packets" | "refused" | "unknown_messages" | "crowded";
         /**
          * CheckStatus
          * @description How a line of the checklist stands.
@@ -1602,7 +1602,7 @@ export interface components {
          * @description A layer of the map beside those that its JSON always has.
          * @enum {string}
          */
-        LayerName: "uncertainty" | "count" | "sounded" | "slope" | "tvu_fraction" | "difference";
+        LayerName: "uncertainty" | "count" | "sounded" | "slope" | "tvu_fraction" | "difference" | "live";
         /**
          * Level
          * @description How much an event matters.
@@ -2193,7 +2193,7 @@ export interface components {
          * @description A layer that can be seen as a picture.
          * @enum {string}
          */
-        OverlayLayer: "depth" | "uncertainty" | "count" | "slope" | "tvu_fraction" | "difference";
+        OverlayLayer: "depth" | "uncertainty" | "count" | "slope" | "tvu_fraction" | "difference" | "live";
         /**
          * PcaoModel
          * @description A controller that ``bathyfleet train`` wrote.
@@ -4082,8 +4082,17 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too many requests */
+            /** @description Too much is sent at once; too many requests */
             429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too much is under way */
+            503: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -4342,8 +4351,17 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too many requests */
+            /** @description Too much is sent at once; too many requests */
             429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too much is under way */
+            503: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -4459,8 +4477,17 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too many requests */
+            /** @description Too much is sent at once; too many requests */
             429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too much is under way */
+            503: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -4576,8 +4603,17 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too many requests */
+            /** @description Too much is sent at once; too many requests */
             429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too much is under way */
+            503: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -4693,8 +4729,17 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too many requests */
+            /** @description Too much is sent at once; too many requests */
             429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too much is under way */
+            503: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -4810,8 +4855,17 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too many requests */
+            /** @description Too much is sent at once; too many requests */
             429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too much is under way */
+            503: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -5130,8 +5184,17 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too many requests */
+            /** @description Too much is sent at once; too many requests */
             429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too much is under way */
+            503: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -5326,8 +5389,17 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too many requests */
+            /** @description Too much is sent at once; too many requests */
             429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too much is under way */
+            503: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -5690,8 +5762,17 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too many requests */
+            /** @description Too much is sent at once; too many requests */
             429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too much is under way */
+            503: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -5705,7 +5786,7 @@ export interface operations {
         parameters: {
             query?: never;
             header?: {
-                /** @description Name of this batch, made by the sender. Sent again with the same key and content, nothing is stored twice and the first answer is given again */
+                /** @description Name of this batch, made by the sender. Sent again by the same sender with the same key and content, nothing is stored twice and the first answer is given again */
                 "idempotency-key"?: string;
             };
             path: {
@@ -5810,8 +5891,17 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too many requests */
+            /** @description Too much is sent at once; too many requests */
             429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too much is under way */
+            503: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -6086,8 +6176,17 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too many requests */
+            /** @description Too much is sent at once; too many requests */
             429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too much is under way */
+            503: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -6194,8 +6293,17 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too many requests */
+            /** @description Too much is sent at once; too many requests */
             429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too much is under way */
+            503: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -6463,7 +6571,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too many requests */
+            /** @description Too much is sent at once; too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -6472,7 +6580,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description No file can be read now */
+            /** @description No file can be read now; too much is under way */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -6732,7 +6840,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too many requests */
+            /** @description Too much is sent at once; too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -6741,7 +6849,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description No file can be read now */
+            /** @description No file can be read now; too much is under way */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -7638,8 +7746,17 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too many requests */
+            /** @description Too much is sent at once; too many requests */
             429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too much is under way */
+            503: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -7757,8 +7874,17 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too many requests */
+            /** @description Too much is sent at once; too many requests */
             429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too much is under way */
+            503: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -8017,8 +8143,17 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too many requests */
+            /** @description Too much is sent at once; too many requests */
             429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too much is under way */
+            503: {
                 headers: {
                     [name: string]: unknown;
                 };
