@@ -56,6 +56,9 @@ RELIEF = 0.5
 LEAST_CELLS = 1.0
 """So many cells from a sounding are supported in any case."""
 
+ROUNDING = 1e-9
+"""Of a square's side: a point at its edge lies in the same square wherever the origin is."""
+
 
 @dataclass(frozen=True)
 class Reach:
@@ -123,7 +126,7 @@ def _checked_m(levels: TwoLevels, unit_m: float) -> float:
 
 def _checkable(points: FloatArray, radius_m: float) -> bool:
     """Whether predictions over ``radius_m`` can be checked at enough places, in enough directions each."""
-    _, first = np.unique(np.floor(points / (0.5 * radius_m)).astype(np.int64), axis=0, return_index=True)
+    _, first = np.unique(_squares(points, 0.5 * radius_m), axis=0, return_index=True)
     thinned = points[np.sort(first)]
     places = _spread(thinned, TESTS)
     distance, index = nearest(cKDTree(thinned), places, RING_POINTS)
@@ -143,7 +146,12 @@ def _spread(points: FloatArray, count: int) -> FloatArray:
 
 
 def _count(points: FloatArray, side_m: float) -> int:
-    return len(np.unique(np.floor(points / side_m), axis=0))
+    return len(np.unique(_squares(points, side_m), axis=0)) if len(points) else 0
+
+
+def _squares(points: FloatArray, side_m: float) -> IntArray:
+    """Return the squares that points lie in, (n, 2), counted from their own corner: the origin does not matter."""
+    return np.asarray(np.floor((points - points.min(axis=0)) / side_m + ROUNDING), dtype=np.int64)
 
 
 def _steepness(levels: TwoLevels) -> float:
@@ -196,8 +204,7 @@ def likely_square(held_out: HeldOut, steepness: FloatArray, log_scale: float, si
         return None
     variance = held_out.own_variance + held_out.map_variance * steepness * np.exp(2.0 * log_scale)
     score = held_out.error_m**2 / variance
-    squares = np.floor(held_out.points_m / side_m).astype(np.int64)
-    _, group = np.unique(squares, axis=0, return_inverse=True)
+    _, group = np.unique(_squares(held_out.points_m, side_m), axis=0, return_inverse=True)
     mean = np.bincount(group.ravel(), score) / np.bincount(group.ravel())
     if len(mean) < LEAST_GROUPS:
         return None

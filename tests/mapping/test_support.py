@@ -71,7 +71,9 @@ def test_a_smooth_kernel_serves_between_the_lines_and_is_not_believed_beyond_the
     assert rmse(chosen.depth_m) < 0.7 * rmse(rough.depth_m)
     np.testing.assert_allclose(chosen.depth_m[far], rough.depth_m[far], atol=0.05)
     assert np.all(chosen.sd_m[far] > 0.8 * rough.sd_m[far])
-    assert np.median(chosen.sd_m[far]) > np.median(smooth.sd_m[far]), "what the smooth kernel alone would claim"
+    assert np.median(chosen.planning_sd_m[far]) > np.median(smooth.planning_sd_m[far]), (
+        "what the smooth kernel alone would claim"
+    )
 
 
 def test_deviations_beyond_the_soundings_are_as_large_as_the_errors_there() -> None:

@@ -1,11 +1,14 @@
 """Nobody disappears: vehicles that left, and those of missions that ended, stay where they were last."""
 
+from collections.abc import AsyncIterator
+
 import pytest
 
 from app.missions.errors import ConflictError, MissionNotFoundError, VehicleNotFoundError
 from app.missions.import_views import ImportOptions
 from app.missions.service import MissionService
 from app.missions.states import MissionState
+from app.missions.uploads import Uploads
 from app.missions.views import CheckStatus, VehicleView
 from tests.missions.builders import make_spec
 from tests.missions.fleet import Harbour, Rover, sim_spec, until, until_step
@@ -13,6 +16,10 @@ from tests.missions.fleet import Harbour, Rover, sim_spec, until, until_step
 
 def by_name(views: list[VehicleView], name: str) -> VehicleView:
     return next(view for view in views if view.name == name)
+
+
+async def whole(content: bytes) -> AsyncIterator[bytes]:
+    yield content
 
 
 async def test_an_aborted_vehicle_stays_with_its_last_place_and_age_and_can_come_back(harbour: Harbour) -> None:
@@ -83,7 +90,8 @@ async def test_what_was_imported_is_on_the_map_and_in_the_checklist_before_the_s
     async with service.subscribe(mission) as messages:
         first = await anext(messages)
         assert first.type == "snapshot"
-        await service.import_soundings(mission, content, ImportOptions(filename="old.csv", sd_m=0.1))
+        async with Uploads().receive(whole(content), len(content)) as upload:
+            await service.import_soundings(mission, upload, ImportOptions(filename="old.csv", sd_m=0.1))
         async for message in messages:
             if message.type == "map":
                 break

@@ -147,7 +147,7 @@ async def test_events_resume_after_any_of_them(database: Database) -> None:
 async def test_imports_and_the_reference_grid_come_back_as_they_were(database: Database) -> None:
     await _two_missions(database)
     async with database.writing() as session:
-        for rows in one_of_each()[-1:]:
+        for rows in one_of_each():
             session.add_all(row for row in rows if isinstance(row, ImportRow | ReferenceRow))
     async with database.reading() as session:
         np.testing.assert_array_equal(await sounding_queries.imported_arrays(session, "m1"), [[1.0, 2.0, 3.0, 0.5]])
