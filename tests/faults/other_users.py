@@ -32,7 +32,12 @@ def as_user(uid: int) -> list[str]:
         pytest.skip("setpriv (util-linux) is not installed")
     caps = "-all,+dac_read_search"
     ids = [f"--reuid={uid}", f"--regid={uid}", "--clear-groups"]
-    return [found, *ids, f"--inh-caps={caps}", f"--ambient-caps={caps}", f"--bounding-set={caps}"]
+    # What is compiled lies in a folder of the tests, which this user may not write to.
+    cache = Path(tempfile.gettempdir()) / f"bathyfleet-compiled-{uid}"
+    cache.mkdir(mode=0o700, exist_ok=True)
+    os.chown(cache, uid, uid)
+    own = ["env", f"NUMBA_CACHE_DIR={cache}"]
+    return [found, *ids, f"--inh-caps={caps}", f"--ambient-caps={caps}", f"--bounding-set={caps}", *own]
 
 
 @contextmanager

@@ -274,7 +274,7 @@ async def test_a_machine_without_a_network_that_hears_nobody_is_told_to_connect(
 
 
 async def test_an_honest_vehicle_that_sends_much_is_not_called_a_stranger():
-    async with open_sea(chatter=True, speed=10.0, bridge={"max_packets_per_s": 100}) as sea:
+    async with open_sea(chatter=True, speed=10.0, bridge={"max_packets_per_s": 3}) as sea:
         await until(lambda: any(f.cause is Cause.REFUSED for f in judge(sea.bridge, 1.0).own), "it sends too much")
         [finding] = [f for f in judge(sea.bridge, 1.0).own if "max_packets_per_s" in f.text]
         assert "a vehicle of yours" in finding.remedy
