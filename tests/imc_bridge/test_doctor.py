@@ -274,8 +274,19 @@ async def test_a_machine_without_a_network_that_hears_nobody_is_told_to_connect(
 
 
 async def test_an_honest_vehicle_that_sends_much_is_not_called_a_stranger():
-    async with open_sea(chatter=True, speed=10.0, bridge={"max_packets_per_s": 3}) as sea:
-        await until(lambda: any(f.cause is Cause.REFUSED for f in judge(sea.bridge, 1.0).own), "it sends too much")
+    async with open_sea(bridge={"max_packets_per_s": 100}) as sea:
+        await sea.ready()
+        node = sea.fleet.nodes[0]
+        beat = imcpy.Heartbeat()
+        beat.src = node.imc_id
+
+        def is_too_much() -> bool:
+            for _ in range(500):
+                beat.timestamp = sea.fleet.clock.now()
+                node._endpoint.send(bytes(beat.serialize()), ("127.0.0.1", sea.bridge.settings.port))
+            return any("max_packets_per_s" in f.text for f in judge(sea.bridge, 1.0).own)
+
+        await until(is_too_much, "it sends too much")
         [finding] = [f for f in judge(sea.bridge, 1.0).own if "max_packets_per_s" in f.text]
         assert "a vehicle of yours" in finding.remedy
         assert "multiplied by time_scale" in finding.remedy
