@@ -396,7 +396,7 @@ async def control_characters(attacked: Attacked) -> Found:
     async with attacked.client("operator") as api:
         await api.post(f"/missions/{attacked.mission}/notes", json={"text": evil})
         await api.get("/missions/" + "%1b%5b2J")
-        await api.post("/missions/%1b%5b2J%9b/start")
+        await api.post("/missions/%1b%5b2J%c2%9b/start")
         table = (await api.get(f"/missions/{attacked.mission}/map.csv")).text
     audit = await attacked.command("audit")
     log = attacked.service.said

@@ -60,5 +60,6 @@ async def test_the_first_waypoint_does_not_wait_for_what_maps_need(
         mission = await service.create(sim_spec(steps=3))
         await service.act(mission.id, "start", actor="Ana")
         await until_step(service, mission.id, 1)
+        assert not compiled.is_set()
     finally:
         compiled.set()
