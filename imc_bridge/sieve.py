@@ -17,7 +17,7 @@ import imcpy
 LOUD = ("ServoPosition", "EulerAngles", "AngularVelocity", "Acceleration")
 """Messages that come unasked at 94 Hz and more, and that nothing here uses."""
 
-_SO_ATTACH_REUSEPORT_CBPF = 51
+_SO_ATTACH_FILTER, _SO_ATTACH_REUSEPORT_CBPF = 26, 51
 _INSTRUCTION = struct.Struct("=HBBI")
 _LOAD_HALF, _JUMP_EQUAL, _RETURN = 0x28, 0x15, 0x06
 _SYNC_AS_READ = 0x54FE
@@ -47,6 +47,21 @@ def divert(kept: socket.socket) -> None:
     code = [(_LOAD_HALF, 0, 0, 0), (_JUMP_EQUAL, 0, 1 + len(ids), _SYNC_AS_READ), (_LOAD_HALF, 0, 0, 2)]
     code += [(_JUMP_EQUAL, len(ids) - k, 0, number) for k, number in enumerate(swapped)]
     code += [(_RETURN, 0, 0, _KEEP), (_RETURN, 0, 0, _AWAY)]
+    _attach(kept, _SO_ATTACH_REUSEPORT_CBPF, code)
+
+
+def refuse_all(sock: socket.socket) -> None:
+    """Let the system throw away every packet that comes for a socket; errors of what was sent still reach it.
+
+    Raises
+    ------
+    OSError
+        Where the system cannot do that.
+    """
+    _attach(sock, _SO_ATTACH_FILTER, [(_RETURN, 0, 0, 0)])
+
+
+def _attach(sock: socket.socket, option: int, code: list[tuple[int, int, int, int]]) -> None:
     packed = ctypes.create_string_buffer(b"".join(_INSTRUCTION.pack(*line) for line in code))
     program = _Program(len(code), ctypes.addressof(packed))
-    kept.setsockopt(socket.SOL_SOCKET, _SO_ATTACH_REUSEPORT_CBPF, bytes(program))
+    sock.setsockopt(socket.SOL_SOCKET, option, bytes(program))

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import ifaddr
 
 from imc_bridge.settings import BridgeSettings
-from imc_bridge.sieve import divert
+from imc_bridge.sieve import divert, refuse_all
 from imc_bridge.streams import TcpStreams
 
 Address = tuple[str, int]
@@ -107,7 +107,7 @@ class Transport:
         self._traffic: socket.socket | None = None
         self._announces: socket.socket | None = None
         self._unread: socket.socket | None = None
-        """Gets what nobody needs."""
+        """Gets what nobody needs, and half of the errors: the system returns those to either of two on a port."""
         self._loop: asyncio.AbstractEventLoop | None = None
         self.interfaces: list[Interface] = []
         self.announce_port: int | None = None
@@ -142,10 +142,10 @@ class Transport:
             ) from error
         self._traffic.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
         self._traffic.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL, 1)
-        if _MSG_ERRQUEUE:
-            with contextlib.suppress(OSError):
-                self._traffic.setsockopt(socket.IPPROTO_IP, _IP_RECVERR, 1)
+        _ask_for_errors(self._traffic)
         self._unread = _unread_socket(self._traffic)
+        if self._unread is not None:
+            self._loop.add_reader(self._unread, self._take_errors, self._unread)
         self._announces = self._bind_announces(host)
         self._loop.add_reader(self._traffic, self._drain, self._traffic, self._on_packet)
         self._loop.add_reader(self._announces, self._drain, self._announces, self._on_announce)
@@ -213,13 +213,11 @@ class Transport:
 
     def close(self) -> None:
         """Release the sockets; safe to repeat."""
-        for sock in (self._traffic, self._announces):
+        for sock in (self._traffic, self._announces, self._unread):
             if sock is not None:
                 if self._loop is not None:
                     self._loop.remove_reader(sock)
                 sock.close()
-        if self._unread is not None:
-            self._unread.close()
         self._traffic = self._announces = self._unread = None
 
     def _drain(self, sock: socket.socket, handler: PacketHandler) -> None:
@@ -321,6 +319,13 @@ def _bound_socket(host: str, port: int, *, shared: bool = False) -> socket.socke
     return sock
 
 
+def _ask_for_errors(sock: socket.socket) -> None:
+    """Have the system queue ICMP errors for ``sock``, each with the address that it is about."""
+    if _MSG_ERRQUEUE:
+        with contextlib.suppress(OSError):
+            sock.setsockopt(socket.IPPROTO_IP, _IP_RECVERR, 1)
+
+
 def _unread_socket(traffic: socket.socket) -> socket.socket | None:
     """A socket on the port of ``traffic`` that gets the messages that nobody needs; None where there can be none."""
     if not _SO_REUSEPORT:
@@ -329,7 +334,8 @@ def _unread_socket(traffic: socket.socket) -> socket.socket | None:
     unread = None
     try:
         unread = _bound_socket(host, port, shared=True)
-        unread.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 0)
+        refuse_all(unread)
+        _ask_for_errors(unread)
         divert(traffic)
     except OSError:
         if unread is not None:

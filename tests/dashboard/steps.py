@@ -38,6 +38,11 @@ def colours_in_the_middle(page: Page) -> int:
     return len(np.unique(pixels.reshape(-1, 3), axis=0))
 
 
+def expect_colours(page: Page) -> None:
+    """Wait until the map shows depths around the middle of the window; a layer is drawn some pictures after its data."""
+    assert any(colours_in_the_middle(page) > 20 for _ in range(100)), "the map stays of one colour"
+
+
 def click_round(page: Page, corners: list[tuple[int, int]]) -> None:
     """Click corner after corner of an area on the map, the first one again at the end."""
     for x, y in [*corners, corners[0]]:

@@ -145,6 +145,15 @@ async def test_packets_that_nobody_takes_are_noticed(harbour):
     assert bridge.transport.unreachable[dead] == "Connection refused"
 
 
+async def test_every_refusal_is_noticed(harbour):
+    # Two sockets share the bridge's port, and the system returns errors to either, by a hash of both addresses.
+    bridge, _ = harbour
+    dead = {("127.0.0.1", port) for port in free_ports(16)}
+    for address in dead:
+        bridge.transport.send(b"anyone there?", address)
+    await until(lambda: dead <= bridge.transport.unreachable.keys(), "all refusals came back")
+
+
 async def test_a_mission_by_tcp():
     async with open_sea(tcp=True, bridge={"transport": "tcp"}) as sea:
         (name,) = await sea.ready()
