@@ -434,9 +434,16 @@ def _with_tokens(database: str | None, run: Any, changing: str = "", target: str
 
 def main() -> None:
     """Run the command line; expected errors are one line and an exit code: 2 for wrong usage, 1 for failure."""
+    from app.compiled import VARIABLE, keep_compiled
     from app.storage.private import for_owner_only
 
     try:
+        if keep_compiled() is not None:
+            typer.echo(
+                "warning: no folder for compiled functions can be written, so each start compiles for about a minute. "
+                f"Set {VARIABLE} to a folder that this user may write to",
+                err=True,
+            )
         # What a command writes is its user's: maps, logs, copies, also of the programs that it starts.
         with for_owner_only():
             app()

@@ -22,11 +22,13 @@ from collections.abc import Awaitable, Callable, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote
 
 import httpx
 import imcpy
 
-from tests.faults.missions import FRAME, SIDE_M, mission_of
+from tests.faults import leading_out
+from tests.faults.missions import FRAME, mission_of
 from tests.faults.service import Service
 
 ATTACKER = "127.0.0.66"
@@ -202,42 +204,20 @@ async def descriptions(attacked: Attacked) -> Found:
 
 
 async def external_storage(attacked: Attacked) -> Found:
-    """An operator's token: a NetCDF file whose depths lie in a file of the server."""
-    import h5py
-    import numpy as np
-
-    secret = attacked.service.folder / "private.bin"
-    secret.write_bytes(struct.pack("<400d", *[4.321 + i / 1000 for i in range(400)]))
-    secret.chmod(0o600)
-    lat, lon = FRAME.to_geographic(np.linspace(1, SIDE_M - 1, 20), np.linspace(1, SIDE_M - 1, 20))
+    """An operator's token: files whose depths, links or transformations lie in other files of the server."""
     found: Found = {"gained": []}
-    for how in ("external storage", "external link", "virtual"):
-        path = attacked.service.folder / "evil.nc"
-        path.unlink(missing_ok=True)
-        with h5py.File(path, "w") as file:
-            for name, values in (("lat", lat), ("lon", lon)):
-                file[name] = values
-                file[name].make_scale(name)
-            if how == "external storage":
-                depth = file.create_dataset("depth", (20, 20), "f8", external=[(str(secret), 0, 3200)])
-                depth.dims[0].attach_scale(file["lat"])
-                depth.dims[1].attach_scale(file["lon"])
-            elif how == "external link":
-                file["depth"] = h5py.ExternalLink(str(secret), "/depth")
-            else:
-                layout = h5py.VirtualLayout((20, 20), "f8")
-                layout[:] = h5py.VirtualSource(str(secret), "depth", (20, 20))
-                file.create_virtual_dataset("depth", layout)
-        async with attacked.client("operator") as api:
-            new = (await api.post("/missions", json=mission_of([{"name": "boat", "kind": "rest"}]))).json()["id"]
-            answer = await api.post(
-                f"/missions/{new}/imports", params={"filename": "evil.nc"}, content=path.read_bytes()
-            )
-            csv = (await api.get(f"/missions/{new}/map.xyz")).text
-        if answer.is_success or "4.3" in answer.text or "4.3" in csv:
-            found["gained"].append(f"{how}: {answer.text[:200]}")
-        found[how] = str(answer.status_code)
-    return found
+    options = {"crs": "EPSG:4326", "sd_m": 0.3, "positive": "down"}
+    statuses: Counter[str] = Counter()
+    async with attacked.client("operator") as api:
+        for name, content in leading_out.grids(attacked.service.folder).items():
+            made = await api.post("/missions", json=mission_of([{"name": "boat", "kind": "rest"}]))
+            path = f"/missions/{made.json()['id']}"
+            answer = await api.post(f"{path}/imports", params=options | {"filename": name}, content=content)
+            soundings = (await api.get(f"{path}/imports")).text
+            statuses[str(answer.status_code)] += 1
+            if answer.is_success or leading_out.told(answer.text) or soundings != "[]":
+                found["gained"].append(f"{name}: {answer.text[:200]}")
+    return found | {"answers": statuses}
 
 
 async def line_ends(attacked: Attacked) -> Found:
@@ -391,22 +371,31 @@ async def keys(attacked: Attacked) -> Found:
 
 
 async def control_characters(attacked: Attacked) -> Found:
-    """Names and notes with escape sequences, formulas and markup: nothing of it comes out as such."""
+    """Names, notes and paths with escape sequences, formulas and markup: nothing of it comes out as such."""
     evil = "\x1b[2J\x9b31m=cmd|' /C calc'!A0\u202e[red]\u2028"
+    await attacked.command("token", "create", evil, "--role", "viewer")
     async with attacked.client("operator") as api:
         await api.post(f"/missions/{attacked.mission}/notes", json={"text": evil})
-        await api.get("/missions/" + "%1b%5b2J")
-        await api.post("/missions/%1b%5b2J%c2%9b/start")
+        await api.get("/missions/" + quote(evil))
+        await api.post("/missions/" + quote(evil) + "/start")
+        await api.post("/" + quote("=HYPERLINK(1)"))
         table = (await api.get(f"/missions/{attacked.mission}/map.csv")).text
-    audit = await attacked.command("audit")
-    log = attacked.service.said
+    sheet = await attacked.command("audit", "--format", "csv")
+    places = {
+        "the audit log": await attacked.command("audit"),
+        "the audit log as CSV": sheet,
+        "the list of tokens": await attacked.command("token", "list"),
+        "the log": attacked.service.said,
+        "the table": table,
+    }
     gained = [
         f"in {where}: {character!r}"
-        for where, text in (("the audit log", audit), ("the log", log), ("the table", table))
+        for where, text in places.items()
         for character in ("\x1b", "\x9b", "\u202e", "\u2028")
         if character in text
     ]
-    formulas = [cell for row in csv.reader(io.StringIO(table)) for cell in row if cell.startswith(("=", "@"))]
+    cells = [cell for text in (table, sheet) for row in csv.reader(io.StringIO(text)) for cell in row]
+    formulas = [cell for cell in cells if cell.startswith(("=", "@"))]
     return {"gained": gained + formulas[:3]}
 
 

@@ -39,7 +39,7 @@ def colours_in_the_middle(page: Page) -> int:
 
 
 def expect_colours(page: Page) -> None:
-    """Wait until the map shows depths around the middle of the window; a layer is drawn some pictures after its data."""
+    """Wait until the map shows depths around the middle of the window; it is drawn some pictures after its data."""
     assert any(colours_in_the_middle(page) > 20 for _ in range(100)), "the map stays of one colour"
 
 

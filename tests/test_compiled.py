@@ -1,0 +1,42 @@
+"""The service starts for a user who may write nothing but temporary files."""
+
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+from tests.conftest import PROJECT
+from tests.faults.other_users import SERVICE, as_user, needs_root
+
+pytestmark = needs_root
+
+PROGRAM = """
+from app.compiled import keep_compiled
+folder = keep_compiled()
+import app.mapping.gaussian
+print(folder, f"{folder.stat().st_mode & 0o777:o}" if folder else "-")
+"""
+
+
+def imported(home: str) -> list[str]:
+    """Where a user to whom the code does not belong compiles, and who may look there."""
+    chosen = ["NUMBA_CACHE_DIR", "NUMBA_CACHE_LOCATOR_CLASSES", "XDG_CACHE_HOME"]
+    unset = [word for name in chosen for word in ("-u", name)]
+    own = [f"HOME={home}", f"PYTHONPATH={PROJECT}", "PYTHONDONTWRITEBYTECODE=1"]
+    command = [*as_user(SERVICE), "env", *unset, *own, sys.executable, "-c", PROGRAM]
+    ended = subprocess.run(command, cwd=PROJECT, capture_output=True, text=True, timeout=120, check=False)
+    assert ended.returncode == 0, ended.stderr
+    return ended.stdout.split()
+
+
+def test_functions_are_compiled_where_nothing_can_be_kept() -> None:
+    folder, mode = imported("/proc/none")
+    assert Path(folder).parent == Path(tempfile.gettempdir())
+    assert mode == "700"
+    assert not Path(folder).exists(), "it ends with the process"
+
+
+def test_a_folder_of_the_user_is_used() -> None:
+    with tempfile.TemporaryDirectory() as home:
+        Path(home).chmod(0o777)
+        assert imported(home) == ["None", "-"]
