@@ -1,9 +1,10 @@
 """One folder of compiled functions for all processes of a test run, also for those that the tests start.
 
 numba numbers the files of its cache without a lock: processes that compile the same function for different arguments at
-once could take each other's machine code for theirs. Its setting of a class that finds the cache is how this module
-gets into every process. The folder is named after their sources, since numba itself does not notice a change in a
-function that was compiled into another one.
+once could take each other's machine code for theirs. And they would all compile what all need first; here one does, and
+the others wait for it. Functions do not call each other in circles, so nobody waits for those who wait for him. Its
+setting of a class that finds the cache is how this module gets into every process. The folder is named after their
+sources, since numba itself does not notice a change in a function that was compiled into another one.
 """
 
 import fcntl
@@ -11,10 +12,11 @@ import hashlib
 import os
 import re
 import shutil
+import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
 
 import numba
 from numba.core import caching
@@ -23,10 +25,13 @@ PROJECT = Path(__file__).resolve().parents[1]
 PACKAGES = ("app", "simulator", "imc_bridge")
 IMPORT = re.compile(rf"^from ((?:{'|'.join(PACKAGES)})[\w.]*) import (\([^)]*\)|.*)", re.MULTILINE)
 ALL = PROJECT / ".pytest_cache" / "numba"
+PATIENCE_S = 60.0
 
 
 class _Locked(caching.IndexDataCacheFile):
-    """Index and machine code of one function, which one process at a time reads or writes."""
+    """Index and machine code of one function, which one process at a time reads or writes, and one compiles."""
+
+    _compiling: TextIO | None = None
 
     @contextmanager
     def _alone(self) -> Iterator[None]:
@@ -34,13 +39,41 @@ class _Locked(caching.IndexDataCacheFile):
             fcntl.flock(file, fcntl.LOCK_EX)  # closing the file gives it free
             yield
 
+    def _load(self, key: Any) -> Any:
+        with self._alone():
+            return super().load(key)
+
+    def load(self, key: Any) -> Any:
+        """Return what was compiled, perhaps by a process that was waited for; None where this one has to compile."""
+        found = self._load(key)
+        if found is None and self._compiling is None:
+            self._compiling = _taken(Path(f"{self._index_path}.compiling"))
+            found = self._load(key)
+            if found is not None:
+                self._end()
+        return found
+
     def save(self, key: Any, data: Any) -> None:
         with self._alone():
             super().save(key, data)
+        self._end()
 
-    def load(self, key: Any) -> Any:
-        with self._alone():
-            return super().load(key)
+    def _end(self) -> None:
+        if self._compiling is not None:
+            self._compiling.close()
+            self._compiling = None
+
+
+def _taken(path: Path) -> TextIO:
+    """Lock a file; not at any price, since what cannot be compiled is never saved and its lock given free."""
+    file = path.open("w")
+    deadline = time.monotonic() + PATIENCE_S
+    while time.monotonic() < deadline:
+        with suppress(BlockingIOError):
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            break
+        time.sleep(0.05)
+    return file
 
 
 class Locator(caching.UserProvidedCacheLocator):
