@@ -176,7 +176,7 @@ class GaussianProcessMap:
         uniform = uniform_scales(len(self._levels.soundings))
         if learn:
             if self.kernel == "auto":
-                self.kernel_, start = choose_kernel(self._levels)
+                self.kernel_, start = choose_kernel(self._levels, REACH_UNITS * self._unit_m)
             else:
                 self.kernel_ = self.kernel
         likelihood = likelihood_of(self._levels, self.kernel_, subset, uniform)
