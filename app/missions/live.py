@@ -40,9 +40,10 @@ from app.missions.maps import NOT_MADE, MapSnapshot, MissionFacts
 from app.missions.members import Member, Team
 from app.missions.messages import StateMessage
 from app.missions.range_journal import RangeJournal
+from app.missions.search.progress import progress_of
 from app.missions.search.scans import take
 from app.missions.search.state import Search
-from app.missions.search.views import SearchProgress, progress_of
+from app.missions.search.views import SearchProgress
 from app.missions.spec import MissionSpec
 from app.missions.states import ENDED, MissionState
 from app.missions.target_showing import target_views

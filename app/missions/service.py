@@ -69,8 +69,9 @@ from app.missions.reading import Reader
 from app.missions.reviewing import rule, soundings_page
 from app.missions.search.obstacles import obstacles_geojson
 from app.missions.search.posted import Scan
+from app.missions.search.progress import grid_view
 from app.missions.search.scanning import scan, search_of
-from app.missions.search.views import SearchGridView, grid_view
+from app.missions.search.views import SearchGridView
 from app.missions.settings import ServiceSettings
 from app.missions.sounding_views import BatchVerdict, LogImportView, Ruling, SoundingPage, SoundingState, SoundingView
 from app.missions.spec import MissionKind, MissionSpec, SoundSpeed, VehicleSpec
