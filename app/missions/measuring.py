@@ -20,11 +20,10 @@ from app.missions.large import each_of, made_of
 from app.missions.links.rest import RestFleetLink
 from app.missions.live import LiveMission
 from app.missions.measurement import Measurement
-from app.missions.sounding_views import BatchVerdict, ItemVerdict, Verdict
+from app.missions.sounding_views import BatchVerdict, ItemVerdict, Verdict, batch_verdict
 from app.missions.spec import VehicleKind
 from app.missions.states import MissionState
 from app.missions.tracking import Arrived
-from app.missions.verdicts import batch_verdict
 from app.storage import soundings as sounding_queries
 from app.storage.grouping import Grouped
 from app.storage.models import BatchRow

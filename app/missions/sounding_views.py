@@ -103,3 +103,14 @@ class LogImportView(View):
     skipped_bytes: int = Field(description="Bytes that are no packet")
     cut_off: bool = Field(description="The file ends in the middle, as after a power loss; what came before is used")
     known: bool = Field(description="The whole log had been imported before; nothing was written")
+
+
+def batch_verdict(items: list[ItemVerdict]) -> BatchVerdict:
+    """Return the verdicts on a batch, in its order, with how many there are of each."""
+    tally = {verdict: sum(item.verdict is verdict for item in items) for verdict in Verdict}
+    return BatchVerdict(
+        accepted=tally[Verdict.ACCEPTED],
+        rejected=tally[Verdict.REJECTED],
+        duplicate=tally[Verdict.DUPLICATE],
+        items=items,
+    )

@@ -8,10 +8,9 @@ from app.missions.fleet import Position, ScanReport
 from app.missions.live import LiveMission
 from app.missions.search.posted import Scan
 from app.missions.search.state import Search
-from app.missions.sounding_views import BatchVerdict, ItemVerdict, Verdict
+from app.missions.sounding_views import BatchVerdict, ItemVerdict, Verdict, batch_verdict
 from app.missions.spec import VehicleKind
 from app.missions.states import MissionState
-from app.missions.verdicts import batch_verdict
 
 MAX_SCANS = 1000
 SCANS_AT_ONCE = 20
