@@ -257,8 +257,8 @@ def doctor(
 ) -> None:
     """Listen for IMC vehicles and say what is missing. Nothing is commanded. Exit code 1 when something is wrong."""
     settings = command_settings()
-    from app.missions.doctoring import doctor_view
-    from app.missions.links.imc import bridge_settings
+    from app.missions.fleet.links.imc import bridge_settings
+    from app.missions.views.doctor import doctor_view
     from imc_bridge.doctor import Diagnosis, diagnose, diagnose_recording
     from imc_bridge.replay import RecordingError
 

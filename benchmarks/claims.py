@@ -23,11 +23,11 @@ from mapping_terrains import terrains
 from app.evaluation.tables.facts import made
 from app.mapping.georeference import LocalFrame
 from app.mapping.gp import warm_up
-from app.missions.forecasting import fly
-from app.missions.forecasts import starts_of
-from app.missions.map_builder import MapBuilder
-from app.missions.members import Team
-from app.missions.spec import MissionSpec
+from app.missions.forecast.request import starts_of
+from app.missions.forecast.simulate import fly
+from app.missions.maps.builder import MapBuilder
+from app.missions.spec.mission import MissionSpec
+from app.missions.team import Team
 from simulator.seafloors import generate
 from simulator.terrain import Terrain
 

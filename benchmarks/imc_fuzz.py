@@ -35,10 +35,10 @@ from numba import njit
 from shapely.geometry import Polygon
 
 from app.mapping.georeference import LocalFrame
-from app.missions.corrections import Corrections
-from app.missions.gate import MAX_OCEAN_DEPTH_M, Gate
-from app.missions.links.imc import sounding_report
-from app.missions.spec import Tide
+from app.missions.fleet.links.imc import sounding_report
+from app.missions.soundings.corrections import Corrections
+from app.missions.soundings.gate import MAX_OCEAN_DEPTH_M, Gate
+from app.missions.spec.mission import Tide
 from imc_bridge import Bridge, BridgeSettings, LinkChange, RefusedError, Sounding, StateReport, Waypoint
 from imc_bridge.codec import message_ids, message_name
 from imc_bridge.events import SoundingRefused

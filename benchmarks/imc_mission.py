@@ -27,11 +27,11 @@ from imc_report import write_section
 
 from app.api import logs
 from app.mapping.georeference import LocalFrame
-from app.missions.fleet import WaypointStatus
+from app.missions.fleet.interface import WaypointStatus
 from app.missions.metrics import PACKETS_DROPPED
 from app.missions.service import MissionService
 from app.missions.settings import ImcSettings, ServiceSettings
-from app.missions.spec import MissionSpec
+from app.missions.spec.mission import MissionSpec
 from app.missions.states import ENDED
 from app.storage.database import Database
 from app.storage.missions import waypoints_of_step

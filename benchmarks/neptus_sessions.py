@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from app.missions.settings import ImcSettings, ServiceSettings
-from app.missions.sounding_views import Verdict
+from app.missions.views.soundings import Verdict
 from app.storage.prepare import prepare_database
 from simulator.terrain import Terrain
 from simulator.terrain_files import load_terrain

@@ -31,7 +31,7 @@ from app.exploration.constraints import Constraints
 from app.exploration.options import PlannerOptions
 from app.exploration.problem import Belief, Situation
 from app.main import create_app
-from app.missions.spec import Limits, MissionSpec
+from app.missions.spec.mission import Limits, MissionSpec
 from app.settings import Settings
 from simulator.__main__ import app as simulator_app
 from tests.test_cli import ROOT, serving

@@ -7,8 +7,8 @@ from app.api.json_route import JsonRoute
 from app.api.problems import problems
 from app.api.schemas import API, MissionId
 from app.api.state import Service
-from app.missions.correction_views import CorrectionsView, TideCorrection
-from app.missions.spec import SoundSpeed
+from app.missions.spec.mission import SoundSpeed
+from app.missions.views.corrections import CorrectionsView, TideCorrection
 
 router = APIRouter(
     route_class=JsonRoute,

@@ -8,8 +8,8 @@ from app.api.problems import problems
 from app.api.schemas import API
 from app.api.state import Service, State
 from app.api.whole_lists import from_peers
-from app.missions.doctoring import DoctorView
-from app.missions.views import PlannerView, VehicleView
+from app.missions.views.doctor import DoctorView
+from app.missions.views.mission import PlannerView, VehicleView
 
 _views = TypeAdapter(list[VehicleView])
 

@@ -12,8 +12,8 @@ from app.api.missions import EXAMPLE_SPEC
 from app.api.problems import problems
 from app.api.schemas import API, MissionId
 from app.api.state import Service
-from app.missions.forecasts import ForecastView
-from app.missions.spec import MissionSpec
+from app.missions.forecast.request import ForecastView
+from app.missions.spec.mission import MissionSpec
 
 router = APIRouter(
     route_class=JsonRoute, prefix=API, tags=["missions"], responses=problems("unauthenticated", "forbidden")

@@ -22,7 +22,7 @@ from app.api.racing import first_of
 from app.api.schemas import API
 from app.api.spool import Spool, spool_folder
 from app.api.state import EdgeState
-from app.missions.ownership import Peer
+from app.missions.running.ownership import Peer
 
 _OF_A_MISSION = re.compile(rf"^{API}/missions/([0-9a-f]{{8}}-[0-9a-f-]{{27}})(?:/|$)")
 

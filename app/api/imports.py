@@ -11,8 +11,8 @@ from app.api.auth import Operator, Reader
 from app.api.problems import ProblemError, problems
 from app.api.schemas import API, MissionId
 from app.api.state import EdgeState, Service, State
-from app.missions.import_views import ImportOptions, ImportView, ReferenceView
-from app.missions.uploads import Upload
+from app.missions.operations.uploads import Upload
+from app.missions.views.imports import ImportOptions, ImportView, ReferenceView
 
 router = APIRouter(
     prefix=f"{API}/missions/{{mission_id}}", tags=["imports"], responses=problems("unauthenticated", "forbidden")

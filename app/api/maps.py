@@ -15,11 +15,11 @@ from app.api.state import EdgeState, Service, State
 from app.mapping.layers import Layer
 from app.mapping.products.overlay import overlay_png
 from app.mapping.s44 import Order
-from app.missions.map_views import MapView, ProductView, QualityView
-from app.missions.maps import MapSnapshot
-from app.missions.products import MAP, PRODUCTS, SOUNDINGS, TRACKS, ProductOptions, layers_of
-from app.missions.quality import quality_of
-from app.missions.spec_base import Name
+from app.missions.maps.products import MAP, PRODUCTS, SOUNDINGS, TRACKS, ProductOptions, layers_of
+from app.missions.maps.quality import quality_of
+from app.missions.maps.snapshot import MapSnapshot
+from app.missions.spec.base import Name
+from app.missions.views.map import MapView, ProductView, QualityView
 
 router = APIRouter(
     prefix=f"{API}/missions/{{mission_id}}",

@@ -10,9 +10,9 @@ from app.api.problems import ProblemError, problems
 from app.api.racing import first_of
 from app.api.schemas import API, MeasurementBatch, MissionId, VehicleName
 from app.api.state import Service, State
-from app.missions.measurement import Measurement
-from app.missions.sounding_views import BatchVerdict, ItemVerdict, Verdict
-from app.missions.views import WaypointView
+from app.missions.soundings.measurement import Measurement
+from app.missions.views.mission import WaypointView
+from app.missions.views.soundings import BatchVerdict, ItemVerdict, Verdict
 
 router = APIRouter(
     route_class=JsonRoute,

@@ -4,9 +4,9 @@ from collections.abc import Sequence
 
 from prometheus_client import REGISTRY, CollectorRegistry, Counter, Gauge, Histogram, generate_latest
 
-from app.missions.fleet import LinkState
+from app.missions.fleet.interface import LinkState
 from app.missions.states import MissionState
-from app.missions.views import MissionSummary, VehicleView
+from app.missions.views.mission import MissionSummary, VehicleView
 
 REQUESTS = Counter(
     "bathyfleet_http_requests_total", "Requests by method, route and status", ["method", "route", "status"]

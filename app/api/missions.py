@@ -12,9 +12,9 @@ from app.api.problems import problems
 from app.api.schemas import API, ActionRequest, MissionId, NoteRequest, VehicleName
 from app.api.state import Service, State
 from app.api.whole_lists import from_peers
-from app.missions.spec import MissionSpec, VehicleSpec
-from app.missions.telemetry import TelemetryView
-from app.missions.views import ActionView, EventView, MissionSummary, MissionView, PreflightView, StepView
+from app.missions.spec.mission import MissionSpec, VehicleSpec
+from app.missions.views.mission import ActionView, EventView, MissionSummary, MissionView, PreflightView, StepView
+from app.missions.views.telemetry import TelemetryView
 
 router = APIRouter(
     route_class=JsonRoute,

@@ -7,7 +7,7 @@ from fastapi.openapi.utils import get_openapi
 from pydantic import TypeAdapter
 
 from app.api.problems import MEDIA_TYPE, Problem, problems
-from app.missions.messages import LiveMessage
+from app.missions.views.messages import LiveMessage
 
 TAGS = [
     {"name": "missions", "description": "Describe a mission, start it, pause, resume, abort or finish it."},

@@ -23,7 +23,7 @@ from starlette.datastructures import Headers, MutableHeaders
 from starlette.types import Scope
 
 from app.api.tokens import Principal, Role
-from app.missions.ownership import Peer
+from app.missions.running.ownership import Peer
 
 PEER = "x-bathyfleet-peer"
 """Header with who sent a request on, its number there and the signature: ``SENDER.NUMBER.SIGNATURE``."""

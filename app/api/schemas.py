@@ -17,10 +17,10 @@ from pydantic import (
 
 from app.api.json_text import Bounds
 from app.api.problems import MAX_ERRORS, field_problem
-from app.missions.measurement import Measurement
-from app.missions.search.posted import Scan
-from app.missions.search.scanning import MAX_SCANS
-from app.missions.spec_base import Name
+from app.missions.operations.scans import MAX_SCANS
+from app.missions.search.scan_schema import Scan
+from app.missions.soundings.measurement import Measurement
+from app.missions.spec.base import Name
 
 API = "/api/v1"
 

@@ -9,8 +9,8 @@ from app.api.json_route import JsonRoute
 from app.api.problems import problems
 from app.api.schemas import API, MissionId, ScanBatch
 from app.api.state import Service
-from app.missions.search.views import SearchGridView
-from app.missions.sounding_views import BatchVerdict
+from app.missions.views.search import SearchGridView
+from app.missions.views.soundings import BatchVerdict
 
 router = APIRouter(
     route_class=JsonRoute,

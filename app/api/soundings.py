@@ -9,8 +9,8 @@ from app.api.json_route import JsonRoute
 from app.api.problems import problems
 from app.api.schemas import API, ActionRequest, MissionId
 from app.api.state import Service
-from app.missions.sounding_views import Ruling, SoundingPage, SoundingState, SoundingView
-from app.missions.spec_base import Name
+from app.missions.spec.base import Name
+from app.missions.views.soundings import Ruling, SoundingPage, SoundingState, SoundingView
 
 router = APIRouter(
     route_class=JsonRoute,

@@ -16,11 +16,11 @@ from app.api.problems import ProblemError, describe_mission_error, problems
 from app.api.racing import first_of
 from app.api.schemas import API, MissionId
 from app.api.state import EdgeState, Service, State, edge_state
-from app.missions.broadcast import WatchEndedError
 from app.missions.errors import MissionError
-from app.missions.messages import EventMessage, LiveMessage, SnapshotMessage
+from app.missions.live.broadcast import WatchEndedError
 from app.missions.service import MissionService
-from app.missions.views import EventView
+from app.missions.views.messages import EventMessage, LiveMessage, SnapshotMessage
+from app.missions.views.mission import EventView
 
 router = APIRouter(prefix=f"{API}/missions/{{mission_id}}", tags=["live"])
 

@@ -8,8 +8,8 @@ from app.api.auth import Reader
 from app.api.problems import problems
 from app.api.schemas import API, MissionId
 from app.api.state import Service
-from app.missions.spec_base import Name
-from app.missions.target_views import TargetRangePage, TargetView
+from app.missions.spec.base import Name
+from app.missions.views.targets import TargetRangePage, TargetView
 
 router = APIRouter(
     prefix=f"{API}/missions/{{mission_id}}/targets",

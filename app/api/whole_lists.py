@@ -10,7 +10,7 @@ from starlette.requests import Request
 
 from app.api.processes import comes_from_peer
 from app.api.state import EdgeState
-from app.missions.ownership import Peer
+from app.missions.running.ownership import Peer
 
 ANSWER_S = 5.0
 """How long another process may take to answer."""

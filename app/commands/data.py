@@ -50,7 +50,7 @@ def export(
     """Write a mission's map, soundings or tracks to a file, from the database; no service has to run."""
     settings = command_settings(database_url=database)
     from app.mapping.s44 import Order
-    from app.missions.products import PRODUCTS, Product, ProductOptions
+    from app.missions.maps.products import PRODUCTS, Product, ProductOptions
     from app.missions.service import MissionService
     from app.storage import private
 
@@ -116,8 +116,8 @@ def import_file(
     database: Database = None,
 ) -> None:
     """Begin a mission with soundings or a map from elsewhere. The same file again changes nothing."""
-    from app.missions.import_views import ImportOptions, ImportView, ReferenceView
-    from app.missions.uploads import open_upload
+    from app.missions.operations.uploads import open_upload
+    from app.missions.views.imports import ImportOptions, ImportView, ReferenceView
 
     given = {
         "filename": file.name,
@@ -190,7 +190,7 @@ def tide(
     database: Database = None,
 ) -> None:
     """Correct a mission's tide, also afterwards: every sounding is corrected anew from its raw depth."""
-    from app.missions.correction_views import CorrectionsView, TideCorrection
+    from app.missions.views.corrections import CorrectionsView, TideCorrection
 
     try:
         text = None if table is None else table.read_text(encoding="utf-8")

@@ -8,7 +8,7 @@ import structlog
 from app.estimation import Sensor, SingleBeam
 from app.exploration.planners import warm_up_planner
 from app.mapping.gp import warm_up as warm_up_maps
-from app.missions.spec import PlannerSpec
+from app.missions.spec.mission import PlannerSpec
 
 log = structlog.get_logger(__name__)
 

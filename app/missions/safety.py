@@ -220,7 +220,7 @@ def below_surface_m(depth_m: FloatArray, water_level_m: float) -> FloatArray:
     depth_m
         Below the datum, positive down.
     water_level_m
-        How high the water stands above the datum: :meth:`app.missions.corrections.Corrections.water_level_m`, which
+        How high the water stands above the datum: :meth:`.Corrections.water_level_m`, which
         knows of tide tables and datum offsets.
     """
     return depth_m + min(water_level_m, 0.0)

@@ -15,47 +15,27 @@ import structlog
 from app.exploration.options import PlannerOptions
 from app.exploration.planners import PLANNERS
 from app.mapping.products.tracks import Track, TrackPoint
-from app.missions import importing, states
-from app.missions.admission import check_spec
-from app.missions.claims import Claims, Lead, ShowArea, free_elsewhere
+from app.missions import states
 from app.missions.clock import now
 from app.missions.compilation import Compilation
-from app.missions.conducting import Conductor
-from app.missions.correcting import check_level_is_known, corrections_view, set_sound_speed, set_tide
-from app.missions.correction_views import CorrectionsView, TideCorrection
-from app.missions.crews import Crews, refuse_ended, vehicle_row
-from app.missions.deleting import check_deletable, delete_mission
-from app.missions.doctoring import DoctorView, Examine, doctor_view, switched_off
 from app.missions.errors import (
     ConflictError,
     InvalidRequestError,
     MapNotReadyError,
     MissionElsewhereError,
 )
-from app.missions.fleet import (
+from app.missions.fleet.hub import FleetHub
+from app.missions.fleet.interface import (
     FleetLink,
     StopReceipt,
 )
-from app.missions.forecasts import Forecaster, ForecastView
-from app.missions.history import map_at_step, steps_after
-from app.missions.hub import FleetHub
-from app.missions.import_views import ImportOptions, ImportView, ReferenceView
-from app.missions.importing import Importing
-from app.missions.journal import event_view
-from app.missions.links.rest import RestFleetLink
-from app.missions.links.sim import SimFleetLink
-from app.missions.live import LiveMission
-from app.missions.map_keeping import MapKeeper
-from app.missions.maps import MapSnapshot
-from app.missions.measurement import Measurement
-from app.missions.measuring import measure
-from app.missions.memory import Memory
-from app.missions.messages import LiveMessage
-from app.missions.mission_showing import action_view, beginning_with, idle_vehicle_view, mission_view, snapshot_message
-from app.missions.ownership import Ownership
-from app.missions.polling import waypoint
-from app.missions.preflight import preflight
-from app.missions.products import (
+from app.missions.fleet.links.rest import RestFleetLink
+from app.missions.fleet.links.sim import SimFleetLink
+from app.missions.forecast.request import Forecaster, ForecastView
+from app.missions.live.journal import event_view
+from app.missions.live.mission import LiveMission
+from app.missions.live.trails import Trail
+from app.missions.maps.products import (
     MAP,
     SOUNDINGS,
     TRACKS,
@@ -65,23 +45,47 @@ from app.missions.products import (
     make_product,
     product_kind,
 )
-from app.missions.reading import Reader
-from app.missions.reviewing import rule, soundings_page
+from app.missions.maps.snapshot import MapSnapshot
+from app.missions.operations import imports as importing
+from app.missions.operations.history import map_at_step, steps_after
+from app.missions.operations.imports import Importing
+from app.missions.operations.measurements import measure
+from app.missions.operations.polling import waypoint
+from app.missions.operations.reading import Reader
+from app.missions.operations.recorrection import check_level_is_known, corrections_view, set_sound_speed, set_tide
+from app.missions.operations.review import rule, soundings_page
+from app.missions.operations.scans import scan, search_of
+from app.missions.operations.target_pages import target_ranges_page
+from app.missions.operations.uploads import Upload, Uploads
+from app.missions.preflight.survey import preflight
+from app.missions.running.admission import check_spec
+from app.missions.running.claims import Claims, Lead, ShowArea, free_elsewhere
+from app.missions.running.deletion import check_deletable, delete_mission
+from app.missions.running.failover import Watch
+from app.missions.running.final_maps import MapKeeper
+from app.missions.running.mission_views import (
+    action_view,
+    beginning_with,
+    idle_vehicle_view,
+    mission_view,
+    snapshot_message,
+)
+from app.missions.running.ownership import Ownership
+from app.missions.running.registry import Memory
+from app.missions.running.supervisor import Conductor
+from app.missions.running.team_changes import Crews, refuse_ended, vehicle_row
 from app.missions.search.obstacles import obstacles_geojson
-from app.missions.search.posted import Scan
 from app.missions.search.progress import grid_view
-from app.missions.search.scanning import scan, search_of
-from app.missions.search.views import SearchGridView
+from app.missions.search.scan_schema import Scan
 from app.missions.settings import ServiceSettings
-from app.missions.sounding_views import BatchVerdict, LogImportView, Ruling, SoundingPage, SoundingState, SoundingView
-from app.missions.spec import MissionKind, MissionSpec, SoundSpeed, VehicleSpec
+from app.missions.soundings.measurement import Measurement
+from app.missions.spec.mission import MissionKind, MissionSpec, SoundSpeed, VehicleSpec
 from app.missions.states import ENDED, Action, MissionState
-from app.missions.target_pages import target_ranges_page
-from app.missions.target_views import TargetRangePage, TargetView
-from app.missions.telemetry import TelemetryView, telemetry_view
-from app.missions.trails import Trail
-from app.missions.uploads import Upload, Uploads
-from app.missions.views import (
+from app.missions.views.corrections import CorrectionsView, TideCorrection
+from app.missions.views.doctor import DoctorView, Examine, doctor_view, switched_off
+from app.missions.views.imports import ImportOptions, ImportView, ReferenceView
+from app.missions.views.messages import LiveMessage
+from app.missions.views.mission import (
     ActionView,
     EventView,
     Level,
@@ -93,7 +97,10 @@ from app.missions.views import (
     VehicleView,
     WaypointView,
 )
-from app.missions.watch import Watch
+from app.missions.views.search import SearchGridView
+from app.missions.views.soundings import BatchVerdict, LogImportView, Ruling, SoundingPage, SoundingState, SoundingView
+from app.missions.views.targets import TargetRangePage, TargetView
+from app.missions.views.telemetry import TelemetryView, telemetry_view
 from app.storage import events as event_queries
 from app.storage import missions as mission_queries
 from app.storage import soundings as sounding_queries
@@ -145,7 +152,7 @@ class MissionService:
         show_area: ShowArea = lambda _mission, _ring: None  # noqa: E731
         lead: Lead = lambda _vehicle, _guidance, _gateway: None  # noqa: E731
         if settings.imc.enabled:
-            from app.missions.links.imc import make_imc_link
+            from app.missions.fleet.links.imc import make_imc_link
 
             imc = make_imc_link(settings.imc, settings.time_scale)
             self._examine = imc.diagnosis
@@ -153,7 +160,7 @@ class MissionService:
             show_area = imc.show_area
             links.append(imc)
         if settings.neptus.enabled:
-            from app.missions.neptus import NeptusSessions
+            from app.missions.neptus_sessions import NeptusSessions
 
             links.append(NeptusSessions(self, database, settings.neptus, log_in or _nobody, is_own_user).link)
         self._hub = FleetHub(links)
@@ -407,7 +414,7 @@ class MissionService:
         InvalidRequestError
             When the file is no log of a vehicle, or does not tell which one's.
         """
-        from app.missions.log_import import LogImport
+        from app.missions.operations.log_import import LogImport
 
         live = await self._get(mission_id)
         work = await asyncio.to_thread(LogImport, live, self._settings, path, vehicle)

@@ -12,7 +12,7 @@ from typing import Any
 import httpx
 import pytest
 
-from app.missions import reading, uploads
+from app.missions.operations import reading, uploads
 from tests.api.conftest import make_client, mission_spec, running
 from tests.api.test_imports import prior_text
 from tests.faults.leading_out import grids, told

@@ -10,8 +10,8 @@ import pytest
 import rasterio
 from PIL import Image
 
-from app.missions.map_views import MapView
 from app.missions.settings import ProviderSettings
+from app.missions.views.map import MapView
 from app.settings import Settings
 from tests.api.conftest import make_client, mission_spec, running, soundings
 

@@ -17,7 +17,7 @@ from app.api.processes import (
     vouched_for,
 )
 from app.api.tokens import Principal, Role
-from app.missions.ownership import Peer
+from app.missions.running.ownership import Peer
 
 SECRET = "s3cret of the one that is asked"  # noqa: S105 - the test's own
 PEER_ASKED = Peer(2, "http://127.0.0.1:8081", SECRET, None)

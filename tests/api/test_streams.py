@@ -14,7 +14,7 @@ from pydantic import TypeAdapter
 
 from app.api.tokens import Role, TokenStore
 from app.main import Server
-from app.missions.messages import LiveMessage
+from app.missions.views.messages import LiveMessage
 from app.settings import Settings
 from app.storage.database import Database
 from tests.api.conftest import make_client, mission_spec, running, soundings

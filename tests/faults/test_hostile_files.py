@@ -16,7 +16,7 @@ from pydantic import ValidationError
 
 from app.mapping.readers.files import read_file
 from app.mapping.readers.types import ReadError
-from app.missions.import_views import ImportOptions
+from app.missions.views.imports import ImportOptions
 from simulator.terrain import Terrain, TerrainError
 from simulator.terrain_files import load_terrain, save_npz
 from tests.faults.hostile import npy, npz

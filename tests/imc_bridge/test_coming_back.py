@@ -7,7 +7,7 @@ import pytest
 
 from app.missions.service import MissionService
 from app.missions.settings import ImcSettings, ServiceSettings
-from app.missions.spec import MissionSpec
+from app.missions.spec.mission import MissionSpec
 from app.missions.states import MissionState
 from app.storage.database import Database
 from imc_bridge import Bridge, LinkChange, NodeState, RefusedError, WaypointStatus

@@ -6,7 +6,7 @@ import imcpy
 import pytest
 
 from app.missions import metrics
-from app.missions.links.imc import ImcFleetLink
+from app.missions.fleet.links.imc import ImcFleetLink
 from imc_bridge import Bridge, BridgeSettings, PacketsDropped, PortInUseError
 from imc_bridge.doctor import Cause, judge
 from imc_bridge.drops import RECENT_WALL_S, DropMeter

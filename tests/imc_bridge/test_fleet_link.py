@@ -2,7 +2,7 @@
 
 import pytest
 
-from app.missions.fleet import (
+from app.missions.fleet.interface import (
     LinkReport,
     LinkState,
     Position,
@@ -13,7 +13,7 @@ from app.missions.fleet import (
     WaypointReport,
     WaypointStatus,
 )
-from app.missions.links.imc import ImcFleetLink, make_imc_link
+from app.missions.fleet.links.imc import ImcFleetLink, make_imc_link
 from app.missions.settings import ImcSettings
 from tests.imc_bridge.conftest import open_sea, until
 from tests.ports import free_ports

@@ -9,7 +9,7 @@ from pydantic import ValidationError
 
 from app.missions.service import MissionService
 from app.missions.settings import ImcSettings, ServiceSettings
-from app.missions.spec import MissionSpec, VehicleSpec
+from app.missions.spec.mission import MissionSpec, VehicleSpec
 from app.missions.states import MissionState
 from app.storage.database import Database
 from imc_bridge import NodeState, Sounding

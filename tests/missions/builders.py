@@ -3,7 +3,7 @@
 from typing import Any
 
 from app.mapping.georeference import LocalFrame
-from app.missions.spec import MissionSpec
+from app.missions.spec.mission import MissionSpec
 
 LAT, LON = 41.185, -8.705
 FRAME = LocalFrame(LAT, LON)

@@ -7,12 +7,12 @@ from collections.abc import Awaitable, Callable
 from typing import Any
 
 from app.missions.errors import ConflictError, VehicleNotFoundError
-from app.missions.measurement import Measurement
 from app.missions.service import MissionService
 from app.missions.settings import ServiceSettings
-from app.missions.spec import MissionSpec
+from app.missions.soundings.measurement import Measurement
+from app.missions.spec.mission import MissionSpec
 from app.missions.states import MissionState
-from app.missions.views import MissionView
+from app.missions.views.mission import MissionView
 from app.storage.database import Database
 from tests.missions.builders import lon_lat, spec_json
 

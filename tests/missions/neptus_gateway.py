@@ -8,10 +8,10 @@ from app.api.auth import console_log_in
 from app.api.limits import Limits
 from app.api.peers import is_own_user
 from app.api.tokens import Role, TokenStore
-from app.missions.links.neptus import gateway_settings
+from app.missions.fleet.links.neptus import gateway_settings
 from app.missions.service import MissionService
 from app.missions.settings import ServiceSettings
-from app.missions.views import MissionView
+from app.missions.views.mission import MissionView
 from app.storage.database import Database
 from imc_bridge.neptus import Area
 from tests.missions.neptus_panel import Auv, Floor, RealPanel

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from app.missions.boundaries import Boundaries
-from app.missions.decision import make_constraints
-from app.missions.links.sim import Launch, SimFleetLink
+from app.missions.fleet.links.sim import Launch, SimFleetLink
+from app.missions.flight.decision import make_constraints
+from app.missions.live.boundaries import Boundaries
 from app.missions.safety import WAITING_CIRCLE_M
 from app.missions.service import MissionService
 from app.missions.settings import SimulationSettings
-from app.missions.spec import Sensor, VehicleKind
-from app.missions.views import CheckStatus, EventView, Level
+from app.missions.spec.mission import Sensor, VehicleKind
+from app.missions.views.mission import CheckStatus, EventView, Level
 from simulator.seafloors import generate
 from simulator.sensors import SensorKind, SonarNoise
 from simulator.world import SimulatedVehicle

@@ -5,11 +5,11 @@ from datetime import UTC, datetime
 
 import pytest
 
-from app.missions import broadcast
-from app.missions.broadcast import Broadcaster, Subscription, WatchEndedError
-from app.missions.messages import EventMessage, LiveMessage, VehiclesMessage, WaypointsMessage
-from app.missions.telling import live_period_s
-from app.missions.views import EventView, Level
+from app.missions.live.broadcast import Broadcaster, Subscription, WatchEndedError
+from app.missions.live.feed import live_period_s
+from app.missions.live.mission import broadcast
+from app.missions.views.messages import EventMessage, LiveMessage, VehiclesMessage, WaypointsMessage
+from app.missions.views.mission import EventView, Level
 
 TIME = datetime(2026, 6, 1, tzinfo=UTC)
 

@@ -19,8 +19,8 @@ from numba.core.dispatcher import Dispatcher
 import app.exploration
 from app.estimation import SingleBeam
 from app.exploration.planners import create_planner, warm_up_planner
-from app.missions.decision import Place, decide, make_constraints
-from app.missions.live import builder_of
+from app.missions.flight.decision import Place, decide, make_constraints
+from app.missions.live.mission import builder_of
 from tests.missions.fleet import sim_spec
 
 names = [found.name for found in pkgutil.walk_packages(app.exploration.__path__, "app.exploration.")]

@@ -9,7 +9,7 @@ from collections.abc import AsyncIterator
 import numpy as np
 import pytest
 
-from app.missions.fleet import (
+from app.missions.fleet.interface import (
     FleetEvent,
     FleetLink,
     LinkReport,
@@ -23,11 +23,11 @@ from app.missions.fleet import (
     WaypointReport,
     WaypointStatus,
 )
-from app.missions.links.imc import ImcFleetLink
-from app.missions.links.rest import RestFleetLink, horizontal_distance_m
-from app.missions.links.sim import Launch, SimFleetLink
+from app.missions.fleet.links.imc import ImcFleetLink
+from app.missions.fleet.links.rest import RestFleetLink, horizontal_distance_m
+from app.missions.fleet.links.sim import Launch, SimFleetLink
 from app.missions.settings import SimulationSettings
-from app.missions.spec import Sensor
+from app.missions.spec.mission import Sensor
 from imc_bridge import BridgeSettings
 from simulator import seafloors
 from simulator.dune import DuneFleet, DuneOptions, default_specs

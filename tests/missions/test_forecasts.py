@@ -6,12 +6,12 @@ import threading
 import numpy as np
 import pytest
 
-from app.missions import forecasts
 from app.missions.errors import ConflictError, InvalidRequestError
-from app.missions.forecast_floor import Floor, floors_of
-from app.missions.forecasting import Flown, Forecast, forecast
+from app.missions.forecast import request as forecasts
+from app.missions.forecast.floor import Floor, floors_of
+from app.missions.forecast.simulate import Flown, Forecast, forecast
 from app.missions.service import MissionService
-from app.missions.spec import MissionSpec
+from app.missions.spec.mission import MissionSpec
 from app.missions.states import MissionState
 from tests.missions.builders import make_spec
 from tests.missions.fleet import sim_spec, until, until_state

@@ -8,10 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely.geometry import Point, Polygon
 
-from app.missions.corrections import Corrections
-from app.missions.fleet import Position, SoundingReport
-from app.missions.gate import JUMP_ALLOWANCE_M, MAX_VEHICLE_SPEED_MPS, Gate
-from app.missions.spec import Tide
+from app.missions.fleet.interface import Position, SoundingReport
+from app.missions.soundings.corrections import Corrections
+from app.missions.soundings.gate import JUMP_ALLOWANCE_M, MAX_VEHICLE_SPEED_MPS, Gate
+from app.missions.spec.mission import Tide
 from tests.missions.builders import FRAME, lon_lat
 
 AREA = Polygon([(0, 0), (100, 0), (100, 100), (0, 100)])

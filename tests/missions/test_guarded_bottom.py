@@ -7,11 +7,11 @@ from app.exploration.planners import create_planner
 from app.exploration.problem import Belief
 from app.mapping.tides import TideTable
 from app.missions.clock import now
-from app.missions.committing import Committing
-from app.missions.corrections import Corrections
-from app.missions.decision import Place, decide, make_constraints
-from app.missions.fleet import Position, VehicleReport
+from app.missions.fleet.interface import Position, VehicleReport
+from app.missions.flight.commit import Committing
+from app.missions.flight.decision import Place, decide, make_constraints
 from app.missions.service import MissionService
+from app.missions.soundings.corrections import Corrections
 from tests.missions.fleet import sim_spec
 
 DATUM_DEPTH_M = 10.0

@@ -3,12 +3,19 @@
 import pytest
 
 from app.missions.errors import ConflictError
-from app.missions.fleet import FleetEvent, LinkState, Position, VehicleRefusedError, VehicleReport, WaypointOrder
-from app.missions.hub import FleetHub
-from app.missions.links.rest import RestFleetLink
-from app.missions.links.sim import SimFleetLink
+from app.missions.fleet.hub import FleetHub
+from app.missions.fleet.interface import (
+    FleetEvent,
+    LinkState,
+    Position,
+    VehicleRefusedError,
+    VehicleReport,
+    WaypointOrder,
+)
+from app.missions.fleet.links.rest import RestFleetLink
+from app.missions.fleet.links.sim import SimFleetLink
 from app.missions.settings import SimulationSettings
-from app.missions.spec import VehicleKind
+from app.missions.spec.mission import VehicleKind
 from tests.missions.builders import LAT, LON
 
 A = (VehicleKind.REST, "a")

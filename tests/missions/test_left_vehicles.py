@@ -5,11 +5,11 @@ from collections.abc import AsyncIterator
 import pytest
 
 from app.missions.errors import ConflictError, MissionNotFoundError, VehicleNotFoundError
-from app.missions.import_views import ImportOptions
+from app.missions.operations.uploads import Uploads
 from app.missions.service import MissionService
 from app.missions.states import MissionState
-from app.missions.uploads import Uploads
-from app.missions.views import CheckStatus, VehicleView
+from app.missions.views.imports import ImportOptions
+from app.missions.views.mission import CheckStatus, VehicleView
 from tests.missions.builders import make_spec
 from tests.missions.fleet import Harbour, Rover, sim_spec, until, until_step
 

@@ -13,11 +13,11 @@ from typing import Any
 
 import pytest
 
-from app.missions import log_import
 from app.missions.errors import InvalidRequestError
+from app.missions.operations import log_import
 from app.missions.service import MissionService
 from app.missions.settings import ServiceSettings
-from app.missions.sounding_views import LogImportView
+from app.missions.views.soundings import LogImportView
 from app.storage import missions as mission_queries
 from app.storage.database import Database
 from tests.databases import query

@@ -6,7 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 
-from app.missions.map_builder import CLAIM_MARGIN, MAX_LANDMARKS, UNSEEN_MARGIN, MapBuilder, make_grid
+from app.missions.maps.builder import CLAIM_MARGIN, MAX_LANDMARKS, UNSEEN_MARGIN, MapBuilder, make_grid
 
 AREA = np.array([[0.0, 0.0], [30.0, 0.0], [30.0, 30.0], [0.0, 30.0]])
 

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from app.missions.map_builder import BuiltMap, MapBuilder
-from app.missions.map_tiles import ACCURATE, SOUNDED, TILE, VISIBLE, TileCache
-from app.missions.maps import MapSnapshot, MissionFacts
+from app.missions.maps.builder import BuiltMap, MapBuilder
+from app.missions.maps.snapshot import MapSnapshot, MissionFacts
+from app.missions.maps.tiles import ACCURATE, SOUNDED, TILE, VISIBLE, TileCache
 from tests.missions.builders import make_spec
 
 SPEC = make_spec(side_m=70.0, cell_m=1.0)
@@ -21,7 +21,7 @@ def snapshot(version: int, *soundings: tuple[float, float, float]) -> MapSnapsho
     builder.add(np.array([(east, north, depth, 0.05) for east, north, depth in soundings]))
     built = builder.build()
     assert built is not None
-    from app.missions.corrections import Corrections
+    from app.missions.soundings.corrections import Corrections
 
     facts = MissionFacts("m", SPEC, SPEC.frame(), Corrections(SPEC.frame(), SPEC.tide).vertical_datum)
     return MapSnapshot(facts, replace(built, version=version), step=1)

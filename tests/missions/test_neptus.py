@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from app.api.tokens import Role, TokenStore
-from app.missions.links.neptus import GATHER_S, gateway_settings
+from app.missions.fleet.links.neptus import GATHER_S, gateway_settings
 from app.missions.settings import NeptusSettings
 from app.missions.states import MissionState
 from tests.missions.fleet import until

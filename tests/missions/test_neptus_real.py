@@ -11,9 +11,9 @@ from typing import Any
 
 import pytest
 
-from app.missions.map_builder import make_grid
-from app.missions.sounding_views import Verdict
+from app.missions.maps.builder import make_grid
 from app.missions.states import MissionState
+from app.missions.views.soundings import Verdict
 from imc_bridge.neptus import SessionRefusedError
 from tests.missions.fleet import until
 from tests.missions.neptus_gateway import COLS, ROWS, SESSION, Gateway
@@ -326,8 +326,8 @@ async def test_a_console_that_began_anew_ends_what_it_does_not_fly_any_more(
 
 
 async def test_the_map_has_the_panels_rows_and_columns(make_gateway: Callable[..., Gateway]) -> None:
-    from app.missions.links.neptus import gateway_settings
-    from app.missions.neptus import session_spec
+    from app.missions.fleet.links.neptus import gateway_settings
+    from app.missions.neptus_sessions import session_spec
 
     for rows, cols, cell_m in ((240, 240, 1.0), (60, 50, 1.0), (37, 400, 2.5), (1500, 2000, 1.0)):
         settings = make_gateway(rows=rows, cols=cols, cell_m=cell_m).settings.neptus

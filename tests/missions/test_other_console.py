@@ -4,10 +4,10 @@ from collections.abc import Callable
 
 import imcpy
 
-from app.missions.fleet import LinkState
+from app.missions.fleet.interface import LinkState
 from app.missions.service import MissionService
 from app.missions.settings import ImcSettings, ServiceSettings
-from app.missions.views import Level
+from app.missions.views.mission import Level
 from app.storage.database import Database
 from imc_bridge import BridgeSettings
 from simulator.dune import DuneFleet, DuneOptions, default_specs

@@ -10,7 +10,7 @@ from app.missions.errors import ConflictError, MissionElsewhereError
 from app.missions.service import MissionService
 from app.missions.settings import ServiceSettings
 from app.missions.states import MissionState
-from app.missions.views import Level
+from app.missions.views.mission import Level
 from tests.databases import Databases, query
 from tests.missions.builders import make_spec
 from tests.missions.fleet import Harbour, sim_spec, until, until_state, until_step

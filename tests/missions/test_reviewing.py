@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from app.missions.errors import ConflictError, SoundingNotFoundError
-from app.missions.measurement import Measurement
 from app.missions.service import MissionService
-from app.missions.sounding_views import Ruling, SoundingState
+from app.missions.soundings.measurement import Measurement
+from app.missions.views.soundings import Ruling, SoundingState
 from tests.missions.builders import lon_lat, make_spec
 from tests.missions.fleet import CLOCK_S, Harbour, until
 
@@ -96,7 +96,7 @@ async def test_a_restored_sounding_bends_the_map_at_once_and_after_a_restart(har
 async def test_a_sounding_that_the_gate_refused_counts_when_restored_and_stays_through_corrections(
     service: MissionService,
 ) -> None:
-    from app.missions.correction_views import TideCorrection
+    from app.missions.views.corrections import TideCorrection
 
     mission = (await service.create(make_spec())).id
     await service.measure(mission, measured(wrong=None))
@@ -163,7 +163,7 @@ async def test_missions_that_left_memory_are_listed_as_they_were(harbour: Harbou
 
 
 async def test_the_map_of_an_earlier_step_is_that_of_the_soundings_until_then(service: MissionService) -> None:
-    from app.missions.history import map_at_step
+    from app.missions.operations.history import map_at_step
 
     mission = (await service.create(make_spec())).id
     await service.measure(mission, measured()[:30])

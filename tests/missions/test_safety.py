@@ -13,8 +13,8 @@ from app.exploration.bottom import Bottom
 from app.exploration.constraints import Constraints
 from app.exploration.problem import Belief, Proposal, Situation
 from app.missions import safety
-from app.missions.decision import Decision, Place, decide, make_constraints
-from app.missions.spec import MissionSpec
+from app.missions.flight.decision import Decision, Place, decide, make_constraints
+from app.missions.spec.mission import MissionSpec
 from tests.missions.builders import make_spec, rectangle
 
 AREA = np.array([[0.0, 0.0], [60.0, 0.0], [60.0, 60.0], [0.0, 60.0]])

@@ -9,18 +9,18 @@ from pydantic import ValidationError
 from shapely.geometry import Point, shape
 
 from app.missions.errors import ConflictError, InvalidRequestError
-from app.missions.links.sim import AGROUND
+from app.missions.fleet.links.sim import AGROUND
+from app.missions.operations.scans import report_of_posted
 from app.missions.search.course import hold_before_hazards
 from app.missions.search.examples import example
-from app.missions.search.posted import Scan
-from app.missions.search.scanning import report_of_posted
+from app.missions.search.scan_schema import Scan
 from app.missions.search.site import simulated_world
 from app.missions.search.state import Search
 from app.missions.service import MissionService
-from app.missions.sounding_views import Verdict
-from app.missions.spec import MissionKind, MissionSpec
+from app.missions.spec.mission import MissionKind, MissionSpec
 from app.missions.states import MissionState
-from app.missions.views import CheckStatus
+from app.missions.views.mission import CheckStatus
+from app.missions.views.soundings import Verdict
 from simulator.car_parks import car_park, harbour_basin
 from tests.missions.builders import lon_lat, rectangle
 from tests.missions.fleet import Harbour, Rover, until, until_state

@@ -20,7 +20,6 @@ from app.exploration.bottom import Bottom
 from app.exploration.planners import PLANNERS
 from app.exploration.planners.random_walk import RandomPlanner
 from app.exploration.problem import Proposal, Situation
-from app.missions import telling
 from app.missions.errors import (
     ConflictError,
     InvalidRequestError,
@@ -28,16 +27,17 @@ from app.missions.errors import (
     MissionNotFoundError,
     VehicleNotFoundError,
 )
-from app.missions.fleet import LinkState, WaypointStatus
-from app.missions.measurement import Measurement
-from app.missions.messages import EventMessage, MapMessage, SnapshotMessage, StateMessage
-from app.missions.products import PRODUCTS
+from app.missions.fleet.interface import LinkState, WaypointStatus
+from app.missions.live.mission import feed as telling
+from app.missions.maps.products import PRODUCTS
 from app.missions.service import MissionService
 from app.missions.settings import ServiceSettings
-from app.missions.sounding_views import Verdict
-from app.missions.spec import MissionSpec, VehicleKind, VehicleSpec
+from app.missions.soundings.measurement import Measurement
+from app.missions.spec.mission import MissionSpec, VehicleKind, VehicleSpec
 from app.missions.states import MissionState, MoveRefusedError
-from app.missions.views import Level
+from app.missions.views.messages import EventMessage, MapMessage, SnapshotMessage, StateMessage
+from app.missions.views.mission import Level
+from app.missions.views.soundings import Verdict
 from app.storage.database import Database
 from app.storage.models import MissionRow, MissionVehicleRow, SoundingRow, StepRow, WaypointRow
 from tests.missions.builders import lon_lat, make_spec, rectangle

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 from shapely.geometry import Polygon
 
-from app.missions.map_builder import make_grid
-from app.missions.spec import MissionSpec
+from app.missions.maps.builder import make_grid
+from app.missions.spec.mission import MissionSpec
 from app.missions.states import ENDED, MOVES, MissionState, MoveRefusedError, move
 from tests.missions.builders import LAT, LON, lon_lat, make_spec, rectangle, spec_json
 

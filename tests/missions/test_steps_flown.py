@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import pytest
 
-from app.missions import runner
-from app.missions.committing import Committing
-from app.missions.decision import Decision
-from app.missions.fleet import LinkState, VehicleRefusedError
-from app.missions.hub import FleetHub
+from app.missions.fleet.hub import FleetHub
+from app.missions.fleet.interface import LinkState, VehicleRefusedError
+from app.missions.flight import step_loop as runner
+from app.missions.flight.commit import Committing
+from app.missions.flight.decision import Decision
 from app.missions.service import MissionService
 from app.missions.states import MissionState
 from tests.missions.fleet import sim_spec, until, until_state

@@ -7,13 +7,13 @@ from dataclasses import dataclass, field
 
 import pytest
 
-from app.missions.correction_views import TideCorrection
 from app.missions.errors import ConflictError, MissionError
-from app.missions.fleet import LinkState
-from app.missions.map_builder import MapBuilder
+from app.missions.fleet.interface import LinkState
+from app.missions.maps.builder import MapBuilder
 from app.missions.service import WORKERS, MissionService
-from app.missions.sounding_views import Ruling
 from app.missions.states import MissionState, MoveRefusedError
+from app.missions.views.corrections import TideCorrection
+from app.missions.views.soundings import Ruling
 from app.storage import missions as mission_queries
 from tests.missions.builders import make_spec
 from tests.missions.fleet import Harbour, Rover, sim_spec, state_of, until, until_state, until_step

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 from sqlalchemy import select
 
-from app.missions.decision import Decision, Place, make_constraints
+from app.missions.flight.decision import Decision, Place, make_constraints
 from app.missions.states import MissionState
 from app.storage.database import Database
 from app.storage.models import EventRow, WaypointRow

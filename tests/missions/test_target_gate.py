@@ -9,11 +9,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from app.missions.fleet import Position, RangeReport
-from app.missions.spec import MissionSpec
-from app.missions.target_showing import ellipse, target_views
-from app.missions.target_views import TargetState
-from app.missions.tracking import ECHOES, LATEST_S, Arrived, Tracking
+from app.missions.fleet.interface import Position, RangeReport
+from app.missions.spec.mission import MissionSpec
+from app.missions.targets.filters import ECHOES, LATEST_S, Arrived, Tracking
+from app.missions.targets.views import ellipse, target_views
+from app.missions.views.targets import TargetState
 from tests.missions.builders import FRAME, lon_lat, make_spec
 
 TAG = np.array([40.0, 25.0, 6.0])

@@ -6,11 +6,11 @@ from typing import Any
 import pytest
 
 from app.missions.errors import TargetNotFoundError
-from app.missions.measurement import Measurement
 from app.missions.service import MissionService
 from app.missions.settings import ImcSettings
-from app.missions.sounding_views import Verdict
+from app.missions.soundings.measurement import Measurement
 from app.missions.states import MissionState
+from app.missions.views.soundings import Verdict
 from app.storage.database import Database
 from simulator.dune import DuneFleet, DuneOptions, default_specs
 from simulator.seafloors import generate

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 from shapely.geometry import LineString, Point
 
-from app.missions.journal import METRES_PER_DEGREE
-from app.missions.trails import TOLERANCE_M, in_order, worth_drawing
+from app.missions.live.journal import METRES_PER_DEGREE
+from app.missions.live.trails import TOLERANCE_M, in_order, worth_drawing
 
 
 def wandering(seed: int, count: int = 400) -> np.ndarray:

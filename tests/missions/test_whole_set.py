@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.missions import whole_set
-from app.missions.map_builder import MapBuilder
+from app.missions.live.mission import sounding_store as whole_set
+from app.missions.maps.builder import MapBuilder
+from app.missions.maps.codec import pack, unpack
 from app.missions.service import MissionService
-from app.missions.sounding_views import Ruling, SoundingState
-from app.missions.stored_map import pack, unpack
+from app.missions.views.soundings import Ruling, SoundingState
 from app.storage.database import Database
 from app.storage.models import StoredMapRow
 from tests.missions.builders import make_spec

@@ -62,7 +62,7 @@ class PlannerBase(ABC):
     def _with_errands(self, team: Situation, bottom: Bottom, seed: int) -> Proposal:
         """Decide for the vehicles that are on no errand, then send the others on theirs."""
         self._whole = team
-        # Bathymeter missions rise along their legs instead; see app.missions.decision.
+        # Bathymeter missions rise along their legs instead; see app.missions.flight.decision.
         localization = None if self._surveys else team.localization
         if not self.runs_errands or (team.targets is None and localization is None):
             return self._decide(team, bottom, seed)

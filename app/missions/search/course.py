@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 from app.exploration.search import SearchTask
 from app.exploration.search.ground import Ground
 from app.mapping.georeference import LocalFrame
-from app.missions.members import Member
 from app.missions.search.state import Search
-from app.missions.spec import MissionSpec
+from app.missions.spec.mission import MissionSpec
+from app.missions.team import Member
 
 FloatArray = NDArray[np.float64]
 

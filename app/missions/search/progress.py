@@ -3,9 +3,9 @@
 import base64
 
 from app.mapping.georeference import LocalFrame
-from app.missions.members import Team
 from app.missions.search.state import Search
-from app.missions.search.views import SearchGridView, SearchProgress
+from app.missions.team import Team
+from app.missions.views.search import SearchGridView, SearchProgress
 
 
 def progress_of(search: Search | None, team: Team, frame: LocalFrame) -> SearchProgress | None:

@@ -13,8 +13,8 @@ from app.estimation.occupancy import OccupancyGrid, Scanner
 from app.mapping.georeference import LocalFrame
 from app.mapping.outlines import touched
 from app.missions.safety import widened
-from app.missions.search_spec import SearchSpec
-from app.missions.spec import MissionSpec
+from app.missions.spec.mission import MissionSpec
+from app.missions.spec.search import SearchSpec
 from simulator.obstacles import ObstacleWorld
 
 FloatArray = NDArray[np.float64]

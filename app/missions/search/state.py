@@ -15,10 +15,10 @@ from app.exploration.search.criteria import in_contact
 from app.exploration.search.ground import Ground
 from app.mapping.georeference import LocalFrame
 from app.missions.clock import now
-from app.missions.fleet import ScanReport
+from app.missions.fleet.interface import ScanReport
 from app.missions.search.site import Site, site_of
-from app.missions.search_spec import SearchSpec
-from app.missions.spec import MissionSpec
+from app.missions.spec.mission import MissionSpec
+from app.missions.spec.search import SearchSpec
 
 FloatArray = NDArray[np.float64]
 

@@ -1,0 +1,129 @@
+"""All links together: which vehicles exist, how they are, and which mission hears of which vehicle."""
+
+from collections.abc import Sequence
+
+import structlog
+
+from app.missions.errors import ConflictError
+from app.missions.fleet.interface import (
+    EventSink,
+    FleetEvent,
+    FleetLink,
+    LinkState,
+    StopReceipt,
+    VehicleInfo,
+    VehicleRefusedError,
+    WaypointOrder,
+)
+from app.missions.spec.mission import VehicleKind
+
+VehicleKey = tuple[VehicleKind, str]
+
+log = structlog.get_logger(__name__)
+
+
+class FleetHub:
+    """Routes commands to the link that reaches a vehicle, and its events to the mission that claimed it."""
+
+    def __init__(self, links: Sequence[FleetLink]) -> None:
+        self._links = {VehicleKind(link.kind): link for link in links}
+        self._claims: dict[VehicleKey, tuple[str, EventSink]] = {}
+
+    async def start(self) -> None:
+        """Open every link."""
+        for kind, link in self._links.items():
+            await link.start(self._sink(kind))
+
+    async def close(self) -> None:
+        """Close every link, which stops every engaged vehicle; one link's trouble does not keep the others from it."""
+        for kind, link in self._links.items():
+            try:
+                await link.close()
+            except Exception:
+                log.exception("link did not close", link=kind)
+
+    @property
+    def kinds(self) -> tuple[VehicleKind, ...]:
+        """The kinds of vehicles that can be reached."""
+        return tuple(self._links)
+
+    def vehicles(self) -> list[tuple[VehicleInfo, str | None]]:
+        """Return every known vehicle, each with the id of the mission it takes part in."""
+        return [
+            (info, self.claimed_by((VehicleKind(info.kind), info.name)))
+            for link in self._links.values()
+            for info in link.vehicles()
+        ]
+
+    def infos(self) -> dict[VehicleKey, VehicleInfo]:
+        """Return what is known of every vehicle that was heard."""
+        return {(kind, info.name): info for kind, link in self._links.items() for info in link.vehicles()}
+
+    def info(self, key: VehicleKey) -> VehicleInfo:
+        """Return what is known of a vehicle; state ``unknown`` when it was never heard."""
+        kind, name = key
+        link = self._links.get(kind)
+        if link is None:
+            return VehicleInfo(name, kind, LinkState.UNKNOWN, f"links of kind {kind} are switched off in the settings")
+        for info in link.vehicles():
+            if info.name == name:
+                return info
+        reason = "never heard of: is it switched on, and does it reach this service?"
+        if kind is VehicleKind.SIM:
+            reason = "simulated: it is launched when its mission starts"
+        return VehicleInfo(name, kind, LinkState.UNKNOWN, reason)
+
+    def claimed_by(self, key: VehicleKey) -> str | None:
+        """Return the id of the mission a vehicle takes part in."""
+        claim = self._claims.get(key)
+        return claim[0] if claim else None
+
+    def claim(self, key: VehicleKey, mission_id: str, sink: EventSink) -> None:
+        """Give a vehicle's events to a mission. Raises ConflictError when another one has it."""
+        owner = self.claimed_by(key)
+        if owner not in (None, mission_id):
+            raise ConflictError(
+                f"vehicle {key[1]!r} takes part in mission {owner}",
+                f"finish or abort that mission, or take the vehicle out of it: "
+                f"DELETE /api/v1/missions/{owner}/vehicles/{key[1]}",
+            )
+        self._claims[key] = (mission_id, sink)
+
+    def release(self, key: VehicleKey, mission_id: str) -> None:
+        """Give up a vehicle; nothing happens when the mission does not have it."""
+        if self.claimed_by(key) == mission_id:
+            del self._claims[key]
+
+    async def engage(self, key: VehicleKey) -> None:
+        """Make a vehicle ready to follow. Raises VehicleRefusedError."""
+        await self._link(key).engage(key[1])
+
+    async def order(self, key: VehicleKey, order: WaypointOrder) -> None:
+        """Send a waypoint. Raises VehicleRefusedError."""
+        await self._link(key).order(order)
+
+    async def stop(self, key: VehicleKey) -> StopReceipt:
+        """Stop a vehicle; whatever goes wrong is told in the receipt."""
+        try:
+            return await self._link(key).stop(key[1])
+        except VehicleRefusedError as error:
+            return StopReceipt(key[1], acknowledged=False, detail=error.reason)
+        except Exception as error:
+            log.exception("stop failed", vehicle=key[1])
+            return StopReceipt(key[1], acknowledged=False, detail=f"stop failed: {error}")
+
+    def _link(self, key: VehicleKey) -> FleetLink:
+        kind, name = key
+        try:
+            return self._links[kind]
+        except KeyError:
+            reason = f"links of kind {kind} are switched off"
+            raise VehicleRefusedError(name, reason, "switch them on in the settings") from None
+
+    def _sink(self, kind: VehicleKind) -> EventSink:
+        def receive(event: FleetEvent) -> None:
+            claim = self._claims.get((kind, event.vehicle))
+            if claim is not None:
+                claim[1](event)
+
+        return receive

@@ -1,0 +1,321 @@
+"""Vehicles on the IMC network (DUNE on board), through :class:`imc_bridge.Bridge`."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+from app.missions import metrics
+from app.missions.errors import InvalidRequestError
+from app.missions.fleet.interface import (
+    BeamGeometry,
+    EventSink,
+    FleetEvent,
+    LinkReport,
+    LinkState,
+    Position,
+    RangeReport,
+    RestartReport,
+    SoundingReport,
+    StopReceipt,
+    VehicleInfo,
+    VehicleRefusedError,
+    VehicleReport,
+    WaypointOrder,
+    WaypointReport,
+    WaypointStatus,
+)
+from app.missions.settings import ImcSettings
+from imc_bridge import (
+    BottomPoint,
+    Bridge,
+    BridgeEvent,
+    BridgeSettings,
+    Guidance,
+    LinkChange,
+    NodeState,
+    NodeView,
+    PacketsDropped,
+    RefusedError,
+    Restarted,
+    Sounding,
+    StateReport,
+    TargetRange,
+    Waypoint,
+    WaypointChange,
+)
+from imc_bridge.consoles import Mark
+from imc_bridge.diagnosis import drop_words, radio_gap_words
+from imc_bridge.doctor import Diagnosis, judge
+
+_UNENGAGED = {
+    NodeState.HEARD: LinkState.HEARD,
+    NodeState.ANNOUNCED: LinkState.HEARD,
+    NodeState.ACTIVE: LinkState.HEARD,
+    NodeState.IN_PLAN: LinkState.HEARD,
+    NodeState.READY: LinkState.READY,
+    NodeState.LOST: LinkState.LOST,
+    NodeState.EXPECTED_OFFLINE: LinkState.EXPECTED_OFFLINE,
+}
+MAX_CORNERS = 24
+"""Of an area that are shown to other consoles."""
+_SILENT = frozenset({NodeState.LOST, NodeState.EXPECTED_OFFLINE})
+
+
+def make_imc_link(settings: ImcSettings, time_scale: float) -> "ImcFleetLink":
+    """The link as the service's settings describe it."""
+    return ImcFleetLink(bridge_settings(settings, time_scale))
+
+
+def bridge_settings(settings: ImcSettings, time_scale: float) -> BridgeSettings:
+    """The bridge's settings as the service's describe them. Raises ValueError, naming the field."""
+    return BridgeSettings(
+        imc_id=settings.id,
+        name=settings.name,
+        port=settings.port,
+        loopback_only=settings.loopback_only,
+        announce_ports=settings.announce_ports,
+        altimeter=settings.altimeter,
+        interfaces=settings.interfaces,
+        transport=settings.transport,
+        position_deg=settings.position,
+        vehicles=settings.vehicles,
+        allowed_ids=settings.allowed_ids,
+        allowed_addresses=settings.allowed_addresses,
+        max_packets_per_s=settings.max_packets_per_s,
+        rate_limiters=settings.rate_limiters,
+        unknown_bottom_depth_m=settings.unknown_bottom_depth_m,
+        time_scale=time_scale,
+    )
+
+
+class ImcFleetLink:
+    """The fleet interface over IMC/UDP; see :class:`app.missions.fleet.interface.FleetLink` for its contract."""
+
+    def __init__(self, settings: BridgeSettings) -> None:
+        self._bridge = Bridge(settings)
+        self._sink: EventSink = lambda _event: None
+        self._led: dict[str, tuple[Guidance, str]] = {}
+
+    @property
+    def kind(self) -> str:
+        """``imc``."""
+        return "imc"
+
+    async def start(self, sink: EventSink) -> None:
+        """Bind the ports and listen.
+
+        Raises ``imc_bridge.PortInUseError`` when a port is taken, InvalidRequestError when an interface is not there.
+        """
+        self._sink = sink
+        try:
+            await self._bridge.start(self._forward)
+        except ValueError as error:
+            raise InvalidRequestError("imc", str(error), "See docs/settings.md") from None
+
+    async def close(self) -> None:
+        """Stop every engaged vehicle, then release sockets and tasks."""
+        await self._bridge.close()
+
+    def vehicles(self) -> Sequence[VehicleInfo]:
+        """Every vehicle heard of, by IMC id."""
+        wanted = self._bridge.settings.vehicles
+        lost = self._bridge.drops.recent
+        trouble = ". ".join(drop_words(lost, self._bridge.transport.receive_buffer_bytes)) if lost else ""
+        return [
+            replace(_info(node), machine_advice=trouble)
+            for node in self._bridge.nodes()
+            if node.is_vehicle and (not wanted or node.name in wanted)
+        ]
+
+    def lead(self, vehicle: str, guidance: str, gateway: str | None) -> None:
+        """Say how a vehicle shall be led from its next engagement on, as its mission describes it."""
+        self._led[vehicle] = Guidance(guidance), gateway or ""
+        self._bridge.want(vehicle)
+        if gateway:
+            self._bridge.want(gateway)
+
+    def show_area(self, mission: str, ring: Sequence[tuple[float, float]]) -> None:
+        """Show a mission's area on other consoles' maps, corner by corner: (longitude, latitude); empty: no longer."""
+        board = self._bridge.board
+        for name in [name for name in board.marks if name.startswith(f"{mission} corner ")]:
+            board.show(name, None)
+        for index, (lon, lat) in enumerate(ring[:MAX_CORNERS]):
+            board.show(f"{mission} corner {index + 1}", Mark("Area", lat, lon))
+
+    async def engage(self, vehicle: str) -> None:
+        """Make the vehicle ours; raises VehicleRefusedError.
+
+        A vehicle that someone else aborted or took over is left alone until it was stopped from here, which pausing a
+        mission does: only an operator may decide that it goes on.
+        """
+        intervention = self._bridge.intervention(vehicle)
+        if intervention:
+            remedy = "It is left alone; when it may go on, pause and resume the mission"
+            raise VehicleRefusedError(vehicle, intervention, remedy)
+        try:
+            await self._bridge.engage(vehicle, *self._led.get(vehicle, (Guidance.FOLLOW, "")))
+        except RefusedError as error:
+            raise VehicleRefusedError(vehicle, error.reason, error.remedy) from error
+
+    async def order(self, order: WaypointOrder) -> None:
+        """Send a waypoint; raises VehicleRefusedError when the vehicle is not engaged."""
+        waypoint = Waypoint(
+            mission_id=order.mission_id,
+            step=order.step,
+            lat_deg=order.position.lat_deg,
+            lon_deg=order.position.lon_deg,
+            depth_m=order.position.depth_m,
+            speed_mps=order.speed_mps,
+            arrival_radius_m=order.arrival_radius_m,
+            min_altitude_m=order.min_altitude_m,
+            lead_lat_deg=order.lead.lat_deg if order.lead else None,
+            lead_lon_deg=order.lead.lon_deg if order.lead else None,
+            circle_lat_deg=order.circle.lat_deg if order.circle else None,
+            circle_lon_deg=order.circle.lon_deg if order.circle else None,
+            bottom=tuple(BottomPoint(place.lat_deg, place.lon_deg, place.depth_m) for place in order.bottom),
+        )
+        try:
+            self._bridge.goto(order.vehicle, waypoint)
+        except RefusedError as error:
+            raise VehicleRefusedError(order.vehicle, error.reason, error.remedy) from error
+        place = order.position
+        self._bridge.board.show(
+            f"waypoint of {order.vehicle}", Mark("Waypoint", place.lat_deg, place.lon_deg, place.depth_m)
+        )
+
+    async def stop(self, vehicle: str, *, timeout_s: float = 3.0) -> StopReceipt:
+        """Stop the vehicle; a plan of another console is left alone."""
+        self._bridge.board.show(f"waypoint of {vehicle}", None)
+        result = await self._bridge.stop(vehicle, timeout_s=timeout_s)
+        return StopReceipt(result.vehicle, result.acknowledged, result.detail)
+
+    def diagnosis(self) -> Diagnosis:
+        """What keeps vehicles from working with us, as heard so far."""
+        return judge(self._bridge, self._bridge.listening_s)
+
+    def _forward(self, event: BridgeEvent) -> None:
+        if isinstance(event, PacketsDropped):
+            metrics.PACKETS_DROPPED.inc(event.count)
+        translated = _translate(event)
+        if translated is not None:
+            self._sink(translated)
+
+
+def _translate(event: BridgeEvent) -> FleetEvent | None:
+    match event:
+        case StateReport():
+            return vehicle_report(event)
+        case Sounding():
+            return sounding_report(event)
+        case TargetRange():
+            return range_report(event)
+        case WaypointChange():
+            return WaypointReport(
+                vehicle=event.vehicle,
+                mission_id=event.waypoint.mission_id,
+                step=event.waypoint.step,
+                status=WaypointStatus(event.status.value),
+                reason=event.reason,
+            )
+        case Restarted():
+            where = ", under water when it was last heard before" if event.submerged else ""
+            words = (
+                f"DUNE on board has restarted{where}: what it was doing is forgotten, and it is asked to follow again"
+            )
+            return RestartReport(event.vehicle, words)
+        case LinkChange():
+            return LinkReport(event.vehicle, _link_state(event.state, event.engaged, event.ours), event.reason)
+        case _:
+            # A refused Distance is counted in the vehicle's details.
+            return None
+
+
+def _beam_geometry(sounding: Sounding) -> BeamGeometry | None:
+    angles = (
+        sounding.roll_rad,
+        sounding.pitch_rad,
+        sounding.yaw_rad,
+        sounding.beam_azimuth_rad,
+        sounding.beam_off_nadir_rad,
+    )
+    degrees = (None if angle is None else math.degrees(angle) for angle in angles)
+    return BeamGeometry.where_known(sounding.vehicle_lat_deg, sounding.vehicle_lon_deg, *degrees)
+
+
+def _link_state(state: NodeState, engaged: bool, ours: bool) -> LinkState:
+    """``ours``: it executes our plan. One of an earlier run is replaced when the vehicle is engaged."""
+    if engaged and state not in _SILENT:
+        return LinkState.ENGAGED
+    if state is NodeState.IN_PLAN and ours:
+        return LinkState.READY
+    return _UNENGAGED[state]
+
+
+def sounding_report(event: Sounding) -> SoundingReport:
+    """What the bridge measured, as missions know it."""
+    return SoundingReport(
+        vehicle=event.vehicle,
+        time_s=event.time_s,
+        footprint=Position(event.lat_deg, event.lon_deg, event.bottom_depth_m),
+        vehicle_depth_m=event.vehicle_depth_m,
+        range_m=event.range_m,
+        source=event.source,
+        beam=event.beam,
+        position_sd_m=event.position_sd_m,
+        beam_geometry=_beam_geometry(event),
+    )
+
+
+def range_report(event: TargetRange) -> RangeReport:
+    """A range that the bridge heard of, as missions know it."""
+    return RangeReport(
+        vehicle=event.vehicle,
+        time_s=event.time_s,
+        target=event.target,
+        range_m=event.range_m,
+        position=Position(event.vehicle_lat_deg, event.vehicle_lon_deg, event.vehicle_depth_m),
+        source=event.source,
+        position_sd_m=event.position_sd_m,
+    )
+
+
+def vehicle_report(state: StateReport) -> VehicleReport:
+    """What the bridge heard of a vehicle, as missions know it."""
+    return VehicleReport(
+        vehicle=state.vehicle,
+        time_s=state.time_s,
+        position=Position(state.lat_deg, state.lon_deg, state.depth_m),
+        heading_rad=state.heading_rad,
+        speed_mps=state.speed_mps,
+        altitude_m=state.altitude_m,
+        battery_pct=state.battery_pct,
+        position_sd_m=state.position_sd_m,
+    )
+
+
+def _info(node: NodeView) -> VehicleInfo:
+    details = {
+        "operation mode": node.operation_mode,
+        "plan": node.plan_id,
+        "plan control": node.plan_state,
+        "IMC version": node.imc_version,
+        "clock ahead of ours": None if node.clock_offset_s is None else f"{node.clock_offset_s:.1f} s",
+        "bottom sensors": ", ".join(node.bottom_sensors) or None,
+        "soundings": str(node.soundings),
+        "soundings refused": "; ".join(f"{reason}: {count}" for reason, count in node.refused.items()) or None,
+        "rate limiters": node.rate_limiters,
+        "conflict": node.conflict,
+    }
+    return VehicleInfo(
+        name=node.name,
+        kind="imc",
+        state=_link_state(node.state, node.engaged, node.ours),
+        reason=node.reason,
+        age_s=node.age_s,
+        address=node.address,
+        imc_id=node.imc_id,
+        report=None if node.report is None else vehicle_report(node.report),
+        details={key: value for key, value in details.items() if value is not None},
+        # Only a vehicle that came back shows that it was radio that ended.
+        advice=". ".join(radio_gap_words(node.radio_gaps)) if node.radio_gaps and node.state not in _SILENT else "",
+    )

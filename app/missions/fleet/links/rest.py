@@ -1,0 +1,169 @@
+"""Vehicles that poll: they post their positions and soundings and fetch their waypoints over HTTP.
+
+A vehicle acknowledges a waypoint by fetching it and a stop by being told so; arrival is judged by the positions that it
+posts. Nothing is sent to it of our own accord, so it counts as lost when it has been silent for ``lost_after_s``.
+"""
+
+import asyncio
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+
+from app.missions.fleet.interface import (
+    EventSink,
+    LinkState,
+    Position,
+    StopReceipt,
+    VehicleInfo,
+    VehicleRefusedError,
+    VehicleReport,
+    WaypointOrder,
+    WaypointStatus,
+)
+from app.missions.fleet.links.visiting import VisitedLink, Visitor
+
+EARTH_RADIUS_M = 6_371_000.0
+
+
+@dataclass
+class _Poller(Visitor):
+    heard_s: float = 0.0
+    stopping: bool = False
+    told: asyncio.Event = field(default_factory=asyncio.Event)
+
+
+class RestFleetLink(VisitedLink):
+    """The fleet interface for vehicles that poll.
+
+    The mission service calls ``heard``, ``has_waypoint`` and ``told_to_stop`` as requests come in.
+    """
+
+    kind = "rest"
+
+    def __init__(self, *, lost_after_s: float = 30.0) -> None:
+        super().__init__(lost_after_s)
+        self._pollers: dict[str, _Poller] = {}
+
+    async def start(self, sink: EventSink) -> None:
+        """Begin; events go to ``sink``."""
+        self._begin(sink)
+
+    async def close(self) -> None:
+        """Stop every engaged vehicle, then end."""
+        engaged = [p.name for p in self._pollers.values() if p.state is LinkState.ENGAGED]
+        await asyncio.gather(*(self.stop(name, timeout_s=1.0) for name in engaged))
+        await self._end()
+
+    def vehicles(self) -> Sequence[VehicleInfo]:
+        """Every vehicle that was heard of since the service started."""
+        now_s = asyncio.get_running_loop().time()
+        return [
+            VehicleInfo(
+                name=p.name,
+                kind=self.kind,
+                state=p.state,
+                reason=self._reason(p.state),
+                age_s=now_s - p.heard_s,
+                report=p.report,
+            )
+            for p in self._pollers.values()
+        ]
+
+    async def engage(self, vehicle: str) -> None:
+        """Let a vehicle follow. Raises VehicleRefusedError when it was never heard or is silent."""
+        poller = self._pollers.get(vehicle)
+        if poller is None:
+            raise VehicleRefusedError(
+                vehicle, "never heard of", "let it post its position: POST /api/v1/missions/{id}/measurements"
+            )
+        if poller.state is LinkState.LOST:
+            raise VehicleRefusedError(vehicle, self._reason(poller.state), "check its connection; it must poll again")
+        poller.stopping = False
+        self._set_state(poller, LinkState.ENGAGED)
+
+    async def order(self, order: WaypointOrder) -> None:
+        """Lay a waypoint out for the vehicle to fetch."""
+        poller = self._pollers.get(order.vehicle)
+        if poller is None or poller.state is not LinkState.ENGAGED:
+            raise VehicleRefusedError(order.vehicle, "does not follow this service now", "it must poll again")
+        if poller.order == order and poller.status is not None:
+            self._report(poller, poller.status)
+            return
+        poller.order = order
+        poller.status = None
+        self._report(poller, WaypointStatus.SENT)
+
+    async def stop(self, vehicle: str, *, timeout_s: float = 3.0) -> StopReceipt:
+        """Withdraw the waypoint; acknowledged when the vehicle polled and was told."""
+        poller = self._pollers.get(vehicle)
+        follows = poller is not None and poller.state in (LinkState.ENGAGED, LinkState.LOST)
+        if poller is None or not (follows or poller.stopping):
+            return StopReceipt(vehicle, acknowledged=True, detail="was not following")
+        poller.order = None
+        poller.status = None
+        poller.stopping = True
+        poller.told.clear()
+        if poller.state is LinkState.ENGAGED:
+            self._set_state(poller, LinkState.READY)
+        try:
+            await asyncio.wait_for(poller.told.wait(), timeout_s)
+        except TimeoutError:
+            return StopReceipt(vehicle, acknowledged=False, detail="has not polled since; it is told at its next poll")
+        return StopReceipt(vehicle, acknowledged=True, detail="told at its poll")
+
+    def heard(self, report: VehicleReport) -> None:
+        """Take a position that a vehicle posted."""
+        poller = self._touch(report.vehicle)
+        poller.report = report
+        self._sink(report)
+        self._check_arrival(poller)
+
+    def has_waypoint(self, vehicle: str, step: int) -> None:
+        """Note that a vehicle has the waypoint of ``step``: it fetched it now, or says that it did before."""
+        poller = self._touch(vehicle)
+        if poller.order is not None and poller.order.step <= step and poller.status is WaypointStatus.SENT:
+            self._report(poller, WaypointStatus.ACKNOWLEDGED)
+            self._check_arrival(poller)
+
+    def _check_arrival(self, poller: _Poller) -> None:
+        order, report = poller.order, poller.report
+        if order is None or report is None or poller.status is not WaypointStatus.ACKNOWLEDGED:
+            return
+        if horizontal_distance_m(report.position, order.position) <= order.arrival_radius_m:
+            self._report(poller, WaypointStatus.REACHED)
+
+    def told_to_stop(self, vehicle: str, mission_id: str) -> None:
+        """Note that a vehicle was told to stop, which acknowledges the stop, also one that is yet to come."""
+        if vehicle not in self._pollers:
+            return
+        poller = self._touch(vehicle)
+        poller.stopping = False
+        poller.told.set()
+        if poller.order is not None and poller.order.mission_id == mission_id:
+            poller.order = None
+            poller.status = None
+            self._set_state(poller, LinkState.READY)
+
+    def _touch(self, vehicle: str) -> _Poller:
+        now_s = asyncio.get_running_loop().time()
+        poller = self._pollers.get(vehicle)
+        if poller is None:
+            poller = self._pollers[vehicle] = _Poller(vehicle, LinkState.UNKNOWN)
+        poller.heard_s = now_s
+        if poller.state in (LinkState.UNKNOWN, LinkState.LOST):
+            self._set_state(poller, LinkState.READY)
+        return poller
+
+    def _reason(self, state: LinkState) -> str:
+        return f"silent for more than {self._lost_after_s:g} s" if state is LinkState.LOST else ""
+
+    def _silent(self) -> Iterable[Visitor]:
+        limit_s = asyncio.get_running_loop().time() - self._lost_after_s
+        return [poller for poller in self._pollers.values() if poller.heard_s < limit_s]
+
+
+def horizontal_distance_m(a: Position, b: Position) -> float:
+    """Return the distance over the ground; good to 0.5 %, which arrival needs no better than."""
+    north = math.radians(b.lat_deg - a.lat_deg)
+    east = math.radians(b.lon_deg - a.lon_deg) * math.cos(math.radians((a.lat_deg + b.lat_deg) / 2))
+    return EARTH_RADIUS_M * math.hypot(north, east)

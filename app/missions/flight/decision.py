@@ -1,0 +1,271 @@
+"""One step's decision, from the situation to waypoints that may be sent. Pure apart from the planner's memory."""
+
+import math
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from shapely.geometry import Polygon
+
+from app.exploration.bottom import Bottom
+from app.exploration.constraints import Constraints
+from app.exploration.dynamic import Localization, Targets
+from app.exploration.errands import due_to_rise
+from app.exploration.problem import Belief, Planner, Situation
+from app.exploration.search import SearchTask
+from app.missions import safety
+from app.missions.search.course import hold_before_hazards
+from app.missions.spec.mission import MissionSpec, SurfacePolicy, VehicleKind
+
+FloatArray = NDArray[np.float64]
+
+NEARBY_OUTSIDE_M = 10.0
+"""A vehicle that drifted or overshot this little is planned for as if it were at the border."""
+
+RESERVE = 0.06
+"""Share of the remaining steps that a planner is not told of: vehicles turn in circles and pass waypoints at the side,
+so a plan that needs every step would end with its last line half flown. What is not used is released bit by bit."""
+
+RISE_AT = 0.9
+"""Part of the allowed deviation at which a vehicle comes up: the rest is for the way to the surface."""
+
+RISE_OF_STEP = 0.9
+"""Part of a step that a vehicle rises at most, so that a deep one comes up in several steps."""
+
+INSET_M = 1.0
+"""Vehicles that come from outside are sent to a point this far inside the border."""
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where one vehicle is when a step begins, and the depth it should travel at."""
+
+    vehicle: str
+    en_m: FloatArray
+    heading_rad: float
+    cruise_depth_m: float
+    position_sd_m: float = math.nan
+    """How well it says that it knows where it is; NaN: it does not say."""
+    surfacing_depth_m: float = math.nan
+    """Its depth, when its last waypoint brought it up for a fix; NaN when not."""
+
+    @property
+    def surfacing(self) -> bool:
+        """Whether its last waypoint brought it up for a fix."""
+        return math.isfinite(self.surfacing_depth_m)
+
+
+@dataclass(frozen=True)
+class Leg:
+    """Where one vehicle is sent, or why it is not sent anywhere."""
+
+    vehicle: str
+    target_m: FloatArray
+    refusal: str = ""
+    surfacing: bool = False
+    """Whether it comes up, or stays up, for a fix."""
+
+
+@dataclass(frozen=True)
+class Decision:
+    """A step's waypoints, the planner's figures, and what the operator has to know.
+
+    ``bottom`` is the pessimistic sea floor that the depths of travel were chosen by, below the surface as it is now.
+    """
+
+    legs: list[Leg]
+    objective: float | None
+    terms: dict[str, float]
+    memory: bytes
+    notes: list[str] = field(default_factory=list)
+    fixes: dict[str, str] = field(default_factory=dict)
+    """Vehicles that begin or end coming up for a fix, with what there is to say."""
+    bottom: Bottom = field(default_factory=Bottom.unknown)
+    pursuits: dict[str, str] = field(default_factory=dict)
+    """Vehicles that leave the mapping for a target, with its name."""
+    origin_m: dict[str, FloatArray] = field(default_factory=dict)
+    """Where every vehicle was, (2,)."""
+
+
+def make_constraints(spec: MissionSpec) -> Constraints:
+    """Return a mission's limits in its local frame."""
+    limits = spec.limits
+    zones = [spec.to_local(zone) for zone in spec.keep_out]
+    margins = [safety.widened(zone, limits.keep_out_margin_m) for zone in zones if limits.keep_out_margin_m > 0]
+    return Constraints(
+        area=spec.local_inner_area(),
+        # A vehicle that came too near by turning may leave the margin by any way but one through the zone itself.
+        keep_out=(*zones, *margins),
+        max_step_m=limits.max_step_m,
+        # Depths are chosen here and may be shallower than asked where the water is; see safety.travel_depth_m.
+        min_depth_m=0.0,
+        max_depth_m=limits.max_depth_m,
+        min_altitude_m=limits.min_altitude_m,
+        com_range_m=limits.com_range_m if limits.com_range_m is not None else np.inf,
+        min_separation_m=limits.min_separation_m,
+        min_vertical_separation_m=limits.min_vertical_separation_m,
+    )
+
+
+def decide(
+    step: int,
+    spec: MissionSpec,
+    constraints: Constraints,
+    planner: Planner,
+    places: list[Place],
+    belief: Belief,
+    soundings_en_m: FloatArray,
+    water_level_m: float = 0.0,
+    doubtful_en_m: FloatArray | None = None,
+    targets: Targets | None = None,
+    search: SearchTask | None = None,
+) -> Decision:
+    """Decide one step for the vehicles at ``places``; vehicles far outside the area are sent to its border.
+
+    ``water_level_m`` is how high the water stands above the datum of the belief's depths. Vehicles count their depth
+    from the water level: below the datum it leaves them less room; above it the room to spare is not used.
+    ``doubtful_en_m`` (k, 2) is where the map left soundings out as outliers.
+    ``targets`` are the mission's, in the order of its description. ``search`` is what a search knows of its site.
+    """
+    polygon = Polygon(constraints.area)
+    where = {place.vehicle: place.en_m for place in places}
+    notes: list[str] = []
+    team: list[Place] = []
+    legs: list[Leg] = []
+    nearby_m = NEARBY_OUTSIDE_M + spec.limits.border_margin_m
+    for place in places:
+        outside_m = safety.distance_outside_m(polygon, place.en_m)
+        if outside_m > nearby_m and search is not None:
+            refusal = (
+                f"it is {outside_m:.0f} m outside the site, and what lies between is not known: bring it to the entry"
+            )
+            notes.append(f"{place.vehicle}: {refusal}")
+            legs.append(Leg(place.vehicle, np.append(place.en_m, 0.0), refusal))
+        elif outside_m > nearby_m:
+            others = [p.en_m for p in places if p is not place] + [other.target_m[:2] for other in legs]
+            leg = _come_in(place, constraints, others)
+            what = leg.refusal or "it is sent to the border"
+            notes.append(f"{place.vehicle} is {outside_m:.0f} m outside the area: {what}")
+            legs.append(leg)
+        elif outside_m > 0:
+            border = safety.nearest_inside(polygon, place.en_m)
+            team.append(replace(place, en_m=border))
+        else:
+            team.append(place)
+    if not team:
+        return Decision(legs, None, {}, planner.snapshot(), notes, origin_m=where)
+
+    names = tuple(place.vehicle for place in team)
+    below_level_m = safety.below_surface_m(belief.depth_m, water_level_m)
+    bottom = Bottom.from_landmarks(belief.xy_m, below_level_m)
+    cautious = Bottom.from_landmarks(
+        belief.xy_m,
+        np.where(np.isfinite(belief.sd_m), below_level_m - safety.UNCERTAINTY_FACTOR * belief.sd_m, np.nan),
+    )
+    origin = np.array(
+        [
+            [*p.en_m, safety.travel_depth_m(p.en_m, p.en_m, p.cruise_depth_m, cautious, constraints.min_altitude_m)]
+            for p in team
+        ]
+    )
+    up, fixes = surfacing(team, spec.surface_policy)
+    for i, place in enumerate(team):
+        if place.surfacing:
+            origin[i, 2] = min(origin[i, 2], max(place.surfacing_depth_m, 0.0))
+    situation = Situation(
+        step=step,
+        steps_total=step - 1 + math.ceil((1 - RESERVE) * (spec.steps - step + 1)),
+        vehicles=names,
+        positions=origin,
+        headings_rad=np.array([p.heading_rad for p in team]),
+        belief=belief,
+        soundings_en_m=soundings_en_m,
+        constraints=constraints,
+        doubtful_en_m=np.zeros((0, 2)) if doubtful_en_m is None else doubtful_en_m,
+        targets=targets,
+        search=search,
+    )
+    proposal = planner.propose(situation, np.random.default_rng([spec.seed, step]))
+    proposed = np.array(proposal.positions, dtype=float)
+    for i, place in enumerate(team):
+        if not np.isfinite(proposed[i]).all():
+            continue  # the check makes the vehicle hold
+        proposed[i, 2] = safety.travel_depth_m(
+            place.en_m, proposed[i, :2], place.cruise_depth_m, cautious, constraints.min_altitude_m
+        )
+        if up[i]:
+            # It goes on along its leg while it rises; the checks below are the same for it as for everyone.
+            proposed[i, 2] = min(proposed[i, 2], max(origin[i, 2] - RISE_OF_STEP * constraints.max_step_m, 0.0))
+        proposed[i] = _within_step(origin[i], proposed[i], constraints.max_step_m)
+    if search is not None:
+        proposed, held = hold_before_hazards(search, names, origin, proposed)
+        notes += held
+    for i, place in enumerate(team):
+        start = where[place.vehicle]
+        if np.array_equal(start, place.en_m) or not np.isfinite(proposed[i]).all():
+            continue
+        # It was planned for from the border, and comes from beyond it: no farther than there where both is too far.
+        if np.linalg.norm(proposed[i, :2] - start) > constraints.max_step_m:
+            proposed[i] = origin[i]
+        depth_m = safety.travel_depth_m(
+            start, proposed[i, :2], place.cruise_depth_m, cautious, constraints.min_altitude_m
+        )
+        proposed[i, 2] = min(proposed[i, 2], depth_m)
+    checked = safety.check_step(names, origin, proposed, constraints, bottom)
+    notes += [f"{name}: {reason}" for name, reason in (checked.corrections | checked.refusals).items()]
+    layered = {vehicle.name for vehicle in spec.vehicles if vehicle.kind is VehicleKind.NEPTUS}
+    for i, place in enumerate(team):
+        refusal = checked.refusals.get(place.vehicle, "")
+        if not refusal and place.vehicle in layered:
+            refusal = safety.too_deep(place.cruise_depth_m, float(checked.positions[i, 2]))
+            notes += [f"{place.vehicle}: {refusal}"] if refusal else []
+        legs.append(Leg(place.vehicle, checked.positions[i], refusal, bool(up[i])))
+    pursuits = {name: spec.targets[number].name for name, number in proposal.errands.items() if number >= 0}
+    return Decision(
+        legs, proposal.objective, dict(proposal.terms), planner.snapshot(), notes, fixes, cautious, pursuits, where
+    )
+
+
+def surfacing(team: list[Place], policy: SurfacePolicy | None) -> tuple[list[bool], dict[str, str]]:
+    """Return which vehicles come up or stay up for a fix, and what is to be said of those that begin or end it.
+
+    A vehicle that does not say how well it knows where it is never comes up for that.
+    """
+    if policy is None:
+        return [False] * len(team), {}
+    sd = np.array([place.position_sd_m for place in team])
+    due = due_to_rise(Localization(sd, sd / RISE_AT, policy.max_position_sd_m))
+    up: list[bool] = []
+    told: dict[str, str] = {}
+    for place, late in zip(team, due, strict=True):
+        stays = place.surfacing and not place.position_sd_m <= policy.until_sd_m
+        up.append(bool(late or stays))
+        if up[-1] and not place.surfacing:
+            told[place.vehicle] = (
+                f"{place.vehicle} comes up for a fix: it knows its position to {place.position_sd_m:.2g} m, "
+                f"{policy.max_position_sd_m:g} m are allowed"
+            )
+        elif place.surfacing and not up[-1]:
+            told[place.vehicle] = (
+                f"{place.vehicle} goes down again: it knows its position to {place.position_sd_m:.2g} m"
+            )
+    return up, told
+
+
+def _come_in(place: Place, constraints: Constraints, taken: list[FloatArray]) -> Leg:
+    """Send a vehicle that is far outside to the area's border, clear of keep-out zones and of others (n of (2,))."""
+    goal = safety.way_in(constraints, place.en_m, INSET_M, taken)
+    if goal is None:
+        return Leg(place.vehicle, np.append(place.en_m, 0.0), "a keep-out zone or a vehicle bars every straight way in")
+    # The bottom on the way is unknown: it comes at the surface.
+    return Leg(place.vehicle, np.append(goal, 0.0))
+
+
+def _within_step(origin: FloatArray, target: FloatArray, max_step_m: float) -> FloatArray:
+    """Shorten a leg horizontally when the change of depth made it longer than a step may be."""
+    rise = abs(target[2] - origin[2])
+    run = float(np.linalg.norm(target[:2] - origin[:2]))
+    if np.hypot(run, rise) <= max_step_m or run == 0.0:
+        return target
+    factor = np.sqrt(max(max_step_m**2 - rise**2, 0.0)) / run * (1 - 1e-9)
+    return np.append(origin[:2] + factor * (target[:2] - origin[:2]), target[2])

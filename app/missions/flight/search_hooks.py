@@ -1,0 +1,106 @@
+"""What a step loop has to do beyond the usual when its mission is a search; nothing in a survey."""
+
+import asyncio
+from collections.abc import Awaitable, Callable
+
+import numpy as np
+
+from app.exploration.search import SearchTask
+from app.missions.flight.decision import Decision
+from app.missions.live.mission import LiveMission
+from app.missions.search.course import IDLE_STEPS, REST_S, Course
+from app.missions.team import Member
+from app.missions.views.mission import Level
+
+Wait = Callable[[Callable[[], bool], float | None], Awaitable[bool]]
+"""Waits until a condition holds, or until the event loop's time; tells whether it does."""
+
+
+class Lookout:
+    """Keeps one running mission from going where something stands, and tells when a search is over.
+
+    Parameters
+    ----------
+    time_scale
+        How much faster than the wall clock the vehicles live.
+    wait
+        The step loop's own way to wait for what vehicles tell.
+    """
+
+    def __init__(self, live: LiveMission, time_scale: float, wait: Wait) -> None:
+        self._live = live
+        self._time_scale = time_scale
+        self._wait = wait
+        self._course = None if live.search is None else Course(live.search, live.spec, live.frame)
+
+    @property
+    def needed(self) -> bool:
+        """Whether the mission is a search."""
+        return self._course is not None
+
+    def task(self, step: int) -> SearchTask | None:
+        """Return what the planner of a search is to see when a step is decided."""
+        return None if self._course is None else self._course.task(step)
+
+    def barred(self) -> list[Member]:
+        """Return the vehicles under way that have something on their way by what is known now."""
+        course = self._course
+        return [] if course is None else [m for m in self._live.team if m.busy and course.barred(m)]
+
+    def still_clear(self, decision: Decision) -> bool:
+        """Return whether the legs of a decision are still clear by what was seen since it was made."""
+        if self._course is None:
+            return True
+        search = self._course.search
+        return all(
+            leg.refusal or search.clear(member.place_m(self._live.frame), leg.target_m[:2])
+            for leg in decision.legs
+            if (member := self._live.team.get(leg.vehicle)) is not None and member.report is not None
+        )
+
+    async def look_round(self) -> None:
+        """Wait for scans: from every vehicle's place, and for a new one where nobody could go on."""
+        course, live = self._course, self._live
+        if course is None:
+            return
+        rest_s = asyncio.get_running_loop().time() + REST_S / self._time_scale
+        if course.idle:
+            version = course.search.version
+            await self._wait(lambda: course.search.version > version, rest_s)
+        if await self._wait(lambda: not course.unseen(live.team.present), rest_s):
+            return
+        blind = course.unseen(live.team.present)
+        message = f"no scan tells what is around {', '.join(blind)}: the search waits for one"
+        await live.journal.log(Level.ALARM, "waiting", message, vehicles=blind)
+        await self._wait(lambda: not course.unseen(live.team.present), None)
+
+    async def tell_of(self, barred: list[Member]) -> None:
+        """Write down why a step ends early."""
+        names = [member.name for member in barred]
+        message = f"something was seen on the way of {', '.join(names)}: another way is taken"
+        await self._live.journal.log(Level.WARNING, "obstacle", message, step=self._live.header.step, vehicles=names)
+
+    async def is_over(self, decision: Decision, step_s: float) -> bool:
+        """Note how a step went that took ``step_s`` on the wall clock; tell whether it was a search's last one."""
+        course, live = self._course, self._live
+        if course is None:
+            return False
+        team = live.team.present
+        legs = [np.hypot(*(leg.target_m[:2] - decision.origin_m[leg.vehicle])) for leg in decision.legs]
+        course.note(np.array(legs), step_s * self._time_scale)
+        away, last = course.away(team), live.header.step >= live.spec.steps
+        if away and (course.search.left_s() <= 0 or last) and not course.told_late:
+            course.told_late = True
+            places = {member.name: member.place_m(live.frame) for member in team}
+            far = ", ".join(f"{name} {course.search.way_to_entry_m(places[name]):.0f} m" for name in away)
+            why = "the time is up" if course.search.left_s() <= 0 else "every step is done"
+            then = "the mission ends where they are" if last else "they go on to the entry"
+            message = f"{why} and not everybody is back (from the entry: {far}): {then}"
+            await live.journal.log(Level.ALARM, "late", message, vehicles=away)
+        if away and course.idle == IDLE_STEPS:
+            message = (
+                f"nobody can go anywhere from where {', '.join(away)} stand: no way that was looked at is wide enough "
+                "and leads on, or to the entry. Bring them there, or make search.safety_m smaller in a new mission"
+            )
+            await live.journal.log(Level.ALARM, "stuck", message, vehicles=away)
+        return course.over(team, int(decision.terms.get("homebound", 0)))

@@ -1,0 +1,207 @@
+"""Forecasts as they are asked for: one at a time, in a thread of their own, until nobody waits for the answer."""
+
+import asyncio
+import threading
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+
+import numpy as np
+from pydantic import Field
+from shapely.geometry import Point, Polygon
+
+from app.mapping.types import FloatArray
+from app.missions.errors import InvalidRequestError
+from app.missions.forecast.simulate import Forecast, forecast
+from app.missions.spec.mission import MissionSpec
+from app.missions.team import Member, Team
+from app.missions.views.base import View
+
+BUDGET_S = 10.0
+"""Seconds of the processor for each floor."""
+
+PATIENCE_S = 60.0
+"""After so long by the clock no further floor is begun."""
+
+LOW, HIGH = 0.1, 0.9
+START_MARGIN_M, START_SPACING_M = 2.0, 5.0
+NEAR_M = 500.0
+"""A vehicle farther away than this is taken to be brought to the area first."""
+
+
+class ForecastRange(View):
+    """From where to where a figure went, over floors of different roughness: 10 % were below, 10 % above."""
+
+    low: float
+    high: float
+
+
+class VehicleForecast(View):
+    """What one vehicle will have done."""
+
+    vehicle: str
+    distance_m: float = Field(description="Median over the floors")
+    distance_m_range: ForecastRange
+
+
+class ForecastView(View):
+    """What is to be expected of a mission: a forecast from a simulation, not a promise."""
+
+    duration_s: float = Field(description="Seconds of the vehicles' time until the last step is done; median")
+    duration_s_range: ForecastRange
+    vehicles: list[VehicleForecast]
+    coverage_pct: float = Field(
+        description="Share of the area's cells that will be known to `accuracy_m`; median over the floors"
+    )
+    coverage_pct_range: ForecastRange
+    remaining_pct: float = Field(description="Share of the landmarks that will not be; median over the floors")
+    remaining_pct_range: ForecastRange
+    mean_sd_m: float | None = Field(description="Mean deviation of the map; median; null: nothing was sounded")
+    mean_sd_m_range: ForecastRange | None
+    steps: int = Field(description="Steps that are still to be flown")
+    steps_simulated: int = Field(
+        description="Of these were simulated in the time allowed; `coverage_pct` and what follows is after as many"
+    )
+    steps_flown: int = Field(description="The same as `steps_simulated`")
+    floors: int = Field(description="Over how many floors of different roughness it was flown")
+    assumptions: list[str] = Field(description="What was taken to be so, in words")
+
+
+class Forecaster:
+    """Makes forecasts beside the planning of running missions."""
+
+    def __init__(self) -> None:
+        self._executor = ThreadPoolExecutor(1, thread_name_prefix="forecast")
+        self._one = asyncio.Lock()
+        self._closing = threading.Event()
+
+    def close(self) -> None:
+        """End what is being made."""
+        self._closing.set()
+        self._executor.shutdown(wait=True, cancel_futures=True)
+
+    async def make(
+        self,
+        spec: MissionSpec,
+        *,
+        members: list[Member] | None = None,
+        prior: FloatArray | None = None,
+        first_step: int = 1,
+        floor_depth_m: float | None = None,
+    ) -> ForecastView:
+        """Return a forecast; ends soon after whoever waits for it is cancelled.
+
+        Parameters
+        ----------
+        members
+            The vehicles as they are; None: those of the description, not yet in the water.
+        prior
+            Imported soundings, shape (n, 4).
+
+        Raises
+        ------
+        InvalidRequestError
+            When the mission has no vehicle.
+        """
+        team = Team()
+        ours = members or [team.join(vehicle, slot) for slot, vehicle in enumerate(spec.vehicles)]
+        if not ours:
+            raise InvalidRequestError("vehicles", "the mission has no vehicle", "add one: without any nothing is done")
+        gone = threading.Event()
+        known = np.zeros((0, 4)) if prior is None else prior
+        starts, where = await asyncio.to_thread(starts_of, spec, ours)
+        work = partial(
+            forecast,
+            spec,
+            ours,
+            starts,
+            known,
+            floor_depth_m=floor_depth_m,
+            first_step=first_step,
+            budget_s=BUDGET_S,
+            patience_s=PATIENCE_S,
+            stop=lambda: gone.is_set() or self._closing.is_set(),
+        )
+        try:
+            async with self._one:
+                found = await asyncio.get_running_loop().run_in_executor(self._executor, work)
+        finally:
+            gone.set()
+        return _view(spec, found, where, spec.steps - first_step + 1)
+
+
+def starts_of(spec: MissionSpec, members: list[Member]) -> tuple[FloatArray, str]:
+    """Return where the vehicles begin, (vehicles, 2), and that in words: where they are, or in the area's corner."""
+    frame, area = spec.frame(), Polygon(spec.local_area())
+    width = float(np.ptp(spec.local_area()[:, 0]))
+    starts, reported = [], 0
+    for index, member in enumerate(members):
+        corner = np.array([START_MARGIN_M + index * START_SPACING_M % max(width - START_MARGIN_M, 1.0), START_MARGIN_M])
+        place = corner
+        if member.report is not None:
+            here = member.place_m(frame)
+            if area.distance(Point(here)) <= NEAR_M:
+                place, reported = here, reported + 1
+        elif member.spec.start is not None:
+            place = np.array([float(x) for x in frame.to_local(member.spec.start[1], member.spec.start[0])])
+        starts.append(place)
+    words = "Vehicles begin where they are." if reported == len(members) else "Vehicles begin in a corner of the area."
+    if 0 < reported < len(members):
+        words = f"{reported} of {len(members)} vehicles begin where they are, the others in a corner of the area."
+    return np.array(starts), words
+
+
+def _view(spec: MissionSpec, found: Forecast, where: str, steps: int) -> ForecastView:
+    first, flights = found.floors[0], found.flights
+    kinds = ", ".join(floor.kind for floor in found.floors)
+    assumptions = [
+        f"Sea floor: {first.words}.",
+        f"Flown over {len(flights)} floors: {kinds}. Ranges leave out the lowest and the highest tenth; which floor it "
+        "will be is not known."
+        if len(flights) > 1
+        else "Flown over one floor only, for want of time: on a rougher one it will be worse.",
+        where,
+        f"Straight legs at {spec.speed_mps:g} m/s without current; nobody waits for a link, and none is lost.",
+    ]
+    if spec.surface_policy is not None:
+        assumptions.append("Coming up for fixes is not in it.")
+    if spec.targets:
+        assumptions.append("Going for moving targets is not in it.")
+    if found.steps_flown < steps:
+        assumptions.append(
+            f"Only {found.steps_flown} of {steps} steps were simulated on every floor, in {BUDGET_S:g} s of the "
+            "processor each: duration and distances are drawn out to all of them; coverage and deviation are those "
+            "after as many."
+        )
+
+    sds = [flight.mean_sd_m for flight in flights if flight.mean_sd_m is not None]
+    durations = [flight.duration_s for flight in flights]
+    coverages, remainders = [flight.coverage_pct for flight in flights], [flight.remaining_pct for flight in flights]
+    ways = {name: [flight.distances_m[name] for flight in flights] for name in flights[0].distances_m}
+    return ForecastView(
+        duration_s=_median(durations),
+        duration_s_range=_range(durations),
+        vehicles=[
+            VehicleForecast(vehicle=name, distance_m=_median(way), distance_m_range=_range(way))
+            for name, way in ways.items()
+        ],
+        coverage_pct=_median(coverages),
+        coverage_pct_range=_range(coverages),
+        remaining_pct=_median(remainders),
+        remaining_pct_range=_range(remainders),
+        mean_sd_m=_median(sds) if sds else None,
+        mean_sd_m_range=_range(sds) if sds else None,
+        steps=steps,
+        steps_simulated=found.steps_flown,
+        steps_flown=found.steps_flown,
+        floors=len(flights),
+        assumptions=assumptions,
+    )
+
+
+def _median(values: list[float]) -> float:
+    return float(np.median(values))
+
+
+def _range(values: list[float]) -> ForecastRange:
+    low, high = (float(x) for x in np.quantile(values, [LOW, HIGH]))
+    return ForecastRange(low=low, high=high)

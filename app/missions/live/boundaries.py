@@ -1,0 +1,117 @@
+"""Whether vehicles are where they may be: an entry into a keep-out zone is an alarm, and so is leaving the area."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely.geometry import Point, Polygon
+
+from app.missions.views.mission import Level
+
+FloatArray = NDArray[np.float64]
+
+OUTSIDE_ALARM_M = 20.0
+"""Vehicles that wait circle across the border; farther outside than this they have gone astray."""
+OUTSIDE_OVER_M = 10.0
+CLEAR_M = 1.0
+"""An entry is over this far outside of the zone: a vehicle at its very border enters it once."""
+
+
+@dataclass
+class _Breach:
+    words: str
+    began_s: float
+    farthest_m: float = 0.0
+
+
+@dataclass(frozen=True)
+class Crossing:
+    """A vehicle that went where it must not be, or came back: a line for the log."""
+
+    level: Level
+    message: str
+    data: dict[str, Any]
+
+
+class Boundaries:
+    """Holds the vehicles' reported places against a mission's keep-out zones and area.
+
+    Parameters
+    ----------
+    area : (n, 2)
+        East and north of its corners.
+    zones
+        The keep-out zones as drawn, each (n, 2), without a margin.
+    """
+
+    def __init__(self, area: FloatArray, zones: list[FloatArray]) -> None:
+        self._area = Polygon(area)
+        self._zones = [Polygon(zone) for zone in zones]
+        shapely.prepare([self._area, *self._zones])
+        self._been_inside: set[str] = set()
+        self._breaches: dict[str, dict[int, _Breach]] = {}
+
+    def judge(self, vehicle: str, en_m: tuple[float, float], depth_m: float, at_s: float) -> list[Crossing]:
+        """Return what there is to tell of a vehicle at a place; ``at_s`` in seconds of any one clock."""
+        place = Point(en_m)
+        crossings = []
+        for number, zone in enumerate(self._zones, 1):
+            inside_m = -_signed_distance_m(zone, place)
+            crossings += self._follow(
+                vehicle,
+                number,
+                f"in keep-out zone {number}",
+                inside_m,
+                inside_m > 0,
+                inside_m < -CLEAR_M,
+                depth_m,
+                at_s,
+            )
+        outside_m = _signed_distance_m(self._area, place)
+        if outside_m <= 0:
+            self._been_inside.add(vehicle)
+        # One that comes from outside for the first time is on its way in.
+        astray = vehicle in self._been_inside and outside_m > OUTSIDE_ALARM_M
+        crossings += self._follow(
+            vehicle, 0, "outside the area", outside_m, astray, outside_m <= OUTSIDE_OVER_M, depth_m, at_s
+        )
+        return crossings
+
+    def breach(self, vehicle: str) -> str:
+        """Return where a vehicle is that it must not be; empty when all is well."""
+        return ", ".join(breach.words for breach in self._breaches.get(vehicle, {}).values())
+
+    def forget(self, vehicle: str) -> None:
+        """A vehicle left the mission: where it goes is no matter of the mission any more."""
+        self._breaches.pop(vehicle, None)
+        self._been_inside.discard(vehicle)
+
+    def _follow(
+        self, vehicle: str, key: int, words: str, by_m: float, began: bool, over: bool, depth_m: float, at_s: float
+    ) -> list[Crossing]:
+        known = self._breaches.setdefault(vehicle, {})
+        breach = known.get(key)
+        data = {"vehicle": vehicle, "zone": key or None}
+        if breach is None:
+            if not began:
+                return []
+            known[key] = _Breach(words, at_s, by_m)
+            message = f"{vehicle} is {words}, at {depth_m:.1f} m depth: abort it if it goes on"
+            return [Crossing(Level.ALARM, message, data | {"begins": True})]
+        breach.farthest_m = max(breach.farthest_m, by_m)
+        if not over:
+            return []
+        del known[key]
+        message = (
+            f"{vehicle} is no longer {words}: it was for {max(at_s - breach.began_s, 0.0):.0f} s, "
+            f"by up to {breach.farthest_m:.1f} m"
+        )
+        return [Crossing(Level.WARNING, message, data | {"begins": False, "farthest_m": round(breach.farthest_m, 2)})]
+
+
+def _signed_distance_m(polygon: Polygon, place: Point) -> float:
+    """Return how far a place lies outside of a polygon, negative inside."""
+    distance = float(shapely.distance(polygon.exterior, place))
+    return -distance if polygon.contains(place) else distance

@@ -1,0 +1,455 @@
+"""What a mission writes down as it goes: soundings, tracks, waypoint states and its log.
+
+Everything that arrives from vehicles is buffered for a moment and written in one transaction; a sounding counts as
+accepted only when that transaction has committed. What cannot be written, because the disk is full for example, stays
+noted until it can.
+"""
+
+import asyncio
+import math
+from collections.abc import Awaitable, Callable, Sequence
+from dataclasses import asdict, dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import structlog
+from sqlalchemy.ext.asyncio import AsyncSession
+
+from app.missions import metrics
+from app.missions.clock import now
+from app.missions.errors import MissionElsewhereError
+from app.missions.fleet.interface import ScanReport, SoundingReport, VehicleReport, WaypointReport
+from app.missions.large_batches import made_of
+from app.missions.live.broadcast import Broadcaster
+from app.missions.live.db_retry import RETRY_S, Outlasting
+from app.missions.soundings.corrections import NO_LEVEL
+from app.missions.soundings.gate import Gate, GatedSounding
+from app.missions.views.messages import EventMessage
+from app.missions.views.mission import EventView, Level
+from app.missions.views.soundings import ItemVerdict, Verdict
+from app.missions.views.telemetry import VehicleSample
+from app.storage import missions as mission_queries
+from app.storage import soundings as sounding_queries
+from app.storage import telemetry as telemetry_queries
+from app.storage.database import Database
+from app.storage.models import EventRow
+from app.storage.shielding import to_the_end
+
+FLUSH_PERIOD_S = 0.1
+TRACK_SPACING_M = 1.0
+METRES_PER_DEGREE = 111_320.0
+
+TakeScans = Callable[[Sequence[ScanReport], int, AsyncSession], Awaitable[tuple[list[ItemVerdict], Callable[[], None]]]]
+"""Stores scans of a step in a transaction; returns the verdicts and what to call once it has committed."""
+
+log = structlog.get_logger(__name__)
+
+
+@dataclass(frozen=True, slots=True)
+class Counts:
+    """Soundings of a mission so far."""
+
+    accepted: int = 0
+    rejected: int = 0
+
+
+class Journal:
+    """Writes one mission's records.
+
+    Parameters
+    ----------
+    on_accepted
+        Called with every committed batch of accepted soundings, shape (n, 4): east, north, depth, sd.
+    take_scans
+        Stores scans; None in missions that have no use for any.
+    """
+
+    def __init__(
+        self,
+        database: Database,
+        mission_id: str,
+        gate: Gate,
+        counts: Counts,
+        broadcaster: Broadcaster,
+        on_accepted: Callable[[np.ndarray[Any, np.dtype[np.float64]]], None],
+        take_scans: TakeScans | None = None,
+    ) -> None:
+        self._database = database
+        self._mission_id = mission_id
+        self._gate = gate
+        self._broadcaster = broadcaster
+        self._on_accepted = on_accepted
+        self._take_scans = take_scans
+        self.counts = counts
+        self.travelled_m = 0.0
+        self.step = 0
+        self._soundings: list[SoundingReport] = []
+        self._scans: list[ScanReport] = []
+        self._positions: list[dict[str, Any]] = []
+        self._statuses: list[WaypointReport] = []
+        self._telemetry: list[dict[str, Any]] = []
+        self._lines: list[EventRow] = []
+        self.storage = Outlasting(mission_id, lambda: self.on_trouble(), self._note_trouble)
+        """Waits where the database cannot be used."""
+        self.on_trouble: Callable[[], None] = lambda: None
+        """Called when the database cannot be used any more, or can be again."""
+        self.told_of_missing_level = False
+        """Whether the log has it that no water level is known for soundings; once is enough."""
+        self._untold = ""
+        self._track_ends: dict[str, tuple[float, float]] = {}
+        self.writing = asyncio.Lock()
+        """Held while soundings are stored, so that corrections do not change under them."""
+        self._pump: asyncio.Task[None] | None = None
+
+    def sounding(self, report: SoundingReport) -> None:
+        """Note a sounding; it is written within a moment."""
+        self._soundings.append(report)
+        self._start_pump()
+
+    def scan(self, report: ScanReport) -> None:
+        """Note a look round; it is written within a moment, in a mission that has use for it."""
+        if self._take_scans is not None:
+            self._scans.append(report)
+            self._start_pump()
+
+    def position(self, report: VehicleReport) -> None:
+        """Note a point of a track, unless it is close to the last one."""
+        place = report.position
+        end = (place.lon_deg, place.lat_deg)
+        last = self._track_ends.get(report.vehicle)
+        if last is not None:
+            leg_m = track_length_m([last, end])
+            if leg_m < TRACK_SPACING_M:
+                return
+            self.travelled_m += leg_m
+        self._track_ends[report.vehicle] = end
+        self._positions.append(position_row(self._mission_id, report))
+        self._start_pump()
+
+    def waypoint(self, report: WaypointReport) -> None:
+        """Note what became of a waypoint."""
+        self._statuses.append(report)
+        self._start_pump()
+
+    def telemetry(self, samples: Sequence[VehicleSample]) -> None:
+        """Note what the vehicles told of themselves."""
+        self._telemetry += [{"mission_id": self._mission_id} | asdict(sample) for sample in samples]
+        self._start_pump()
+
+    async def flush(self) -> None:
+        """Write everything noted so far. What could not be written stays noted."""
+        await to_the_end(self._flush())
+        if self._untold:
+            why, self._untold = self._untold, ""
+            await self.log(
+                Level.ALARM, "corrections", f"soundings are rejected: {why}. Send a tide table that covers them"
+            )
+
+    async def _flush(self) -> None:
+        async with self.writing:
+            soundings, self._soundings = self._soundings, []
+            scans, self._scans = self._scans, []
+            positions, self._positions = self._positions, []
+            statuses, self._statuses = self._statuses, []
+            telemetry, self._telemetry = self._telemetry, []
+            lines, self._lines = self._lines, []
+            if not (soundings or scans or positions or statuses or telemetry or lines):
+                return
+            told = [self.line(Level(line.level), line.kind, line.message, **line.data) for line in lines]
+            try:
+                async with self._database.writing() as session:
+                    gated, new = await self._store(session, soundings)
+                    _, seen = await self.take_scans(scans, session)
+                    await mission_queries.add_positions(session, positions)
+                    await telemetry_queries.add(session, telemetry)
+                    for row, line in zip(told, lines, strict=True):
+                        row.time = line.time
+                    session.add_all(told)
+                    for report in statuses:
+                        await mission_queries.set_waypoint_status(
+                            session, self._mission_id, report.step, report.vehicle, report.status, report.reason, now()
+                        )
+            except BaseException:
+                self._soundings[:0] = soundings
+                self._scans[:0] = scans
+                self._positions[:0] = positions
+                self._statuses[:0] = statuses
+                self._telemetry[:0] = telemetry
+                self._lines[:0] = lines
+                raise
+            self._count(gated, new)
+            seen()
+            for row in told:
+                self.tell(row)
+
+    async def take_scans(
+        self, reports: Sequence[ScanReport], session: AsyncSession
+    ) -> tuple[list[ItemVerdict], Callable[[], None]]:
+        """Store scans in the caller's transaction; the caller holds ``writing``.
+
+        Returns
+        -------
+        The verdicts in the order of the reports, and what to call once the transaction has committed.
+        """
+        if self._take_scans is None or not reports:
+            return [], lambda: None
+        return await self._take_scans(reports, self.step, session)
+
+    async def take(
+        self, reports: Sequence[SoundingReport], session: AsyncSession, *, gate: Gate | None = None
+    ) -> tuple[list[ItemVerdict], Callable[[], None]]:
+        """Store soundings in the caller's transaction; the caller holds ``writing``.
+
+        ``gate`` judges them in place of the mission's own.
+
+        Returns
+        -------
+        The verdicts in the order of the reports, and what to call once the transaction has committed.
+        """
+        gated, new = await self._store(session, reports, gate)
+        return await made_of(gated, _verdicts, gated, new), lambda: self._count(gated, new)
+
+    async def log(self, level: Level, kind: str, message: str, **data: Any) -> None:
+        """Write a line of the mission's log and show it to everyone who watches.
+
+        Where the database cannot be written the line is noted like a sounding: nobody who has to tell something waits.
+        """
+        row = self.line(level, kind, message, **data)
+        if self._lines or self.storage.trouble:
+            self.note_line(row)
+            return
+        try:
+            await self.write(row)
+        except Exception as error:
+            self.storage.note(error)
+            self.note_line(self.line(level, kind, message, **data))
+
+    async def log_all(self, rows: Sequence[EventRow]) -> None:
+        """Write lines of the mission's log together and show them; what cannot be written is noted, as by :meth:`log`.
+
+        Parameters
+        ----------
+        rows
+            Made by :meth:`line`.
+        """
+        if self._lines or self.storage.trouble:
+            for row in rows:
+                self.note_line(row)
+            return
+        copies = [(row.time, self.line(Level(row.level), row.kind, row.message, **row.data)) for row in rows]
+        try:
+            await to_the_end(self._add_all(rows))
+        except Exception as error:
+            self.storage.note(error)
+            # Rows of a transaction that failed cannot be written again.
+            for time, row in copies:
+                row.time = time
+                self.note_line(row)
+            return
+        for row in rows:
+            self.tell(row)
+
+    async def _add_all(self, rows: Sequence[EventRow]) -> None:
+        async with self._database.writing() as session:
+            session.add_all(rows)
+
+    def note_line(self, row: EventRow) -> None:
+        """Note a line; it is written within a moment, or when that is possible again."""
+        self._lines.append(row)
+        self._start_pump()
+
+    async def write(self, row: EventRow) -> None:
+        """Write a line now and show it; raises when that cannot be."""
+        await to_the_end(self._add(row))
+        self.tell(row)
+
+    def _note_trouble(self, message: str) -> None:
+        self.note_line(self.line(Level.ALARM, "storage", message))
+
+    def line(self, level: Level, kind: str, message: str, **data: Any) -> EventRow:
+        """Return a line of the mission's log for a transaction of the caller's; ``tell`` of it once that is done."""
+        return EventRow(mission_id=self._mission_id, time=now(), level=level, kind=kind, message=message, data=data)
+
+    def tell(self, row: EventRow) -> None:
+        """Show a line that was written to everyone who watches."""
+        metrics.EVENTS.labels(row.level).inc()
+        said = {"mission": self._mission_id, "level": str(row.level), "kind": row.kind, "message": row.message}
+        log.info("mission event", **(row.data | said))
+        self._broadcaster.publish(EventMessage(event=event_view(row)))
+
+    async def _add(self, row: EventRow) -> None:
+        async with self._database.writing() as session:
+            session.add(row)
+
+    async def count_again(self, read: Callable[[], Awaitable[Counts]]) -> None:
+        """Let ``read`` take up what another process has written, while nothing is written here."""
+        await self.flush()
+        async with self.writing:
+            self.counts = await read()
+
+    def abandon(self) -> None:
+        """Forget what is left: the mission is another process's."""
+        self._soundings, self._scans, self._positions, self._statuses = [], [], [], []
+        self._telemetry, self._lines = [], []
+
+    async def close(self) -> None:
+        """Write what is left and stop."""
+        if self._pump is not None:
+            self._pump.cancel()
+            await asyncio.gather(self._pump, return_exceptions=True)
+        try:
+            await self.flush()
+        except Exception as error:
+            self.storage.note(error)
+            log.error(
+                "what was heard last is lost, it could not be written",
+                mission=self._mission_id,
+                soundings=len(self._soundings),
+                why=self.storage.trouble,
+            )
+
+    def _start_pump(self) -> None:
+        if self._pump is None or self._pump.done():
+            self._pump = asyncio.create_task(self._flush_soon())
+
+    async def _flush_soon(self) -> None:
+        while any((self._soundings, self._scans, self._positions, self._statuses, self._telemetry, self._lines)):
+            await asyncio.sleep(FLUSH_PERIOD_S)
+            try:
+                await self.storage.done(self.flush)
+            except MissionElsewhereError:
+                return  # nothing more is ours to write
+            except Exception:
+                log.exception("could not write to the database, trying again", mission=self._mission_id)
+                await asyncio.sleep(RETRY_S)
+
+    async def _store(
+        self, session: AsyncSession, reports: Sequence[SoundingReport], gate: Gate | None = None
+    ) -> tuple[list[GatedSounding], set[sounding_queries.Identity]]:
+        gated, rows = await made_of(reports, self._gated, reports, gate or self._gate)
+        return gated, await sounding_queries.insert_new(session, rows)
+
+    def _gated(self, reports: Sequence[SoundingReport], gate: Gate) -> tuple[list[GatedSounding], list[dict[str, Any]]]:
+        """Return soundings as the gate judges them, and how they are stored."""
+        gated, received = gate.check(reports), now()
+        return gated, [_row(self._mission_id, self.step, received, item) for item in gated if _storable(item)]
+
+    def _count(self, gated: Sequence[GatedSounding], new: set[sounding_queries.Identity]) -> None:
+        first = {_identity(item.report): item for item in reversed(gated) if _storable(item)}
+        fresh = [item for identity, item in first.items() if identity in new]
+        accepted = [item for item in reversed(fresh) if item.accepted]
+        rejected = len(fresh) - len(accepted)
+        no_level = next((item.reason for item in fresh if item.reason.startswith(NO_LEVEL)), "")
+        if no_level and not self.told_of_missing_level:
+            self.told_of_missing_level, self._untold = True, no_level.removeprefix(NO_LEVEL)
+        self.counts = Counts(self.counts.accepted + len(accepted), self.counts.rejected + rejected)
+        metrics.SOUNDINGS.labels(Verdict.ACCEPTED).inc(len(accepted))
+        metrics.SOUNDINGS.labels(Verdict.REJECTED).inc(rejected)
+        metrics.SOUNDINGS.labels(Verdict.DUPLICATE).inc(len(gated) - len(fresh))
+        if accepted:
+            self._on_accepted(np.array([(s.east_m, s.north_m, s.depth_m, s.sd_m) for s in accepted]))
+
+
+def position_row(mission_id: str, report: VehicleReport, *, imported: bool = False) -> dict[str, Any]:
+    """Return a point of a vehicle's track as it is stored; ``imported``: a log brought it, it was not heard."""
+    place = report.position
+    return {
+        "mission_id": mission_id,
+        "vehicle": report.vehicle,
+        "time_s": report.time_s,
+        "lat_deg": place.lat_deg,
+        "lon_deg": place.lon_deg,
+        "depth_m": place.depth_m,
+        "imported": imported,
+    }
+
+
+def track_length_m(track: Sequence[tuple[float, float]]) -> float:
+    """Return the length of a line through (longitude, latitude) points a short way apart; good to 0.5 %."""
+    return sum(
+        METRES_PER_DEGREE * math.hypot((lon2 - lon1) * math.cos(math.radians(lat1)), lat2 - lat1)
+        for (lon1, lat1), (lon2, lat2) in pairwise(track)
+    )
+
+
+def event_view(row: EventRow) -> EventView:
+    """Return a log line as it is shown."""
+    return EventView(
+        id=row.id,
+        mission_id=row.mission_id,
+        time=row.time,
+        level=Level(row.level),
+        kind=row.kind,
+        message=row.message,
+        data=row.data,
+    )
+
+
+def _identity(report: SoundingReport) -> sounding_queries.Identity:
+    return report.vehicle, report.time_s, report.beam
+
+
+def _verdicts(gated: Sequence[GatedSounding], new: set[sounding_queries.Identity]) -> list[ItemVerdict]:
+    """Return the verdicts on soundings of which those in ``new`` were stored."""
+    left = set(new)
+    verdicts = []
+    for index, item in enumerate(gated):
+        identity = _identity(item.report)
+        if _storable(item) and identity not in left:
+            verdicts.append(ItemVerdict(index=index, verdict=Verdict.DUPLICATE, reason="already stored"))
+            continue
+        if _storable(item):
+            left.discard(identity)
+        verdict = Verdict.ACCEPTED if item.accepted else Verdict.REJECTED
+        verdicts.append(ItemVerdict(index=index, verdict=verdict, reason=item.reason))
+    return verdicts
+
+
+def _storable(item: GatedSounding) -> bool:
+    # NaN and infinity have no place in a database column that is summed later; the verdict still goes out.
+    report = item.report
+    place = report.footprint
+    finite = math.isfinite
+    return (
+        finite(report.time_s)
+        and finite(report.range_m)
+        and finite(report.vehicle_depth_m)
+        and finite(place.lat_deg)
+        and finite(place.lon_deg)
+        and finite(place.depth_m)
+    )
+
+
+def _row(mission_id: str, step: int, received: Any, item: GatedSounding) -> dict[str, Any]:
+    report = item.report
+    geometry = report.beam_geometry
+    return {
+        "mission_id": mission_id,
+        "vehicle": report.vehicle,
+        "time_s": report.time_s,
+        "beam": report.beam,
+        "received_at": received,
+        "step": step,
+        "source": report.source,
+        "lat_deg": report.footprint.lat_deg,
+        "lon_deg": report.footprint.lon_deg,
+        "east_m": item.east_m,
+        "north_m": item.north_m,
+        "vehicle_depth_m": report.vehicle_depth_m,
+        "range_m": report.range_m,
+        "raw_depth_m": report.footprint.depth_m,
+        "depth_m": item.depth_m,
+        "sd_m": item.sd_m,
+        "position_sd_m": report.position_sd_m,
+        "level_m": item.level_m,
+        "vehicle_lat_deg": geometry and geometry.lat_deg,
+        "vehicle_lon_deg": geometry and geometry.lon_deg,
+        "roll_deg": geometry and geometry.roll_deg,
+        "pitch_deg": geometry and geometry.pitch_deg,
+        "heading_deg": geometry and geometry.heading_deg,
+        "beam_azimuth_deg": geometry and geometry.azimuth_deg,
+        "beam_off_nadir_deg": geometry and geometry.off_nadir_deg,
+        "verdict": Verdict.ACCEPTED if item.accepted else Verdict.REJECTED,
+        "reason": item.reason,
+    }

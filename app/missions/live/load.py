@@ -1,0 +1,92 @@
+"""Takes a mission up from the database, as it was last committed."""
+
+import asyncio
+from concurrent.futures import Executor
+from functools import partial
+
+from app.mapping.tides import parse_tid
+from app.missions.fleet.hub import FleetHub
+from app.missions.fleet.interface import Position, VehicleReport
+from app.missions.live.journal import Counts
+from app.missions.live.mission import RISES, LiveMission, builder_of
+from app.missions.search.scan_log import report_of
+from app.missions.search.state import Search
+from app.missions.spec.mission import MissionSpec, VehicleSpec
+from app.missions.states import ENDED
+from app.missions.targets.filters import warm_up as tracking_warm_up
+from app.storage import events as event_queries
+from app.storage import missions as mission_queries
+from app.storage import scans as scan_queries
+from app.storage import soundings as sounding_queries
+from app.storage import stored_maps
+from app.storage import telemetry as telemetry_queries
+from app.storage.database import Database
+from app.storage.models import MissionRow, PositionRow, TideTableRow
+
+
+async def take_up(
+    database: Database, hub: FleetHub, executor: Executor, row: MissionRow, time_scale: float = 1.0
+) -> LiveMission:
+    """Return the mission of a row, with its vehicles, its newest waypoints, its map and how far it had come."""
+    async with database.reading() as session:
+        imported = await event_queries.last_event_id(session, row.id, kind="import")
+        stored = await stored_maps.stored_map(session, row.id, imported)
+        prior = await sounding_queries.any_imported(session, row.id)
+        vehicles = await mission_queries.vehicles_of(session, row.id)
+        waypoints = await mission_queries.newest_waypoints(session, row.id)
+        step = await mission_queries.last_step(session, row.id)
+        positions = await mission_queries.last_positions(session, row.id)
+        reference = await sounding_queries.reference_grid(session, row.id)
+        tide = await session.get(TideTableRow, row.id)
+        heard = await telemetry_queries.last_heard(session, row.id)
+        risings = await event_queries.count_by_vehicle(session, row.id, "surface", RISES)
+    # Building the spec checks geometry, which takes milliseconds: not on the event loop.
+    loop = asyncio.get_running_loop()
+    spec = await loop.run_in_executor(executor, MissionSpec.model_validate, row.spec)
+    table = None
+    if tide is not None:
+        table = await loop.run_in_executor(executor, partial(parse_tid, tide.text, name=tide.name))
+    search = None
+    if spec.search is not None:
+        search = await loop.run_in_executor(executor, Search, spec, spec.search, spec.frame(), time_scale)
+    counts = Counts(stored.accepted, stored.rejected)
+    # Which cells lie in the area is quick to tell of hundreds, and holds everyone up of millions.
+    builder = await asyncio.to_thread(builder_of, spec)
+    live = LiveMission(database, hub, executor, row, spec, counts, table, time_scale, search, builder)
+    if spec.targets:
+        await loop.run_in_executor(executor, tracking_warm_up)
+        async with database.reading() as session:
+            await live.ranges.load(session, step)
+    await live.whole.show(stored, imported=prior, ended=live.header.state in ENDED)
+    if search is not None:
+        await _take_up_search(live, search)
+    live.reference_m = reference
+    live.whole.imports_noticed = imported
+    await live.trails.newest()
+    live.journal.travelled_m = live.trails.length_m
+    if step is not None:
+        live.set_step(step.number, step.objective, step.terms)
+    for vehicle in vehicles:
+        member = live.team.join(VehicleSpec.model_validate(vehicle.spec), vehicle.slot)
+        member.report = _last_report(positions.get(member.name))
+        member.heard_s = heard.get(member.name)
+        member.risings = risings.get(member.name, 0)
+        if vehicle.left_at is not None:
+            live.team.leave(member.name, vehicle.left_at)
+    live.waypoints.show_rows(waypoints)
+    return live
+
+
+async def _take_up_search(live: LiveMission, search: Search) -> None:
+    """Make the site's grid of every scan that was accepted."""
+    async with live.database.reading() as session:
+        scans = await scan_queries.accepted_scans(session, live.id)
+        search.began_at = await mission_queries.first_step_at(session, live.id)
+    await live.in_thread(search.see, [report_of(row) for row in scans])
+
+
+def _last_report(row: PositionRow | None) -> VehicleReport | None:
+    """Return where a vehicle was last: one that holds there and only polls has nothing new to tell."""
+    if row is None:
+        return None
+    return VehicleReport(row.vehicle, row.time_s, Position(row.lat_deg, row.lon_deg, row.depth_m))

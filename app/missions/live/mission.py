@@ -1,0 +1,399 @@
+"""The side of a mission that lives in memory: its map, its journal, its vehicles' reports and its watchers."""
+
+import asyncio
+import math
+from collections.abc import Callable
+from concurrent.futures import Executor
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any, TypeVar
+
+import structlog
+from shapely.geometry import Polygon
+
+from app.estimation import Sensor, SingleBeam
+from app.mapping.georeference import LocalFrame
+from app.mapping.tides import TideTable
+from app.mapping.types import FloatArray
+from app.missions.clock import now
+from app.missions.fleet.hub import FleetHub
+from app.missions.fleet.interface import (
+    FleetEvent,
+    LinkReport,
+    LinkState,
+    RangeReport,
+    RestartReport,
+    ScanReport,
+    SoundingReport,
+    VehicleReport,
+    WaypointReport,
+)
+from app.missions.live.boundaries import Boundaries
+from app.missions.live.broadcast import Broadcaster
+from app.missions.live.feed import Telling
+from app.missions.live.journal import Counts, Journal
+from app.missions.live.range_journal import RangeJournal
+from app.missions.live.sounding_store import WholeSet
+from app.missions.live.trails import Trails
+from app.missions.live.vehicles import VehicleShowing, local_place
+from app.missions.live.waypoints import WaypointBoard
+from app.missions.maps.builder import BuiltMap, MapBuilder
+from app.missions.maps.live_grid import map_of
+from app.missions.maps.snapshot import NOT_MADE, MapSnapshot, MissionFacts
+from app.missions.maps.tiles import TileCache
+from app.missions.search.progress import progress_of
+from app.missions.search.scan_log import take
+from app.missions.search.state import Search
+from app.missions.soundings.corrections import Corrections
+from app.missions.soundings.gate import Gate
+from app.missions.spec.mission import MissionSpec
+from app.missions.states import ENDED, MissionState
+from app.missions.targets.filters import Tracking
+from app.missions.targets.views import target_views
+from app.missions.team import Member, Team
+from app.missions.views.messages import StateMessage
+from app.missions.views.mission import Level, MissionSummary, Progress
+from app.missions.views.search import SearchProgress
+from app.missions.views.targets import TargetView
+from app.storage import events as event_queries
+from app.storage import soundings as sounding_queries
+from app.storage.database import Database
+from app.storage.grouping import Grouped
+from app.storage.models import MissionRow
+from app.storage.sharing import Shared
+
+RISES = "rises"
+"""Marks events that tell of a vehicle sent up for a fix."""
+
+log = structlog.get_logger(__name__)
+
+Made = TypeVar("Made")
+
+
+@dataclass
+class Header:
+    """A mission's state as last committed."""
+
+    state: MissionState
+    reason: str
+    created_at: Any
+    updated_at: Any
+    elapsed_s: float
+    step: int = 0
+    objective: float | None = None
+    terms: dict[str, float] | None = None
+
+
+class LiveMission:
+    """One mission in memory. Made by ``take_up``; the step loop, the service and the watchers share it."""
+
+    def __init__(
+        self,
+        database: Database,
+        hub: FleetHub,
+        executor: Executor,
+        row: MissionRow,
+        spec: MissionSpec,
+        counts: Counts,
+        tide_table: TideTable | None = None,
+        time_scale: float = 1.0,
+        search: Search | None = None,
+        builder: MapBuilder | None = None,
+    ) -> None:
+        self.id = row.id
+        self.spec = spec
+        self.header = Header(MissionState(row.state), row.reason, row.created_at, row.updated_at, row.elapsed_s)
+        self.frame: LocalFrame = spec.frame()
+        self.area = spec.local_area()
+        self.team = Team()
+        self.broadcaster = Broadcaster()
+        self.builder = builder or builder_of(spec)
+        self.margin_m = 2 * spec.limits.max_step_m
+        """How far outside the area what vehicles measured still belongs to the mission and helps the map's edge."""
+        corrections = Corrections(self.frame, spec.tide, table=tide_table, sound_speed=spec.sound_speed)
+        self.gate = self._gate_with(corrections)
+        self.reference_m: FloatArray | None = None
+        """Depths of the grid that the map is compared with, at the map's cells."""
+        self.revision = 0
+        """Counts changes of what the map is shown with."""
+        self.tiles = TileCache()
+        self.trails = Trails(database, row.id)
+        self.changed = asyncio.Event()
+        """Set whenever a vehicle reported something that the step loop may be waiting for."""
+        self.search = search
+        """What a mission of kind search knows of its site."""
+        take_scans = None if self.search is None else partial(take, self.search, row.id, self.changed.set)
+        self.journal = Journal(database, row.id, self.gate, counts, self.broadcaster, self._take_soundings, take_scans)
+        self.journal.on_trouble = self.publish_summary
+        self.whole = WholeSet(database, row.id, self.builder, self.journal)
+        """All its soundings, and its map as it is stored."""
+        self.ranges = RangeJournal(database, row.id, Tracking(spec, self.frame), self.journal, time_scale)
+        """Ranges to moving targets, and what they tell."""
+        self.intake: Grouped[Any, Any] | None = None
+        """Batches of measurements that wait to be stored together."""
+        self.keys_looked_at_s = -math.inf
+        """When old idempotency keys were last forgotten, by the loop's clock."""
+        self.correcting = asyncio.Lock()
+        """Held while corrections change, one after the other."""
+        self.halted = False
+        """Set while vehicles are being stopped: the step loop must not send them off again as it ends."""
+        self.standstill = ""
+        """Why no vehicle may be sent anywhere now; empty while at least one may."""
+        self.seconds_per_step: float | None = None
+        self.running_since_s: float | None = None
+        self.database = database
+        """What is written through it is refused once another process has the mission."""
+        self.waypoints = WaypointBoard(spec, self.broadcaster)
+        self.boundaries = Boundaries(self.area, [spec.to_local(zone) for zone in spec.keep_out])
+        self.vehicles = VehicleShowing(row.id, spec, self.frame, hub, self.team, self.boundaries.breach)
+        targets = self.target_views if spec.targets else None
+        self.telling = Telling(self.broadcaster, self.vehicles.all, targets, self.search_progress)
+        self._time_scale = time_scale
+        self._executor = executor
+        self.notice_imports = Shared(self._notice_imports)
+        """Take up the soundings of logs that the command line imported while this process had the mission."""
+
+    def make_gate(self) -> Gate:
+        """Return a gate with the mission's corrections, which has seen no sounding yet."""
+        return self._gate_with(self.gate.corrections)
+
+    def _gate_with(self, corrections: Corrections) -> Gate:
+        return Gate(corrections, Polygon(self.area), margin_m=self.margin_m, noise=self.spec.sounding_noise)
+
+    async def _notice_imports(self) -> None:
+        async with self.database.reading() as session:
+            newest = await event_queries.last_event_id(session, self.id, kind="import")
+        if newest <= self.whole.imports_noticed:
+            return
+
+        async def read() -> Counts:
+            async with self.database.reading() as session:
+                counted = await sounding_queries.counts(session, self.id)
+            self.whole.changed()
+            self.whole.imports_noticed = newest
+            return Counts(counted.get("accepted", 0), counted.get("rejected", 0))
+
+        await self.journal.count_again(read)
+        self.publish_summary()
+
+    def halt(self) -> None:
+        """Keep the step loop from sending anything more, and wake everyone who waits for a waypoint."""
+        self.halted = True
+        for member in self.team:
+            member.pursuing = None
+        self.changed.set()
+        self.publish_summary()
+
+    def set_step(self, number: int, objective: float | None, terms: dict[str, float]) -> None:
+        """Note the last committed step."""
+        self.header.step = number
+        self.header.objective = objective
+        self.header.terms = terms
+        self.journal.step = number
+
+    def receive(self, event: FleetEvent) -> None:
+        """Take an event from one of this mission's vehicles; called from the event loop, never blocks."""
+        member = self.team.get(event.vehicle)
+        if member is None:
+            return
+        match event:
+            case VehicleReport():
+                place = local_place(self.frame, event.position)
+                if place is None:
+                    log.warning("position is not near the mission, ignored", vehicle=event.vehicle)
+                    return
+                member.report, member.heard_s = event, now().timestamp()
+                self.journal.position(event)
+                self._hold_against_boundaries(event, place)
+                if self.spec.targets:
+                    self.ranges.times.heard(event.vehicle, event.time_s)
+            case SoundingReport():
+                self.journal.sounding(event)
+                return
+            case ScanReport():
+                self.journal.scan(event)
+                return
+            case RangeReport():
+                self.ranges.note(event, member.report.time_s if member.report else None)
+                return
+            case LinkReport():
+                member.link = event.state
+                if event.state in (LinkState.HEARD, LinkState.READY):
+                    # It can be reached but follows nothing of ours (any more): the loop engages it again.
+                    member.engaged = False
+            case RestartReport():
+                words = f"{event.vehicle}: {event.reason}"
+                self.journal.note_line(self.journal.line(Level.ALARM, "vehicle", words, vehicle=event.vehicle))
+            case WaypointReport():
+                self._receive_waypoint(member, event)
+        self.changed.set()
+
+    def _hold_against_boundaries(self, report: VehicleReport, place: tuple[float, float]) -> None:
+        if self.header.state in ENDED:
+            return
+        for crossing in self.boundaries.judge(
+            report.vehicle, place, report.position.depth_m, asyncio.get_running_loop().time()
+        ):
+            self.journal.note_line(self.journal.line(crossing.level, "boundary", crossing.message, **crossing.data))
+
+    def _receive_waypoint(self, member: Member, event: WaypointReport) -> None:
+        if event.mission_id != self.id or member.order is None or event.step != member.order.step:
+            return
+        member.status = event.status
+        member.reason = event.reason
+        self.journal.waypoint(event)
+        self.waypoints.take(event)
+
+    async def build_map(self) -> BuiltMap | None:
+        """Make the map of everything accepted so far as thoroughly as for a product, in a worker thread."""
+        await self.whole.complete()
+        before = self.builder.newest
+        built = await self.in_thread(partial(self.builder.build, thorough=True))
+        if built is not None and built is not before:
+            self.publish_map(built)
+        return built
+
+    async def map_what_is_stored(self) -> None:
+        """Make the map of a mission that was just taken up, and tell everyone who watches how far it has come."""
+        if self.builder.stale:
+            await self.build_map()
+            self.publish_summary()
+            await self.whole.keep(self.header.step, ended=self.header.state in ENDED)
+
+    async def in_thread(self, work: Callable[..., Made], *arguments: Any) -> Made:
+        """Compute something in a worker thread."""
+        return await asyncio.get_running_loop().run_in_executor(self._executor, work, *arguments)
+
+    @property
+    def facts(self) -> MissionFacts:
+        """Return what every product states."""
+        return MissionFacts(self.id, self.spec, self.frame, self.gate.corrections.vertical_datum)
+
+    @property
+    def planning_sensor(self) -> Sensor:
+        """What the mission's planner takes its vehicles to measure with."""
+        return SingleBeam() if self.search is None else self.search.site.scanner
+
+    def show_reference(self, depths_m: FloatArray | None) -> None:
+        """Compare the map with these depths at its cells, or with nothing."""
+        self.reference_m = depths_m
+        self.revision += 1
+
+    def snapshot(self, built: BuiltMap) -> MapSnapshot:
+        """Return a map with what is needed to understand it."""
+        step = self.whole.step_of(built, self.header.step)
+        return MapSnapshot(self.facts, built, step, self.reference_m, self.revision, interpolation=self.builder.live)
+
+    def live_snapshot(self) -> MapSnapshot | None:
+        """Return the newest map with what was sounded since; None before the first sounding. For a worker thread."""
+        live = None if self.builder.live is None else self.builder.live.fresh()
+        built = self.builder.newest
+        if built is not None:
+            return replace(self.snapshot(built), live=live)
+        if live is None:
+            return None
+        # No map was made yet: there is nothing but what was just sounded.
+        first = BuiltMap(NOT_MADE, int(live.count.sum()), map_of(self.builder.grid, live), "")
+        return MapSnapshot(self.facts, first, self.header.step, self.reference_m, self.revision, live)
+
+    def _take_soundings(self, soundings: FloatArray) -> None:
+        """Take in committed soundings, shape (n, 4): east, north, depth, standard deviation."""
+        self.builder.add(soundings)
+        self.telling.of_soundings(len(soundings), self.header.step)
+
+    def publish_map(self, built: BuiltMap) -> None:
+        """Tell everyone who watches that there is a new map."""
+        self.telling.of_map(built, self.header.step)
+
+    def figures(self) -> dict[str, float]:
+        """Return how far the mission has come, as each step keeps it."""
+        built = self.builder.newest
+        found = {
+            "coverage_pct": self.builder.coverage_pct(),
+            "remaining_pct": self.builder.remaining_pct(),
+            "distance_m": self.journal.travelled_m,
+        }
+        return found | ({} if built is None else {"mean_sd_m": built.mean_sd_m})
+
+    def progress(self) -> Progress:
+        """Return how far the mission has come."""
+        built = self.builder.newest
+        header = self.header
+        loop_time = asyncio.get_running_loop().time()
+        running_s = loop_time - self.running_since_s if self.running_since_s is not None else 0.0
+        return Progress(
+            step=header.step,
+            steps=self.spec.steps,
+            soundings=self.journal.counts.accepted,
+            rejected=self.journal.counts.rejected,
+            distance_m=self.journal.travelled_m,
+            coverage_pct=self.builder.coverage_pct(),
+            remaining_pct=self.builder.remaining_pct(),
+            mean_sd_m=built.mean_sd_m if built is not None else None,
+            objective=header.objective,
+            terms=header.terms or {},
+            elapsed_s=header.elapsed_s + running_s,
+            eta_s=self._eta_s(),
+            search=self.search_progress(),
+        )
+
+    def search_progress(self) -> SearchProgress | None:
+        """Return how a search stands; None in a survey."""
+        return progress_of(self.search, self.team, self.frame)
+
+    def _eta_s(self) -> float | None:
+        """Return how long the mission still takes, wall-clock seconds; a search as long as its time window lasts."""
+        if self.search is not None:
+            return max(self.search.left_s(), 0.0) / self._time_scale
+        if self.seconds_per_step is None:
+            return None
+        return (self.spec.steps - self.header.step) * self.seconds_per_step
+
+    def summary(self) -> MissionSummary:
+        """Return the mission as it stands in a list."""
+        header = self.header
+        return MissionSummary(
+            id=self.id,
+            name=self.spec.name,
+            state=header.state,
+            reason=self._why_it_waits() or header.reason,
+            created_at=header.created_at,
+            updated_at=header.updated_at,
+            progress=self.progress(),
+        )
+
+    def _why_it_waits(self) -> str:
+        trouble = self.journal.storage.trouble
+        if not trouble:
+            stands = self.standstill and self.header.state is MissionState.RUNNING
+            return f"no vehicle can be sent anywhere: {self.standstill}" if stands else ""
+        waits = "; the vehicles wait at their waypoints" if self.header.state is MissionState.RUNNING else ""
+        return f"nothing can be written down: {trouble}{waits}"
+
+    def publish_summary(self) -> None:
+        """Tell everyone who watches about state and progress."""
+        self.broadcaster.publish(StateMessage(mission=self.summary()))
+
+    def target_views(self) -> list[TargetView]:
+        """Return the moving targets, foretold for now."""
+        pursuers = {member.pursuing: member.name for member in self.team if member.pursuing is not None}
+        return target_views(self.ranges.tracking, self.frame, self.area, self.ranges.times.now_s(), pursuers)
+
+    def abandon(self, why: str = "another process has the mission now") -> None:
+        """Write nothing any more, and let everyone who watches ask again."""
+        self.telling.stop()
+        self.ranges.abandon()
+        self.journal.abandon()
+        self.broadcaster.end(why)
+
+    async def close(self) -> None:
+        """Write what is left."""
+        await self.telling.close()
+        await self.ranges.close()
+        await self.journal.close()
+        await self.whole.close(self.header.step)
+
+
+def builder_of(spec: MissionSpec) -> MapBuilder:
+    """Return the builder of a mission's map, which knows of no sounding yet."""
+    return MapBuilder(spec.local_area(), spec.cell_m, spec.accuracy_m, live=True)

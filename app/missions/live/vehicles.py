@@ -1,0 +1,121 @@
+"""What operators are shown of a mission's vehicles."""
+
+import math
+from collections.abc import Callable
+
+from app.mapping.georeference import LocalFrame
+from app.missions.clock import now
+from app.missions.fleet.hub import FleetHub
+from app.missions.fleet.interface import LinkState, Position, VehicleInfo
+from app.missions.live.position_quality import position_quality
+from app.missions.spec.mission import MissionSpec, VehicleKind
+from app.missions.team import Member, Team
+from app.missions.views.mission import VehicleView
+
+
+class VehicleShowing:
+    """Shows the vehicles of one mission as their links know them now.
+
+    Parameters
+    ----------
+    breach
+        Returns where a vehicle is that it must not be.
+    """
+
+    def __init__(
+        self,
+        mission_id: str,
+        spec: MissionSpec,
+        frame: LocalFrame,
+        hub: FleetHub,
+        team: Team,
+        breach: Callable[[str], str],
+    ) -> None:
+        self._mission_id = mission_id
+        self._spec = spec
+        self._frame = frame
+        self._hub = hub
+        self._team = team
+        self._breach = breach
+        self._places: dict[str, tuple[Position, tuple[float, float] | None]] = {}
+
+    def all(self) -> list[VehicleView]:
+        """Return the vehicles that take part, and after them those that left, as they were last heard of."""
+        infos = self._hub.infos()
+        shown = [*self._team, *(member for member in self._team.left.values() if member.report is not None)]
+        return [self._view(member, infos.get(member.key)) for member in shown]
+
+    def of(self, info: VehicleInfo) -> VehicleView | None:
+        """Return a vehicle of this name and kind, if it takes part."""
+        member = self._team.get(info.name)
+        return None if member is None or member.key != (info.kind, info.name) else self._view(member, info)
+
+    def _view(self, member: Member, info: VehicleInfo | None) -> VehicleView:
+        info = info or self._hub.info(member.key)
+        # Whoever left is not heard by the mission any more, but perhaps by its link.
+        report = (info.report or member.report) if member.left_at is not None else (member.report or info.report)
+        heard_s = member.heard_s if info.age_s is None else now().timestamp() - info.age_s
+        view = VehicleView(
+            name=member.name,
+            kind=member.spec.kind,
+            sensor=member.spec.sensor,
+            mission_id=self._mission_id if member.left_at is None else None,
+            active=member.left_at is None,
+            left_at=member.left_at,
+            breach=self._breach(member.name),
+            link=info.state,
+            reason=_reason(member, info),
+            age_s=None if heard_s is None else rounded(max(now().timestamp() - heard_s, 0.0), 2),
+            address=info.address,
+            imc_id=info.imc_id,
+            surfacing=member.surfacing,
+            risings=member.risings,
+            pursuing=member.pursuing,
+        )
+        if report is None:
+            return view
+        position = report.position
+        place = self._place(member.name, position)
+        return view.model_copy(
+            update={
+                # No more digits than mean anything: this goes to every viewer several times a second.
+                "lat_deg": round(position.lat_deg, 8),
+                "lon_deg": round(position.lon_deg, 8),
+                "east_m": place and round(place[0], 3),
+                "north_m": place and round(place[1], 3),
+                "depth_m": round(position.depth_m, 3),
+                "altitude_m": rounded(report.altitude_m, 3),
+                "heading_deg": rounded(report.heading_rad and math.degrees(report.heading_rad) % 360, 2),
+                "speed_mps": rounded(report.speed_mps, 3),
+                "battery_pct": rounded(report.battery_pct, 2),
+                "position_sd_m": rounded(report.position_sd_m, 3),
+                "localization": position_quality(report.position_sd_m, self._spec.surface_policy),
+            }
+        )
+
+    def _place(self, name: str, position: Position) -> tuple[float, float] | None:
+        """Return where a vehicle is; it is shown far more often than it moves."""
+        known = self._places.get(name)
+        if known is None or known[0] is not position:
+            known = self._places[name] = position, local_place(self._frame, position)
+        return known[1]
+
+
+def _reason(member: Member, info: VehicleInfo) -> str:
+    launched = member.spec.kind is VehicleKind.SIM and info.state is LinkState.UNKNOWN and member.report is not None
+    # Nothing is to be done about a simulated vehicle that was put away with its mission.
+    return member.refusal or ("" if launched else info.reason)
+
+
+def local_place(frame: LocalFrame, position: Position) -> tuple[float, float] | None:
+    """Return east and north of a position, metres; None when it is not near enough to be on the frame."""
+    try:
+        east, north = frame.to_local(position.lat_deg, position.lon_deg)
+    except ValueError:
+        return None
+    return float(east), float(north)
+
+
+def rounded(value: float | None, digits: int) -> float | None:
+    """Return a value with so many decimals; None stays."""
+    return None if value is None else round(value, digits)

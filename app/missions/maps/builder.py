@@ -1,0 +1,358 @@
+"""From accepted soundings to the mission's map and to the belief a planner works on."""
+
+import copy
+import hashlib
+import threading
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely.geometry import Polygon
+
+from app.exploration.problem import Belief
+from app.mapping.fusion import fuse, prior_map
+from app.mapping.gp import GaussianProcessMap
+from app.mapping.outliers import flag_outliers
+from app.mapping.types import BathymetricMap, BoolArray, FloatArray, Grid, Soundings
+from app.missions.maps.live_grid import LiveGrid
+from app.missions.maps.queue import Arrivals, Everything
+
+MAX_LANDMARKS = 4000
+"""More landmarks make planning slower, not better: neighbouring cells are almost the same question."""
+
+CLAIM_MARGIN, UNSEEN_MARGIN = 1.25, 1.0
+"""By the first factor a cell's deviation must be below the asked accuracy to become known; up to the accuracy it stays
+so. What is learned of the sea floor changes a little with every map: cells at the limit do not come and go with it.
+Ground that no sounding supports may be rougher than the rest, and a model that learns of it will be less sure of all:
+the second is added times its share of the area."""
+
+RELEARN_GROWTH = 1.15
+"""Hyperparameters are learned again when the soundings grew by this factor."""
+
+
+@dataclass(frozen=True)
+class _Learned:
+    """The model with its hyperparameters, and of the soundings that it was learned on why outliers are left out.
+
+    ``soundings``, shape (n, 4), are those it was learned on; ``reasons`` has an entry for each, empty where it is used.
+    """
+
+    model: GaussianProcessMap
+    soundings: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 4)))
+    reasons: tuple[str, ...] = ()
+
+    @cached_property
+    def rejected(self) -> BoolArray:
+        return np.array([bool(reason) for reason in self.reasons], dtype=bool)
+
+    @cached_property
+    def doubted(self) -> list[tuple[NDArray[np.float64], str]]:
+        return [(row, reason) for row, reason in zip(self.soundings, self.reasons, strict=True) if reason]
+
+
+@dataclass(frozen=True)
+class BuiltMap:
+    """A map and what was known when it was made. ``version`` grows with each.
+
+    ``thorough`` maps are those before which outliers were judged and the model was learned of all soundings.
+    """
+
+    version: int
+    soundings: int
+    map: BathymetricMap
+    digest: str
+    thorough: bool = False
+
+    @cached_property
+    def mean_sd_m(self) -> float:
+        """Mean standard deviation over the area."""
+        return float(np.nanmean(self.map.sd_m))
+
+
+def make_grid(area: FloatArray, cell_m: float) -> tuple[Grid, BoolArray]:
+    """Return the grid over a polygon (n, 2), and which of its cells (rows, cols) have their centre in it."""
+    low, high = area.min(axis=0), area.max(axis=0)
+    # A side that is a whole number of cells up to rounding is not given one cell more.
+    cols, rows = (max(1, int(np.ceil(side / cell_m - 1e-3))) for side in high - low)
+    grid = Grid(float(low[0]), float(low[1]), cell_m, rows, cols)
+    centres = grid.centres_m
+    inside = shapely.contains_xy(Polygon(area), centres[:, 0], centres[:, 1])
+    return grid, inside.reshape(rows, cols)
+
+
+class MapBuilder:
+    """Collects soundings and makes maps of them.
+
+    ``add`` may be called from the event loop at any time; ``build`` and ``learn`` belong in worker threads.
+
+    Parameters
+    ----------
+    area : (n, 2)
+        Corners of a polygon, east and north.
+    live
+        Also keep the interpolation that takes every sounding in at once.
+    """
+
+    def __init__(self, area: FloatArray, cell_m: float, accuracy_m: float, *, live: bool = False) -> None:
+        self.grid, self.mask = make_grid(area, cell_m)
+        self._accuracy_m = accuracy_m
+        stride = int(np.ceil(np.sqrt(max(self.mask.sum(), 1) / MAX_LANDMARKS)))
+        self._nodes = np.zeros_like(self.mask)
+        self._nodes[stride // 2 :: stride, stride // 2 :: stride] = True
+        self._nodes &= self.mask
+        if not self._nodes.any():
+            self._nodes = self.mask.copy()
+        self._nodes_xy = self.grid.centres_m[self._nodes.ravel()]
+        self.arrivals = Arrivals()
+        self.live = LiveGrid(self.grid, self.mask) if live else None
+        """What came since the newest map was made; None: nobody asks for it."""
+        self._soundings = np.zeros((0, 4))
+        # Those that an operator restored: they are no outliers whatever their neighbours say.
+        self._trusted = np.zeros(0, dtype=bool)
+        self._prior: BathymetricMap | None = None
+        self._learned = _Learned(_new_model())
+        self._building = threading.Lock()
+        self._learning = threading.Lock()
+        self._newest: BuiltMap | None = None
+        self._doubted: list[tuple[NDArray[np.float64], str]] = []
+        # What ``arrivals.replaced`` was when the newest map's soundings were taken in.
+        self._replaced_mapped = 0
+        self._version = 0
+        self._shares: tuple[BuiltMap | None, float, float] = (None, 0.0, 100.0)
+        # Counts how often all soundings were replaced: what is learned meanwhile of the old ones is void.
+        self._generation = 0
+
+    def add(self, soundings: NDArray[np.float64]) -> None:
+        """Take in soundings, shape (n, 4): east, north, depth, standard deviation in metres."""
+        if len(soundings):
+            if self.live is not None:
+                # Before it arrives: what a map has taken, the live grid has noted.
+                self.live.note(soundings)
+            self.arrivals.add(soundings)
+
+    def show(self, built: BuiltMap, doubted: list[tuple[NDArray[np.float64], str]]) -> None:
+        """Begin with a map that was stored, and with what it left out; its soundings stay where they are stored."""
+        self._version = built.version
+        self._newest, self._doubted = built, doubted
+        self.arrivals.rest()
+
+    def release(self) -> None:
+        """Let go of the soundings, which are read again when they are needed; map and doubts stay."""
+        # Nothing is released that a thread works with.
+        if self._building.acquire(blocking=False):
+            if self._learning.acquire(blocking=False):
+                if self.arrivals.rest():
+                    self._doubted = self.doubted()
+                    self._soundings, self._trusted = np.zeros((0, 4)), np.zeros(0, dtype=bool)
+                    self._prior, self._learned = None, _Learned(_new_model())
+                    if self.live is not None:
+                        self.live.release()
+                self._learning.release()
+            self._building.release()
+
+    @property
+    def true(self) -> bool:
+        """Whether nothing that the newest map was made of was changed since; more may have come."""
+        return self.arrivals.replaced == self._replaced_mapped
+
+    @property
+    def newest(self) -> BuiltMap | None:
+        """The newest map; None before the first sounding was built in."""
+        return self._newest
+
+    @property
+    def stale(self) -> bool:
+        """Whether there are soundings that the newest map does not hold."""
+        return bool(self.arrivals)
+
+    def build(self, *, thorough: bool = False) -> BuiltMap | None:
+        """Make a map of everything added so far; None without soundings.
+
+        Gross outliers are judged by ``learn``; a sounding that came since is trusted until then. A thorough map judges
+        every sounding and learns the model first, as a product should. While the soundings are not in memory the newest
+        map stays as it is.
+        """
+        with self._building:
+            came = self.arrivals.take()
+            if came is None:
+                return self._newest
+            upto, generation = self.arrivals.taken, self._generation
+            self._take_in(came[0])
+            if self.live is not None and (generation != self._generation or self.live.outgrown(len(self._soundings))):
+                self.live.begin_anew(self._soundings, upto)
+            if not len(self._soundings) and self._prior is None:
+                self._newest = None
+                return None
+            if thorough:
+                self.learn(always=True)
+            if came[0] or (self._newest is not None and thorough):
+                self._newest = self._build(thorough=thorough)
+                self._replaced_mapped = came[1]
+                if self.live is not None:
+                    self.live.settle(upto)
+            return self._newest
+
+    def _take_in(self, came: list[NDArray[np.float64] | Everything]) -> None:
+        """Add what came."""
+        arrived: list[NDArray[np.float64]] = []
+        for item in came:
+            if isinstance(item, Everything):
+                self._prior = prior_map(_as_soundings(item.prior), self.grid, self.mask) if len(item.prior) else None
+                if item.soundings is not None:
+                    self._generation += 1
+                    arrived, self._soundings, self._trusted = [], item.soundings, item.trusted
+                    self._learned = _Learned(_new_model())
+            else:
+                arrived.append(item)
+        if arrived:
+            self._soundings = np.concatenate([self._soundings, *arrived])
+            new = np.zeros(len(self._soundings) - len(self._trusted), dtype=bool)
+            self._trusted = np.concatenate([self._trusted, new])
+
+    def _build(self, *, thorough: bool) -> BuiltMap:
+        bathymetry = self._prior
+        if len(self._soundings):
+            measured = self._measured()
+            bathymetry = measured if bathymetry is None else fuse(measured, bathymetry)
+        if bathymetry is None:
+            raise ValueError("there is no sounding to make a map of")
+        bathymetry = self._with_margin(bathymetry)
+        digest = hashlib.sha256(bathymetry.depth_m.tobytes()).hexdigest()
+        self._version += 1
+        return BuiltMap(self._version, len(self._soundings), bathymetry, digest, thorough)
+
+    def _with_margin(self, bathymetry: BathymetricMap) -> BathymetricMap:
+        """Ask more of cells that were not known in the newest map."""
+        bound = bathymetry.claim_sd_m
+        asked = CLAIM_MARGIN + UNSEEN_MARGIN * float(np.isinf(bound[self.mask]).mean())
+        before = np.zeros_like(self.mask) if self._newest is None else self._newest.map.known(self._accuracy_m)
+        return replace(bathymetry, bound_sd_m=bound * np.where(before, 1.0, asked))
+
+    def _measured(self) -> BathymetricMap:
+        """Return the map of the mission's own soundings."""
+        learned = self._learned
+        used = np.ones(len(self._soundings), dtype=bool)
+        used[: len(learned.reasons)] = ~learned.rejected
+        model = copy.copy(learned.model)
+        bathymetry = model.fit(_as_soundings(self._soundings[used]), learn=False).predict(self.grid, self.mask)
+        if not learned.reasons:
+            # The first fit had to learn; keep what it found.
+            self._learned = _Learned(model)
+        return bathymetry
+
+    def learn(self, *, always: bool = False) -> None:
+        """Judge outliers and learn the model's hyperparameters anew when there are enough more soundings.
+
+        Slower than a build, so it is done while the vehicles travel. The next ``build`` uses what was found.
+        """
+        if not self._learning.acquire(blocking=always):
+            return  # somebody is at it
+        try:
+            generation = self._generation
+            model, before = self._learned.model, self._learned.reasons
+            known, trusted = self._soundings, self._trusted
+            if not len(known) or (len(known) < RELEARN_GROWTH * len(before) and not always):
+                return
+            soundings = _as_soundings(known)
+            verdict = flag_outliers(soundings, hyperparameters=getattr(model, "stationary_hyperparameters_", None))
+            # Both were taken while soundings may have been added: the shorter one says for how many.
+            restored = np.flatnonzero(trusted[: len(known)])
+            reasons = list(verdict.reasons)
+            for i in restored:
+                reasons[i] = ""
+            used = np.array([not reason for reason in reasons])
+            fitted = copy.copy(model).fit(soundings.take(used), learn=True)
+            if generation == self._generation:
+                self._learned = _Learned(fitted, known, tuple(reasons))
+        finally:
+            self._learning.release()
+
+    def doubted(self) -> list[tuple[NDArray[np.float64], str]]:
+        """Return the soundings, rows of shape (4,), that the map leaves out as outliers, each with the reason.
+
+        Does not wait for a map that is being made.
+        """
+        return self._learned.doubted if self._learned.reasons else self._doubted
+
+    @property
+    def soundings(self) -> NDArray[np.float64]:
+        """All that the newest map was made of, (n, 4), those left out as outliers included."""
+        return self._soundings
+
+    def as_of(self, soundings: NDArray[np.float64]) -> BathymetricMap:
+        """Return the map that the first soundings (n, 4) alone make, under the model learned of all of them."""
+        with self._building:
+            learned, prior = self._learned, self._prior
+        doubted = {row[:3].tobytes() for row, _ in learned.doubted}
+        used = np.array([row[:3].tobytes() not in doubted for row in soundings], dtype=bool)
+        if not used.any():
+            if prior is None:
+                raise ValueError("there is no sounding to make a map of")
+            return prior
+        model = copy.copy(learned.model)
+        measured = model.fit(_as_soundings(soundings[used]), learn=False).predict(self.grid, self.mask)
+        return measured if prior is None else fuse(measured, prior)
+
+    def coverage_pct(self) -> float:
+        """Return the share of the area's cells that are known to the asked accuracy: now, supported by soundings."""
+        return self._counted()[1]
+
+    def remaining_pct(self) -> float:
+        """Return the share of the landmarks that are not known to the asked accuracy."""
+        return self._counted()[2]
+
+    def _counted(self) -> tuple[BuiltMap | None, float, float]:
+        """Return both shares of the newest map: they are asked for with every look at the mission."""
+        built = self._newest
+        if built is None:
+            return None, 0.0, 100.0
+        if built is not self._shares[0]:
+            known = built.map.known(self._accuracy_m)
+            self._shares = built, float(100.0 * known[self.mask].mean()), float(100.0 * (~known[self._nodes]).mean())
+        return self._shares
+
+    def belief(self) -> Belief:
+        """Return what is known at the landmarks (a lattice of the grid's cells)."""
+        n = len(self._nodes_xy)
+        if self._newest is None:
+            extent = float(np.ptp(self.grid.centres_m, axis=0).max())
+            return Belief(
+                xy_m=self._nodes_xy,
+                depth_m=np.full(n, np.nan),
+                sd_m=np.full(n, np.inf),
+                accurate=np.zeros(n, dtype=bool),
+                weight=np.ones(n),
+                correlation_length_m=extent / 5,
+            )
+        bathymetry = self._newest.map
+        return Belief(
+            xy_m=self._nodes_xy,
+            depth_m=bathymetry.depth_m[self._nodes],
+            sd_m=bathymetry.planning_sd_m[self._nodes],
+            # Not latched as in AURO15: more soundings may show that a map was too sure of itself.
+            accurate=bathymetry.known(self._accuracy_m)[self._nodes],
+            weight=bathymetry.roughness[self._nodes],
+            correlation_length_m=bathymetry.correlation_length_m,
+        )
+
+    def sounded_at_m(self) -> tuple[FloatArray, FloatArray]:
+        """Return where was sounded, (n, 2), and where soundings are left out as outliers, (k, 2).
+
+        What came since the newest map was begun counts as sounded.
+        """
+        places = np.concatenate([self._soundings, *self.arrivals.noted()])[:, :2]
+        rejected = self._learned.rejected[: len(places)]
+        doubtful = np.zeros(len(places), dtype=bool)
+        doubtful[: len(rejected)] = rejected
+        return places[~doubtful], places[doubtful]
+
+
+def _new_model() -> GaussianProcessMap:
+    return GaussianProcessMap(reject_outliers=False)  # outliers are judged by ``learn``
+
+
+def _as_soundings(rows: NDArray[np.float64]) -> Soundings:
+    east, north, depth, sd = rows.T.copy()
+    return Soundings(east, north, depth, sd)

@@ -1,0 +1,107 @@
+"""A mission's map as it leaves the service: where it lies, what its depths mean, and its JSON."""
+
+from collections.abc import Collection
+from dataclasses import dataclass
+
+import numpy as np
+
+from app.mapping.georeference import LocalFrame
+from app.mapping.layers import Layer
+from app.mapping.products.overlay import overlay_corners
+from app.mapping.types import FloatArray
+from app.mapping.vertical import VerticalDatum
+from app.missions.maps.builder import BuiltMap
+from app.missions.maps.live_grid import LiveCells, LiveGrid
+from app.missions.spec.mission import MissionSpec
+from app.missions.views.map import MapView
+from imc_bridge.printable import printable
+
+NOT_MADE = 0
+"""Version of a map that holds nothing but live cells: the first considered map is still being made."""
+
+
+@dataclass(frozen=True)
+class MissionFacts:
+    """What every product of a mission states."""
+
+    mission_id: str
+    spec: MissionSpec
+    frame: LocalFrame
+    vertical_datum: VerticalDatum
+
+    @property
+    def title(self) -> str:
+        """Return the mission's name as it may stand in every file."""
+        return printable(self.spec.name).strip()
+
+    @property
+    def common_sd_m(self) -> float:
+        """Standard deviation of what all soundings share."""
+        return self.spec.tide.sd_m
+
+
+@dataclass(frozen=True)
+class MapSnapshot:
+    """A mission's map at one moment.
+
+    Attributes
+    ----------
+    reference_m
+        A reference grid's depths at its cells, if one was given.
+    revision
+        Grows when what the map is shown with changes: the reference grid, the datum.
+    live
+        What was sounded since the map was made.
+    interpolation
+        The papers' interpolation of every sounding so far, while the mission's soundings are in memory.
+    """
+
+    facts: MissionFacts
+    built: BuiltMap
+    step: int
+    reference_m: FloatArray | None = None
+    revision: int = 0
+    live: LiveCells | None = None
+    interpolation: LiveGrid | None = None
+
+    @property
+    def version(self) -> int:
+        """Grows with every new map of the mission."""
+        return self.built.version
+
+    @property
+    def tag(self) -> str:
+        """Changes with everything that the map shows."""
+        return f"{self.version}.{self.revision}" + ("" if self.live is None else f"@{self.live.version}")
+
+    def view(self, layers: Collection[Layer] = ()) -> MapView:
+        """Return the map as JSON shows it, with the values of further layers."""
+        bathymetry = self.built.map
+        grid = bathymetry.grid
+        depths = bathymetry.depth_m[np.isfinite(bathymetry.depth_m)]
+        return MapView.model_construct(
+            mission_id=self.facts.mission_id,
+            version=self.version,
+            step=self.step,
+            west_m=grid.west_m,
+            south_m=grid.south_m,
+            cell_m=grid.cell_m,
+            rows=grid.rows,
+            cols=grid.cols,
+            corners=overlay_corners(grid, self.facts.frame),
+            vertical_datum=self.facts.vertical_datum.statement,
+            min_depth_m=round(float(depths.min()), 3) if depths.size else None,
+            max_depth_m=round(float(depths.max()), 3) if depths.size else None,
+            model=bathymetry.model,
+            depth_m=_nullable(bathymetry.depth_m),
+            sd_m=_nullable(bathymetry.sd_m),
+            count=bathymetry.count.tolist(),
+            sounded=bathymetry.sounded.tolist(),
+            layers={layer.name: _nullable(layer.values) for layer in layers},
+        )
+
+
+def _nullable(layer: FloatArray) -> list[list[float | None]]:
+    rounded = np.round(layer, 3).astype(object)
+    rounded[~np.isfinite(layer)] = None
+    return rounded.tolist()  # type: ignore[no-any-return]

@@ -1,0 +1,217 @@
+"""The map as it travels to browsers: whole once, then only the tiles that changed, each made once for all who ask."""
+
+import asyncio
+import json
+import struct
+import threading
+import zlib
+from collections import OrderedDict
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import distance_transform_edt
+
+from app.mapping.layers import make_layers
+from app.mapping.products.overlay import overlay_corners
+from app.mapping.s44 import Order
+from app.mapping.types import BathymetricMap, BoolArray
+from app.missions.maps.live_grid import LiveCells
+from app.missions.maps.snapshot import NOT_MADE, MapSnapshot
+
+MAGIC = b"BFM1"
+TILE = 32
+UNKNOWN = np.int32(-(2**31))
+"""Stands for a cell without a value."""
+
+SCALES = {
+    "depth": 100,
+    "uncertainty": 1000,
+    "count": 1,
+    "flags": 1,
+    "slope": 10,
+    "tvu_fraction": 100,
+    "difference": 100,
+}
+"""Whole numbers are sent: a layer's value times this."""
+
+BASE = ("depth", "uncertainty", "count", "flags")
+FURTHER = ("slope", "tvu_fraction", "difference")
+SOUNDED, PRIOR, ACCURATE, VISIBLE = 1, 2, 4, 8
+"""Bits of the layer ``flags``: sounded; imported soundings in it; known to the asked accuracy and supported by
+soundings; near a sounding."""
+
+KEPT_VERSIONS = 12
+KEPT_ANSWERS = 24
+
+
+@dataclass(frozen=True)
+class _Picture:
+    """One version's layers as whole numbers, (rows, cols) each."""
+
+    tag: str
+    layers: dict[str, NDArray[np.int32]]
+
+
+class TileCache:
+    """Makes and keeps the answers to "what changed since". May be used from several threads."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._pictures: OrderedDict[str, _Picture] = OrderedDict()
+        self._answers: OrderedDict[tuple[str, str, tuple[str, ...]], bytes] = OrderedDict()
+        self._making: dict[tuple[str, str, tuple[str, ...]], asyncio.Task[bytes]] = {}
+
+    async def answer(self, snapshot: MapSnapshot, tag: str, since: str, further: tuple[str, ...] = ()) -> bytes:
+        """Return what ``changes`` does, which works in a thread; all who ask the same while it works wait for one."""
+        key = (tag, since, further)
+        known = self._answers.get(key)
+        if known is not None:
+            return known
+        making = self._making.get(key)
+        if making is None:
+            making = asyncio.create_task(asyncio.to_thread(self.changes, snapshot, tag, since, further))
+            self._making[key] = making
+            making.add_done_callback(lambda _: self._making.pop(key, None))
+        # Whoever stops waiting does not end it for the others.
+        return await asyncio.shield(making)
+
+    def changes(self, snapshot: MapSnapshot, tag: str, since: str, further: tuple[str, ...] = ()) -> bytes:
+        """Return what changed between the map that ``since`` names and this one, whole when that one is not known.
+
+        The answer is compressed by zlib. Then: ``BFM1``, the header's length (uint32), the header (JSON), padding to
+        four bytes, and for every tile in ``tiles`` and every layer in ``layers`` its cells (int32, little endian, row
+        by row from the south-west, cut off at the grid's edges).
+        """
+        key = (tag, since, further)
+        with self._lock:
+            known = self._answers.get(key)
+            if known is None:
+                picture = self._picture(snapshot, tag, further)
+                known = _encode(snapshot, picture, self._pictures.get(since), (*BASE, *further))
+                self._answers[key] = known
+                _shorten(self._answers, KEPT_ANSWERS)
+            return known
+
+    def _picture(self, snapshot: MapSnapshot, tag: str, further: tuple[str, ...]) -> _Picture:
+        known = self._pictures.get(tag)
+        if known is None or not set(further) <= known.layers.keys():
+            if snapshot.live is None or snapshot.version == NOT_MADE:
+                made = _layers(snapshot, further)
+            else:
+                considered = replace(snapshot, live=None)
+                made = _with_live_cells(self._picture(considered, considered_tag(tag), further).layers, snapshot.live)
+            known = _Picture(tag, made | (known.layers if known is not None else {}))
+            self._pictures[tag] = known
+            _shorten(self._pictures, KEPT_VERSIONS)
+        return known
+
+
+def _shorten(kept: OrderedDict, most: int) -> None:  # type: ignore[type-arg]
+    while len(kept) > most:
+        kept.popitem(last=False)
+
+
+def _layers(snapshot: MapSnapshot, further: tuple[str, ...]) -> dict[str, NDArray[np.int32]]:
+    bathymetry, accuracy_m = snapshot.built.map, snapshot.facts.spec.accuracy_m
+    made = make_layers(
+        bathymetry,
+        order=Order.ORDER_1A,
+        common_sd_m=snapshot.facts.common_sd_m,
+        reference_m=snapshot.reference_m,
+    )
+    wanted = {*BASE, *further}
+    found = {layer.name: _whole(layer.values * SCALES[layer.name]) for layer in made if layer.name in wanted}
+    for name in wanted - found.keys() - {"flags"}:
+        # There is nothing to differ from: no cell has a value.
+        found[name] = np.full(bathymetry.depth_m.shape, UNKNOWN, dtype=np.int32)
+    found["flags"] = _flags(bathymetry, accuracy_m)
+    return found
+
+
+def considered_tag(tag: str) -> str:
+    """Return the tag of the map below live cells."""
+    return tag.rpartition("@")[0]
+
+
+def _with_live_cells(layers: dict[str, NDArray[np.int32]], live: LiveCells) -> dict[str, NDArray[np.int32]]:
+    """Return a map's layers with what was sounded since; the others stay as the map has them until it is made anew."""
+    found = dict(layers)
+    for name, values in (("depth", live.depth_m), ("uncertainty", live.sd_m)):
+        found[name] = layers[name].copy()
+        found[name][live.cells] = _whole(values * SCALES[name])
+    found["count"], found["flags"] = layers["count"].copy(), layers["flags"].copy()
+    found["count"][live.cells] = np.maximum(found["count"][live.cells], live.count)
+    flags = np.where(found["flags"][live.cells] == UNKNOWN, 0, found["flags"][live.cells])
+    found["flags"][live.cells] = flags | np.where(live.count > 0, SOUNDED | VISIBLE, VISIBLE)
+    return found
+
+
+def _whole(values: NDArray[np.float64]) -> NDArray[np.int32]:
+    known = np.isfinite(values)
+    limits = np.clip(np.round(np.where(known, values, 0.0)), -(2**31) + 1, 2**31 - 1)
+    return np.where(known, limits, float(UNKNOWN)).astype(np.int32)
+
+
+def _flags(bathymetry: BathymetricMap, accuracy_m: float) -> NDArray[np.int32]:
+    inside = np.isfinite(bathymetry.depth_m)
+    measured = bathymetry.sounded if bathymetry.prior is None else bathymetry.sounded | bathymetry.prior
+    flags = np.where(bathymetry.sounded, SOUNDED, 0)
+    if bathymetry.prior is not None:
+        flags |= np.where(bathymetry.prior, PRIOR, 0)
+    flags |= np.where(bathymetry.known(accuracy_m), ACCURATE, 0)
+    flags |= np.where(_near(measured, bathymetry.correlation_length_m / bathymetry.grid.cell_m), VISIBLE, 0)
+    return np.where(inside, flags, UNKNOWN).astype(np.int32)
+
+
+def _near(measured: BoolArray, cells: float) -> BoolArray:
+    """Return which cells lie within so many cells of a measured one."""
+    if not measured.any():
+        return np.zeros_like(measured)
+    near: BoolArray = distance_transform_edt(~measured) <= cells
+    return near
+
+
+def _encode(snapshot: MapSnapshot, now: _Picture, before: _Picture | None, names: tuple[str, ...]) -> bytes:
+    bathymetry = snapshot.built.map
+    grid = bathymetry.grid
+    if before is not None and not set(names) <= before.layers.keys():
+        before = None
+    across, down = -(-grid.cols // TILE), -(-grid.rows // TILE)
+    places = [
+        (slice(row * TILE, (row + 1) * TILE), slice(col * TILE, (col + 1) * TILE))
+        for row in range(down)
+        for col in range(across)
+    ]
+    tiles = [
+        number
+        for number, place in enumerate(places)
+        if before is None or any(not np.array_equal(now.layers[n][place], before.layers[n][place]) for n in names)
+    ]
+    depths = bathymetry.depth_m[np.isfinite(bathymetry.depth_m)]
+    header = json.dumps(
+        {
+            "tag": now.tag,
+            "base": before.tag if before is not None else None,
+            "version": snapshot.version,
+            "step": snapshot.step,
+            "rows": grid.rows,
+            "cols": grid.cols,
+            "cell_m": grid.cell_m,
+            "west_m": grid.west_m,
+            "south_m": grid.south_m,
+            "corners": overlay_corners(grid, snapshot.facts.frame),
+            "vertical_datum": snapshot.facts.vertical_datum.statement,
+            "min_depth_m": float(depths.min()) if depths.size else None,
+            "max_depth_m": float(depths.max()) if depths.size else None,
+            "model": bathymetry.model,
+            "accuracy_m": snapshot.facts.spec.accuracy_m,
+            "tile": TILE,
+            "tiles": tiles,
+            "layers": names,
+            "scales": [SCALES[name] for name in names],
+        }
+    ).encode()
+    parts = [MAGIC, struct.pack("<I", len(header)), header, b" " * (-(len(header)) % 4)]
+    parts += [now.layers[name][places[number]].astype("<i4").tobytes() for number in tiles for name in names]
+    return zlib.compress(b"".join(parts), level=3)

@@ -1,0 +1,293 @@
+"""Soundings, maps and reference grids from elsewhere, for a mission: everything in a file or nothing."""
+
+import asyncio
+import uuid
+from concurrent.futures import Executor
+from typing import Any
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely.geometry import Polygon
+from sqlalchemy import select
+
+from app.mapping.readers.endings import ending
+from app.mapping.readers.types import Place, ReadError, ReadOptions
+from app.mapping.supersoundings import merge_soundings
+from app.mapping.types import Soundings
+from app.missions.clock import now
+from app.missions.errors import ConflictError, ImportNotFoundError, InvalidRequestError
+from app.missions.live.mission import LiveMission
+from app.missions.operations.reading import Reader
+from app.missions.operations.uploads import Upload
+from app.missions.states import ENDED
+from app.missions.views.imports import ImportOptions, ImportView, ReferenceView
+from app.missions.views.mission import Level
+from app.storage import soundings as sounding_queries
+from app.storage import stored_maps
+from app.storage.models import ImportRow, ReferenceRow
+from app.storage.shielding import to_the_end
+
+MAX_PRIOR = 100_000
+"""Imported soundings per file that the map takes one by one; where there are more they are merged per cell."""
+
+
+def kind_of(options: ImportOptions) -> str:
+    """Return the ending of a file's name, which says how it is read. Raises InvalidRequestError."""
+    try:
+        return ending(options.filename)
+    except ReadError as error:
+        raise InvalidRequestError(error.field, str(error), error.remedy) from None
+
+
+class Importing:
+    """Takes files into missions and out of them again.
+
+    Parameters
+    ----------
+    reader
+        Reads them.
+    executor
+        Where what takes long is computed.
+    """
+
+    def __init__(self, reader: Reader, executor: Executor) -> None:
+        self._reader = reader
+        self._executor = executor
+        # Held while something is stored or taken away, not while a file is read.
+        self._storing = asyncio.Lock()
+
+    async def add(self, live: LiveMission, upload: Upload, options: ImportOptions, actor: str) -> ImportView:
+        """Add the soundings of a file to what is known before a mission measures.
+
+        The same file again changes nothing and gives the first answer.
+
+        Raises
+        ------
+        InvalidRequestError, ConflictError, ImportUnavailableError
+            When the file cannot be used; when the mission has ended, or has the same file with other options; when
+            nothing can be read now.
+        """
+        kind = _checked(upload, options)
+        known = await _same_file(live, upload.sha256, options)
+        if known is not None:
+            return known
+        _refuse_ended(live)
+        async with self._reader.turn():
+            # It may have been taken in while this waited.
+            known = await _same_file(live, upload.sha256, options)
+            if known is not None:
+                return known
+            found = await self._reader.read(upload, kind, "soundings", _place(live), _read_options(options))
+            loop = asyncio.get_running_loop()
+            kept, merged = await loop.run_in_executor(self._executor, _kept, live, found.values)
+            if not len(kept):
+                wrong = "none of its depths lies near the mission's area"
+                raise InvalidRequestError("file", wrong, "check file and crs")
+            notes = [*found.notes, *([f"{merged} soundings were merged per cell of the map"] if merged else [])]
+            row = ImportRow(
+                id=str(uuid.uuid4()),
+                mission_id=live.id,
+                digest=upload.sha256,
+                filename=options.filename,
+                count=len(kept),
+                summary=options.model_dump(mode="json")
+                | {
+                    "notes": notes,
+                    "found": found.found,
+                    "min_depth_m": float(kept[:, 2].min()),
+                    "max_depth_m": float(kept[:, 2].max()),
+                    "median_sd_m": float(np.median(kept[:, 3])),
+                },
+                soundings=await asyncio.to_thread(sounding_queries.pack, kept),
+            )
+            view = await to_the_end(self._store(live, row, kept))
+        words = f"{view.taken} prior soundings of {view.filename} imported by {actor}"
+        await live.journal.log(Level.INFO, "import", words, actor=actor)
+        return view
+
+    async def _store(self, live: LiveMission, row: ImportRow, kept: NDArray[np.float64]) -> ImportView:
+        async with self._storing:
+            _refuse_ended(live)
+            before = await _imported(live)
+            prior = np.concatenate([before, kept])
+            row.created_at = now()
+            view = _view(row)
+            # A map that is stored meanwhile would lack these.
+            async with live.journal.writing:
+                async with live.database.writing() as session:
+                    session.add(row)
+                    await session.flush()
+                    await stored_maps.forget(session, live.id)
+                live.builder.arrivals.replace_prior(prior)
+        live.changed.set()
+        live.publish_summary()
+        return view
+
+    async def delete(self, live: LiveMission, import_id: str, actor: str) -> None:
+        """Take an import back. Raises ImportNotFoundError."""
+        filename = await to_the_end(self._take_away(live, import_id))
+        await live.journal.log(Level.INFO, "import", f"import of {filename} taken back by {actor}", actor=actor)
+
+    async def _take_away(self, live: LiveMission, import_id: str) -> str:
+        async with self._storing:
+            prior = await _imported(live, without=import_id)
+            async with live.journal.writing:
+                async with live.database.writing() as session:
+                    row = await session.get(ImportRow, import_id)
+                    if row is None or row.mission_id != live.id:
+                        raise ImportNotFoundError(
+                            f"there is no import {import_id!r}", "GET /api/v1/missions/{id}/imports lists them"
+                        )
+                    filename = row.filename
+                    await session.delete(row)
+                    await session.flush()
+                    await stored_maps.forget(session, live.id)
+                live.builder.arrivals.replace_prior(prior)
+        return filename
+
+    async def set_reference(
+        self, live: LiveMission, upload: Upload, options: ImportOptions, actor: str
+    ) -> ReferenceView:
+        """Compare the mission's map with the grid in a file from now on.
+
+        Raises
+        ------
+        InvalidRequestError, ImportUnavailableError
+            When the file cannot be used, or nothing can be read now.
+        """
+        kind = _checked(upload, options)
+        async with self._reader.turn():
+            found = await self._reader.read(upload, kind, "reference", _place(live), _read_options(options))
+        depths = found.values
+        row = ReferenceRow(
+            mission_id=live.id,
+            filename=options.filename,
+            created_at=now(),
+            rows=depths.shape[0],
+            cols=depths.shape[1],
+            summary=options.model_dump(mode="json") | {"notes": found.notes, "cells": int(np.isfinite(depths).sum())},
+            depths=await asyncio.to_thread(sounding_queries.pack, depths),
+        )
+        view = _reference_view(row)
+        async with self._storing:
+            async with live.database.writing() as session:
+                await _forget_reference(session, live.id)
+                session.add(row)
+            live.show_reference(depths)
+        await live.journal.log(Level.INFO, "import", f"reference grid {options.filename} set by {actor}", actor=actor)
+        return view
+
+    async def delete_reference(self, live: LiveMission, actor: str) -> None:
+        """Compare with nothing any more. Raises ImportNotFoundError when there was nothing."""
+        async with self._storing:
+            await reference_of(live)
+            async with live.database.writing() as session:
+                await _forget_reference(session, live.id)
+            live.show_reference(None)
+        await live.journal.log(Level.INFO, "import", f"reference grid taken away by {actor}", actor=actor)
+
+
+async def imports_of(live: LiveMission) -> list[ImportView]:
+    """Return what was imported, oldest first."""
+    async with live.database.reading() as session:
+        query = select(ImportRow).where(ImportRow.mission_id == live.id).order_by(ImportRow.created_at, ImportRow.id)
+        return [_view(row) for row in await session.scalars(query)]
+
+
+async def reference_of(live: LiveMission) -> ReferenceView:
+    """Return what the map is compared with. Raises ImportNotFoundError when there is nothing."""
+    async with live.database.reading() as session:
+        row = await session.get(ReferenceRow, live.id)
+    if row is None:
+        raise ImportNotFoundError("the mission has no reference grid", "PUT /api/v1/missions/{id}/reference sets one")
+    return _reference_view(row)
+
+
+def _checked(upload: Upload, options: ImportOptions) -> str:
+    kind = kind_of(options)
+    if not upload.size_bytes:
+        raise InvalidRequestError("file", "it is empty", "send the file's content as the body")
+    return kind
+
+
+def _refuse_ended(live: LiveMission) -> None:
+    if live.header.state in ENDED:
+        raise ConflictError(f"the mission is {live.header.state} and takes no more soundings", "create a new mission")
+
+
+def _place(live: LiveMission) -> Place:
+    return Place(live.frame, live.builder.grid, live.margin_m)
+
+
+def _read_options(options: ImportOptions) -> ReadOptions:
+    return ReadOptions(**options.model_dump(mode="json", exclude={"filename", "source"}))
+
+
+async def _imported(live: LiveMission, *, without: str = "") -> NDArray[np.float64]:
+    """Return what was imported, unpacked aside: that takes a while where it is much."""
+    async with live.database.reading() as session:
+        stored = await sounding_queries.imported(session, live.id, without=without)
+    return await asyncio.to_thread(sounding_queries.unpack_imported, stored)
+
+
+async def _forget_reference(session: Any, mission_id: str) -> None:
+    known = await session.get(ReferenceRow, mission_id)
+    if known is not None:
+        await session.delete(known)
+        await session.flush()
+
+
+async def _same_file(live: LiveMission, digest: str, options: ImportOptions) -> ImportView | None:
+    """Return the answer once given to the same file. Raises ConflictError when it was read otherwise then."""
+    async with live.database.reading() as session:
+        query = select(ImportRow).where(ImportRow.mission_id == live.id, ImportRow.digest == digest)
+        row = (await session.scalars(query)).first()
+    if row is None:
+        return None
+    asked = options.model_dump(mode="json", exclude={"filename", "source"})
+    if any(row.summary.get(name) != value for name, value in asked.items()):
+        raise ConflictError(
+            f"the same file was imported before, as {row.filename}, with other options",
+            f"take that import back first: DELETE /api/v1/missions/{live.id}/imports/{row.id}",
+        )
+    return _view(row).model_copy(update={"replayed": True})
+
+
+def _kept(live: LiveMission, table: NDArray[np.float64]) -> tuple[NDArray[np.float64], int]:
+    """Return the soundings in or near the area, (n, 4), and how many were merged into them (0: none was)."""
+    zone = Polygon(live.area).buffer(live.margin_m)
+    shapely.prepare(zone)
+    near = table[shapely.contains_xy(zone, table[:, 0], table[:, 1])]
+    if len(near) <= MAX_PRIOR:
+        return near, 0
+    merged, group = merge_soundings(Soundings(*near.T.copy()), live.spec.cell_m)
+    # Errors of one survey belong together: a mean of many is not better known than one of them.
+    deviation = np.sqrt(np.bincount(group, near[:, 3] ** 2) / np.bincount(group))
+    return np.column_stack([merged.east_m, merged.north_m, merged.depth_m, deviation]), len(near)
+
+
+def _view(row: ImportRow) -> ImportView:
+    return ImportView(
+        id=row.id,
+        filename=row.filename,
+        source=row.summary["source"],
+        sha256=row.digest,
+        created_at=row.created_at,
+        found=row.summary["found"],
+        taken=row.count,
+        min_depth_m=row.summary["min_depth_m"],
+        max_depth_m=row.summary["max_depth_m"],
+        median_sd_m=row.summary["median_sd_m"],
+        notes=row.summary["notes"],
+    )
+
+
+def _reference_view(row: ReferenceRow) -> ReferenceView:
+    return ReferenceView(
+        filename=row.filename,
+        source=row.summary["source"],
+        created_at=row.created_at,
+        cells=row.summary["cells"],
+        notes=row.summary["notes"],
+    )

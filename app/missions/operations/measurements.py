@@ -1,0 +1,365 @@
+"""Measurements that vehicles post: judged one by one, stored together, each batch once."""
+
+import asyncio
+import hashlib
+import math
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass
+from datetime import timedelta
+from functools import partial
+
+import orjson
+from sqlalchemy.ext.asyncio import AsyncSession
+
+from app.mapping.georeference import LocalFrame
+from app.missions.clock import now
+from app.missions.errors import ConflictError, InvalidRequestError
+from app.missions.fleet.hub import FleetHub
+from app.missions.fleet.interface import BeamGeometry, Position, RangeReport, SoundingReport, VehicleReport
+from app.missions.fleet.links.rest import RestFleetLink
+from app.missions.large_batches import each_of, made_of
+from app.missions.live.mission import LiveMission
+from app.missions.soundings.measurement import Measurement
+from app.missions.spec.mission import VehicleKind
+from app.missions.states import MissionState
+from app.missions.targets.filters import Arrived
+from app.missions.views.soundings import BatchVerdict, ItemVerdict, Verdict, batch_verdict
+from app.storage import soundings as sounding_queries
+from app.storage.grouping import Grouped
+from app.storage.models import BatchRow
+from app.storage.soundings import LOG_KEY
+from imc_bridge.soundings import Beam, StateSample, footprint
+
+MAX_BATCH = 10_000
+
+KEYS_KEPT = timedelta(days=1)
+"""For so long the answer to an idempotency key is given again."""
+LOOK_AT_KEYS_S = 3600.0
+
+_Answer = tuple[str, BatchVerdict]
+"""The digest of a batch, and what was answered."""
+
+
+async def measure(
+    live: LiveMission,
+    hub: FleetHub,
+    rest: RestFleetLink,
+    items: Sequence[Measurement],
+    *,
+    idempotency_key: str | None = None,
+    sender: str = "",
+) -> BatchVerdict:
+    """Take in measurements; what is counted accepted is stored for good when this returns.
+
+    Idempotency keys are the ``sender``'s own: what others sent under the same key has nothing to do with his.
+
+    Raises
+    ------
+    ConflictError
+        When the mission is a draft, or the idempotency key came before with other content.
+    """
+    if live.header.state is MissionState.DRAFT:
+        raise ConflictError("the mission is a draft and takes no measurements yet", "add a vehicle to it first")
+    if len(items) > MAX_BATCH:
+        raise InvalidRequestError("items", f"{len(items)} items are too many", f"send at most {MAX_BATCH} at once")
+    digest, strangers, reports = await made_of(items, _looked_through, live, items)
+    ranges = _ranges(live, items, strangers)
+    key = _Key.of(sender, idempotency_key) if idempotency_key is not None else None
+    batch = _Batch(items, key, digest, strangers, reports, ranges)
+    if live.intake is None:
+        live.intake = Grouped(partial(_take, live, hub, rest), lambda batch: bool(batch.ranges))
+    answer: BatchVerdict = await live.intake(batch)
+    return answer
+
+
+def _looked_through(
+    live: LiveMission, items: Sequence[Measurement]
+) -> tuple[str, dict[int, str], dict[int, SoundingReport]]:
+    """Return what a batch is known by, and by item why it is refused and its sounding; changes nothing."""
+    digest = hashlib.sha256(orjson.dumps([item.model_dump() for item in items])).hexdigest()
+    near = _all_near(items, live.frame)
+    strangers = {i: _stranger(live, item, near=near) for i, item in enumerate(items)}
+    reports = {i: report for i, item in enumerate(items) if not strangers[i] and (report := _sounding(item))}
+    return digest, strangers, reports
+
+
+@dataclass(frozen=True)
+class _Key:
+    """An idempotency key as its sender knows it, as it is stored, and as it was before keys had owners, if that."""
+
+    given: str
+    stored: str
+    before: str | None
+
+    @classmethod
+    def of(cls, sender: str, key: str) -> "_Key":
+        if not sender:
+            return cls(key, key, None)
+        owner = hashlib.sha256(sender.encode()).hexdigest()[:32]
+        # A log's keys are nobody's who sends measurements.
+        return cls(key, f"{owner}:{key}", None if key.startswith(LOG_KEY) else key)
+
+
+@dataclass(frozen=True)
+class _Batch:
+    """A batch that was looked through: by item why it is refused, its sounding, its range to a target."""
+
+    items: Sequence[Measurement]
+    key: _Key | None
+    digest: str
+    strangers: Mapping[int, str]
+    reports: Mapping[int, SoundingReport]
+    ranges: Mapping[int, Arrived]
+
+    @property
+    def known(self) -> list[Measurement]:
+        return [item for i, item in enumerate(self.items) if not self.strangers[i]]
+
+
+async def _take(
+    live: LiveMission, hub: FleetHub, rest: RestFleetLink, batches: Sequence[_Batch]
+) -> list[BatchVerdict | Exception]:
+    """Store batches in one transaction: many vehicles that post at the same time wait for the disk once."""
+    keys = {name for batch in batches if batch.key for name in (batch.key.stored, batch.key.before) if name}
+    async with live.journal.writing, live.ranges.writing, live.database.writing() as session:
+        rows = await sounding_queries.answers_to(session, live.id, keys)
+        known = _answers(batches, {row.key: (row.digest, BatchVerdict.model_validate(row.answer)) for row in rows})
+        fresh = _first_of_each(batches, known)
+        stored, committed = await _store(live, [batches[i] for i in fresh], session)
+        await _forget_old_keys(live, session)
+    for work in committed:
+        work()
+    answers = dict(zip(fresh, stored, strict=True))
+    known |= {key.stored: (batches[i].digest, answers[i]) for i in fresh if (key := batches[i].key) is not None}
+    results: list[BatchVerdict | Exception] = [
+        answers.get(i) or _again(batch, known) for i, batch in enumerate(batches)
+    ]
+    for batch, result in zip(batches, results, strict=True):
+        if isinstance(result, BatchVerdict):
+            # The first answer may have got lost together with the process that knew where the vehicle is.
+            await _hear(hub, rest, batch.known, only_unknown=result.replayed)
+    # Where the vehicle is, and whether it arrived, is on disk as well before it is answered.
+    await live.journal.flush()
+    return results
+
+
+def _answers(batches: Sequence[_Batch], rows: Mapping[str, _Answer]) -> dict[str, _Answer]:
+    """Return the answers given to the batches' keys.
+
+    One that was stored before keys had owners is the answer to the same content, whoever sends it again; other content
+    under that key is another sender's.
+    """
+    found = {}
+    for batch in batches:
+        if batch.key is None:
+            continue
+        own, before = rows.get(batch.key.stored), rows.get(batch.key.before or "")
+        if own is not None:
+            found[batch.key.stored] = own
+        elif before is not None and before[0] == batch.digest:
+            found[batch.key.stored] = before
+    return found
+
+
+def _first_of_each(batches: Sequence[_Batch], known: Collection[str]) -> list[int]:
+    """Return which batches are to be stored: those without a key, and the first of every key that is not known."""
+    seen = set(known)
+    found = []
+    for i, batch in enumerate(batches):
+        if batch.key is None or batch.key.stored not in seen:
+            found.append(i)
+        if batch.key is not None:
+            seen.add(batch.key.stored)
+    return found
+
+
+def _again(batch: _Batch, known: Mapping[str, _Answer]) -> BatchVerdict | ConflictError:
+    """Return the answer to a batch whose key came before: the first one's, if it is the same batch."""
+    key = batch.key or _Key.of("", "")
+    digest, first = known[key.stored]
+    if digest == batch.digest:
+        return first.model_copy(update={"replayed": True})
+    return ConflictError(
+        f"idempotency key {key.given!r} was used before with other measurements", "use a new key for every new batch"
+    )
+
+
+async def _forget_old_keys(live: LiveMission, session: AsyncSession) -> None:
+    """Once an hour forget keys that nobody sends again; a sounding is known without them, too."""
+    moment = asyncio.get_running_loop().time()
+    if moment - live.keys_looked_at_s >= LOOK_AT_KEYS_S:
+        live.keys_looked_at_s = moment
+        await sounding_queries.forget_answers(session, live.id, now() - KEYS_KEPT, LOG_KEY)
+
+
+async def _store(
+    live: LiveMission, batches: Sequence[_Batch], session: AsyncSession
+) -> tuple[list[BatchVerdict], list[Callable[[], None]]]:
+    """Store batches that are new; returns their answers, and what is done once they are committed."""
+    reports = [report for batch in batches for report in batch.reports.values()]
+    on_reports, counted = await live.journal.take(reports, session)
+    verdicts, then, answers = iter(on_reports), [counted], []
+    for batch in batches:
+        taken = {i: next(verdicts) for i in batch.reports}
+        if batch.ranges:
+            on_ranges, used = await live.ranges.take(list(batch.ranges.values()), session)
+            taken |= dict(zip(batch.ranges, on_ranges, strict=True))
+            then.append(used)
+        answers.append(await made_of(batch.items, _batch_verdict, len(batch.items), taken, batch.strangers))
+    moment = now()
+    written = [await made_of(answer.items, partial(answer.model_dump, mode="json")) for answer in answers]
+    session.add_all(
+        BatchRow(
+            mission_id=live.id,
+            key=batch.key.stored,
+            digest=batch.digest,
+            answer=answer,
+            created_at=moment,
+        )
+        for batch, answer in zip(batches, written, strict=True)
+        if batch.key is not None
+    )
+    return answers, then
+
+
+async def _hear(
+    hub: FleetHub, rest: RestFleetLink, items: Sequence[Measurement], *, only_unknown: bool = False
+) -> None:
+    """Tell the link where vehicles are; ``only_unknown``: of those only whose place it does not know."""
+    known: set[str] = set()
+    if only_unknown:
+        names = {item.vehicle for item in items}
+        known = {name for name in names if hub.info((VehicleKind.REST, name)).report is not None}
+    fresh = [item for item in items if item.vehicle not in known]
+    await each_of(fresh, lambda item: rest.heard(_vehicle_report(item)))
+
+
+def _stranger(live: LiveMission, item: Measurement, *, near: bool) -> str:
+    member = live.team.get(item.vehicle)
+    if member is None:
+        return f"vehicle: {item.vehicle!r} takes no part in this mission"
+    if member.spec.kind is not VehicleKind.REST:
+        return f"vehicle: {item.vehicle!r} is of kind {member.spec.kind}; only vehicles of kind rest post measurements"
+    return ("" if near else _impossible_place(item, live.frame)) or _useless_range(item, live)
+
+
+def _useless_range(item: Measurement, live: LiveMission) -> str:
+    if item.target is None:
+        return ""
+    return live.ranges.tracking.stranger(item.target) or live.ranges.not_yet(item.time_s)
+
+
+def _ranges(live: LiveMission, items: Sequence[Measurement], strangers: Mapping[int, str]) -> dict[int, Arrived]:
+    """Return the ranges to targets by their item; each is as old as its vehicle's newest item says."""
+    newest: dict[str, float] = {}
+    for item in items:
+        newest[item.vehicle] = max(newest.get(item.vehicle, -math.inf), item.time_s)
+    return {
+        i: live.ranges.posted(
+            RangeReport(
+                vehicle=item.vehicle,
+                time_s=item.time_s,
+                target=item.target,
+                range_m=item.target_range_m,
+                position=Position(item.lat_deg, item.lon_deg, item.depth_m),
+                source="rest",
+                position_sd_m=item.position_sd_m,
+            ),
+            newest[item.vehicle],
+        )
+        for i, item in enumerate(items)
+        if item.target is not None and item.target_range_m is not None and not strangers[i]
+    }
+
+
+def _all_near(items: Sequence[Measurement], frame: LocalFrame) -> bool:
+    """Tell whether every place is possible: at once, which costs far less than one by one."""
+    if not all(-90 <= item.lat_deg <= 90 and -180 <= item.lon_deg <= 180 for item in items):
+        return False
+    try:
+        frame.to_local([item.lat_deg for item in items], [item.lon_deg for item in items])
+    except ValueError:
+        return False
+    return True
+
+
+def _impossible_place(item: Measurement, frame: LocalFrame) -> str:
+    if not -90 <= item.lat_deg <= 90:
+        return f"lat_deg: {item.lat_deg} is not between -90 and 90"
+    if not -180 <= item.lon_deg <= 180:
+        return f"lon_deg: {item.lon_deg} is not between -180 and 180"
+    try:
+        frame.to_local(item.lat_deg, item.lon_deg)
+    except ValueError as error:
+        return f"lat_deg, lon_deg: {error}"
+    return ""
+
+
+def _sounding(item: Measurement) -> SoundingReport | None:
+    if item.range_m is None:
+        return None
+    place, geometry = _footprint(item, item.range_m)
+    return SoundingReport(
+        vehicle=item.vehicle,
+        time_s=item.time_s,
+        footprint=place,
+        vehicle_depth_m=item.depth_m,
+        range_m=item.range_m,
+        source="rest",
+        beam=item.beam,
+        depth_sd_m=item.range_sd_m,
+        position_sd_m=item.position_sd_m,
+        beam_geometry=geometry,
+    )
+
+
+def _footprint(item: Measurement, range_m: float) -> tuple[Position, BeamGeometry]:
+    """Return where a beam met the bottom, and how it pointed."""
+    if item.beam_off_nadir_deg is None or item.heading_deg is None:
+        below = Position(item.lat_deg, item.lon_deg, item.depth_m + range_m)
+        return below, BeamGeometry(item.lat_deg, item.lon_deg)
+    state = StateSample(
+        item.time_s,
+        math.radians(item.lat_deg),
+        math.radians(item.lon_deg),
+        item.depth_m,
+        math.radians(item.roll_deg),
+        math.radians(item.pitch_deg),
+        math.radians(item.heading_deg),
+    )
+    beam = Beam(item.beam, math.radians(item.beam_azimuth_deg), math.radians(item.beam_off_nadir_deg))
+    geometry = BeamGeometry(
+        item.lat_deg,
+        item.lon_deg,
+        item.roll_deg,
+        item.pitch_deg,
+        item.heading_deg,
+        item.beam_azimuth_deg,
+        item.beam_off_nadir_deg,
+    )
+    return Position(*footprint(state, beam, range_m)), geometry
+
+
+def _vehicle_report(item: Measurement) -> VehicleReport:
+    return VehicleReport(
+        vehicle=item.vehicle,
+        time_s=item.time_s,
+        position=Position(item.lat_deg, item.lon_deg, item.depth_m),
+        heading_rad=None if item.heading_deg is None else math.radians(item.heading_deg),
+        speed_mps=item.speed_mps,
+        altitude_m=item.range_m,
+        battery_pct=item.battery_pct,
+        position_sd_m=item.position_sd_m,
+    )
+
+
+def _batch_verdict(count: int, taken: Mapping[int, ItemVerdict], strangers: Mapping[int, str]) -> BatchVerdict:
+    items = []
+    for index in range(count):
+        if index in taken:
+            items.append(taken[index].model_copy(update={"index": index}))
+        elif strangers[index]:
+            items.append(ItemVerdict(index=index, verdict=Verdict.REJECTED, reason=strangers[index]))
+        else:
+            items.append(ItemVerdict(index=index, verdict=Verdict.ACCEPTED, reason="position report"))
+    return batch_verdict(items)

@@ -1,0 +1,75 @@
+"""Waypoints for vehicles that ask for them."""
+
+import asyncio
+from collections.abc import Callable
+
+from app.missions.errors import ConflictError, VehicleNotFoundError
+from app.missions.fleet.interface import WaypointStatus
+from app.missions.fleet.links.rest import RestFleetLink
+from app.missions.live.mission import LiveMission
+from app.missions.spec.mission import VehicleKind
+from app.missions.states import MissionState
+from app.missions.views.mission import WaypointView
+
+
+async def waypoint(
+    live: LiveMission, rest: RestFleetLink, vehicle: str, *, after_step: int | None = None, timeout_s: float = 0.0
+) -> WaypointView | None:
+    """Return a vehicle's waypoint when it is newer than ``after_step``, waiting for it; None when none came.
+
+    A polling vehicle acknowledges the waypoint by this. Raises ConflictError when it must stop.
+    """
+    member = live.team.get(vehicle)
+    if member is None:
+        rest.told_to_stop(vehicle, live.id)
+        raise VehicleNotFoundError(
+            f"vehicle {vehicle!r} takes no part in this mission", "stop; nothing more comes from here for it"
+        )
+    polls = member.spec.kind is VehicleKind.REST
+    after = -1 if after_step is None else after_step
+
+    def newer() -> WaypointView | None:
+        shown = live.waypoints.of(vehicle)
+        ready = shown is not None and shown.step > after and shown.status is not WaypointStatus.PLANNED
+        return shown if ready and member.order is not None else None
+
+    def must_stop() -> bool:
+        waits = live.header.state is MissionState.READY or (
+            live.header.state is MissionState.RUNNING and not live.halted
+        )
+        return not waits or live.team.get(vehicle) is None
+
+    def settled() -> bool:
+        return newer() is not None or must_stop()
+
+    if polls:
+        rest.has_waypoint(vehicle, after)
+    await _wait_watching(live, settled, timeout_s)
+    if must_stop():
+        if polls:
+            rest.told_to_stop(vehicle, live.id)
+        state = live.header.state if live.team.get(vehicle) is not None else "without this vehicle"
+        state = "ending" if state is MissionState.RUNNING else state
+        raise ConflictError(f"the mission is {state}: stop and hold", "ask again after it was started or resumed")
+    found = newer()
+    if found is not None and polls:
+        rest.has_waypoint(vehicle, found.step)
+        return live.waypoints.of(vehicle)
+    return found
+
+
+async def _wait_watching(live: LiveMission, condition: Callable[[], bool], timeout_s: float) -> None:
+    """Wait until the condition holds or the time is over, looking again at every live message."""
+    if condition() or timeout_s <= 0:
+        return
+    with live.broadcaster.subscribe() as subscription:
+
+        async def until_it_holds() -> None:
+            async for _message in subscription:
+                if condition():
+                    return
+
+        try:
+            await asyncio.wait_for(until_it_holds(), timeout_s)
+        except TimeoutError:
+            return

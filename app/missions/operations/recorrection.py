@@ -1,0 +1,164 @@
+"""Changing a mission's corrections: every stored sounding is corrected anew from its raw values."""
+
+import asyncio
+from collections.abc import Sequence
+from concurrent.futures import Executor
+from functools import partial
+from typing import Any
+
+from sqlalchemy import update
+from sqlalchemy.ext.asyncio import AsyncSession
+
+from app.mapping.tides import TideTable, TideTableError, parse_tid
+from app.missions.clock import now
+from app.missions.errors import ConflictError, InvalidRequestError
+from app.missions.fleet.interface import BeamGeometry, Position, SoundingReport
+from app.missions.live.journal import Counts
+from app.missions.live.mission import LiveMission
+from app.missions.soundings.corrections import NO_LEVEL, Corrections
+from app.missions.soundings.gate import Gate
+from app.missions.spec.mission import MissionSpec, SoundSpeed, Tide
+from app.missions.views.corrections import CorrectionsView, TideCorrection, TideTableView
+from app.missions.views.mission import Level
+from app.missions.views.soundings import Ruling, Verdict
+from app.storage import soundings as sounding_queries
+from app.storage import stored_maps
+from app.storage.models import MissionRow, SoundingRow, TideTableRow
+
+
+def corrections_view(live: LiveMission) -> CorrectionsView:
+    """Return a mission's corrections as they are shown."""
+    table = live.gate.corrections.table
+    return CorrectionsView(
+        tide=live.spec.tide,
+        tide_table=table
+        and TideTableView(
+            name=table.name, first=table.first, last=table.last, entries=len(table.times_s), sha256=table.digest
+        ),
+        sound_speed=live.spec.sound_speed,
+        vertical_datum=live.facts.vertical_datum.statement,
+        accepted=live.journal.counts.accepted,
+        rejected=live.journal.counts.rejected,
+    )
+
+
+async def set_tide(live: LiveMission, executor: Executor, tide: TideCorrection, actor: str) -> None:
+    """Change level, datum and table, or nothing when the table cannot be read (InvalidRequestError)."""
+    table: TideTable | None = None
+    row: TideTableRow | None = None
+    if tide.table is not None:
+        parse = partial(parse_tid, tide.table, name=tide.table_name)
+        try:
+            table = await asyncio.get_running_loop().run_in_executor(executor, parse)
+        except TideTableError as error:
+            raise InvalidRequestError("table", str(error), "correct that line and send the whole table again") from None
+        row = TideTableRow(mission_id=live.id, name=table.name, text=tide.table)
+    plain = Tide.model_validate(tide.model_dump(exclude={"table", "table_name"}))
+    spec = live.spec.model_copy(update={"tide": plain})
+
+    async def store(session: AsyncSession) -> None:
+        known = await session.get(TideTableRow, live.id)
+        if known is not None:
+            await session.delete(known)
+            await session.flush()
+        if row is not None:
+            session.add(row)
+
+    await _recorrect(live, executor, spec, table, store)
+    what = f"tide table {table.name}" if table is not None else f"a constant level of {plain.level_m:+.2f} m"
+    await live.journal.log(Level.INFO, "corrections", f"tide corrected by {what}, set by {actor}", actor=actor)
+
+
+async def set_sound_speed(live: LiveMission, executor: Executor, sound_speed: SoundSpeed | None, actor: str) -> None:
+    """Change the sound speed profile; None: the sonars' own ranges are taken."""
+
+    async def store(_session: AsyncSession) -> None:
+        pass
+
+    spec = live.spec.model_copy(update={"sound_speed": sound_speed})
+    await _recorrect(live, executor, spec, live.gate.corrections.table, store)
+    words = "sound speed is not corrected" if sound_speed is None else f"sound speed: {sound_speed.source or 'profile'}"
+    await live.journal.log(Level.INFO, "corrections", f"{words}, set by {actor}", actor=actor)
+
+
+def check_level_is_known(live: LiveMission) -> None:
+    """Raise ConflictError when the tide table has no level for the present: every sounding would be refused."""
+    table = live.gate.corrections.table
+    why = table.why_not(now().timestamp()) if table is not None else ""
+    if why:
+        raise ConflictError(why, "send a table that covers today, or a constant level: PUT /api/v1/missions/{id}/tide")
+
+
+async def _recorrect(
+    live: LiveMission, executor: Executor, spec: MissionSpec, table: TideTable | None, store: Any
+) -> None:
+    corrections = Corrections(live.frame, spec.tide, table=table, sound_speed=spec.sound_speed)
+    loop = asyncio.get_running_loop()
+    async with live.journal.writing:
+        # Nothing else changes soundings meanwhile. Computing may have to wait for a thread, and the database's turn is
+        # for all missions, whose stops are written, too.
+        async with live.database.reading() as session:
+            rows = await sounding_queries.all_soundings(session, live.id)
+        changes = await loop.run_in_executor(executor, recorrected, rows, corrections, live.gate)
+        async with live.database.writing() as session:
+            if changes:
+                await session.execute(update(SoundingRow), changes)
+            mission = await session.get_one(MissionRow, live.id)
+            mission.spec = mission.spec | spec.model_dump(mode="json", include={"tide", "sound_speed"})
+            await store(session)
+            await session.flush()
+            await stored_maps.forget(session, live.id)
+            counted = await sounding_queries.counts(session, live.id)
+        # Committed: from here on nothing waits until all of it holds.
+        live.spec = spec
+        live.gate.corrections = corrections
+        live.journal.counts = Counts(counted.get("accepted", 0), counted.get("rejected", 0))
+        live.whole.changed()
+        live.journal.told_of_missing_level = False
+        live.revision += 1
+    live.changed.set()
+    live.publish_summary()
+
+
+def recorrected(rows: Sequence[SoundingRow], corrections: Corrections, gate: Gate) -> list[dict[str, Any]]:
+    """Return what changes in each row, by its id.
+
+    Verdicts stay, but for soundings that had no water level and have one now, or the other way round.
+    """
+    changes = []
+    for row, found in zip(rows, corrections.apply([report_of(row) for row in rows]), strict=True):
+        change: dict[str, Any] = {"id": row.id, "level_m": found.level_m, "verdict": row.verdict, "reason": row.reason}
+        change |= {"east_m": found.east_m, "north_m": found.north_m, "depth_m": found.depth_m}
+        if row.verdict == Verdict.ACCEPTED and found.reason:
+            change |= {"verdict": Verdict.REJECTED, "reason": found.reason}
+        elif row.reason.startswith(NO_LEVEL):
+            outside = "" if row.ruling == Ruling.RESTORED else gate.outside(found.east_m, found.north_m)
+            reason = found.reason or outside
+            change |= {"verdict": Verdict.REJECTED if reason else Verdict.ACCEPTED, "reason": reason}
+        changes.append(change)
+    return changes
+
+
+def report_of(row: SoundingRow) -> SoundingReport:
+    """Return a stored sounding as it came from the vehicle."""
+    geometry = BeamGeometry.where_known(
+        row.vehicle_lat_deg,
+        row.vehicle_lon_deg,
+        row.roll_deg,
+        row.pitch_deg,
+        row.heading_deg,
+        row.beam_azimuth_deg,
+        row.beam_off_nadir_deg,
+    )
+    return SoundingReport(
+        vehicle=row.vehicle,
+        time_s=row.time_s,
+        footprint=Position(row.lat_deg, row.lon_deg, row.raw_depth_m),
+        vehicle_depth_m=row.vehicle_depth_m,
+        range_m=row.range_m,
+        source=row.source,
+        beam=row.beam,
+        depth_sd_m=row.sd_m,
+        position_sd_m=row.position_sd_m,
+        beam_geometry=geometry,
+    )

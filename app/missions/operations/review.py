@@ -1,0 +1,165 @@
+"""Soundings that are not in the map, and an operator's word on any of them: it counts, or it does not."""
+
+from collections.abc import Sequence
+
+from sqlalchemy import ColumnElement, and_, func, or_, select
+from sqlalchemy.ext.asyncio import AsyncSession
+
+from app.missions.errors import ConflictError, SoundingNotFoundError
+from app.missions.live.journal import Counts
+from app.missions.live.mission import LiveMission
+from app.missions.operations.recorrection import report_of
+from app.missions.soundings.gate import implausible_value
+from app.missions.views.mission import Level
+from app.missions.views.soundings import Ruling, SoundingPage, SoundingState, SoundingView, Verdict
+from app.storage import soundings as sounding_queries
+from app.storage import stored_maps
+from app.storage.models import EventRow, SoundingRow
+from app.storage.shielding import to_the_end
+
+Doubts = dict[int, str]
+"""Why the map leaves accepted soundings out, by their ids."""
+
+
+async def soundings_page(
+    live: LiveMission, states: Sequence[SoundingState], vehicle: str | None, after: int, limit: int
+) -> SoundingPage:
+    """Return up to ``limit`` soundings in any of the states with an id above ``after``, in the order they came."""
+    await live.journal.flush()
+    async with live.database.reading() as session:
+        doubts = await _doubts(live, session)
+        wanted = [SoundingRow.mission_id == live.id, or_(*(_condition(state, doubts) for state in states))]
+        if vehicle is not None:
+            wanted.append(SoundingRow.vehicle == vehicle)
+        total = await session.scalar(select(func.count()).select_from(SoundingRow).where(*wanted))
+        query = select(SoundingRow).where(*wanted, SoundingRow.id > after).order_by(SoundingRow.id).limit(limit + 1)
+        rows = (await session.scalars(query)).all()
+    return SoundingPage(
+        total=total or 0,
+        items=[_view(row, doubts) for row in rows[:limit]],
+        next_after=rows[limit - 1].id if len(rows) > limit else None,
+    )
+
+
+async def rule(live: LiveMission, sounding_id: int, ruling: Ruling, note: str, actor: str) -> SoundingView:
+    """Restore a sounding or reject it; the map is that of the new choice when this returns. Raw values stay.
+
+    Raises
+    ------
+    SoundingNotFoundError, ConflictError
+        The latter when no depth can be had from what was measured.
+    """
+    await live.journal.flush()
+    async with live.journal.writing:
+        line = await to_the_end(_store(live, sounding_id, ruling, note, actor))
+    if line is not None:
+        live.journal.tell(line)
+        live.changed.set()
+    await live.build_map()
+    live.publish_summary()
+    async with live.database.reading() as session:
+        row = await session.get_one(SoundingRow, sounding_id)
+        return _view(row, await _doubts(live, session))
+
+
+async def _store(live: LiveMission, sounding_id: int, ruling: Ruling, note: str, actor: str) -> EventRow | None:
+    """Write verdict and log line down together; None when it was so already."""
+    async with live.database.writing() as session:
+        row = await session.get(SoundingRow, sounding_id)
+        if row is None or row.mission_id != live.id:
+            raise SoundingNotFoundError(
+                f"there is no sounding {sounding_id} in this mission", "GET /api/v1/missions/{id}/soundings lists them"
+            )
+        if row.ruling == ruling:
+            return None
+        was_accepted = row.verdict == Verdict.ACCEPTED
+        before = row.reason or (await _doubts(live, session)).get(row.id, "")
+        said = f": {note}" if note else ""
+        if ruling is Ruling.RESTORED:
+            _correct(live, row)
+            row.verdict = Verdict.ACCEPTED
+            row.reason = f"restored by {actor}{said}" + (f" (before: {before})" if before else "")
+        else:
+            row.verdict = Verdict.REJECTED
+            row.reason = f"rejected by {actor}{said}"
+        row.ruling = ruling
+        words = f"sounding {row.id} of {row.vehicle}, {row.depth_m:.2f} m, {ruling} by {actor}{said}"
+        line = live.journal.line(
+            Level.INFO, "sounding", words, sounding=row.id, ruling=str(ruling), actor=actor, note=note, before=before
+        )
+        session.add(line)
+        await session.flush()
+        await stored_maps.forget(session, live.id)
+    # To count all of them again takes seconds where there are millions.
+    counts, more = live.journal.counts, int(row.verdict == Verdict.ACCEPTED) - int(was_accepted)
+    live.journal.counts = Counts(counts.accepted + more, counts.rejected - more)
+    live.whole.changed()
+    return line
+
+
+def _correct(live: LiveMission, row: SoundingRow) -> None:
+    """Give a sounding its place and depth: one that was refused for a value has none yet. Raises ConflictError."""
+    report = report_of(row)
+    if row.sd_m == 0:
+        row.sd_m = live.gate.deviation_m(report.range_m)
+        report = report_of(row)
+    why = implausible_value(report)
+    found = None if why else live.gate.corrections.apply([report])[0]
+    if found is None or found.reason:
+        why = why or (found.reason if found is not None else "")
+        raise ConflictError(
+            f"sounding {row.id} cannot be restored, no depth can be had from it: {why}",
+            "send a tide table that covers its time, or leave it out",
+        )
+    row.east_m, row.north_m, row.depth_m, row.level_m = found.east_m, found.north_m, found.depth_m, found.level_m
+
+
+async def _doubts(live: LiveMission, session: AsyncSession) -> Doubts:
+    doubted = live.builder.doubted()
+    if not doubted:
+        return {}
+    found = await sounding_queries.ids_at(session, live.id, [row for row, _ in doubted])
+    return {number: reason for ids, (_, reason) in zip(found, doubted, strict=True) for number in ids}
+
+
+def _condition(state: SoundingState, doubts: Doubts) -> ColumnElement[bool]:
+    match state:
+        case SoundingState.RESTORED:
+            return and_(SoundingRow.ruling == Ruling.RESTORED, SoundingRow.verdict == Verdict.ACCEPTED)
+        case SoundingState.WITHDRAWN:
+            return SoundingRow.ruling == Ruling.REJECTED
+        case SoundingState.REJECTED:
+            return and_(SoundingRow.verdict == Verdict.REJECTED, SoundingRow.ruling.is_distinct_from(Ruling.REJECTED))
+        case SoundingState.DOUBTED:
+            return and_(SoundingRow.id.in_(doubts), SoundingRow.ruling.is_(None))
+        case SoundingState.USED:
+            used = and_(SoundingRow.verdict == Verdict.ACCEPTED, SoundingRow.ruling.is_(None))
+            return and_(used, SoundingRow.id.not_in(doubts))
+
+
+def _state(row: SoundingRow, doubts: Doubts) -> SoundingState:
+    if row.verdict == Verdict.REJECTED:
+        return SoundingState.WITHDRAWN if row.ruling == Ruling.REJECTED else SoundingState.REJECTED
+    if row.ruling == Ruling.RESTORED:
+        return SoundingState.RESTORED
+    return SoundingState.DOUBTED if row.id in doubts else SoundingState.USED
+
+
+def _view(row: SoundingRow, doubts: Doubts) -> SoundingView:
+    state = _state(row, doubts)
+    corrected = row.sd_m > 0
+    return SoundingView(
+        id=row.id,
+        vehicle=row.vehicle,
+        time_s=row.time_s,
+        beam=row.beam,
+        step=row.step,
+        lat_deg=row.lat_deg,
+        lon_deg=row.lon_deg,
+        range_m=row.range_m,
+        raw_depth_m=row.raw_depth_m,
+        depth_m=row.depth_m if corrected else None,
+        sd_m=row.sd_m if corrected else None,
+        state=state,
+        reason=doubts.get(row.id, "") if state is SoundingState.DOUBTED else row.reason,
+    )

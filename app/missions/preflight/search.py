@@ -1,0 +1,98 @@
+"""What stands before the start of a search, beside what stands before every start."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from app.exploration.search.ground import UNREACHED, Ground
+from app.missions.fleet.hub import FleetHub
+from app.missions.live.mission import LiveMission
+from app.missions.live.vehicles import local_place
+from app.missions.search.course import FIRST_PACE
+from app.missions.search.state import Search
+from app.missions.spec.mission import MissionSpec, VehicleKind
+from app.missions.views.mission import CheckStatus, CheckView
+
+OK, NOTE, WARNING, PROBLEM = CheckStatus.OK, CheckStatus.NOTE, CheckStatus.WARNING, CheckStatus.PROBLEM
+
+DUNE_CIRCLES_M = 15.0
+"""From this distance on DUNE circles about a reference in place of going straight to it."""
+
+
+def search_checks(live: LiveMission, hub: FleetHub) -> Iterator[CheckView]:
+    """Return the lines of the checklist that only a search has; none for other missions."""
+    search = live.search
+    if search is None:
+        return
+    yield _ways(search, live.spec)
+    for member in live.team:
+        report = member.report or hub.info(member.key).report
+        place = None if report is None else local_place(live.frame, report.position)
+        if place is not None:
+            away_m = search.way_to_entry_m(np.array(place))
+            far = away_m > search.home_radius_m(len(list(live.team)))
+            yield CheckView(
+                id=f"entry.{member.name}",
+                title=f"{member.name} at the entry",
+                status=WARNING if far else OK,
+                message=f"{away_m:.0f} m from it",
+                remedy="Bring it to the entry: it is not sent where nobody has looked" if far else "",
+            )
+        if member.spec.kind is not VehicleKind.SIM:
+            seen = place is not None and search.knows(np.array(place))
+            yield CheckView(
+                id=f"scans.{member.name}",
+                title=f"Scans of {member.name}",
+                status=OK if seen else NOTE,
+                message="they come" if seen else "none tells yet what is around it; the search waits for one",
+                remedy="" if seen else f"Let it post to /api/v1/missions/{live.id}/scans",
+            )
+        if member.spec.kind is VehicleKind.IMC and search.spec.safety_m < DUNE_CIRCLES_M:
+            yield CheckView(
+                id=f"circles.{member.name}",
+                title=f"Room for {member.name}",
+                status=WARNING,
+                message=f"DUNE circles within {DUNE_CIRCLES_M:g} m of its waypoints unless the vehicle hovers; "
+                f"search.safety_m is {search.spec.safety_m:g} m",
+                remedy="Make search.safety_m larger, or be sure that the vehicle can stand still",
+            )
+
+
+def _ways(search: Search, spec: MissionSpec) -> CheckView:
+    """Return whether vehicles can leave the entry and get to the goal area and back, by what is known of the site."""
+    task = search.task(0.0)
+    ground = Ground.of(task)
+    start = np.zeros_like(task.in_goal)
+    row, col = ground.places(search.site.entry_m[None])[0]
+    start[row, col] = True
+    far = ground.hoped(start)
+    around = far[max(row - 1, 0) : row + 2, max(col - 1, 0) : col + 2]
+    title, check = "Ways of the search", "search.ways"
+    if task.grid.blueprint[row, col] or np.count_nonzero(around < UNREACHED) < 2:
+        return CheckView(
+            id=check,
+            title=title,
+            status=PROBLEM,
+            message=f"known obstacles stand closer to the entry than search.safety_m, {search.spec.safety_m:g} m: no "
+            "vehicle gets away from it",
+            remedy="Move search.entry, or make search.safety_m smaller",
+        )
+    goal_m = ground.metres(int(far[task.in_goal].min(initial=UNREACHED))).item()
+    if not np.isfinite(goal_m):
+        return CheckView(
+            id=check,
+            title=title,
+            status=WARNING,
+            message="known obstacles bar every way from the entry to the goal area",
+            remedy="Check search.goal, search.obstacles and keep-out zones",
+        )
+    there_and_back_s = 2 * goal_m / (FIRST_PACE * spec.speed_mps)
+    short = there_and_back_s > search.left_s()
+    return CheckView(
+        id=check,
+        title=title,
+        status=WARNING if short else OK,
+        message=f"{goal_m:.0f} m to the goal area; there and back about {there_and_back_s / 60:.0f} of "
+        f"{search.left_s() / 60:.0f} min",
+        remedy="Make search.window_s longer: nobody will get to the goal area" if short else "",
+    )

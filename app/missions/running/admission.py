@@ -1,0 +1,47 @@
+"""What a mission may not ask of this service: planners and vehicles that it does not have."""
+
+from collections.abc import Sequence
+
+from app.exploration.planners import ONLY_IN_SIMULATION, PLANNERS, REFUSAL, SEARCHERS
+from app.missions.errors import InvalidRequestError
+from app.missions.spec.mission import MissionKind, MissionSpec, VehicleKind, VehicleSpec
+
+
+def check_spec(spec: MissionSpec, kinds: Sequence[VehicleKind]) -> None:
+    """Refuse a mission with a planner or a vehicle that cannot be had. Raises InvalidRequestError.
+
+    ``kinds`` are the kinds of vehicles that can be reached.
+    """
+    name = spec.planner.name
+    there = PLANNERS if spec.kind is MissionKind.SURVEY else SEARCHERS
+    use = f"use one of {', '.join(there)}"
+    if name in ONLY_IN_SIMULATION:
+        raise InvalidRequestError("planner.name", REFUSAL.format(name=name), use)
+    if name not in there:
+        what = (
+            f"{name!r} plans no missions of kind {spec.kind}" if name in PLANNERS else f"there is no planner {name!r}"
+        )
+        raise InvalidRequestError("planner.name", what, use)
+    for index, vehicle in enumerate(spec.vehicles):
+        check_vehicle(vehicle, spec, kinds, f"vehicles.{index}.")
+
+
+def check_vehicle(vehicle: VehicleSpec, spec: MissionSpec, kinds: Sequence[VehicleKind], prefix: str = "") -> None:
+    """Refuse a vehicle that this service cannot reach or its mission cannot lead. Raises InvalidRequestError."""
+    if vehicle.kind not in kinds:
+        raise InvalidRequestError(
+            f"{prefix}kind",
+            f"links of kind {vehicle.kind} are switched off",
+            f"use one of {', '.join(kinds)} or switch them on in the settings",
+        )
+    if vehicle.depth_m is not None and vehicle.depth_m > spec.limits.max_depth_m:
+        raise InvalidRequestError(
+            f"{prefix}depth_m",
+            f"{vehicle.depth_m:g} m is deeper than limits.max_depth_m, {spec.limits.max_depth_m:g} m",
+            "make it shallower or raise the limit",
+        )
+    taken = {name for target in spec.targets for name in (target.name, target.called)}
+    if vehicle.name in taken:
+        raise InvalidRequestError(
+            f"{prefix}name", f"{vehicle.name!r} is the name of a target of this mission", "give it another name"
+        )

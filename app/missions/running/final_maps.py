@@ -1,0 +1,75 @@
+"""Maps that are made while nobody waits for them: of missions that were taken up, and of those that just ended."""
+
+import asyncio
+from collections.abc import Coroutine
+from typing import Any
+
+import structlog
+
+from app.missions.live.mission import LiveMission
+
+log = structlog.get_logger(__name__)
+
+
+class MapKeeper:
+    """Makes maps beside everything else: no state changes and no vehicle waits for one."""
+
+    def __init__(self) -> None:
+        # Those of missions that were taken up come one at a time, so that planning has a thread.
+        self._one_at_a_time = asyncio.Lock()
+        self._taken_up: dict[str, asyncio.Task[None]] = {}
+        self._last: dict[str, asyncio.Task[None]] = {}
+
+    def busy(self, mission_id: str) -> bool:
+        """Tell whether a map of this mission is on its way."""
+        return mission_id in self._taken_up or mission_id in self._last
+
+    def take_up(self, live: LiveMission) -> None:
+        """Make the map of what was stored."""
+        if live.builder.stale:
+            self._begin(self._taken_up, live, self._map_stored(live))
+
+    def map_last(self, live: LiveMission) -> None:
+        """Make the map of a mission that has just ended, of everything until its vehicles stopped."""
+        self._begin(self._last, live, _map_all(live))
+
+    async def last(self, mission_id: str) -> None:
+        """Wait for the last map of a mission that has just ended; at once when none is being made."""
+        task = self._last.get(mission_id)
+        if task is not None:
+            await asyncio.wait([task])
+
+    def forget(self, mission_id: str) -> None:
+        """Make no map of a mission that is deleted."""
+        for tasks in (self._taken_up, self._last):
+            if mission_id in tasks:
+                tasks[mission_id].cancel()
+
+    async def close(self) -> None:
+        """Make no more maps."""
+        tasks = [*self._taken_up.values(), *self._last.values()]
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+
+    async def _map_stored(self, live: LiveMission) -> None:
+        async with self._one_at_a_time:
+            await live.map_what_is_stored()
+
+    def _begin(self, tasks: dict[str, asyncio.Task[None]], live: LiveMission, work: Coroutine[Any, Any, None]) -> None:
+        def done(ended: asyncio.Task[None]) -> None:
+            if tasks.get(live.id) is ended:
+                del tasks[live.id]
+            error = None if ended.cancelled() else ended.exception()
+            if error is not None:
+                log.error("the map is not made yet; it is when it is asked for", mission=live.id, exc_info=error)
+
+        tasks[live.id] = task = asyncio.create_task(work, name=f"map of {live.id}")
+        task.add_done_callback(done)
+
+
+async def _map_all(live: LiveMission) -> None:
+    await live.journal.flush()
+    await live.build_map()
+    live.publish_summary()
+    await live.whole.keep(live.header.step, ended=True)

@@ -1,0 +1,72 @@
+"""What is answered about missions, and about vehicles that take part in none."""
+
+from collections.abc import AsyncIterator, Sequence
+
+from app.missions.fleet.interface import StopReceipt, VehicleInfo
+from app.missions.live.broadcast import Subscription
+from app.missions.live.mission import LiveMission
+from app.missions.running.supervisor import receipt
+from app.missions.spec.mission import VehicleKind
+from app.missions.views.messages import LiveMessage, SnapshotMessage
+from app.missions.views.mission import ActionView, MissionView, StopView, VehicleView
+from app.storage import events as event_queries
+
+
+def mission_view(live: LiveMission) -> MissionView:
+    """Return a mission as it stands, with its vehicles, waypoints and targets."""
+    frame = live.frame
+    # All of it was checked when it was made.
+    return MissionView.model_construct(
+        **dict(live.summary()),
+        spec=live.spec,
+        origin=(frame.origin_lon_deg, frame.origin_lat_deg),
+        vehicles=live.vehicles.all(),
+        waypoints=live.waypoints.newest,
+        targets=live.target_views(),
+    )
+
+
+def action_view(live: LiveMission, stops: Sequence[StopReceipt]) -> ActionView:
+    """Return what an action led to, and what each vehicle answered that was stopped."""
+    return ActionView(mission=live.summary(), stops=[StopView(**receipt(stop)) for stop in stops])
+
+
+async def snapshot_message(live: LiveMission) -> SnapshotMessage:
+    """Return everything that is needed to draw the picture of a mission."""
+    tracks = await live.trails.newest()
+    async with live.database.reading() as session:
+        last_event_id = await event_queries.last_event_id(session, live.id)
+    built = live.builder.newest
+    return SnapshotMessage(
+        mission=mission_view(live),
+        tracks=tracks,
+        map_version=built.version if built else 0,
+        last_event_id=last_event_id,
+    )
+
+
+async def beginning_with(first: LiveMessage, rest: Subscription) -> AsyncIterator[LiveMessage]:
+    """Yield the first message, then all that follow."""
+    yield first
+    async for message in rest:
+        yield message
+
+
+def idle_vehicle_view(info: VehicleInfo) -> VehicleView:
+    """Return a vehicle that takes part in no mission, as its link knows it."""
+    report = info.report
+    return VehicleView(
+        name=info.name,
+        kind=VehicleKind(info.kind),
+        link=info.state,
+        reason=info.reason,
+        age_s=info.age_s,
+        address=info.address,
+        imc_id=info.imc_id,
+        lat_deg=report.position.lat_deg if report else None,
+        lon_deg=report.position.lon_deg if report else None,
+        depth_m=report.position.depth_m if report else None,
+        altitude_m=report.altitude_m if report else None,
+        speed_mps=report.speed_mps if report else None,
+        battery_pct=report.battery_pct if report else None,
+    )

@@ -1,0 +1,160 @@
+"""The missions that this process has in memory."""
+
+import asyncio
+from collections.abc import Awaitable, Callable, Iterator
+from concurrent.futures import Executor
+
+import structlog
+from sqlalchemy import select
+
+from app.missions.errors import MissionElsewhereError, MissionNotFoundError
+from app.missions.fleet.hub import FleetHub
+from app.missions.live.load import take_up
+from app.missions.live.mission import LiveMission
+from app.missions.running.final_maps import MapKeeper
+from app.missions.running.ownership import Ownership
+from app.missions.states import ENDED
+from app.missions.views.mission import MissionSummary
+from app.storage.database import Database
+from app.storage.models import MissionRow
+
+ENDED_MISSIONS_IN_MEMORY = 8
+
+log = structlog.get_logger(__name__)
+
+
+class Memory:
+    """Takes missions up from the database when they are asked for, and lets those go that ended.
+
+    Until ``share`` is called it belongs to a process that only looks something up beside the others.
+    """
+
+    def __init__(
+        self,
+        database: Database,
+        hub: FleetHub,
+        executor: Executor,
+        maps: MapKeeper,
+        time_scale: float,
+    ) -> None:
+        self._database = database
+        self._hub = hub
+        self._executor = executor
+        self._maps = maps
+        self._time_scale = time_scale
+        self._ownership: Ownership | None = None
+        self._may_take_up: Callable[[MissionRow], Awaitable[bool]] = _always
+        self._taken_up: Callable[[LiveMission], Awaitable[None]] = _nothing
+        self._live: dict[str, LiveMission] = {}
+        # As they were when they left memory.
+        self._left: dict[str, MissionSummary] = {}
+        # Known to exist, whoever has them: missions are never deleted while a service runs.
+        self._seen: set[str] = set()
+        self._loading = asyncio.Lock()
+
+    def share(
+        self,
+        ownership: Ownership,
+        may_take_up: Callable[[MissionRow], Awaitable[bool]],
+        taken_up: Callable[[LiveMission], Awaitable[None]],
+    ) -> None:
+        """Take up only what ``ownership`` and ``may_take_up`` allow.
+
+        ``taken_up`` is called with what was taken up, before anybody else gets it.
+        """
+        self._ownership = ownership
+        self._may_take_up = may_take_up
+        self._taken_up = taken_up
+
+    def __iter__(self) -> Iterator[LiveMission]:
+        return iter(list(self._live.values()))
+
+    def left(self, mission_id: str) -> MissionSummary | None:
+        """Return a mission as it was when it ended and left memory; None where it is in memory or never was."""
+        return None if mission_id in self._live else self._left.get(mission_id)
+
+    async def check_exists(self, mission_id: str) -> None:
+        """Raise MissionNotFoundError where there is no such mission; it is not taken up."""
+        if mission_id in self._live or mission_id in self._left or mission_id in self._seen:
+            return
+        async with self._database.reading() as session:
+            if await session.scalar(select(MissionRow.id).where(MissionRow.id == mission_id)) is None:
+                raise _not_found(mission_id)
+        self._seen.add(mission_id)
+
+    async def get(self, mission_id: str) -> LiveMission:
+        """Return a mission, taken up if need be. Raises MissionNotFoundError, MissionElsewhereError."""
+        live = self._live.get(mission_id)
+        if live is not None:
+            return live
+        async with self._loading:
+            if mission_id in self._live:
+                return self._live[mission_id]
+            async with self._database.reading() as session:
+                row = await session.get(MissionRow, mission_id)
+            if row is None:
+                raise _not_found(mission_id)
+            database = self._database
+            if self._ownership is not None:
+                if not (await self._may_take_up(row) and await self._ownership.take(mission_id)):
+                    raise MissionElsewhereError(f"another process has mission {mission_id}", "ask again in a moment")
+                database = database.guarded(self._ownership.guard(mission_id))
+                # Its last owner may have written until the moment it was taken.
+                async with database.reading() as session:
+                    row = await session.get_one(MissionRow, mission_id)
+            live = await take_up(database, self._hub, self._executor, row, self._time_scale)
+            await self._make_room()
+            self._live[mission_id] = live
+            self._left.pop(mission_id, None)
+            self._maps.take_up(live)
+            await self._taken_up(live)
+            return live
+
+    async def _make_room(self) -> None:
+        idle = [
+            m
+            for m in self._live.values()
+            if m.header.state in ENDED and not m.broadcaster.watched and not self._maps.busy(m.id)
+        ]
+        for live in idle[: max(0, len(idle) - ENDED_MISSIONS_IN_MEMORY + 1)]:
+            self._left[live.id] = live.summary()
+            del self._live[live.id]
+            await live.close()
+            if self._ownership is not None:
+                await self._ownership.release([live.id])
+
+    async def forget(self, mission_id: str) -> None:
+        """Let go of a mission that was deleted, without writing anything more."""
+        self._left.pop(mission_id, None)
+        live = self._live.pop(mission_id, None)
+        if live is not None:
+            live.abandon("the mission was deleted")
+        if self._ownership is not None:
+            await self._ownership.release([mission_id])
+
+    async def close(self) -> None:
+        """Write down what is left."""
+        for live in self:
+            try:
+                await live.close()
+            except MissionElsewhereError as error:
+                log.warning("the last words of a mission are not written", mission=live.id, error=str(error))
+
+    def drop(self) -> None:
+        """Forget everything unwritten: other processes have it now."""
+        for live in self:
+            live.abandon()
+        self._live.clear()
+        self._left.clear()
+
+
+def _not_found(mission_id: str) -> MissionNotFoundError:
+    return MissionNotFoundError(f"there is no mission {mission_id!r}", "GET /api/v1/missions lists all")
+
+
+async def _always(_row: MissionRow) -> bool:
+    return True
+
+
+async def _nothing(_live: LiveMission) -> None:
+    return None

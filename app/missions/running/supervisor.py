@@ -1,0 +1,307 @@
+"""Missions as they run: their step loops are begun, watched over and ended, their vehicles stopped."""
+
+import asyncio
+from collections.abc import Awaitable, Callable, Sequence
+from concurrent.futures import Executor
+from functools import partial
+
+import structlog
+
+from app.missions.clock import now
+from app.missions.compilation import Compilation
+from app.missions.errors import MissionElsewhereError
+from app.missions.fleet.hub import FleetHub
+from app.missions.fleet.interface import LinkState, StopReceipt
+from app.missions.flight.step_loop import Runner
+from app.missions.live.mission import LiveMission
+from app.missions.running.claims import Claims
+from app.missions.running.final_maps import MapKeeper
+from app.missions.states import MissionState
+from app.missions.team import Member
+from app.missions.views.mission import Level
+from app.storage import missions as mission_queries
+from app.storage.database import Guard
+from app.storage.shielding import to_the_end
+
+PATIENCE_S = 0.5
+"""How long a stop waits for the database, so that a restart knows of it too; vehicles wait no longer for a disk."""
+ANSWER_S = 0.5
+"""How long whoever stops a mission waits for that to be written down, once its vehicles were stopped."""
+NOT_WRITTEN = "not written down yet, a restart of the service would go on with the mission"
+
+log = structlog.get_logger(__name__)
+
+
+class Conductor:
+    """Runs missions and ends them.
+
+    Attributes
+    ----------
+    runs
+        The step loops that go on, by their missions' ids.
+    """
+
+    def __init__(
+        self,
+        hub: FleetHub,
+        claims: Claims,
+        executor: Executor,
+        maps: MapKeeper,
+        compilation: Compilation,
+        time_scale: float,
+    ) -> None:
+        self._hub = hub
+        self._claims = claims
+        self._executor = executor
+        self._maps = maps
+        self._compilation = compilation
+        self._time_scale = time_scale
+        self.runs: dict[str, asyncio.Task[None]] = {}
+        self._acting: dict[str, asyncio.Lock] = {}
+        self._ending: dict[str, asyncio.Task[list[StopReceipt]]] = {}
+        """Step loops that were cancelled and have not ended yet."""
+        self._unwritten: dict[str, asyncio.Task[None]] = {}
+        """States that are in force and will be written down when that is possible again."""
+
+    def acting(self, mission_id: str) -> asyncio.Lock:
+        """Return the lock under which a mission's state changes.
+
+        Whoever holds it keeps an abort waiting: nothing is computed under it.
+        """
+        return self._acting.setdefault(mission_id, asyncio.Lock())
+
+    def run(self, live: LiveMission) -> None:
+        """Begin the step loop."""
+        live.header.state = MissionState.RUNNING
+        live.halted = False
+        for member in live.team:
+            member.engaged = False
+            member.refusal = ""
+        runner = Runner(live, self._hub, self._executor, self._time_scale)
+        self.runs[live.id] = asyncio.create_task(self._supervise(live, runner.run), name=f"mission {live.id}")
+
+    async def _supervise(self, live: LiveMission, run: Callable[[], Awaitable[str]]) -> None:
+        """Run a mission to its end; whatever happens, its vehicles are stopped."""
+        try:
+            if (ending := self._ending.get(live.id)) is not None:
+                await asyncio.wait([ending])
+            # Compiling what planning needs takes seconds on a new machine; vehicles must not wait for it.
+            await self._compilation.planner(live.spec.planner.name, live.planning_sensor)
+            reason = await run()
+        except asyncio.CancelledError:
+            raise
+        except MissionElsewhereError as error:
+            # What another process makes of the mission is not ours to write down.
+            log.error("the mission was taken from this process", mission=live.id, error=str(error))
+            live.halt()
+            await self.stop_team(live)
+            self.runs.pop(live.id, None)
+            return
+        except Exception as error:
+            log.exception("the step loop failed", mission=live.id)
+            target, level, reason = MissionState.FAILED, Level.ALARM, f"the step loop failed: {error}"
+        else:
+            target, level = MissionState.FINISHED, Level.INFO
+        async with self.acting(live.id):
+            try:
+                await to_the_end(self._conclude(live, target, reason, level))
+            finally:
+                self.runs.pop(live.id, None)
+
+    async def _conclude(self, live: LiveMission, target: MissionState, reason: str, level: Level) -> None:
+        """Bring a mission whose step loop ended to its end."""
+        live.halt()
+        stops = await self.stop_team(live)
+        await self._write_down(live)
+        await self.log_stops(live, stops)
+        # Who reads that the mission has ended finds its vehicles free.
+        self._claims.release_team(live)
+        await self._settle(live, self._begin_state(live, target, reason, "service", level), target, reason)
+        self._maps.map_last(live)
+
+    def _begin_state(
+        self, live: LiveMission, state: MissionState, reason: str, actor: str, level: Level = Level.INFO
+    ) -> asyncio.Task[None]:
+        """Begin to write a state down, if need be when the database can be used again."""
+        work = live.journal.storage.done(partial(self._write_state, live, state, reason, actor, level))
+        return asyncio.create_task(work, name=f"{state} of {live.id}")
+
+    async def _settle(self, live: LiveMission, written: asyncio.Task[None], state: MissionState, reason: str) -> None:
+        """Wait for a state to be written down; where that takes long it is in force before."""
+        await asyncio.wait([written], timeout=ANSWER_S)
+        if written.done():
+            written.result()
+            return
+        self._unwritten[live.id] = written
+        written.add_done_callback(partial(self._forget_unwritten, live.id))
+        live.header.state = state
+        live.header.reason = f"{reason}: {NOT_WRITTEN}" if reason else NOT_WRITTEN
+        live.changed.set()
+        live.publish_summary()
+
+    def _forget_unwritten(self, mission_id: str, done: asyncio.Task[None]) -> None:
+        if self._unwritten.get(mission_id) is done:
+            del self._unwritten[mission_id]
+        if not done.cancelled() and done.exception() is not None:
+            log.error("a mission's state could not be written", mission=mission_id, exc_info=done.exception())
+
+    async def close(self) -> None:
+        """Give up what could not be written down."""
+        await asyncio.gather(*self._ending.values(), return_exceptions=True)
+        unwritten = list(self._unwritten.values())
+        for task in unwritten:
+            task.cancel()
+        await asyncio.gather(*unwritten, return_exceptions=True)
+
+    async def stand_down(self, live: LiveMission, state: MissionState, reason: str, actor: str) -> list[StopReceipt]:
+        """Commit a state in which vehicles do not follow, and stop them; returns what each answered.
+
+        The state comes first: killed in between, a restart must not go on with an aborted mission. But a disk that
+        hangs, or a long transaction, keeps no vehicle from being stopped.
+        """
+        live.halt()
+        self._supersede(live)
+        written = self._begin_state(live, state, reason, actor)
+        await asyncio.wait([written], timeout=PATIENCE_S)
+        stops = await self.halt(live)
+        await asyncio.gather(self._settle(live, written, state, reason), self.log_stops(live, stops))
+        return stops
+
+    def dismiss(self, live: LiveMission) -> None:
+        """Give up the vehicles of a mission that ended; its last map is made meanwhile."""
+        self._claims.release_team(live)
+        self._maps.map_last(live)
+
+    async def halt(self, live: LiveMission) -> list[StopReceipt]:
+        """End the step loop and stop the vehicles, at once and not only when the loop has ended."""
+        live.halt()
+        task = self.runs.pop(live.id, None)
+        if task is not None:
+            task.cancel()
+        stops = await self.stop_team(live)
+        if task is not None:
+            # Where the machine is busy the loop takes its time to end: vehicles and operators do not wait for it.
+            ended = asyncio.create_task(self._ended(live, task), name=f"end of {live.id}")
+            self._ending[live.id] = ended
+            ended.add_done_callback(partial(self._forget_ending, live.id))
+            await asyncio.wait([ended], timeout=PATIENCE_S)
+            if ended.done():
+                again = {stop.vehicle: stop for stop in ended.result()}
+                stops = [again.get(stop.vehicle, stop) for stop in stops]
+        await self._write_down(live)
+        return stops
+
+    async def _ended(self, live: LiveMission, task: asyncio.Task[None]) -> list[StopReceipt]:
+        """Wait for a cancelled step loop to end; a vehicle that was just being engaged follows then, and is stopped."""
+        await asyncio.gather(task, return_exceptions=True)
+        return await self.stop_team(live, only_engaged=True)
+
+    def _forget_ending(self, mission_id: str, done: asyncio.Task[list[StopReceipt]]) -> None:
+        if self._ending.get(mission_id) is done:
+            del self._ending[mission_id]
+        if not done.cancelled() and done.exception() is not None:
+            log.error("a mission's vehicles could not be stopped again", mission=mission_id, exc_info=done.exception())
+
+    async def _write_down(self, live: LiveMission) -> None:
+        """Write what vehicles measured until now, unless that takes long: then the journal goes on by itself."""
+        flushing = asyncio.ensure_future(live.journal.flush())
+        flushing.add_done_callback(partial(_log_failure, live.id))
+        await asyncio.wait([flushing], timeout=PATIENCE_S)
+
+    async def stop_vehicle(self, live: LiveMission, member: Member) -> StopReceipt:
+        """Stop one vehicle and write down what it answered."""
+        member.engaged = False
+        stop = await self._hub.stop(member.key)
+        await self.log_stops(live, [stop])
+        return stop
+
+    async def stop_team(self, live: LiveMission, *, only_engaged: bool = False) -> list[StopReceipt]:
+        """Stop the mission's vehicles, or those of them that follow; returns what each answered."""
+        mine = [
+            member
+            for member in live.team
+            if self._hub.claimed_by(member.key) == live.id
+            and (not only_engaged or self._hub.info(member.key).state is LinkState.ENGAGED)
+        ]
+        for member in mine:
+            member.engaged = False
+        live.changed.set()
+        return list(await asyncio.gather(*(self._hub.stop(member.key) for member in mine)))
+
+    async def log_stops(self, live: LiveMission, stops: Sequence[StopReceipt]) -> None:
+        """Write down, together, what vehicles answered to a stop; a missing answer is an alarm.
+
+        Nobody waits for that longer than for any other stop to be written; the vehicles have stopped.
+        """
+        lines = []
+        for stop in stops:
+            level = Level.INFO if stop.acknowledged else Level.ALARM
+            words = "acknowledged the stop" if stop.acknowledged else "has NOT acknowledged the stop"
+            text = f"{stop.vehicle} {words}: {stop.detail}"
+            lines.append(live.journal.line(level, "stop", text, **receipt(stop)))
+        if live.id in self._unwritten:
+            for line in lines:
+                live.journal.note_line(line)
+            return
+        writing = asyncio.ensure_future(live.journal.log_all(lines))
+        writing.add_done_callback(partial(_log_failure, live.id))
+        await asyncio.wait([writing], timeout=PATIENCE_S)
+
+    async def set_state(
+        self,
+        live: LiveMission,
+        state: MissionState,
+        reason: str,
+        actor: str,
+        level: Level = Level.INFO,
+        *,
+        check: Guard | None = None,
+    ) -> None:
+        """Commit a mission's new state together with its line in the log, then tell everyone.
+
+        ``check`` is called within the transaction before anything is changed, and raises what speaks against it.
+        """
+        self._supersede(live)
+        await self._write_state(live, state, reason, actor, level, check)
+
+    def _supersede(self, live: LiveMission) -> None:
+        """Leave off writing an earlier state down: another one comes."""
+        unwritten = self._unwritten.pop(live.id, None)
+        if unwritten is not None:
+            unwritten.cancel()
+
+    async def _write_state(
+        self,
+        live: LiveMission,
+        state: MissionState,
+        reason: str,
+        actor: str,
+        level: Level,
+        check: Guard | None = None,
+    ) -> None:
+        changed_at = now()
+        words = f"{state} by {actor}" + (f": {reason}" if reason else "")
+        line = live.journal.line(level, "state", words, state=state, actor=actor)
+        async with live.database.writing() as session:
+            if check is not None:
+                await check(session)
+            await mission_queries.set_state(session, live.id, state, reason, changed_at)
+            session.add(line)
+        live.header.state = state
+        live.header.reason = reason
+        live.header.updated_at = changed_at
+        live.changed.set()
+        live.publish_summary()
+        live.journal.tell(line)
+
+
+def _log_failure(mission_id: str, done: asyncio.Task[None]) -> None:
+    error = None if done.cancelled() else done.exception()
+    if error is not None:
+        # What could not be written stays noted and is tried again.
+        log.error("the last soundings are not written yet", mission=mission_id, exc_info=error)
+
+
+def receipt(stop: StopReceipt) -> dict[str, str | bool]:
+    """Return a vehicle's answer to a stop as it is written down and shown."""
+    return {"vehicle": stop.vehicle, "acknowledged": stop.acknowledged, "detail": stop.detail}

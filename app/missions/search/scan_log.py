@@ -1,0 +1,95 @@
+"""Scans as they come: judged, written down, and only then added to the grid."""
+
+import math
+from collections.abc import Callable, Sequence
+
+from sqlalchemy.ext.asyncio import AsyncSession
+
+from app.missions.clock import now
+from app.missions.fleet.interface import Position, ScanReport
+from app.missions.search.state import Search
+from app.missions.views.soundings import ItemVerdict, Verdict
+from app.storage import scans as scan_queries
+from app.storage.models import ScanRow
+
+
+async def take(
+    search: Search,
+    mission_id: str,
+    seen: Callable[[], None],
+    reports: Sequence[ScanReport],
+    step: int,
+    session: AsyncSession,
+) -> tuple[list[ItemVerdict], Callable[[], None]]:
+    """Store scans in the caller's transaction; ``seen`` is called when they are in the grid.
+
+    Returns
+    -------
+    The verdicts in the order of the reports, and what to call once the transaction has committed.
+    """
+    known = await scan_queries.known_scans(session, mission_id, [_identity(r) for r in reports if _storable(r)])
+    verdicts: list[ItemVerdict] = []
+    rows, fresh = [], []
+    received = now()
+    for index, report in enumerate(reports):
+        if _identity(report) in known:
+            verdicts.append(ItemVerdict(index=index, verdict=Verdict.DUPLICATE, reason="already stored"))
+            continue
+        reason = search.refusal(report)
+        verdict = Verdict.REJECTED if reason else Verdict.ACCEPTED
+        verdicts.append(ItemVerdict(index=index, verdict=verdict, reason=reason))
+        if not _storable(report):
+            continue
+        known.add(_identity(report))
+        rows.append(
+            {
+                "mission_id": mission_id,
+                "vehicle": report.vehicle,
+                "time_s": report.time_s,
+                "received_at": received,
+                "step": step,
+                "source": report.source,
+                "lat_deg": report.position.lat_deg,
+                "lon_deg": report.position.lon_deg,
+                "depth_m": report.position.depth_m,
+                "first_bearing_deg": report.first_bearing_deg,
+                "bearing_step_deg": report.bearing_step_deg,
+                "reach_m": report.reach_m,
+                "ranges": scan_queries.pack_ranges(report.ranges_m),
+                "verdict": verdict,
+                "reason": reason,
+            }
+        )
+        if not reason:
+            fresh.append(report)
+    await scan_queries.add_scans(session, rows)
+
+    def committed() -> None:
+        search.see(fresh)
+        seen()
+
+    return verdicts, committed
+
+
+def report_of(row: ScanRow) -> ScanReport:
+    """Return a stored scan as it came."""
+    return ScanReport(
+        vehicle=row.vehicle,
+        time_s=row.time_s,
+        position=Position(row.lat_deg, row.lon_deg, row.depth_m),
+        first_bearing_deg=row.first_bearing_deg,
+        bearing_step_deg=row.bearing_step_deg,
+        reach_m=row.reach_m,
+        ranges_m=scan_queries.unpack_ranges(row.ranges),
+        source=row.source,
+    )
+
+
+def _identity(report: ScanReport) -> scan_queries.Identity:
+    return report.vehicle, report.time_s
+
+
+def _storable(report: ScanReport) -> bool:
+    place = report.position
+    values = (report.time_s, place.lat_deg, place.lon_deg, place.depth_m, report.first_bearing_deg)
+    return all(math.isfinite(v) for v in (*values, report.bearing_step_deg, report.reach_m))

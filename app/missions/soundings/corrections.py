@@ -1,0 +1,171 @@
+"""From what a sonar reported to a depth below the datum: sound speed, then tide. The report itself stays as it came."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.mapping.georeference import LocalFrame
+from app.mapping.sound_speed import SoundSpeedProfile
+from app.mapping.tides import TideTable
+from app.mapping.vertical import INSTANTANEOUS_WATER_LEVEL, VerticalDatum
+from app.missions.fleet.interface import Position, SoundingReport
+from app.missions.spec.mission import SoundSpeed, Tide
+from imc_bridge.printable import printable
+
+NO_LEVEL = "tide: "
+"""How the reason of a sounding begins that is refused because no water level is known for its time."""
+
+
+@dataclass(frozen=True, slots=True)
+class Corrected:
+    """A sounding in the local frame; ``reason`` says why it has no place or depth, empty when it has both.
+
+    Attributes
+    ----------
+    level_m
+        Water level that was subtracted, None where there is none for its time.
+    """
+
+    east_m: float = 0.0
+    north_m: float = 0.0
+    depth_m: float = 0.0
+    level_m: float | None = None
+    reason: str = ""
+
+
+class Corrections:
+    """The corrections of one mission.
+
+    Parameters
+    ----------
+    tide
+        A constant level; where there is a ``table`` its levels count instead.
+    sound_speed
+        None: the sonars' own ranges are taken.
+    """
+
+    def __init__(
+        self, frame: LocalFrame, tide: Tide, *, table: TideTable | None = None, sound_speed: SoundSpeed | None = None
+    ) -> None:
+        self._frame = frame
+        self._tide = tide
+        self.table = table
+        self._profile = _profile(sound_speed)
+        self._sound_speed = sound_speed
+
+    @property
+    def vertical_datum(self) -> VerticalDatum:
+        """Return what corrected depths are counted from."""
+        tide = self._tide
+        source = printable(tide.source).strip()
+        sound = ""
+        if self._sound_speed is not None:
+            sound = f"; sound speed: {printable(self._sound_speed.source).strip() or 'profile'}"
+        if self.table is None and not tide.is_applied:
+            statement = f"instantaneous water level (tide: {source}{sound})"
+            return VerticalDatum(INSTANTANEOUS_WATER_LEVEL, statement)
+        if self.table is None:
+            how = f"level {tide.level_m:+.2f} m (tide: {source}"
+        else:
+            named = "" if tide.is_unnamed else f", {source}"
+            how = f"tide table {printable(self.table.name)} (sha256 {self.table.digest[:12]}{named}"
+        if tide.datum_offset_m:
+            how += f"; datum offset {tide.datum_offset_m:+.3f} m"
+        name = VerticalDatum(tide.datum_epsg, "").crs.name
+        return VerticalDatum(tide.datum_epsg, f"EPSG:{tide.datum_epsg} {name}, by {how}{sound})")
+
+    def water_level_m(self, time_s: float) -> float:
+        """How high the water stands above the datum of corrected depths; the table's lowest where it has no level."""
+        level = self._tide.level_m
+        if self.table is not None:
+            level = float(self.table.levels_at(time_s))
+            if not np.isfinite(level):
+                level = float(self.table.levels_m.min())
+        return level - self._tide.datum_offset_m
+
+    def apply(self, reports: Sequence[SoundingReport]) -> list[Corrected]:
+        """Return one result per report, in their order. Every number in a report is finite."""
+        if not reports:
+            return []
+        places = self._places([report.footprint for report in reports])
+        raw = np.array([report.footprint.depth_m for report in reports])
+        shift, depth = self._sound_speed_corrected(reports, raw, places)
+        levels = self._levels(reports)
+        results = []
+        for report, place, moved, bottom, level in zip(reports, places, shift, depth, levels, strict=True):
+            if isinstance(place, str):
+                results.append(Corrected(reason=place))
+                continue
+            east, north = place[0] + float(moved[0]), place[1] + float(moved[1])
+            if not np.isfinite(level):
+                why = self.table.why_not(report.time_s) if self.table is not None else ""
+                results.append(Corrected(east, north, float(bottom), None, NO_LEVEL + why))
+                continue
+            below = float(bottom) - float(level) + self._tide.datum_offset_m
+            results.append(Corrected(east, north, below, float(level)))
+        return results
+
+    def _levels(self, reports: Sequence[SoundingReport]) -> NDArray[np.float64]:
+        if self.table is None:
+            return np.full(len(reports), self._tide.level_m)
+        return self.table.levels_at([report.time_s for report in reports])
+
+    def _sound_speed_corrected(
+        self,
+        reports: Sequence[SoundingReport],
+        raw_m: NDArray[np.float64],
+        places: Sequence[tuple[float, float] | str],
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return how far each footprint moves, (n, 2) east and north, and the bottom's depth below the water level."""
+        shift = np.zeros((len(reports), 2))
+        if self._profile is None:
+            return shift, raw_m
+        sonar = np.array([report.vehicle_depth_m for report in reports])
+        down = raw_m - sonar
+        slant = np.array([report.range_m for report in reports])
+        # Where the sonar was is not always known; then the length of the slanted range says how far aside the beam met
+        # the bottom, and only the direction is missing.
+        across = np.sqrt(np.maximum(slant**2 - down**2, 0.0))
+        offsets = np.array([self._offset(report, place) for report, place in zip(reports, places, strict=True)])
+        seen = np.isfinite(offsets[:, 0])
+        across[seen] = np.hypot(*offsets[seen].T)
+        beams = down > 0.0
+        depth = raw_m.copy()
+        across_true, down_true = self._profile.trace(sonar[beams], across[beams], down[beams])
+        depth[beams] = sonar[beams] + down_true
+        moved = beams & seen & (across > 0.0)
+        stretch = across_true[moved[beams]] / across[moved] - 1.0
+        shift[moved] = offsets[moved] * stretch[:, None]
+        return shift, depth
+
+    def _offset(self, report: SoundingReport, place: tuple[float, float] | str) -> tuple[float, float]:
+        """Return the footprint's place from the sonar's, east and north; NaN where one of them is unknown."""
+        if isinstance(place, str) or report.beam_geometry is None:
+            return np.nan, np.nan
+        geometry = report.beam_geometry
+        try:
+            east, north = self._frame.to_local(geometry.lat_deg, geometry.lon_deg)
+        except ValueError:
+            return np.nan, np.nan
+        return place[0] - float(east), place[1] - float(north)
+
+    def _places(self, footprints: list[Position]) -> list[tuple[float, float] | str]:
+        """Return east and north of each footprint, or why it has none in the mission's frame."""
+        lat, lon = (np.array([getattr(place, name) for place in footprints]) for name in ("lat_deg", "lon_deg"))
+        try:
+            east, north = self._frame.to_local(lat, lon)
+        except ValueError as error:
+            if len(footprints) == 1:
+                return [f"position: {error}"]
+            # One far-away place must not take the others of its batch with it.
+            return [place for footprint in footprints for place in self._places([footprint])]
+        return list(zip(east.tolist(), north.tolist(), strict=True))
+
+
+def _profile(sound_speed: SoundSpeed | None) -> SoundSpeedProfile | None:
+    if sound_speed is None:
+        return None
+    depths, speeds = np.array(sound_speed.profile).T
+    return SoundSpeedProfile(depths, speeds, sound_speed.assumed_mps)

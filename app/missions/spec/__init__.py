@@ -1,0 +1,1 @@
+"""What an operator describes: a mission, declared once. Schemas, forms and help are made from ``MissionSpec``."""

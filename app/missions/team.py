@@ -1,0 +1,130 @@
+"""The vehicles of one mission as its step loop sees them."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from datetime import datetime
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.mapping.georeference import LocalFrame
+from app.missions.fleet.hub import VehicleKey
+from app.missions.fleet.interface import (
+    LinkState,
+    VehicleReport,
+    WaypointOrder,
+    WaypointStatus,
+)
+from app.missions.spec.mission import Limits, VehicleSpec
+
+SETTLED = frozenset({WaypointStatus.REACHED, WaypointStatus.REFUSED, WaypointStatus.MISSED})
+OUT_OF_REACH = frozenset({LinkState.UNKNOWN, LinkState.LOST})
+
+
+@dataclass
+class Member:
+    """A vehicle that takes part. ``slot`` is its place in the depth stack."""
+
+    spec: VehicleSpec
+    slot: int
+    report: VehicleReport | None = None
+    heard_s: float | None = None
+    """When that was, Unix seconds by the service's clock."""
+    left_at: datetime | None = None
+    """When it left the mission; None while it takes part."""
+    link: LinkState = LinkState.UNKNOWN
+    engaged: bool = False
+    followed: bool = False
+    """Whether it ever followed in this run: one that then refuses is an alarm."""
+    refusal: str = ""
+    order: WaypointOrder | None = None
+    status: WaypointStatus | None = None
+    reason: str = ""
+    surfacing: bool = False
+    """Whether its waypoint brings it up for a fix."""
+    risings: int = 0
+    """How often it was sent up for one."""
+    pursuing: str | None = None
+    """The target for which it left the mapping."""
+
+    @property
+    def name(self) -> str:
+        """The vehicle's name."""
+        return self.spec.name
+
+    @property
+    def key(self) -> VehicleKey:
+        """What the hub knows the vehicle by."""
+        return self.spec.kind, self.spec.name
+
+    @property
+    def present(self) -> bool:
+        """Whether it can be planned for: it follows us and we know where it is."""
+        return self.engaged and self.report is not None and self.link not in OUT_OF_REACH
+
+    @property
+    def ordered(self) -> bool:
+        """Whether it has a waypoint that is not settled, whether or not it can be reached now."""
+        return self.order is not None and self.status not in SETTLED
+
+    @property
+    def busy(self) -> bool:
+        """Whether it is on its way to a waypoint."""
+        return self.ordered and self.link not in OUT_OF_REACH
+
+    @property
+    def unsent(self) -> bool:
+        """Whether it has a waypoint that was never sent, as when its link was lost just then."""
+        return self.order is not None and self.status is WaypointStatus.PLANNED
+
+    def cruise_depth_m(self, limits: Limits) -> float:
+        """Return the depth it travels at where the bottom leaves room: as asked for, or its place in the stack."""
+        if self.spec.depth_m is not None:
+            return self.spec.depth_m
+        return min(limits.min_depth_m + self.slot * limits.min_vertical_separation_m, limits.max_depth_m)
+
+    def place_m(self, frame: LocalFrame) -> NDArray[np.float64]:
+        """Return its last reported place, (2,): east and north in the mission's frame."""
+        if self.report is None:
+            raise ValueError(f"{self.name} has not reported a position yet")
+        position = self.report.position
+        east, north = frame.to_local(np.array(position.lat_deg), np.array(position.lon_deg))
+        return np.array([float(east), float(north)])
+
+
+@dataclass
+class Team:
+    """All vehicles of a mission, by name, in the order of their slots."""
+
+    members: dict[str, Member] = field(default_factory=dict)
+    left: dict[str, Member] = field(default_factory=dict)
+    """Those that took part and do not any more, as they were last."""
+
+    def join(self, spec: VehicleSpec, slot: int) -> Member:
+        """Add a vehicle, or take one back."""
+        before = self.left.pop(spec.name, None)
+        member = Member(spec, slot)
+        if before is not None and before.key == member.key:
+            member.report, member.heard_s, member.risings = before.report, before.heard_s, before.risings
+        self.members[spec.name] = member
+        return member
+
+    def leave(self, name: str, at: datetime) -> None:
+        """Take a vehicle out; what was last known of it stays."""
+        member = self.members.pop(name, None)
+        if member is not None:
+            member.left_at, member.order, member.status, member.pursuing = at, None, None, None
+            member.engaged = member.surfacing = False
+            self.left[name] = member
+
+    def __iter__(self) -> Iterator[Member]:
+        return iter(list(self.members.values()))
+
+    def get(self, name: str) -> Member | None:
+        """Return the vehicle of this name, if it takes part."""
+        return self.members.get(name)
+
+    @property
+    def present(self) -> list[Member]:
+        """Those that can be planned for."""
+        return [m for m in self.members.values() if m.present]

@@ -1,0 +1,41 @@
+"""How corrections of soundings are asked for and answered."""
+
+from datetime import datetime
+
+from pydantic import Field
+
+from app.missions.spec.mission import SoundSpeed, Tide
+from app.missions.views.base import View
+
+
+class TideCorrection(Tide):
+    """A mission's tide: a constant level, or a table of high and low waters in its place."""
+
+    table: str | None = Field(
+        default=None,
+        max_length=8_000_000,
+        description="Text of a .tid table, UTC: a line 'YYYY/MM/DD hh:mm:ss.sss level' per high or low water. Levels "
+        "between two are a half cosine; soundings beyond the table are rejected until it covers them. Null: level_m",
+    )
+    table_name: str = Field(default="", max_length=200, description="Its name; default: the harbour that it states")
+
+
+class TideTableView(View):
+    """A tide table in short."""
+
+    name: str
+    first: datetime = Field(description="Time of the first entry")
+    last: datetime = Field(description="Time of the last entry")
+    entries: int
+    sha256: str = Field(description="Of the table as it was sent")
+
+
+class CorrectionsView(View):
+    """How soundings are corrected; their raw values stay beside the corrected ones."""
+
+    tide: Tide
+    tide_table: TideTableView | None = Field(description="Its levels count in place of tide.level_m")
+    sound_speed: SoundSpeed | None
+    vertical_datum: str = Field(description="What corrected depths are counted from")
+    accepted: int = Field(description="Soundings accepted under these corrections")
+    rejected: int

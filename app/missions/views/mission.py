@@ -1,0 +1,210 @@
+"""What the mission service answers about missions, vehicles and steps; REST, live view and dashboard share it."""
+
+from datetime import datetime
+from enum import StrEnum
+from typing import Any
+
+from pydantic import Field, SkipValidation
+
+from app.missions.fleet.interface import LinkState, WaypointStatus
+from app.missions.spec.base import Latitude, Longitude
+from app.missions.spec.mission import MissionSpec, Sensor, VehicleKind
+from app.missions.states import MissionState
+from app.missions.views.base import View
+from app.missions.views.search import SearchProgress
+from app.missions.views.targets import TargetView
+
+
+class PositionQuality(StrEnum):
+    """How well a vehicle knows where it is."""
+
+    UNTOLD = "untold"
+    """It does not say."""
+    STATED = "stated"
+    """It says, and the mission has no surface_policy to judge it by."""
+    GOOD = "good"
+    """As well as after a fix."""
+    FADING = "fading"
+    POOR = "poor"
+    """Worse than the mission allows."""
+
+
+class VehicleView(View):
+    """A vehicle as an operator sees it now."""
+
+    name: str
+    kind: VehicleKind
+    sensor: Sensor | None = None
+    mission_id: str | None = Field(default=None, description="The mission it takes part in, if any")
+    active: bool = Field(default=True, description="False once it left its mission")
+    left_at: datetime | None = Field(default=None, description="When it left the mission; null while it takes part")
+    breach: str = Field(
+        default="", description="Where it is that it must not be: in a keep-out zone or outside the area; else empty"
+    )
+    link: LinkState
+    reason: str = Field(default="", description="What is missing or wrong, and what to do; empty when all is well")
+    age_s: float | None = Field(default=None, description="Seconds since last heard; null: never")
+    address: str | None = None
+    imc_id: int | None = None
+    lat_deg: float | None = None
+    lon_deg: float | None = None
+    east_m: float | None = None
+    north_m: float | None = None
+    depth_m: float | None = None
+    altitude_m: float | None = None
+    heading_deg: float | None = None
+    speed_mps: float | None = None
+    battery_pct: float | None = None
+    position_sd_m: float | None = Field(
+        default=None, description="How well it says that it knows where it is: standard deviation in metres"
+    )
+    localization: PositionQuality = Field(
+        default=PositionQuality.UNTOLD, description="What that is worth beside the mission's surface_policy"
+    )
+    surfacing: bool = Field(default=False, description="On its way up, or at the surface, for a GPS fix")
+    risings: int = Field(default=0, description="How often it was sent up for a fix in this mission")
+    pursuing: str | None = Field(default=None, description="The target that it leaves the mapping for")
+
+
+class WaypointView(View):
+    """One waypoint of one vehicle."""
+
+    vehicle: str
+    step: int
+    lat_deg: float
+    lon_deg: float
+    east_m: float
+    north_m: float
+    depth_m: float
+    speed_mps: float
+    arrival_radius_m: float
+    min_altitude_m: float
+    status: WaypointStatus
+    reason: str = ""
+
+
+class Progress(View):
+    """How far a mission has come."""
+
+    step: int = Field(description="Last committed step; 0 before the first")
+    steps: int
+    soundings: int = Field(description="Accepted soundings")
+    rejected: int = Field(description="Soundings kept but not used")
+    distance_m: float = Field(description="Distance travelled by all vehicles, along their tracks")
+    coverage_pct: float = Field(description="Share of the area's cells known to accuracy_m")
+    remaining_pct: float = Field(default=100.0, description="Share of the landmarks not known to accuracy_m")
+    mean_sd_m: float | None = Field(default=None, description="Mean standard deviation of the map")
+    objective: float | None = Field(default=None, description="The planner's objective at the last step")
+    terms: dict[str, float] = Field(default_factory=dict)
+    elapsed_s: float = Field(default=0.0, description="Wall-clock seconds in state running")
+    eta_s: float | None = Field(default=None, description="Estimated wall-clock seconds until the last step")
+    search: SearchProgress | None = Field(default=None, description="In missions of kind search: how it stands")
+
+
+class MissionSummary(View):
+    """A mission in a list."""
+
+    id: str
+    name: str
+    state: MissionState
+    reason: str = Field(default="", description="Why it is in this state")
+    created_at: datetime
+    updated_at: datetime
+    progress: Progress
+
+
+class MissionView(MissionSummary):
+    """A mission with everything an operator sees of it."""
+
+    # Checked when it was stored; checking its geometry for every answer would take milliseconds.
+    spec: SkipValidation[MissionSpec]
+    origin: tuple[Longitude, Latitude] = Field(description="Origin of the local frame, [longitude, latitude]")
+    vehicles: list[VehicleView]
+    waypoints: list[WaypointView] = Field(description="The newest waypoint of each vehicle")
+    targets: list[TargetView] = Field(default_factory=list, description="What is known of the moving targets")
+
+
+class Level(StrEnum):
+    """How much an event matters."""
+
+    INFO = "info"
+    WARNING = "warning"
+    ALARM = "alarm"
+
+
+class EventView(View):
+    """One line of a mission's log."""
+
+    id: int
+    mission_id: str
+    time: datetime
+    level: Level
+    kind: str = Field(description="Machine-readable kind, for example step, state, vehicle, sounding, safety")
+    message: str
+    data: dict[str, Any] = Field(default_factory=dict)
+
+
+class CheckStatus(StrEnum):
+    """How a line of the checklist stands."""
+
+    OK = "ok"
+    NOTE = "note"
+    """Worth knowing; nothing is wrong."""
+    WARNING = "warning"
+    """The mission can start, but look at it first."""
+    PROBLEM = "problem"
+
+
+class StepView(View):
+    """A step that was decided: its figures, and where it sent the vehicles."""
+
+    number: int
+    committed_at: datetime
+    objective: float | None
+    terms: dict[str, float]
+    figures: dict[str, float] = Field(
+        description="How far the mission had come: coverage_pct, remaining_pct, mean_sd_m, distance_m; empty in steps "
+        "of before they were kept"
+    )
+    soundings: int = Field(description="Soundings that its map was made of")
+    waypoints: list[WaypointView]
+
+
+class CheckView(View):
+    """One line of the checklist before a start."""
+
+    id: str = Field(examples=["links"])
+    title: str
+    status: CheckStatus
+    message: str
+    remedy: str = Field(default="", description="What to do about it; empty when all is well")
+
+
+class PreflightView(View):
+    """What stands before a start."""
+
+    ready: bool = Field(description="False while any line is a problem: a start would be refused or fail")
+    checks: list[CheckView]
+
+
+class StopView(View):
+    """A vehicle's answer to a stop."""
+
+    vehicle: str
+    acknowledged: bool
+    detail: str
+
+
+class ActionView(View):
+    """What an action led to, with each vehicle's answer where vehicles were stopped."""
+
+    mission: MissionSummary
+    stops: list[StopView] = Field(default_factory=list)
+
+
+class PlannerView(View):
+    """A planner that a mission may name."""
+
+    name: str
+    summary: str
+    options: dict[str, Any] = Field(description="JSON schema of its options")

@@ -1,0 +1,116 @@
+"""What is answered about soundings, batches of them and logs."""
+
+from enum import StrEnum
+
+from pydantic import Field
+
+from app.missions.views.base import View
+
+
+class Verdict(StrEnum):
+    """What happened to one measurement."""
+
+    ACCEPTED = "accepted"
+    REJECTED = "rejected"
+    """Stored with the reason, not used for the map."""
+    DUPLICATE = "duplicate"
+    """Already there; nothing stored."""
+
+
+class Ruling(StrEnum):
+    """What an operator said of a sounding."""
+
+    RESTORED = "restored"
+    """It counts, whatever gate and map think of it."""
+    REJECTED = "rejected"
+    """It does not count."""
+
+
+class SoundingState(StrEnum):
+    """Whether a sounding is in the map, and who decided that."""
+
+    USED = "used"
+    RESTORED = "restored"
+    """Used because an operator restored it."""
+    REJECTED = "rejected"
+    """Kept out by the gate."""
+    DOUBTED = "doubted"
+    """Left out of the map because its neighbours say otherwise."""
+    WITHDRAWN = "withdrawn"
+    """Kept out by an operator."""
+
+
+class SoundingView(View):
+    """A stored sounding; what was measured never changes, only whether it counts."""
+
+    id: int
+    vehicle: str
+    time_s: float = Field(description="The vehicle's clock, Unix seconds")
+    beam: int
+    step: int
+    lat_deg: float
+    lon_deg: float
+    range_m: float
+    raw_depth_m: float = Field(description="Of the bottom below the surface, as measured")
+    depth_m: float | None = Field(description="Corrected, below the datum; null where no correction could be made")
+    sd_m: float | None
+    state: SoundingState
+    reason: str = Field(description="Why it is not used, or who restored it")
+
+
+class SoundingPage(View):
+    """Some soundings, in the order they came."""
+
+    total: int = Field(description="Of all pages")
+    items: list[SoundingView]
+    next_after: int | None = Field(description="Give it as `after` for the next page; null: this is the last")
+
+
+class ItemVerdict(View):
+    """The verdict on one item of a batch."""
+
+    index: int
+    verdict: Verdict
+    reason: str = ""
+
+
+class BatchVerdict(View):
+    """The verdicts on a batch, in its order. Whatever is counted accepted is stored for good."""
+
+    accepted: int
+    rejected: int
+    duplicate: int
+    items: list[ItemVerdict]
+    replayed: bool = Field(
+        default=False, description="True: this idempotency key was seen before, this is the first answer"
+    )
+
+
+class LogImportView(View):
+    """What came of a vehicle's log."""
+
+    file: str
+    vehicle: str
+    soundings: int = Field(description="Accepted, stored for good")
+    rejected: int = Field(description="Kept but not used")
+    duplicate: int = Field(description="There before, from live telemetry or another log")
+    reasons: dict[str, int] = Field(description="Why soundings were rejected, and how many each")
+    refused: dict[str, int] = Field(description="Why ranges did not become soundings, and how many each")
+    first_s: float | None = Field(description="Vehicle's clock at the first record, Unix seconds")
+    last_s: float | None = Field(description="Vehicle's clock at the last record, Unix seconds")
+    packets: int
+    unreadable: dict[str, int] = Field(description="Packets that could not be read, by reason")
+    skipped_bytes: int = Field(description="Bytes that are no packet")
+    cut_off: bool = Field(description="The file ends in the middle, as after a power loss; what came before is used")
+    known: bool = Field(description="The whole log had been imported before; nothing was written")
+
+
+def batch_verdict(items: list[ItemVerdict]) -> BatchVerdict:
+    """Return the verdicts on a batch, in its order, with how many there are of each."""
+    tally = {verdict: sum(item.verdict is verdict for item in items) for verdict in Verdict}
+    return BatchVerdict(
+        accepted=tally[Verdict.ACCEPTED],
+        rejected=tally[Verdict.REJECTED],
+        duplicate=tally[Verdict.DUPLICATE],
+        items=items,
+    )
