@@ -14,10 +14,10 @@ from rich.console import Console
 from rich.table import Table
 
 from app.estimation import RangeSensor, Sensor, SingleBeam
-from app.exploration.constraints import Constraints
-from app.exploration.options import PlannerOptions
+from app.exploration.core.constraints import Constraints
+from app.exploration.core.problem import Belief, Situation
+from app.exploration.planner.options import PlannerOptions
 from app.exploration.planners import create_planner, warm_up
-from app.exploration.problem import Belief, Situation
 
 STEPS = 15
 NUMPY_CANDIDATES = 50

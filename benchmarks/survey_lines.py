@@ -15,7 +15,7 @@ import numpy as np
 from app.evaluation.survey import judge
 from app.evaluation.survey_world import SurveyScenario, fly_planner
 from app.evaluation.symmetry import turned
-from app.exploration.options import PlannerOptions
+from app.exploration.planner.options import PlannerOptions
 from simulator.terrain_files import load_terrain
 
 SPACING_M, ALONG_M, DEPTH_M = 10.0, 0.5, 2.5

@@ -43,7 +43,7 @@ from app.evaluation.survey import judge
 from app.evaluation.survey_world import SOUNDING_RATE_HZ, SPEED_MPS, FloatArray, SurveyScenario, fly_routes
 from app.evaluation.tables.facts import made
 from app.evaluation.tables.store import Results
-from app.exploration.planners.lawnmower import lawnmower_routes
+from app.exploration.lines.lawnmower import lawnmower_routes
 from app.mapping.types import Soundings
 
 METHODS = ("ours", "offline", "adaptive")

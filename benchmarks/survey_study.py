@@ -26,7 +26,7 @@ from app.evaluation.survey_world import Sampling, Sounder, SurveyScenario
 from app.evaluation.symmetry import turned, turned_soundings
 from app.evaluation.tables.facts import made
 from app.evaluation.tables.store import Results
-from app.exploration.options import PlannerOptions
+from app.exploration.planner.options import PlannerOptions
 from app.mapping.types import Soundings
 from simulator.seafloors import generate
 from simulator.terrain import Terrain

@@ -26,10 +26,10 @@ from app.api.schemas import API, MeasurementBatch, ScanBatch
 from app.cli import app as command_line
 from app.estimation import SingleBeam
 from app.evaluation.commands import evaluate_app
-from app.exploration.bottom import Bottom
-from app.exploration.constraints import Constraints
-from app.exploration.options import PlannerOptions
-from app.exploration.problem import Belief, Situation
+from app.exploration.core.bottom import Bottom
+from app.exploration.core.constraints import Constraints
+from app.exploration.core.problem import Belief, Situation
+from app.exploration.planner.options import PlannerOptions
 from app.main import create_app
 from app.missions.spec.mission import Limits, MissionSpec
 from app.settings import Settings

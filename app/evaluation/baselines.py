@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from app.evaluation.flown import fly_lawnmower
 from app.evaluation.survey_world import SOUNDING_RATE_HZ, SPEED_MPS, default_map, rmse_m
-from app.exploration.constraints import Constraints
+from app.exploration.core.constraints import Constraints
 from app.mapping.types import Grid
 from simulator.terrain import Terrain
 

@@ -26,9 +26,9 @@ from app.evaluation.survey_world import Sampling, Sounder, SurveyScenario
 from app.evaluation.symmetry import SYMMETRIES, turned, turned_soundings
 from app.evaluation.team_changes import TeamChanges, parse_changes
 from app.exploration.communication.messages import MAX_ENTRIES
-from app.exploration.objective import TERMS
-from app.exploration.options import PlannerOptions
+from app.exploration.core.objective import TERMS
 from app.exploration.pcao.model import PcaoModel
+from app.exploration.planner.options import PlannerOptions
 from app.exploration.planners import PLANNERS
 from simulator.terrain import Terrain, TerrainError
 from simulator.terrain_files import load_terrain

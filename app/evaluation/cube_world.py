@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from app.estimation import LandmarkEstimator, Landmarks, RangeSensor, in_sight, landmark_sets
 from app.evaluation.keep_out import draw_keep_out
 from app.evaluation.team_changes import TeamChanges, launch_site
-from app.exploration.bottom import Bottom
 from app.exploration.communication.messages import MAX_LANDMARKS
-from app.exploration.constraints import Constraints, inside_area
-from app.exploration.objective import Objective, ObjectiveWeights, VehicleProgress, objective
-from app.exploration.problem import Belief
+from app.exploration.core.bottom import Bottom
+from app.exploration.core.constraints import Constraints, inside_area
+from app.exploration.core.objective import Objective, ObjectiveWeights, VehicleProgress, objective
+from app.exploration.core.problem import Belief
 from simulator.terrain import Terrain
 
 FloatArray = NDArray[np.float64]

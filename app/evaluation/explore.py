@@ -10,10 +10,10 @@ from app.evaluation.cube_world import DEEPEST, SHALLOWEST, ExploreScenario, Worl
 from app.evaluation.osarses import Osarses
 from app.evaluation.teams import LimitedTeam, UnlimitedTeam
 from app.evaluation.tries import GradientTrier, Trier
-from app.exploration.options import PlannerOptions
+from app.exploration.core.problem import Situation
+from app.exploration.planner.base import PlannerBase
+from app.exploration.planner.options import PlannerOptions
 from app.exploration.planners import ONLY_IN_SIMULATION, PLANNERS, create_planner
-from app.exploration.planners.base import PlannerBase
-from app.exploration.problem import Situation
 
 OSARSES, TRIED_SPSA, TRIED_FDSA = ONLY_IN_SIMULATION
 EXPLORERS = (*sorted(PLANNERS), *ONLY_IN_SIMULATION)

@@ -3,8 +3,8 @@
 import numpy as np
 
 from app.evaluation.survey_world import SPEED_MPS
-from app.exploration.constraints import Constraints
-from app.exploration.planners.lawnmower import lawnmower_routes
+from app.exploration.core.constraints import Constraints
+from app.exploration.lines.lawnmower import lawnmower_routes
 from app.mapping.types import FloatArray, Soundings
 from simulator.sensors import SonarNoise
 from simulator.terrain import Terrain

@@ -5,9 +5,9 @@ from numpy.typing import NDArray
 
 from app.evaluation.cube_world import World
 from app.evaluation.tries import Trier
-from app.exploration.bottom import Bottom
-from app.exploration.objective import Terms
-from app.exploration.problem import Proposal, Situation
+from app.exploration.core.bottom import Bottom
+from app.exploration.core.objective import Terms
+from app.exploration.core.problem import Proposal, Situation
 
 FloatArray = NDArray[np.float64]
 

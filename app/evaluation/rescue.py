@@ -8,7 +8,7 @@ import numpy as np
 from app.estimation import Sensor
 from app.evaluation.jobs import Progress
 from app.evaluation.rescue_world import RescueScenario, explored_pct, fully_explored, run_search
-from app.exploration.options import PlannerOptions
+from app.exploration.planner.options import PlannerOptions
 
 TRAPPED_M, LEFT_PCT = 200.0, 5.0
 """A team is trapped that saw nothing new in at least so much of the window, the last in which it searched, while so

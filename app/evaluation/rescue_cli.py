@@ -10,7 +10,7 @@ from app.evaluation.cli import Jobs, Json, Scheduler, Seed, Seeds, compare, eval
 from app.evaluation.rescue import RescueJob
 from app.evaluation.rescue_report import VARIANTS, report_jobs, rescue_report
 from app.evaluation.rescue_world import RescueScenario
-from app.exploration.options import PlannerOptions
+from app.exploration.planner.options import PlannerOptions
 from app.exploration.planners import SEARCHERS
 from simulator.car_parks import SCENARIOS, car_park, harbour_basin
 from simulator.obstacles import ObstacleWorld

@@ -7,7 +7,7 @@ from typing import Any
 from app.evaluation.rescue import RescueJob
 from app.evaluation.rescue_world import RescueScenario
 from app.evaluation.summary import spread
-from app.exploration.options import PlannerOptions
+from app.exploration.planner.options import PlannerOptions
 from simulator.car_parks import SCENARIOS, car_park
 
 Run = Mapping[str, Any]

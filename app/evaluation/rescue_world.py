@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 from scipy.ndimage import label
 
 from app.estimation.occupancy import Cell, OccupancyGrid, Scanner
-from app.exploration.constraints import Constraints
-from app.exploration.options import PlannerOptions
+from app.exploration.core.constraints import Constraints
+from app.exploration.core.problem import Belief, Situation
+from app.exploration.planner.options import PlannerOptions
 from app.exploration.planners import create_planner
-from app.exploration.problem import Belief, Situation
-from app.exploration.search import SearchTask
+from app.exploration.site_search import SearchTask
 from simulator.obstacles import ObstacleWorld
 
 FloatArray = NDArray[np.float64]

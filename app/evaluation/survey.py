@@ -17,10 +17,10 @@ from app.evaluation.survey_world import (
     stationary_map,
     unknown_belief,
 )
-from app.exploration.options import PlannerOptions
-from app.exploration.planners.lawnmower import lawnmower_routes
-from app.exploration.survey_backbone import backbone
-from app.exploration.survey_value import make_nodes
+from app.exploration.lines.lawnmower import lawnmower_routes
+from app.exploration.planner.options import PlannerOptions
+from app.exploration.survey.backbone import backbone
+from app.exploration.survey.value import make_nodes
 from app.mapping.types import FloatArray, Soundings
 
 TVU_A_M, TVU_B = 0.25, 0.0075

@@ -7,7 +7,7 @@ from app.estimation import Sensor, SingleBeam
 from app.evaluation.jobs import Progress
 from app.evaluation.survey import run_survey
 from app.evaluation.survey_world import SurveyScenario
-from app.exploration.options import PlannerOptions
+from app.exploration.planner.options import PlannerOptions
 from app.mapping.types import Soundings
 
 

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.estimation import Attitude, Multibeam, SingleBeam
-from app.exploration.constraints import Constraints
-from app.exploration.options import PlannerOptions
+from app.exploration.core.constraints import Constraints
+from app.exploration.core.problem import Belief, Situation
+from app.exploration.planner.options import PlannerOptions
 from app.exploration.planners import create_planner
-from app.exploration.problem import Belief, Situation
 from app.mapping.gp import GaussianProcessMap
 from app.mapping.outliers import OutlierReport
 from app.mapping.types import BathymetricMap, Grid, Soundings

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from app.exploration.constraints import Constraints, inside_area
+from app.exploration.core.constraints import Constraints, inside_area
 
 FloatArray = NDArray[np.float64]
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from app.estimation import Landmarks
 from app.evaluation.cube_world import MAX_STEP, World
 from app.exploration.communication import StationNode, VehicleNode, WireFormat
-from app.exploration.problem import Belief
+from app.exploration.core.problem import Belief
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]

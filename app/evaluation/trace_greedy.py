@@ -10,9 +10,9 @@ from numba import njit
 from numpy.typing import NDArray
 
 from app.evaluation.track_world import TrackWorld
-from app.exploration.bottom import Bottom
-from app.exploration.errands import neighbouring_moves
-from app.exploration.problem import Proposal, Situation
+from app.exploration.core.bottom import Bottom
+from app.exploration.core.detours import neighbouring_moves
+from app.exploration.core.problem import Proposal, Situation
 
 FloatArray = NDArray[np.float64]
 

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from app.evaluation.trace_greedy import TRACE_GREEDY, TraceGreedy
 from app.evaluation.track_world import TrackScenario, TrackWorld
-from app.exploration.options import PlannerOptions
+from app.exploration.core.problem import Proposal, Situation
+from app.exploration.planner.options import PlannerOptions
 from app.exploration.planners import PLANNERS, create_planner
-from app.exploration.problem import Proposal, Situation
 
 FloatArray = NDArray[np.float64]
 

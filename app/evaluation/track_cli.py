@@ -23,7 +23,7 @@ from app.evaluation.cli import (
 )
 from app.evaluation.track import TRACKERS
 from app.evaluation.track_world import TrackScenario
-from app.exploration.options import PlannerOptions
+from app.exploration.planner.options import PlannerOptions
 from simulator.seafloors import generate
 from simulator.terrain import Terrain
 

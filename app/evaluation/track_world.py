@@ -34,10 +34,10 @@ from app.evaluation.cube_world import (
 )
 from app.evaluation.plain_ekf import PlainEkf
 from app.evaluation.presumed import Presumed
-from app.exploration.constraints import Constraints
-from app.exploration.dynamic import Localization, Targets, dynamic_cost
-from app.exploration.objective import MED13_K, med13_objective
-from app.exploration.problem import Belief, Situation
+from app.exploration.core.constraints import Constraints
+from app.exploration.core.dynamic import Localization, Targets, dynamic_cost
+from app.exploration.core.objective import MED13_K, med13_objective
+from app.exploration.core.problem import Belief, Situation
 from simulator.terrain import Terrain
 
 FloatArray = NDArray[np.float64]

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from app.estimation import Landmarks, landmark_sets
 from app.evaluation.cube_world import World
-from app.exploration.bottom import Bottom
-from app.exploration.objective import Objective, ObjectiveWeights, Terms, VehicleProgress, med13_objective
-from app.exploration.planners.base import settle
-from app.exploration.planners.gradient import Method, ascent, directions, gradient, perturbation, spsa_directions
-from app.exploration.problem import Proposal, Situation
+from app.exploration.cao.gradient import Method, ascent, directions, gradient, perturbation, spsa_directions
+from app.exploration.core.bottom import Bottom
+from app.exploration.core.objective import Objective, ObjectiveWeights, Terms, VehicleProgress, med13_objective
+from app.exploration.core.problem import Proposal, Situation
+from app.exploration.planner.base import settle
 
 FloatArray = NDArray[np.float64]
 

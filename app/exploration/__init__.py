@@ -1,1 +1,5 @@
-"""Where to go: objectives, constraints and planners. Pure: numpy in, numpy out."""
+"""Where every vehicle goes next. Pure: numpy in, numpy out; random generators are passed in.
+
+``core`` is what all planners share, ``planner`` what a planner is, each other folder a family of planners, and
+``planners`` their names: adding one is a class derived from ``planner.base.PlannerBase`` and a line there.
+"""

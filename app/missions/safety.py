@@ -13,8 +13,8 @@ from shapely.geometry.base import BaseGeometry
 from shapely.geometry.polygon import orient
 from shapely.ops import nearest_points, unary_union
 
-from app.exploration.bottom import Bottom
-from app.exploration.constraints import Constraints
+from app.exploration.core.bottom import Bottom
+from app.exploration.core.constraints import Constraints
 
 FloatArray = NDArray[np.float64]
 

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import structlog
 
-from app.exploration.options import PlannerOptions
+from app.exploration.planner.options import PlannerOptions
 from app.exploration.planners import PLANNERS
 from app.mapping.products.tracks import Track, TrackPoint
 from app.missions import states

@@ -4,8 +4,8 @@ import pytest
 from app.evaluation.cube_world import CubeTerrain, ExploreScenario, World
 from app.evaluation.explore import run_explore
 from app.evaluation.team_changes import TeamChanges
-from app.exploration.constraints import inside_area
-from app.exploration.options import PlannerOptions
+from app.exploration.core.constraints import inside_area
+from app.exploration.planner.options import PlannerOptions
 from simulator.seafloors import generate
 from simulator.terrain import Terrain
 

@@ -18,7 +18,7 @@ from app.evaluation.pcao.terrains import sea_floor, sea_floors_of
 from app.evaluation.pcao.training import Checkpoint, CheckpointError, make_optimiser, train
 from app.evaluation.pcao.tried import FDSA, SE, SPSA, _credits, _progress, fly_tried, tries_per_step
 from app.evaluation.pcao.world import SONAR, SeaFloor
-from app.exploration.objective import objective
+from app.exploration.core.objective import objective
 from app.exploration.pcao.controller import gains
 from app.exploration.pcao.model import PcaoModel, default_model
 from simulator.terrain import TerrainError
@@ -66,7 +66,7 @@ def test_a_flight_never_loses_what_it_knows_and_repeats_itself(floor, task):
 
 
 def test_the_tries_are_judged_by_the_objective(floor):
-    """J1, J2 and J3 of the compiled yardsticks are those of app.exploration.objective."""
+    """J1, J2 and J3 of the compiled yardsticks are those of app.exploration.core.objective."""
     rng = np.random.default_rng(2)
     m, n = 50, 3
     points = np.column_stack([rng.uniform(-1, 1, (m, 2)), rng.uniform(0.2, 1, m)])

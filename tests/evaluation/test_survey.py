@@ -10,7 +10,7 @@ from app.evaluation.baselines import lawnmower_baseline, lawnmower_baselines
 from app.evaluation.flown import fly_lawnmower
 from app.evaluation.survey import run_survey
 from app.evaluation.survey_world import SurveyScenario, along, default_map, fly_planner, rmse_m
-from app.exploration.options import PlannerOptions
+from app.exploration.planner.options import PlannerOptions
 from simulator.seafloors import generate
 
 QUICK = PlannerOptions(search=40)

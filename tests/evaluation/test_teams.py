@@ -5,7 +5,7 @@ from app.evaluation.cube_world import ExploreScenario, World
 from app.evaluation.explore import run_explore
 from app.evaluation.team_changes import TeamChanges
 from app.evaluation.teams import SILENT_AFTER, LimitedTeam, UnlimitedTeam
-from app.exploration.options import PlannerOptions
+from app.exploration.planner.options import PlannerOptions
 from simulator.seafloors import generate
 
 

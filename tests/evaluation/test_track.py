@@ -17,7 +17,7 @@ from app.evaluation.track_cli import evaluate_app
 from app.evaluation.track_world import TrackScenario, TrackWorld
 from app.evaluation.tracking import consistency
 from app.evaluation.tracking.setups import TrackJob
-from app.exploration.options import PlannerOptions
+from app.exploration.planner.options import PlannerOptions
 from simulator.seafloors import generate
 
 FLOOR = generate("rugged", 1, width_m=50.0, height_m=50.0)

@@ -1,7 +1,7 @@
 import numpy as np
 
-from app.exploration.constraints import Constraints
-from app.exploration.problem import Belief, Situation
+from app.exploration.core.constraints import Constraints
+from app.exploration.core.problem import Belief, Situation
 
 SQUARE = np.array([[0.0, 0.0], [100.0, 0.0], [100.0, 100.0], [0.0, 100.0]])
 

@@ -8,19 +8,27 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from app.estimation import RangeSensor
-from app.exploration.bottom import Bottom
-from app.exploration.constraints import Constraints
-from app.exploration.dynamic import Targets
-from app.exploration.options import PlannerOptions
+from app.exploration.core.bottom import Bottom
+from app.exploration.core.constraints import Constraints
+from app.exploration.core.dynamic import Targets
+from app.exploration.core.problem import Belief, Situation
+from app.exploration.planner.options import PlannerOptions
 from app.exploration.planners import create_planner
-from app.exploration.problem import Belief, Situation
-from app.exploration.rollout.apart import fly_alone, improve_apart, judge, no_paths, no_routes, route_of, trace
-from app.exploration.rollout.apart_mission import apart_mission
 from app.exploration.rollout.flight import Rules
 from app.exploration.rollout.floor import estimate_floor, let_stay, sample
 from app.exploration.rollout.free_space import free_space
+from app.exploration.rollout.independent_mission import apart_mission
+from app.exploration.rollout.independent_routes import (
+    fly_alone,
+    improve_apart,
+    judge,
+    no_paths,
+    no_routes,
+    route_of,
+    trace,
+)
+from app.exploration.rollout.local_search import DRAWS
 from app.exploration.rollout.points import SURELY, look_whole, make_points
-from app.exploration.rollout.search import DRAWS
 from app.exploration.rollout.sectors import sectors
 
 CUBE = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])

@@ -4,8 +4,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely import LineString, Point, Polygon
 
-from app.exploration.bottom import Bottom
-from app.exploration.constraints import Constraints, Limit, inside_area
+from app.exploration.core.bottom import Bottom
+from app.exploration.core.constraints import Constraints, Limit, inside_area
 
 L_SHAPE = np.array([[0.0, 0.0], [100.0, 0.0], [100.0, 40.0], [40.0, 40.0], [40.0, 100.0], [0.0, 100.0]])
 ZONE = np.array([[10.0, 10.0], [30.0, 12.0], [28.0, 30.0], [12.0, 28.0]])

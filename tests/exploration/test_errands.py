@@ -7,13 +7,13 @@ import pytest
 from situations import SQUARE, make_belief, make_situation
 
 from app.estimation import RangeSensor
-from app.exploration.bottom import Bottom
-from app.exploration.constraints import Constraints
-from app.exploration.dynamic import FICTITIOUS_WEIGHT, Localization, Targets, dynamic_cost
-from app.exploration.lacking import lacking
-from app.exploration.options import PlannerOptions
+from app.exploration.core.bottom import Bottom
+from app.exploration.core.constraints import Constraints
+from app.exploration.core.dynamic import FICTITIOUS_WEIGHT, Localization, Targets, dynamic_cost
+from app.exploration.core.information_need import lacking
+from app.exploration.core.problem import Belief
+from app.exploration.planner.options import PlannerOptions
 from app.exploration.planners import PLANNERS, create_planner
-from app.exploration.problem import Belief
 
 NAMES = ("a", "b", "c")
 START = np.array([[20.0, 20.0, 4.0], [30.0, 20.0, 3.0], [40.0, 20.0, 4.0]])

@@ -4,8 +4,8 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from app.exploration.regressors import landmark_predictions
-from app.exploration.regressors.landmark_predictions import predict, within_reach
+from app.exploration.cao.regressors import landmark_predictions
+from app.exploration.cao.regressors.landmark_predictions import predict, within_reach
 
 VISIBILITY, NOISE, STEP = 0.4, 0.1, 0.05
 

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from app.estimation import LandmarkSets, RangeSensor
-from app.exploration.constraints import Constraints
-from app.exploration.measured import MeasuredObjective
-from app.exploration.objective import ObjectiveWeights, med13_objective, objective
-from app.exploration.options import PlannerOptions
-from app.exploration.problem import Belief, Situation
+from app.exploration.core.constraints import Constraints
+from app.exploration.core.objective import ObjectiveWeights, med13_objective, objective
+from app.exploration.core.problem import Belief, Situation
+from app.exploration.planner.measured import MeasuredObjective
+from app.exploration.planner.options import PlannerOptions
 
 SENSOR = RangeSensor()
 AREA = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])

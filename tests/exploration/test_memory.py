@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from app.exploration.memory import pack, unpack
+from app.exploration.core.snapshot_codec import pack, unpack
 
 
 def test_arrays_come_back_exactly() -> None:

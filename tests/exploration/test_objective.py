@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from app.estimation import LandmarkSets
-from app.exploration.objective import (
+from app.exploration.core.objective import (
     ObjectiveWeights,
     VehicleProgress,
     med13_objective,

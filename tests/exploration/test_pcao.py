@@ -10,8 +10,7 @@ from pydantic import ValidationError
 from situations import SQUARE, make_belief, make_situation
 
 from app.estimation import RangeSensor, SingleBeam
-from app.exploration.constraints import Constraints
-from app.exploration.options import PlannerOptions
+from app.exploration.core.constraints import Constraints
 from app.exploration.pcao.controller import (
     BLOCKS,
     E1,
@@ -28,9 +27,10 @@ from app.exploration.pcao.controller import (
     within_step,
 )
 from app.exploration.pcao.model import PcaoModel, Training, default_model
+from app.exploration.pcao.planner import linked
 from app.exploration.pcao.state import N_FIGURES, N_VECTORS, reduced_state
+from app.exploration.planner.options import PlannerOptions
 from app.exploration.planners import create_planner
-from app.exploration.planners.pcao import linked
 
 UNIT = 0.1
 

@@ -7,12 +7,12 @@ from hypothesis import strategies as st
 from situations import SQUARE, make_belief, make_situation
 
 from app.estimation import RangeSensor, SingleBeam
-from app.exploration.bottom import Bottom
-from app.exploration.constraints import Constraints
-from app.exploration.options import PlannerOptions
+from app.exploration.core.bottom import Bottom
+from app.exploration.core.constraints import Constraints
+from app.exploration.core.problem import Belief, Situation
+from app.exploration.planner.options import PlannerOptions
 from app.exploration.planners import PLANNERS, create_planner
-from app.exploration.problem import Belief, Situation
-from app.exploration.survey_error import expected_roughness
+from app.exploration.survey.error import expected_roughness
 
 QUICK = {"search": 30, "candidates": 24, "rollouts": 20}
 KINDS = [

@@ -6,15 +6,15 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from situations import SQUARE, make_situation
 
-from app.exploration.bottom import Bottom
-from app.exploration.constraints import Constraints
-from app.exploration.felt_bottom import FeltBottom
-from app.exploration.problem import Belief
-from app.exploration.rollout.backbones import Backbone, backbones, with_team
+from app.exploration.core.bottom import Bottom
+from app.exploration.core.bottom_contacts import FeltBottom
+from app.exploration.core.constraints import Constraints
+from app.exploration.core.problem import Belief
 from app.exploration.rollout.flight import Plan, Rules, begin, fly_plan, fly_step, look, make_work, new_course
 from app.exploration.rollout.floor import ENVELOPE_SLOPE, estimate_floor, sample
 from app.exploration.rollout.free_space import clear_ways, free_space, settle_waypoint
-from app.exploration.rollout.search import DRAWS, improve
+from app.exploration.rollout.initial_plans import Backbone, backbones, with_team
+from app.exploration.rollout.local_search import DRAWS, improve
 
 CUBE = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 RULES = Rules(0.05, 0.3, -1.0, 1.0, 0.4, 0.1, cut_corners=True)

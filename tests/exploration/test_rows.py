@@ -4,8 +4,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely import LineString, Polygon
 
-from app.exploration.constraints import Constraints
-from app.exploration.rows import RowSpace, lines_over
+from app.exploration.core.constraints import Constraints
+from app.exploration.lines.formation_lines import RowSpace, lines_over
 
 AREA = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 START = np.array([-0.8, -0.8, 0.1])

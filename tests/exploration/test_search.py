@@ -10,14 +10,14 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 
 from app.estimation import Cell, OccupancyGrid, Scanner
-from app.exploration.constraints import Constraints
-from app.exploration.options import PlannerOptions
+from app.exploration.core.constraints import Constraints
+from app.exploration.core.problem import Belief, Situation
+from app.exploration.planner.options import PlannerOptions
 from app.exploration.planners import SEARCHERS, create_planner
-from app.exploration.problem import Belief, Situation
-from app.exploration.search import SearchTask
-from app.exploration.search.criteria import Standstill, Supervisor, Weights, in_contact, nearness, terms
-from app.exploration.search.gains import Gains, gains, take
-from app.exploration.search.ground import STRAIGHT, UNREACHED, Ground
+from app.exploration.site_search import SearchTask
+from app.exploration.site_search.criteria import Standstill, Supervisor, Weights, in_contact, nearness, terms
+from app.exploration.site_search.gains import Gains, gains, take
+from app.exploration.site_search.ground import STRAIGHT, UNREACHED, Ground
 from simulator.obstacles import ObstacleWorld
 
 SIDE = 40

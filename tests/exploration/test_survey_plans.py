@@ -9,13 +9,13 @@ from situations import make_situation
 
 from app.estimation import SingleBeam
 from app.evaluation.survey_world import SurveyScenario, fly_planner
-from app.exploration.constraints import Constraints
-from app.exploration.options import PlannerOptions
+from app.exploration.core.constraints import Constraints
+from app.exploration.core.routes import fly, next_waypoint
+from app.exploration.planner.options import PlannerOptions
 from app.exploration.planners import create_planner
-from app.exploration.routes import fly, next_waypoint
-from app.exploration.survey_error import MOST_DOUBTS, SECOND_LOOK, with_second_looks
-from app.exploration.survey_search import DRAWS, improve
-from app.exploration.survey_value import Objective, lower_to_segment, make_nodes, plan_value
+from app.exploration.survey.error import MOST_DOUBTS, SECOND_LOOK, with_second_looks
+from app.exploration.survey.local_search import DRAWS, improve
+from app.exploration.survey.value import Objective, lower_to_segment, make_nodes, plan_value
 from simulator.seafloors import generate
 
 SQUARE = np.array([[0.0, 0.0], [100.0, 0.0], [100.0, 100.0], [0.0, 100.0]])

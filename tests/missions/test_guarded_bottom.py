@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from app.exploration.core.problem import Belief
 from app.exploration.planners import create_planner
-from app.exploration.problem import Belief
 from app.mapping.tides import TideTable
 from app.missions.clock import now
 from app.missions.fleet.interface import Position, VehicleReport

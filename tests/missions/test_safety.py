@@ -9,9 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely.geometry import LineString, Point, Polygon
 
-from app.exploration.bottom import Bottom
-from app.exploration.constraints import Constraints
-from app.exploration.problem import Belief, Proposal, Situation
+from app.exploration.core.bottom import Bottom
+from app.exploration.core.constraints import Constraints
+from app.exploration.core.problem import Belief, Proposal, Situation
 from app.missions import safety
 from app.missions.flight.decision import Decision, Place, decide, make_constraints
 from app.missions.spec.mission import MissionSpec

@@ -16,10 +16,10 @@ from PIL import Image
 from shapely.geometry import Point, Polygon
 from sqlalchemy import event, select
 
-from app.exploration.bottom import Bottom
+from app.exploration.core.bottom import Bottom
+from app.exploration.core.problem import Proposal, Situation
+from app.exploration.planner.random_walk import RandomPlanner
 from app.exploration.planners import PLANNERS
-from app.exploration.planners.random_walk import RandomPlanner
-from app.exploration.problem import Proposal, Situation
 from app.missions.errors import (
     ConflictError,
     InvalidRequestError,

@@ -18,8 +18,8 @@ from app.evaluation.pcao.optimisers import METHODS
 from app.evaluation.pcao.task import TrainingTask
 from app.evaluation.pcao.tried import FDSA, SE, SPSA, fly_tried, tries_per_step
 from app.evaluation.pcao.world import LANDMARKS, ROBOTS, STEPS, SeaFloor
-from app.exploration.options import PlannerOptions
 from app.exploration.pcao.model import PcaoModel
+from app.exploration.planner.options import PlannerOptions
 from simulator.terrain import Terrain
 
 FloatArray = NDArray[np.float64]

@@ -1,6 +1,6 @@
 """SE(C), SPSA and FDSA in PCAO18's simulation, compiled: yardsticks that really try their moves and take them back.
 
-They judge by AURO15's objective (eq. 8-15, :mod:`app.exploration.objective` says how it is read), as the paper's SE
+They judge by AURO15's objective (eq. 8-15, read as in :mod:`app.exploration.core.objective`), as the paper's SE
 does ([20, algorithm 1]). A try is flown, pinged with and judged; its measurements are dropped.
 """
 
@@ -16,7 +16,7 @@ BoolArray = NDArray[np.bool_]
 
 SE, SPSA, FDSA = 0, 1, 2
 PERTURBATION, DECAY = 0.5, 0.101
-"""Of SPSA and FDSA; see :mod:`app.exploration.planners.gradient`."""
+"""Of SPSA and FDSA; see :mod:`app.exploration.cao.gradient`."""
 EPS2 = EPS3 = 1e-9
 DRAWS = 1000
 

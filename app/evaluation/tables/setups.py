@@ -11,8 +11,8 @@ from app.evaluation.cube_world import ExploreScenario
 from app.evaluation.explore import OSARSES, run_explore
 from app.evaluation.jobs import Progress
 from app.evaluation.team_changes import TeamChanges
-from app.exploration.objective import TERMS, Terms
-from app.exploration.options import PlannerOptions
+from app.exploration.core.objective import TERMS, Terms
+from app.exploration.planner.options import PlannerOptions
 from app.exploration.planners import PLANNERS
 from simulator.terrain import Terrain
 

@@ -11,7 +11,7 @@ from app.evaluation.jobs import Progress
 from app.evaluation.trace_greedy import TRACE_GREEDY
 from app.evaluation.track import run_track
 from app.evaluation.track_world import TrackScenario
-from app.exploration.options import PlannerOptions
+from app.exploration.planner.options import PlannerOptions
 from simulator.terrain import Terrain
 
 HISTORY_EVERY = 10

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 from scipy.spatial import cKDTree
 
-from app.exploration.bottom import Bottom
-from app.exploration.problem import Belief
+from app.exploration.core.bottom import Bottom
+from app.exploration.core.problem import Belief
 
 FloatArray = NDArray[np.float64]
 

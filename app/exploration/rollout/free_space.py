@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import binary_erosion, distance_transform_edt
 from shapely import Polygon
 
-from app.exploration.constraints import Constraints, inside_area
+from app.exploration.core.constraints import Constraints, inside_area
 from app.exploration.rollout.flight import Plan
 
 FloatArray = NDArray[np.float64]

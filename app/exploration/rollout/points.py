@@ -11,7 +11,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from app.exploration.problem import Belief
+from app.exploration.core.problem import Belief
 from app.exploration.rollout.flight import NEAREST, Work, make_work
 
 FloatArray = NDArray[np.float64]

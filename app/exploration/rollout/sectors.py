@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from app.exploration.lattice import longer_axis_rad
+from app.exploration.lines.lattice import longer_axis_rad
 
 FloatArray = NDArray[np.float64]
 

@@ -4,8 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 from sqlalchemy.orm import make_transient
 
-from app.exploration.bottom import Bottom
-from app.exploration.constraints import Constraints
+from app.exploration.core.bottom import Bottom
+from app.exploration.core.constraints import Constraints
 from app.missions import metrics, safety
 from app.missions.clock import now
 from app.missions.fleet.interface import Position, WaypointOrder, WaypointStatus

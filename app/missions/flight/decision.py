@@ -7,12 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 from shapely.geometry import Polygon
 
-from app.exploration.bottom import Bottom
-from app.exploration.constraints import Constraints
-from app.exploration.dynamic import Localization, Targets
-from app.exploration.errands import due_to_rise
-from app.exploration.problem import Belief, Planner, Situation
-from app.exploration.search import SearchTask
+from app.exploration.core.bottom import Bottom
+from app.exploration.core.constraints import Constraints
+from app.exploration.core.detours import due_to_rise
+from app.exploration.core.dynamic import Localization, Targets
+from app.exploration.core.problem import Belief, Planner, Situation
+from app.exploration.site_search import SearchTask
 from app.missions import safety
 from app.missions.search.course import hold_before_hazards
 from app.missions.spec.mission import MissionSpec, SurfacePolicy, VehicleKind

@@ -5,7 +5,7 @@ from collections.abc import Awaitable, Callable
 
 import numpy as np
 
-from app.exploration.search import SearchTask
+from app.exploration.site_search import SearchTask
 from app.missions.flight.decision import Decision
 from app.missions.live.mission import LiveMission
 from app.missions.search.course import IDLE_STEPS, REST_S, Course

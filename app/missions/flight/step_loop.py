@@ -13,8 +13,8 @@ from concurrent.futures import Executor
 import numpy as np
 from numpy.typing import NDArray
 
+from app.exploration.core.problem import Planner
 from app.exploration.planners import create_planner
-from app.exploration.problem import Planner
 from app.missions import metrics
 from app.missions.clock import now
 from app.missions.fleet.hub import FleetHub

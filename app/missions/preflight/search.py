@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from app.exploration.search.ground import UNREACHED, Ground
+from app.exploration.site_search.ground import UNREACHED, Ground
 from app.missions.fleet.hub import FleetHub
 from app.missions.live.mission import LiveMission
 from app.missions.live.vehicles import local_place

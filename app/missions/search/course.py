@@ -6,8 +6,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from app.exploration.search import SearchTask
-from app.exploration.search.ground import Ground
+from app.exploration.site_search import SearchTask
+from app.exploration.site_search.ground import Ground
 from app.mapping.georeference import LocalFrame
 from app.missions.search.state import Search
 from app.missions.spec.mission import MissionSpec

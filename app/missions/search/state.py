@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.estimation.occupancy import Cell, OccupancyGrid
-from app.exploration.planners.search_base import HOME_STEPS
-from app.exploration.search import SearchTask
-from app.exploration.search.criteria import in_contact
-from app.exploration.search.ground import Ground
+from app.exploration.site_search import SearchTask
+from app.exploration.site_search.base import HOME_STEPS
+from app.exploration.site_search.criteria import in_contact
+from app.exploration.site_search.ground import Ground
 from app.mapping.georeference import LocalFrame
 from app.missions.clock import now
 from app.missions.fleet.interface import ScanReport

@@ -13,7 +13,7 @@ from pydantic import FailFast, Field, field_validator, model_validator
 from shapely.geometry import Point, Polygon
 from shapely.geometry.polygon import orient
 
-from app.exploration.options import PlannerOptions
+from app.exploration.planner.options import PlannerOptions
 from app.mapping.georeference import LocalFrame
 from app.mapping.vertical import LOWEST_ASTRONOMICAL_TIDE, check_depth_datum
 from app.missions.spec.base import Latitude, Longitude, Model, Name, PolygonGeometry

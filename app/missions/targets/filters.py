@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from app.estimation.sensors import RangeSensor
 from app.estimation.targets import TargetEstimator, TargetTrack, expected_range
-from app.exploration.dynamic import Targets
-from app.exploration.memory import pack, unpack
+from app.exploration.core.dynamic import Targets
+from app.exploration.core.snapshot_codec import pack, unpack
 from app.mapping.georeference import LocalFrame
 from app.missions.fleet.interface import RangeReport
 from app.missions.spec.mission import MissionSpec

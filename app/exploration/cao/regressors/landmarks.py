@@ -1,0 +1,114 @@
+"""Predictions for sensors that see landmarks from afar, from the current estimates (method of AURO15, map regressors).
+
+phi = (expected progress of landmarks in sight towards accuracy, expected newly accurate ones, minus the sum over the
+vehicles of the distance to the closest open landmark, in steps). Unseen landmarks are taken to be as deep as the
+closest seen one. While nothing is gained the whole team heads for one common landmark: vehicles that pull towards
+different ones under a communication limit would hold each other back for ever.
+"""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from app.estimation import RangeSensor, Sensor
+from app.exploration.cao.regressors.landmark_predictions import predict, within_reach
+from app.exploration.cao.regressors.moves import team_moves
+from app.exploration.core.bottom import Bottom
+from app.exploration.core.information_need import lacking
+from app.exploration.core.problem import Situation
+from app.exploration.planner.measured import MeasuredObjective
+from app.exploration.planner.options import PlannerOptions
+
+FloatArray = NDArray[np.float64]
+
+PATIENCE = 3
+"""Steps without a new accurate landmark after which the team heads for one common landmark."""
+
+
+class LandmarkRegressors:
+    """See the module's text."""
+
+    def __init__(self, options: PlannerOptions, sensor: Sensor) -> None:
+        if not isinstance(sensor, RangeSensor):
+            raise ValueError(f"sensor: landmark regressors need a RangeSensor, not {type(sensor).__name__}")
+        self._options = options
+        self._sensor = sensor
+        self._measured = MeasuredObjective(sensor, options)
+        self._accurate = 0
+        self._idle = 0
+
+    def begin(self, team: Situation, bottom: Bottom, seed: int) -> FloatArray:
+        """See :class:`app.exploration.cao.planner.Regressors`."""
+        self._team, self._seed = team, seed
+        belief = team.belief
+        depth = belief.depth_m.copy()
+        known = np.isfinite(depth)
+        if known.any() and not known.all():
+            _, nearest = cKDTree(belief.xy_m[known], balanced_tree=False, compact_nodes=False).query(
+                belief.xy_m[~known]
+            )
+            depth[~known] = depth[known][nearest]
+        elif not known.any():
+            depth[:] = team.positions[:, 2].max() + self._sensor.visibility_m / 2
+        left = lacking(belief, self._options.accuracy_sd_m)
+        self._points = np.ascontiguousarray(np.column_stack([belief.xy_m, depth])[left.row])
+        self._needed = left.need
+        self._direction = None if belief.covariance_m2 is None else left.direction
+        J = self._measured.update(team)
+        gained = int(belief.accurate.sum()) > self._accurate
+        self._accurate = int(belief.accurate.sum())
+        self._idle = 0 if gained else self._idle + 1
+        self._goals = self._points
+        if self._idle >= PATIENCE and len(self._points):
+            squared = ((self._points[None, :, :2] - team.positions[:, None, :2]) ** 2).sum(axis=2)
+            self._goals = self._points[[int(squared.min(axis=0).argmin())]]
+        return J
+
+    def prior(self, team: Situation) -> tuple[FloatArray, float]:
+        """Progress and completed landmarks count alike; the pull of far ones is gentle."""
+        return np.array([1.0, 1.0, 1.0]), 20.0
+
+    def trusted(self, theta: FloatArray) -> FloatArray:
+        """No prediction counts against what it predicts, and none is switched off altogether."""
+        return np.maximum(theta, 0.2)
+
+    def candidates(self, alpha: float) -> FloatArray:
+        """Whole steps, the team's common heading mixed with each vehicle's own, and random moves of size alpha."""
+        team, step = self._team, self._team.constraints.max_step_m * (1 - 1e-9)
+        n = self._options.candidates * len(team.vehicles)
+        return team.positions + team_moves(self._seed, team.vehicles, n, 3, step, alpha)
+
+    def regressors(self, candidates: FloatArray) -> FloatArray:
+        """See the module's text."""
+        if len(self._points) == 0:
+            return np.zeros((len(candidates), 3))
+        configurations = np.ascontiguousarray(candidates)
+        reach = np.linalg.norm(configurations - self._team.positions, axis=2).max(axis=0, initial=0.0)
+        starts, index = within_reach(self._team.positions, self._points, reach, self._sensor.visibility_m)
+        return predict(
+            self._team.positions,
+            configurations,
+            self._points[index],
+            index,
+            starts,
+            self._needed,
+            self._goals,
+            self._sensor.visibility_m,
+            self._sensor.relative_noise,
+            self._team.constraints.max_step_m,
+            None if self._direction is None else self._direction[index],
+        )
+
+    def chosen(self, positions: FloatArray) -> None:
+        """Nothing to keep."""
+
+    def remember(self) -> dict[str, Any]:
+        """Return the memory."""
+        return {"measured": self._measured.remember(), "accurate": self._accurate, "idle": self._idle}
+
+    def recall(self, state: dict[str, Any]) -> None:
+        """Take up what :meth:`remember` returned."""
+        self._measured.recall(state["measured"])
+        self._accurate, self._idle = int(state["accurate"]), int(state["idle"])

@@ -1,0 +1,359 @@
+"""Predictions for bathymeter missions, from the current map: what a leg gains, and how good the final map becomes.
+
+The team holds two plans for all remaining steps: the coverage backbone, and a freer plan that is improved again and
+again (:mod:`.survey.local_search`) towards where the map is rough and little sounded. It follows the backbone
+until the freer plan promises a clearly better final map. The plan is made anew ``REPLANS`` times in a mission, and when
+the team changes. Then the candidates are the next legs of both plans, turns that a vehicle can fly, legs to places of
+high gain, and random ones; each is judged by the final map when the plan goes on from its end. In between the plan
+is followed.
+
+phi = (improvement of the predicted final map over the plan kept so far, uncertainty removed by the legs alone); the
+objective measured after a step is the improvement of the predicted final map that really came about.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+from shapely import Polygon, unary_union
+
+from app.exploration.core.bottom import Bottom
+from app.exploration.core.constraints import Constraints, inside_area
+from app.exploration.core.geometry import convex
+from app.exploration.core.problem import Belief, Situation
+from app.exploration.core.routes import CORNER_TOLERANCE, next_waypoint
+from app.exploration.lines.handover import hand_over
+from app.exploration.planner.base import vehicle_rng
+from app.exploration.planner.options import PlannerOptions
+from app.exploration.survey.backbone import MARGIN_M, backbone
+from app.exploration.survey.error import expected_roughness, with_second_looks
+from app.exploration.survey.local_search import DRAWS, improve
+from app.exploration.survey.value import Nodes, Objective, make_nodes, plan_value, values_after_first_leg
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
+AtCruise = Callable[[Situation, Bottom, FloatArray], FloatArray]
+
+MAX_NODES = 2500
+REPLANS = 20
+"""How often the plan is made anew in a mission."""
+HEAT = 0.01
+"""Part by which changes to a plan may worsen it while the search begins."""
+POWER = 2.0
+REACH = 4.0
+"""Line spacings beyond which a place counts as quite unknown."""
+LEAVE_BACKBONE = 0.98
+"""The freer plan must promise at most this part of the squared error that the backbone promises."""
+LEAVE_PLAN = 0.02
+"""A leg off the plan must promise a squared error smaller by this part: predictions are noisy, and a choice among many
+takes the luckiest."""
+JITTER = 0.7
+TURN_PENALTY = 0.002
+"""Relative worsening of the final map that a reversal counts for."""
+TURNS_RAD = np.deg2rad([-120.0, -90.0, -60.0, -30.0, 0.0, 30.0, 60.0, 90.0, 120.0])
+
+
+class SurveyRegressors:
+    """See the module's text."""
+
+    def __init__(self, options: PlannerOptions, at_cruise: AtCruise, *, every_step: bool = False) -> None:
+        """Vehicles move at their cruise depths by ``at_cruise``.
+
+        ``every_step``: the regressors are asked for other legs than :meth:`candidates` in every step; costs time.
+        """
+        self._options = options
+        self._at_cruise = at_cruise
+        self._every_step = every_step
+        self._backbone: dict[str, FloatArray] = {}
+        self._coarse: dict[str, int] = {}
+        self._plan: dict[str, FloatArray] = {}
+        self._expected: float | None = None
+        self._planned = 0
+        self._free = False
+        self._row = [0.0, 0.0]
+
+    def begin(self, team: Situation, bottom: Bottom, seed: int) -> float:
+        """See :class:`app.exploration.cao.planner.Regressors`.
+
+        What came of a plan is only measured when the next is made, for the leg chosen when that one was made.
+        """
+        self._team, self._bottom, self._seed = team, bottom, seed
+        self._en = np.ascontiguousarray(team.positions[:, :2])
+        self._steps = max(1, team.steps_total - team.step + 1)
+        self._step_m = team.constraints.max_step_m * (1 - 1e-9)
+        begins = not self._plan.keys() & set(team.vehicles)
+        changed = not begins and self._plan.keys() != set(team.vehicles)
+        every = max(1, round(team.steps_total / REPLANS))
+        explores = not begins and any(self._coarse.get(v, 0) == 0 for v in team.vehicles)
+        self._replans = changed or (explores and team.step - self._planned >= every)
+        self._looks = begins or self._replans or self._every_step
+        if not self._looks:
+            self._followed = self._packed(self._plan if self._free else self._backbone)
+            return np.nan
+        self._look()
+        if begins:
+            self._adopt_backbone()
+        elif changed:
+            self._hand_over()
+        plan, lattice = self._packed(self._plan), self._packed(self._backbone)
+        values = self._value(*plan), self._value(*lattice)
+        expected = min(values) / self._reference
+        before, self._expected = self._expected, expected
+        if self._replans:
+            plan, values = self._improve_plan(plan, lattice, values)
+        self._followed = plan if self._free else lattice
+        self._expected_value = values[0] if self._free else values[1]
+        return np.nan if before is None else before - expected
+
+    def _look(self) -> None:
+        """See what is known and where it is far to the next sounding."""
+        team, constraints = self._team, self._team.constraints
+        self._spacing = _free_area(constraints) / (len(self._en) * team.steps_total * constraints.max_step_m)
+        tree = cKDTree(np.vstack([team.soundings_en_m, self._en]), balanced_tree=False)
+        distance = np.asarray(tree.query(team.belief.xy_m)[0])
+        roughness = expected_roughness(team.belief, distance, self._spacing)
+        self._nodes = thin_nodes(team, with_second_looks(roughness, team, self._spacing))
+        self._scale = max(team.belief.correlation_length_m, self._spacing)
+        self._objective = Objective(self._step_m, self._steps, self._scale, POWER, TURN_PENALTY, REACH * self._spacing)
+        self._d2 = np.asarray(tree.query(self._nodes.en_m)[0]) ** 2
+        self._reference = float(len(self._nodes.x))
+
+    def prior(self, team: Situation) -> tuple[FloatArray, float]:
+        """The final map counts fully, what is gained at once a little."""
+        return np.array([1.0, 0.02]), 10.0
+
+    def trusted(self, theta: FloatArray) -> FloatArray:
+        """Gain at once may bend the plan, never replace it."""
+        final = max(float(theta[0]), 0.1)
+        return np.array([final, float(np.clip(theta[1], 0.0, 0.1 * final))])
+
+    def candidates(self, alpha: float) -> FloatArray:
+        """The next legs of the plan; when it was made anew also, per vehicle, others as described above."""
+        team, n = self._team, len(self._en)
+        along = self._first_legs(self._followed)
+        targets = [along]
+        if team.constraints.keep_out:
+            # The corner that a leg cuts may be that of a zone: then it is flown out.
+            targets.append(self._first_legs(self._followed, cut=0.0))
+        if not self._replans:
+            return self._at_cruise(team, self._bottom, np.array(targets))
+        legs = [self._legs_of(i, alpha) for i in range(n)]
+        for i, name in enumerate(team.vehicles):
+            if self._coarse[name] > 0:
+                continue  # before the first pass is over too little is known to be worth a detour
+            for leg in legs[i]:
+                target = along.copy()
+                target[i] = leg
+                targets.append(target)
+        return self._at_cruise(team, self._bottom, np.array(targets))
+
+    def regressors(self, candidates: FloatArray) -> FloatArray:
+        """See the module's text."""
+        if not self._looks:
+            return np.tile(self._row, (len(candidates), 1))
+        values = self._after_legs(candidates)
+        now = self._uncertainty_now()
+        kept = self._expected_value
+        off_plan = ~self._on_plan(candidates).all(axis=1)
+        final = values[:, 1] + LEAVE_PLAN * kept * off_plan
+        phi = np.column_stack([kept - final, now - values[:, 0]]) / self._reference
+        self._asked = candidates, phi
+        return phi
+
+    def chosen(self, positions: FloatArray) -> None:
+        """Drop the via points that the legs reach."""
+        if self._looks:
+            candidates, phi = self._asked
+            self._row = phi[int(np.argmin(np.abs(candidates - positions).sum(axis=(1, 2))))].tolist()
+        for i, name in enumerate(self._team.vehicles):
+            x, y = self._en[i]
+            for routes in (self._plan, self._backbone):
+                route = routes[name]
+                for cut in (CORNER_TOLERANCE, 0.0):
+                    tx, ty, first = next_waypoint(x, y, route, 0, len(route), self._step_m, cut)
+                    if np.hypot(tx - positions[i, 0], ty - positions[i, 1]) < 1e-3:
+                        routes[name] = route[first:]
+                        if routes is self._plan:
+                            self._coarse[name] = max(0, self._coarse[name] - first)
+                        break
+
+    def remember(self) -> dict[str, Any]:
+        """Return the memory."""
+        return {
+            "backbone": self._backbone,
+            "coarse": self._coarse,
+            "plan": self._plan,
+            "expected": self._expected,
+            "planned": self._planned,
+            "free": self._free,
+            "row": self._row,
+        }
+
+    def recall(self, state: dict[str, Any]) -> None:
+        """Take up what :meth:`remember` returned."""
+        self._backbone, self._plan = (
+            {str(k): np.array(v, dtype=np.float64).reshape(-1, 2) for k, v in state[key].items()}
+            for key in ("backbone", "plan")
+        )
+        self._coarse = {str(k): int(v) for k, v in state["coarse"].items()}
+        self._expected = state["expected"]
+        self._planned = int(state["planned"])
+        self._free = bool(state["free"])
+        self._row = [float(x) for x in state["row"]]
+
+    def _adopt_backbone(self) -> None:
+        """Give every vehicle of the team its share of the backbone."""
+        team = self._team
+        shares = backbone(team.constraints, self._en, self._steps, self._nodes, self._scale, POWER)
+        self._backbone = {name: share.stops for name, share in zip(team.vehicles, shares, strict=True)}
+        self._coarse = {name: share.coarse for name, share in zip(team.vehicles, shares, strict=True)}
+        self._plan = dict(self._backbone)
+        self._free, self._planned = False, team.step
+
+    def _hand_over(self) -> None:
+        """Give both plans to a team that has changed."""
+        team = self._team
+        self._backbone = hand_over(self._backbone, team.vehicles, self._en)
+        self._plan = hand_over(self._plan, team.vehicles, self._en)
+        self._coarse = dict.fromkeys(team.vehicles, 0)
+
+    def _improve_plan(
+        self, plan: tuple[FloatArray, IntArray], lattice: tuple[FloatArray, IntArray], values: tuple[float, float]
+    ) -> tuple[tuple[FloatArray, IntArray], tuple[float, float]]:
+        """Improve the freer plan, then decide which of the two to follow; return it and the value of both."""
+        team = self._team
+        coarse = np.array([self._coarse[v] for v in team.vehicles], dtype=np.int64)
+        best: tuple[float, FloatArray, IntArray] | None = None
+        for which, begin in enumerate((plan, lattice)):
+            vias, counts, value = self._improved(*begin, np.minimum(coarse, begin[1]), which)
+            if best is None or value < best[0]:
+                best = value, vias, counts
+        assert best is not None  # noqa: S101 - two beginnings
+        value, vias, counts = best
+        self._plan = {v: vias[i, : counts[i]].copy() for i, v in enumerate(team.vehicles)}
+        knows = bool((np.isfinite(team.belief.depth_m) & np.isfinite(team.belief.sd_m)).any())
+        self._free = knows and value < (1.0 if self._free else LEAVE_BACKBONE) * values[1]
+        self._planned = team.step
+        return (vias, counts), (value, values[1])
+
+    def _improved(
+        self, vias: FloatArray, counts: IntArray, locked: IntArray, which: int
+    ) -> tuple[FloatArray, IntArray, float]:
+        constraints = self._team.constraints
+        rng = np.random.default_rng([self._seed, 1, which])
+        roomy = np.zeros((len(vias), vias.shape[1] + 32, 2))
+        roomy[:, : vias.shape[1]] = vias
+        zones = [np.ascontiguousarray(z, dtype=np.float64) for z in constraints.keep_out]
+        starts = np.concatenate([[0], np.cumsum([len(z) for z in zones])]).astype(np.int64)
+        flat = np.vstack(zones) if zones else np.zeros((0, 2))
+        area = np.ascontiguousarray(constraints.area, dtype=np.float64)
+        return improve(
+            self._d2, self._nodes, self._objective, self._en, self._headings, roomy, counts, locked,
+            self._spacing, area, flat, starts, convex(area), MARGIN_M, HEAT, rng.random((self._options.search, DRAWS)),
+        )  # fmt: skip
+
+    @property
+    def _headings(self) -> FloatArray:
+        return np.ascontiguousarray(self._team.headings_rad)
+
+    def _value(self, vias: FloatArray, counts: IntArray) -> float:
+        return plan_value(self._d2, self._nodes, self._objective, self._en, self._headings, vias, counts)
+
+    def _uncertainty_now(self) -> float:
+        nothing = np.zeros(len(self._en), dtype=np.int64)
+        return self._value(np.zeros((len(self._en), 1, 2)), nothing)
+
+    def _packed(self, routes: dict[str, FloatArray]) -> tuple[FloatArray, IntArray]:
+        names = self._team.vehicles
+        counts = np.array([len(routes[v]) for v in names], dtype=np.int64)
+        vias = np.zeros((len(names), max(1, int(counts.max())), 2))
+        for i, v in enumerate(names):
+            vias[i, : counts[i]] = routes[v]
+        return vias, counts
+
+    def _first_legs(self, plan: tuple[FloatArray, IntArray], cut: float = CORNER_TOLERANCE) -> FloatArray:
+        vias, counts = plan
+        legs = [
+            next_waypoint(self._en[i, 0], self._en[i, 1], vias[i], 0, int(counts[i]), self._step_m, cut)[:2]
+            for i in range(len(self._en))
+        ]
+        return np.array(legs)
+
+    def _on_plan(self, candidates: FloatArray) -> BoolArray:
+        """Return which vehicles' legs are those of the plan that is followed, (c, n_vehicles)."""
+        on_plan = np.zeros(candidates.shape[:2], dtype=np.bool_)
+        for cut in (CORNER_TOLERANCE, 0.0):
+            away = candidates[..., :2] - self._first_legs(self._followed, cut)
+            on_plan |= np.hypot(away[..., 0], away[..., 1]) < 1e-3
+        return on_plan
+
+    def _legs_of(self, i: int, alpha: float) -> FloatArray:
+        """Return the free candidates (k, 2) of one vehicle."""
+        rng = vehicle_rng(self._seed, self._team.vehicles[i])
+        here, step = self._en[i], self._step_m
+        heading = self._team.headings_rad[i]
+        course = np.pi / 2 - (heading if np.isfinite(heading) else rng.uniform(0, 2 * np.pi))
+        turns = here + step * np.column_stack([np.cos(course + TURNS_RAD), np.sin(course + TURNS_RAD)])
+        away = np.hypot(*(self._nodes.en_m - here).T)
+        gain = (
+            self._nodes.weight * np.minimum(1.0, self._d2 / self._scale**2) * (away <= 2 * step) * (away > 0.3 * step)
+        )
+        best = np.argsort(-gain, kind="stable")[:: max(1, len(gain) // 400)][:8]
+        way = self._nodes.en_m[best] - here
+        towards = here + way * np.minimum(1.0, step / np.maximum(away[best], 1e-9))[:, None]
+        n = max(0, self._options.candidates - len(turns) - len(towards))
+        random = alpha * step * rng.standard_normal((n, 2))
+        random *= np.minimum(1.0, step / np.maximum(np.hypot(*random.T), 1e-12))[:, None]
+        return np.vstack([turns, towards, here + random])
+
+    def _after_legs(self, candidates: FloatArray) -> FloatArray:
+        """Return U after the first legs and at the end, when the team goes on with the plan it follows, (c, 2)."""
+        c, n = candidates.shape[:2]
+        plan_vias, plan_counts = self._followed
+        vias, counts = np.zeros((c, n, plan_vias.shape[1], 2)), np.zeros((c, n), dtype=np.int64)
+        on_plan = self._on_plan(candidates)
+        for i in range(n):
+            route = plan_vias[i, : plan_counts[i]]
+            *_, passed = next_waypoint(self._en[i, 0], self._en[i, 1], route, 0, len(route), self._step_m)
+            for which, rest in ((on_plan[:, i], route[passed:]), (~on_plan[:, i], route)):
+                vias[which, i, : len(rest)] = rest
+                counts[which, i] = len(rest)
+        targets = np.ascontiguousarray(candidates[..., :2])
+        return values_after_first_leg(
+            self._d2, self._nodes, self._objective, self._en, self._headings, targets, vias, counts
+        )
+
+
+def thin_nodes(team: Situation, variability: FloatArray) -> Nodes:
+    """Return at most about ``MAX_NODES`` nodes of the area; nodes of one square are merged, their weights averaged.
+
+    They are moved about a little: on a regular grid a plan would gain by lying on its lines.
+    """
+    belief: Belief = team.belief
+    inside = inside_area(team.constraints, belief.xy_m)
+    xy, weight = belief.xy_m[inside], variability[inside]
+    if len(xy) > MAX_NODES:
+        low, size = xy.min(axis=0), np.ptp(xy, axis=0)
+        side = float(np.sqrt(max(size[0], 1e-9) * max(size[1], 1e-9) / MAX_NODES))
+        bins = np.floor((xy - low) / side + 1e-9).astype(np.int64)
+        _, which = np.unique(bins[:, 0] * 1_000_003 + bins[:, 1], return_inverse=True)
+        count = np.bincount(which)
+        xy = np.column_stack([np.bincount(which, xy[:, k]) / count for k in (0, 1)])
+        weight = np.bincount(which, weight) / count
+    if len(xy) > 1:
+        k = np.arange(len(xy))[:, None]
+        xy = xy + JITTER * _cell(xy) * ((k * np.array([0.7548776662, 0.5698402910])) % 1.0 - 0.5)
+    return make_nodes(xy, weight)
+
+
+def _free_area(constraints: Constraints) -> float:
+    zones = unary_union([Polygon(zone) for zone in constraints.keep_out])
+    return max(1.0, float(Polygon(constraints.area).difference(zones).area))
+
+
+def _cell(xy: FloatArray) -> float:
+    size = np.ptp(xy, axis=0)
+    return float(np.sqrt(max(size[0], 1e-9) * max(size[1], 1e-9) / len(xy)))

@@ -1,0 +1,133 @@
+"""What a planner is asked and what it answers.
+
+All positions are metres in one local Cartesian frame: columns ``east_m, north_m, depth_m`` (depth positive down).
+Arrays are never modified by the receiver.
+"""
+
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.exploration.core.constraints import Constraints
+from app.exploration.core.dynamic import Localization, Targets
+from app.exploration.core.search_task import SearchTask
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Belief:
+    """What is known of the sea floor, at fixed landmarks (the nodes of the map's grid in a bathymeter mission).
+
+    Attributes
+    ----------
+    xy_m : (n_landmarks, 2)
+        Fixed horizontal positions, east and north.
+    depth_m : (n_landmarks,)
+        Current depth estimates; NaN where nothing is known at all.
+    sd_m : (n_landmarks,)
+        Their standard deviations (the confidence ``c_L`` is the square); inf where nothing is known.
+    accurate : (n_landmarks,)
+        The set ``A``: landmarks whose estimate once passed the accuracy threshold.
+    weight : (n_landmarks,)
+        How much each landmark matters: local roughness of the sea floor relative to the area's mean, mean about 1.
+    correlation_length_m : float
+        Distance over which a sounding informs its surroundings.
+    covariance_m2 : (n_landmarks, 3, 3) or None
+        Where whole positions are estimated, their covariances; ``xy_m`` are then estimates too, presumed places for
+        landmarks never seen, and ``sd_m`` the deviation along the worst direction. None: only depths are estimated.
+    on_floor : bool
+        Whether landmarks lie on the sea floor, so that vehicles have to keep above them.
+    """
+
+    xy_m: FloatArray
+    depth_m: FloatArray
+    sd_m: FloatArray
+    accurate: BoolArray
+    weight: FloatArray
+    correlation_length_m: float
+    covariance_m2: FloatArray | None = None
+    on_floor: bool = True
+
+
+@dataclass(frozen=True)
+class Situation:
+    """Everything a planner may know when it decides one step.
+
+    Attributes
+    ----------
+    step : int
+        Number of the step being decided, from 1.
+    steps_total : int
+        Steps of the whole mission, this one included in the count.
+    vehicles : tuple of str
+        Names, in the order of the rows of ``positions``; may change from step to step.
+    positions : (n_vehicles, 3)
+        The team configuration ``X_R``: where the vehicles are when the step begins.
+    headings_rad : (n_vehicles,)
+        Clockwise from north; NaN where unknown.
+    belief : Belief
+        What is known of the sea floor.
+    soundings_en_m : (n_soundings, 2)
+        Where soundings were taken so far that the map is made of.
+    constraints : Constraints
+        What every proposed configuration must obey.
+    targets : Targets or None
+        What is known of moving targets, where there are any.
+    localization : Localization or None
+        How well the vehicles know where they are; None: well enough.
+    doubtful_en_m : (k, 2)
+        Soundings that the map leaves out because their neighbours contradict them: a fish, or a rock.
+    search : SearchTask or None
+        What a search mission is about; the belief then says nothing.
+    """
+
+    step: int
+    steps_total: int
+    vehicles: tuple[str, ...]
+    positions: FloatArray
+    headings_rad: FloatArray
+    belief: Belief
+    soundings_en_m: FloatArray
+    constraints: Constraints
+    targets: Targets | None = None
+    localization: Localization | None = None
+    doubtful_en_m: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
+    search: SearchTask | None = None
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """A planner's answer: the next team configuration, (n_vehicles, 3), and figures for the operator.
+
+    ``errands`` names vehicles that left the plan, with the number of the target they go for; negative: the surface.
+    """
+
+    positions: FloatArray
+    objective: float
+    terms: dict[str, float] = field(default_factory=dict)
+    errands: dict[str, int] = field(default_factory=dict)
+
+
+class Planner(Protocol):
+    """Decides where every vehicle goes next.
+
+    The same situation, memory and generator state give the same answer. ``snapshot`` returns everything the planner
+    remembers from step to step as bytes; ``restore`` on a new object of the same class continues as if nothing had
+    happened.
+    """
+
+    def propose(self, situation: Situation, rng: np.random.Generator) -> Proposal:
+        """Return a configuration that obeys ``situation.constraints``."""
+        ...
+
+    def snapshot(self) -> bytes:
+        """Return the planner's memory."""
+        ...
+
+    def restore(self, memory: bytes) -> None:
+        """Take up a memory made by ``snapshot``. Raises ValueError when it is not one."""
+        ...

@@ -1,0 +1,1 @@
+"""Parallel lines: the lattice they lie on, the usual practice (lawnmower), teams in formation, handing over."""

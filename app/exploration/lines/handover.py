@@ -1,0 +1,32 @@
+"""Routes when the team changes: nobody's rest is lost, a newcomer gets a share."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.exploration.lines.lattice import route_length
+
+FloatArray = NDArray[np.float64]
+
+
+def hand_over(routes: dict[str, FloatArray], vehicles: tuple[str, ...], en_m: FloatArray) -> dict[str, FloatArray]:
+    """Return a route (k, 2) for each of ``vehicles``, which are at ``en_m`` (n_vehicles, 2).
+
+    The rest of a vehicle that left goes to the one whose own rest ends closest to it; a newcomer takes the second half
+    of the longest rest. At least one vehicle must have a route already.
+    """
+    here = dict(zip(vehicles, en_m, strict=True))
+    result = {name: routes[name] for name in vehicles if name in routes}
+    for name in sorted(routes.keys() - here.keys()):
+        rest = routes[name]
+        if len(rest):
+            ends = {k: route[-1] if len(route) else here[k] for k, route in result.items()}
+            heir = min(sorted(ends), key=lambda k: float(np.hypot(*(ends[k] - rest[0]))))
+            result[heir] = np.vstack([result[heir], rest])
+    for name in vehicles:
+        if name not in result:
+            donor = max(sorted(result), key=lambda k: route_length(here[k], result[k]))
+            half = (len(result[donor]) + 1) // 2
+            result[donor], rest = result[donor][:half], result[donor][half:]
+            backwards = len(rest) > 1 and np.hypot(*(rest[-1] - here[name])) < np.hypot(*(rest[0] - here[name]))
+            result[name] = rest[::-1] if backwards else rest
+    return result

@@ -1,0 +1,95 @@
+"""The usual practice: evenly spaced parallel lines, an equal share of the area per vehicle."""
+
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import linear_sum_assignment
+
+from app.exploration.core.bottom import Bottom
+from app.exploration.core.constraints import Constraints
+from app.exploration.core.problem import Proposal, Situation
+from app.exploration.core.routes import CORNER_TOLERANCE, FreeSpace, next_waypoint
+from app.exploration.lines.handover import hand_over
+from app.exploration.lines.lattice import Sweep, boustrophedon, longer_axis_rad, route_length
+from app.exploration.planner.base import PlannerBase, settle
+
+FloatArray = NDArray[np.float64]
+
+BORDER_MARGIN_M = 0.5
+
+
+def lawnmower_routes(constraints: Constraints, starts: FloatArray, budget_m: float) -> list[FloatArray]:
+    """Return each vehicle's route (k, 2): lines along the longer axis, as many as fit into the distance it can travel.
+
+    Parameters
+    ----------
+    constraints : Constraints
+        Give the area and its keep-out zones.
+    starts : (n_vehicles, 2)
+        Where the vehicles are; each takes the strip that gives the team the least transit.
+    budget_m : float
+        Distance that every vehicle can travel.
+    """
+    free = FreeSpace(constraints, BORDER_MARGIN_M)
+    sweep = Sweep(constraints, free, longer_axis_rad(constraints.area))
+    cuts = sweep.shares(len(starts))
+    u = sweep.to_uv(starts)[:, 0]
+    transit = np.maximum(0.0, np.maximum(cuts[:-1] - u[:, None], u[:, None] - cuts[1:]))
+    order = np.argsort(
+        u, kind="stable"
+    )  # of equal totals, the assignment that keeps the vehicles' order across the lines
+    rows, strips = linear_sum_assignment(transit[order])
+    routes: list[FloatArray] = [np.zeros((0, 2))] * len(starts)
+    for row, strip in zip(rows, strips, strict=True):
+        i = int(order[row])
+        routes[i] = boustrophedon(sweep, starts[i], float(cuts[strip]), float(cuts[strip + 1]), budget_m)
+    return routes
+
+
+class LawnmowerPlanner(PlannerBase):
+    """Follows the lines; a vehicle that leaves hands on its rest, one that joins takes half of the longest rest."""
+
+    name: ClassVar[str] = "lawnmower"
+
+    def __init__(self, *args: Any, **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        self._routes: dict[str, FloatArray] = {}
+
+    def _remember(self) -> dict[str, Any]:
+        return {"routes": self._routes}
+
+    def _recall(self, state: dict[str, Any]) -> None:
+        self._routes = {k: np.array(v, dtype=np.float64).reshape(-1, 2) for k, v in state["routes"].items()}
+
+    def _decide(self, team: Situation, bottom: Bottom, seed: int) -> Proposal:
+        self._adopt(team)
+        step = team.constraints.max_step_m * (1 - 1e-9)
+        # The corner that a leg cuts may be that of a zone: then it is flown out.
+        cuts = (CORNER_TOLERANCE, 0.0) if team.constraints.keep_out else (CORNER_TOLERANCE,)
+        targets = np.empty((len(cuts), len(team.vehicles), 2))
+        following = np.empty((len(cuts), len(team.vehicles)), dtype=np.int64)
+        for k, cut in enumerate(cuts):
+            for i, name in enumerate(team.vehicles):
+                route = self._routes[name]
+                x, y = team.positions[i, :2]
+                targets[k, i, 0], targets[k, i, 1], following[k, i] = next_waypoint(
+                    x, y, route, 0, len(route), step, cut
+                )
+        positions, which = settle(team, bottom, self._at_cruise(team, bottom, targets))
+        for i, name in enumerate(team.vehicles):
+            if np.hypot(*(positions[i, :2] - targets[which, i])) < 1e-6:
+                self._routes[name] = self._routes[name][following[which, i] :]
+        return Proposal(positions, 0.0, {"left_m": float(sum(self._left(team, i) for i in range(len(positions))))})
+
+    def _left(self, team: Situation, i: int) -> float:
+        return route_length(team.positions[i, :2], self._routes[team.vehicles[i]])
+
+    def _adopt(self, team: Situation) -> None:
+        """Give every vehicle of the team a route."""
+        en = team.positions[:, :2]
+        if not self._routes.keys() & set(team.vehicles):
+            budget = (team.steps_total - team.step + 1) * team.constraints.max_step_m
+            self._routes = dict(zip(team.vehicles, lawnmower_routes(team.constraints, en, budget), strict=True))
+            return
+        self._routes = hand_over(self._routes, team.vehicles, en)

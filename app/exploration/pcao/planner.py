@@ -1,0 +1,253 @@
+"""PCAO (PCAO18): a controller trained beforehand leads the team; see :mod:`app.exploration.pcao`."""
+
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+from shapely import Polygon
+
+from app.estimation import RangeSensor, Sensor
+from app.exploration.core.bottom import Bottom
+from app.exploration.core.constraints import inside_area
+from app.exploration.core.problem import Proposal, Situation
+from app.exploration.core.routes import FreeSpace, next_waypoint
+from app.exploration.pcao.controller import control, within_step
+from app.exploration.pcao.model import default_model
+from app.exploration.pcao.state import reduced_state
+from app.exploration.planner.base import PlannerBase, at_depth, settle
+from app.exploration.planner.options import PlannerOptions
+
+FloatArray = NDArray[np.float64]
+
+UNIT_OF_SIGHT = 0.25
+"""The state's unit where landmarks are seen from afar, as a part of the sight; in training, of the swath's range."""
+
+FINER = (1.0, 0.5, 0.25)
+"""How near, in units, a survey has to come to a cell. Once it was that near everywhere it goes on with the next."""
+
+COVERED = 0.99
+
+TURNS_RAD = tuple(float(x) for x in np.radians([0, 20, -20, 45, -45, 70, -70, 95, -95, 120, -120, 150, -150, 180]))
+"""By how much a vehicle turns off its course when a limit bars it; the smallest that is allowed is taken."""
+
+STAYS_LEADER = 1.5
+"""A vehicle leads until another one's work is closer by this factor."""
+
+LINK_SHARE = 0.92
+"""Part of the communication range that the team's wishes are drawn together to."""
+
+TRAIL = 8
+"""Last places that are remembered: whoever came no farther than STUCK_STEPS in so many steps is stuck."""
+STUCK_STEPS = 2.0
+STUCK_LEFT = 0.1
+"""Share of what is left round a vehicle above which it is not stuck but busy."""
+
+SLOWER = (0.6, 0.3, 0.0)
+"""Parts of its move that the leader tries when the others cannot follow."""
+GATHERING = (0.15, 0.05, 0.02)
+"""Parts of their distance to the middle of the team by which vehicles that lost each other approach in a step."""
+
+
+class PcaoPlanner(PlannerBase):
+    """A controller that was trained in simulation: one product of matrices per step, for any number of vehicles."""
+
+    name: ClassVar[str] = "pcao"
+
+    def __init__(self, options: PlannerOptions, sensor: Sensor) -> None:
+        super().__init__(options, sensor)
+        model = default_model() if options.model is None else options.model
+        self._horizontal, self._vertical = model.gains
+        self._trail: dict[str, list[list[float]]] = {}
+        self._detours: dict[str, list[list[float]]] = {}
+        self._lead = ""
+
+    def _decide(self, team: Situation, bottom: Bottom, seed: int) -> Proposal:
+        belief, limits, here = team.belief, team.constraints, team.positions
+        area = Polygon(limits.area).area
+        unit = self._unit(team, area)
+        left = self._left(team, unit)
+        vectors, figures, schedule = reduced_state(
+            np.ascontiguousarray(here),
+            self._moves(team),
+            bottom.at(here[:, :2]) - here[:, 2],
+            np.ascontiguousarray(belief.xy_m),
+            np.ascontiguousarray(belief.depth_m),
+            left,
+            len(left) / area,
+            unit,
+        )
+        u = control(vectors, figures, schedule, self._horizontal, self._vertical)
+        if self._surveys:
+            u[:, 2] = 0.0
+        way = within_step(u, limits.max_step_m * (1.0 - 1e-9), False)
+        self._go_round(team, left, schedule[:, 0], way)
+        lead = self._leader(team.vehicles, np.linalg.norm(vectors[:, 0], axis=1))
+        positions = self._within_limits(team, bottom, way, lead)
+        for name, place in zip(team.vehicles, here, strict=True):
+            self._trail[name] = [*self._trail.get(name, [])[1 - TRAIL :], [float(place[0]), float(place[1])]]
+        return Proposal(positions, -float(left.sum()), {"left": float(left.mean()) if len(left) else 0.0})
+
+    def _go_round(self, team: Situation, left: FloatArray, here_left: FloatArray, way: FloatArray) -> None:
+        """Lead vehicles that get nowhere to the nearest landmark that is left, round whatever bars them.
+
+        Writes into their moves ``way`` (n, 3). ``here_left`` (n,) is the share left round each vehicle.
+        """
+        step = team.constraints.max_step_m * (1.0 - 1e-9)
+        for i, name in enumerate(team.vehicles):
+            place, trail = team.positions[i, :2], self._trail.get(name, [])
+            stuck = len(trail) == TRAIL and np.hypot(*(place - np.array(trail[0]))) < STUCK_STEPS * step
+            if stuck and name not in self._detours and here_left[i] < STUCK_LEFT and left.any():
+                open_ = np.flatnonzero(left)
+                nearest = open_[np.argmin(np.hypot(*(team.belief.xy_m[open_] - place).T))]
+                free = FreeSpace(team.constraints, 0.0)
+                self._detours[name] = free.way(place, free.nearest(team.belief.xy_m[nearest])).tolist()
+            route = np.array(self._detours.get(name, [])).reshape(-1, 2)
+            if len(route):
+                x, y, passed = next_waypoint(place[0], place[1], route, 0, len(route), step, 0.0)
+                way[i, :2] = x - place[0], y - place[1]
+                self._detours[name] = route[passed:].tolist()
+            if not len(self._detours.get(name, [])):
+                self._detours.pop(name, None)
+
+    def _within_limits(self, team: Situation, bottom: Bottom, way: FloatArray, lead: int) -> FloatArray:
+        """Return where the team goes (n, 3): by the controller's moves ``way`` (n, 3) as far as the limits allow."""
+        limits, here = team.constraints, team.positions
+        ties = (limits.com_range_m, limits.max_step_m * (1.0 - 1e-9), lead)
+        if alone(here, limits.com_range_m).any():  # lifted by its altimeter, or pushed by a current
+            back = [self._clear(team, bottom, here + f * (here.mean(axis=0) - here)) for f in GATHERING]
+            ok = limits.feasible(here, np.stack(back), bottom)
+            if ok.any():
+                return back[int(np.argmax(ok))]
+        wish = linked(here, here + way, *ties)
+        if not self._surveys and limits.feasible(here, wish[None], bottom)[0]:
+            return wish
+        wish = self._clear(team, bottom, wish)
+        if limits.feasible(here, wish[None], bottom)[0]:
+            return wish
+        # A vehicle that has to climb falls behind: the leader goes slower, or waits.
+        slower = [self._clear(team, bottom, linked(here, here + f * way, *ties)) for f in SLOWER]
+        positions, _ = settle(team, bottom, np.stack([self._round_limits(team, bottom, wish), wish, *slower]))
+        return positions
+
+    def _clear(self, team: Situation, bottom: Bottom, wish: FloatArray) -> FloatArray:
+        """Return the wishes (..., n, 3) clear of the bottom, at the depths wished for; in surveys at the cruise's."""
+        if self._surveys:
+            return self._at_cruise(team, bottom, wish[..., :2])
+        return at_depth(team.constraints, bottom, team.positions, wish[..., :2], wish[..., 2])
+
+    def _leader(self, names: tuple[str, ...], distance: FloatArray) -> int:
+        """Return who leads where links hold the team together: who has work closest by; seldom another one."""
+        nearest = int(np.argmin(distance))
+        if self._lead in names and distance[names.index(self._lead)] <= STAYS_LEADER * distance[nearest] + 0.1:
+            nearest = names.index(self._lead)
+        self._lead = names[nearest]
+        return nearest
+
+    def _unit(self, team: Situation, area: float) -> float:
+        """Return the state's unit: half of what a vehicle maps to its sides.
+
+        A survey's lines can lie as close together as the whole way that the team can travel allows.
+        """
+        if isinstance(self.sensor, RangeSensor):
+            return UNIT_OF_SIGHT * self.sensor.visibility_m
+        step = team.constraints.max_step_m
+        return float(np.clip(0.5 * area / (team.steps_total * len(team.vehicles) * step), 0.5 * step, area**0.5 / 8.0))
+
+    def _left(self, team: Situation, unit: float) -> FloatArray:
+        """Return how much is left to learn of every landmark, 0 to 1; in a survey, of every cell that it passed far."""
+        belief = team.belief
+        open_ = np.where(belief.accurate, 0.0, 1.0)
+        if self._surveys:  # nobody gets to the others
+            open_ *= inside_area(team.constraints, belief.xy_m)
+        else:
+            with np.errstate(divide="ignore"):
+                lacking = 1.0 - (self.options.accuracy_sd_m / belief.sd_m) ** 2
+            return open_ * np.maximum(0.25, lacking)
+        if not len(team.soundings_en_m) or not len(belief.xy_m):
+            return open_
+        distance, _ = cKDTree(team.soundings_en_m, balanced_tree=False, compact_nodes=False).query(belief.xy_m)
+        for part in FINER:
+            left = np.where(distance > part * unit, open_, 0.0)
+            if left.mean() > 1.0 - COVERED:
+                return left
+        return np.where(distance > np.median(distance), 1.0, 0.0)
+
+    def _moves(self, team: Situation) -> FloatArray:
+        """Return the directions (n, 2) that the vehicles came from their last places in; else their headings'."""
+        moves = np.zeros((len(team.vehicles), 2))
+        for i, name in enumerate(team.vehicles):
+            was = self._trail[name][-1] if self._trail.get(name) else team.positions[i, :2]
+            way = team.positions[i, :2] - np.array(was)
+            length = float(np.hypot(*way))
+            if length > 1e-3 * team.constraints.max_step_m:
+                moves[i] = way / length
+            elif np.isfinite(team.headings_rad[i]):
+                moves[i] = np.sin(team.headings_rad[i]), np.cos(team.headings_rad[i])
+        return moves
+
+    def _round_limits(self, team: Situation, bottom: Bottom, wish: FloatArray) -> FloatArray:
+        """Return the wishes (n, 3), vehicle by vehicle turned off as little as the limits demand."""
+        result = team.positions.copy()
+        for i, place in enumerate(team.positions):
+            way = wish[i] - place
+            turned = np.array(
+                [
+                    [c * way[0] + s * way[1], c * way[1] - s * way[0]]
+                    for c, s in ((np.cos(a), np.sin(a)) for a in TURNS_RAD)
+                ]
+            )
+            tries = np.repeat(result[None], len(turned), axis=0)
+            tries[:, i, :2] = place[:2] + turned
+            tries[:, i, 2] = wish[i, 2]
+            tries[:, i] = self._clear(team, bottom, tries)[:, i]
+            # Others have decided or still stand; whoever is too far from all of them counts as linked for now.
+            ok = team.constraints.feasible(team.positions, tries, bottom)
+            if ok.any():
+                result[i] = tries[int(np.argmax(ok)), i]
+        return result
+
+    def _remember(self) -> dict[str, Any]:
+        return {"trail": self._trail, "detours": self._detours, "lead": self._lead}
+
+    def _recall(self, state: dict[str, Any]) -> None:
+        self._trail = _places(state["trail"])
+        self._detours = _places(state["detours"])
+        self._lead = str(state["lead"])
+
+
+def _places(of: dict[str, Any]) -> dict[str, list[list[float]]]:
+    return {str(name): [[float(x) for x in place] for place in places] for name, places in of.items()}
+
+
+def alone(here: FloatArray, com_range: float) -> NDArray[np.bool_]:
+    """Return which vehicles (n, 3) have no other one within the range, (n,); a single vehicle needs none."""
+    if len(here) < 2:
+        return np.zeros(len(here), dtype=np.bool_)
+    apart = np.linalg.norm(here[:, None] - here[None], axis=2)
+    np.fill_diagonal(apart, np.inf)
+    return np.asarray(apart.min(axis=1) > com_range, dtype=np.bool_)
+
+
+def linked(here: FloatArray, wish: FloatArray, com_range: float, step: float, leader: int) -> FloatArray:
+    """Return the wishes (n, 3) drawn together so that every vehicle has another one within the range.
+
+    The leader goes where it wishes. The others, by their distance to it, go as near as they must to the closest one
+    that is placed already, as far as a step from ``here`` (n, 3) leads.
+    """
+    n = len(wish)
+    if n < 2 or not np.isfinite(com_range):
+        return wish
+    wish = wish.copy()
+    order = np.argsort(np.linalg.norm(here - here[leader], axis=1), kind="stable")
+    placed = [leader]
+    for i in (int(k) for k in order if k != leader):
+        apart = np.linalg.norm(wish[placed] - wish[i], axis=1)
+        closest = placed[int(np.argmin(np.linalg.norm(wish[placed] - here[i], axis=1)))]
+        if apart.min() > LINK_SHARE * com_range:
+            away = wish[i] - wish[closest]
+            near = wish[closest] + away * (LINK_SHARE * com_range / np.linalg.norm(away))
+            way = near - here[i]
+            wish[i] = here[i] + way * min(1.0, step * (1.0 - 1e-9) / max(float(np.linalg.norm(way)), 1e-12))
+        placed.append(i)
+    return wish

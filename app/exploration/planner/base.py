@@ -1,0 +1,221 @@
+"""What all planners share: order of vehicles, the bottom, cruise depths, and making sure that an answer is feasible."""
+
+import zlib
+from abc import ABC, abstractmethod
+from dataclasses import replace
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.estimation import RangeSensor, Sensor
+from app.exploration.core.bottom import Bottom
+from app.exploration.core.constraints import LEG_CHECKS, Constraints
+from app.exploration.core.detours import Errand, Errands, errand_move
+from app.exploration.core.problem import Proposal, Situation
+from app.exploration.core.snapshot_codec import pack, unpack
+from app.exploration.planner.options import PlannerOptions
+
+FloatArray = NDArray[np.float64]
+
+DEPTH_MARGIN_M = 1e-3
+PASSES = 2
+FRACTIONS = (1.0, 0.75, 0.5, 0.25, 0.1)
+
+
+class PlannerBase(ABC):
+    """Sorts the vehicles by name, so that their order never matters, and falls back when a wish is not feasible."""
+
+    name: ClassVar[str]
+
+    runs_errands: ClassVar[bool] = True
+    """Whether single vehicles leave the plan for targets and the surface; see :mod:`app.exploration.core.detours`."""
+
+    def __init__(self, options: PlannerOptions, sensor: Sensor) -> None:
+        self.options = options
+        self.sensor = sensor
+        self._cruise: dict[str, float] = {}
+        self._errands = Errands()
+        self._whole: Situation | None = None
+
+    def propose(self, situation: Situation, rng: np.random.Generator) -> Proposal:
+        """Return a configuration that obeys ``situation.constraints``; hold when none is found."""
+        if not situation.vehicles:
+            return Proposal(np.zeros((0, 3)), 0.0)
+        order = sorted(range(len(situation.vehicles)), key=lambda i: situation.vehicles[i])
+        inverse = np.argsort(order)
+        team = replace(
+            situation,
+            vehicles=tuple(situation.vehicles[i] for i in order),
+            positions=np.asarray(situation.positions, dtype=np.float64)[order],
+            headings_rad=np.asarray(situation.headings_rad, dtype=np.float64)[order],
+            localization=None if situation.localization is None else situation.localization.of(np.array(order)),
+        )
+        for name, depth in zip(team.vehicles, team.positions[:, 2], strict=True):
+            wish = self.options.cruise_depth_m
+            self._cruise.setdefault(name, float(depth if wish is None else wish))
+        belief = situation.belief
+        bottom = Bottom.from_landmarks(belief.xy_m, belief.depth_m) if belief.on_floor else Bottom.unknown()
+        proposal = self._with_errands(team, bottom, int(rng.integers(2**63)))
+        return replace(proposal, positions=proposal.positions[inverse])
+
+    def _with_errands(self, team: Situation, bottom: Bottom, seed: int) -> Proposal:
+        """Decide for the vehicles that are on no errand, then send the others on theirs."""
+        self._whole = team
+        # Bathymeter missions rise along their legs instead; see app.missions.flight.decision.
+        localization = None if self._surveys else team.localization
+        if not self.runs_errands or (team.targets is None and localization is None):
+            return self._decide(team, bottom, seed)
+        errands = self._errands.assign(team.vehicles, team.positions, team.targets, localization)
+        if not errands:
+            return self._decide(team, bottom, seed)
+        rows = {errand.vehicle: team.vehicles.index(errand.vehicle) for errand in errands}
+        positions, objective, terms = team.positions.copy(), 0.0, {}
+        if np.isfinite(team.constraints.com_range_m):  # nobody may go alone
+            first = errands[0]
+            move = self._go(team, bottom, positions, rows[first.vehicle], first) - positions[rows[first.vehicle]]
+            positions, _ = settle(team, bottom, (team.positions + move)[None])
+        else:
+            rest = np.array([i for i in range(len(team.vehicles)) if i not in rows.values()], dtype=np.int64)
+            if len(rest):
+                proposal = self._decide(part_of(team, rest), bottom, seed)
+                positions[rest], objective, terms = proposal.positions, proposal.objective, proposal.terms
+            for errand in errands:
+                positions[rows[errand.vehicle]] = self._go(team, bottom, positions, rows[errand.vehicle], errand)
+        named = {errand.vehicle: errand.target for errand in errands}
+        return Proposal(positions, objective, {**terms, "errands": float(len(errands))}, named)
+
+    def _go(self, team: Situation, bottom: Bottom, positions: FloatArray, row: int, errand: Errand) -> FloatArray:
+        def at_cruise(configurations: FloatArray) -> FloatArray:
+            return self._at_cruise(team, bottom, configurations[..., :2])
+
+        return errand_move(
+            row,
+            errand,
+            team.positions,
+            positions,
+            team.constraints,
+            bottom,
+            team.targets,
+            team.localization,
+            at_cruise if self._surveys else None,
+        )
+
+    @abstractmethod
+    def _decide(self, team: Situation, bottom: Bottom, seed: int) -> Proposal:
+        """Decide for vehicles in the order of their names."""
+
+    def snapshot(self) -> bytes:
+        """Return the planner's memory."""
+        errands = self._errands.remember()
+        return pack(
+            self.name, {"cruise": self._cruise, **({"errands": errands} if errands else {}), **self._remember()}
+        )
+
+    def restore(self, memory: bytes) -> None:
+        """Take up a memory made by ``snapshot``. Raises ValueError when it is not one."""
+        state = unpack(self.name, memory)
+        try:
+            self._cruise = {str(k): float(v) for k, v in state.pop("cruise").items()}
+            self._errands.recall(state.pop("errands", {}))
+            self._recall(state)
+        except (KeyError, TypeError, AttributeError) as error:
+            raise ValueError(f"planner memory of {self.name!r} lacks or garbles a field: {error}") from error
+
+    def _remember(self) -> dict[str, Any]:
+        return {}
+
+    def _recall(self, state: dict[str, Any]) -> None:
+        return None
+
+    @property
+    def _surveys(self) -> bool:
+        """Whether this is a bathymeter mission: soundings along horizontal legs, no landmarks seen from afar."""
+        return not isinstance(self.sensor, RangeSensor)
+
+    def _at_cruise(self, team: Situation, bottom: Bottom, en_m: FloatArray) -> FloatArray:
+        """Give targets (..., n_vehicles, 2) the vehicles' cruise depths, clear of the bottom: (..., n_vehicles, 3)."""
+        wish = np.array([self._cruise[name] for name in team.vehicles])
+        return at_depth(team.constraints, bottom, team.positions, en_m, wish)
+
+
+def part_of(team: Situation, rows: NDArray[np.int64]) -> Situation:
+    """Return the situation of some of the vehicles only."""
+    return replace(
+        team,
+        vehicles=tuple(team.vehicles[i] for i in rows),
+        positions=team.positions[rows],
+        headings_rad=team.headings_rad[rows],
+        localization=None if team.localization is None else team.localization.of(rows),
+    )
+
+
+def vehicle_rng(seed: int, vehicle: str) -> np.random.Generator:
+    """Return a vehicle's own generator for this step, the same whatever row it stands in."""
+    return np.random.default_rng([seed, zlib.crc32(vehicle.encode())])
+
+
+def at_depth(
+    constraints: Constraints, bottom: Bottom, origin: FloatArray, en_m: FloatArray, wish_m: FloatArray
+) -> FloatArray:
+    """Complete horizontal targets by depths; legs that would become longer than a step are shortened horizontally.
+
+    Parameters
+    ----------
+    origin : (n_vehicles, 3)
+        Where the legs begin.
+    en_m : (..., n_vehicles, 2)
+        Where they should end.
+    wish_m : (..., n_vehicles)
+        Wanted depths; clipped to the band and to the clearance above the estimated bottom along the leg.
+    """
+    leg = en_m - origin[:, :2]
+    reach = constraints.max_step_m * (1.0 - 1e-9)
+    drop = np.zeros(leg.shape[:-1])
+    for _ in range(PASSES):  # a shortened leg lies over other ground
+        deepest = np.full(leg.shape[:-1], constraints.max_depth_m)
+        for k in range(1, LEG_CHECKS + 1):
+            floor = bottom.at(origin[:, :2] + (k / LEG_CHECKS) * leg)
+            deepest = np.fmin(deepest, floor - constraints.min_altitude_m - DEPTH_MARGIN_M)
+        depth = np.maximum(np.minimum(wish_m, deepest), constraints.min_depth_m)
+        drop = np.clip(depth - origin[:, 2], -reach, reach)
+        length = np.hypot(leg[..., 0], leg[..., 1])
+        allowed = np.sqrt(np.maximum(0.0, reach**2 - drop**2))
+        leg = leg * np.minimum(1.0, allowed / np.maximum(length, 1e-12))[..., None]
+    return np.concatenate([origin[:, :2] + leg, (origin[:, 2] + drop)[..., None]], axis=-1)
+
+
+def settle(team: Situation, bottom: Bottom, wishes: FloatArray) -> tuple[FloatArray, int]:
+    """Return the first feasible of some team configurations, or of gentler versions of them, and the wish it came from.
+
+    Tries, in this order: the wishes (k, n_vehicles, 3) as they are; each shortened for the whole team; each for all
+    vehicles but some that hold; hold; straight back towards the middle of the area. When nothing is feasible the answer
+    is to hold, which the safety check then refuses with the reason.
+    """
+    constraints, origin = team.constraints, team.positions
+    n = len(origin)
+    ok = constraints.feasible(origin, wishes, bottom)
+    if ok.any():
+        first = int(np.argmax(ok))
+        return wishes[first], first
+    best = wishes[: min(len(wishes), 8)]
+    tries = [origin + f * (best - origin) for f in FRACTIONS]
+    for i in range(n):
+        others = np.repeat(best, 2 * len(FRACTIONS), axis=0)
+        scale = np.tile([*FRACTIONS, *(-f for f in FRACTIONS)], len(best))[:, None]
+        alone = np.broadcast_to(origin, others.shape).copy()
+        alone[:, i] = origin[i] + scale * (others[:, i] - origin[i])
+        others[:, i] = origin[i]
+        tries += [others[:: 2 * len(FRACTIONS)], alone]
+    tries.append(origin[None])
+    middle = constraints.area.mean(axis=0)
+    inward = np.broadcast_to(origin, (len(FRACTIONS), n, 3)).copy()
+    for k, f in enumerate(FRACTIONS):
+        way = middle - origin[:, :2]
+        length = np.maximum(np.hypot(*way.T), 1e-12)
+        inward[k, :, :2] += way / length[:, None] * np.minimum(length, f * constraints.max_step_m)[:, None]
+    depths = np.clip(origin[:, 2], constraints.min_depth_m, constraints.max_depth_m)
+    tries.append(at_depth(constraints, bottom, origin, inward[..., :2], depths))
+    pool = np.concatenate(tries)
+    ok = constraints.feasible(origin, pool, bottom)
+    return (pool[int(np.argmax(ok))], 0) if ok.any() else (origin.copy(), 0)

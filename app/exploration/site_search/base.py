@@ -1,0 +1,155 @@
+"""What all planners of search missions share: where one may go, being back in time, and giving way to each other."""
+
+from abc import abstractmethod
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.exploration.core.bottom import Bottom
+from app.exploration.core.problem import Proposal, Situation
+from app.exploration.core.search_task import SearchTask
+from app.exploration.planner.base import PlannerBase, vehicle_rng
+from app.exploration.site_search.criteria import Weights, terms
+from app.exploration.site_search.ground import Ground
+
+FloatArray = NDArray[np.float64]
+
+HOME_STEPS = 3.0
+"""Steps from the entry, times vehicles, within which a vehicle counts as being there."""
+ASIDE = 12
+"""Directions in which a vehicle may step aside for another."""
+SPARE_CELLS, SPARE_PART = 3.0, 0.03
+"""By how much the way home is taken to be longer than measured: cells per vehicle (they may be in the way), a part."""
+
+
+@dataclass(frozen=True)
+class Scene:
+    """One decision of a search: the team, its task, where it may go, and how far home is from there.
+
+    Attributes
+    ----------
+    home_m : (rows, cols)
+        Length of the way to the entry from each cell, with something to spare; inf where there is none.
+    """
+
+    team: Situation
+    task: SearchTask
+    ground: Ground
+    home: NDArray[np.int32]
+    home_m: FloatArray
+
+    @classmethod
+    def of(cls, team: Situation) -> "Scene":
+        """Make it. Raises ValueError when the situation is not that of a search."""
+        task = team.search
+        if task is None:
+            raise ValueError("search: the situation holds no search task; this planner is for missions of that kind")
+        ground = Ground.of(task)
+        home = ground.distances(ground.places(task.entry_m[None]))
+        return cls(team, task, ground, home, _with_spare(team, task, ground.metres(home)))
+
+    @property
+    def step_m(self) -> float:
+        """Length of a leg while alpha is 1."""
+        return min(self.task.step_m, self.longest_m)
+
+    @property
+    def longest_m(self) -> float:
+        """Largest leg that the constraints allow."""
+        return float(self.team.constraints.max_step_m) * (1.0 - 1e-9)
+
+    def in_time(self, end_m: FloatArray, gone_m: float) -> bool:
+        """Return whether from a place (2,) the entry is within the time that is left after a step of ``gone_m``."""
+        way = _with_spare(self.team, self.task, np.array(self.ground.way_m(end_m, self.home)))
+        return gone_m + float(way) <= self.task.left_m
+
+
+def _with_spare(team: Situation, task: SearchTask, way_m: FloatArray) -> FloatArray:
+    return np.asarray(way_m * (1.0 + SPARE_PART) + SPARE_CELLS * len(team.vehicles) * task.grid.cell_m)
+
+
+class SearchPlanner(PlannerBase):
+    """Brings everybody back in time, keeps off what is not known to be free, and lets vehicles give way.
+
+    Positions only change where the whole leg lies over explored ground; who cannot be sure to be back later goes now.
+    """
+
+    runs_errands: ClassVar[bool] = False
+
+    def _decide(self, team: Situation, bottom: Bottom, seed: int) -> Proposal:
+        scene = Scene.of(team)
+        wishes = self._seek(scene, seed)
+        here = team.positions[:, :2]
+        gone = max(scene.step_m, float(np.hypot(*(wishes - here).T).max()))
+        late = 0
+        for i in range(len(here)):
+            clear = scene.ground.clear(here[i], wishes[i : i + 1])[0]
+            if not clear or not scene.in_time(wishes[i], gone):
+                late += 1
+                wishes[i] = scene.ground.towards(here[i], scene.home, scene.step_m)
+        positions = give_way(scene, bottom, wishes, seed)
+        task = scene.task
+        at_home = np.hypot(*(positions[:, :2] - task.entry_m).T) <= HOME_STEPS * scene.step_m * len(positions)
+        figures = {
+            "F_1": task.explored_part,
+            "F_2": task.explored_goal_part,
+            "homebound": float(late),
+            "homewards": float(self._homewards),
+            "at_home": float(at_home.sum()),
+        }
+        return Proposal(positions, self._objective(scene, positions), figures)
+
+    @property
+    def _homewards(self) -> bool:
+        """Whether the planner has begun to come home by itself: no view is left to go to, or a criterion says so."""
+        return False
+
+    @abstractmethod
+    def _seek(self, scene: Scene, seed: int) -> FloatArray:
+        """Return where every vehicle should go next, (n_vehicles, 2), within one step; they may hold."""
+
+    def _objective(self, scene: Scene, positions: FloatArray) -> float:
+        """Return the criterion that is being followed; ``CF_1`` unless a planner switches."""
+        return float(terms(scene.task, positions[:, :2], homewards=False, weights=Weights()).sum())
+
+
+def give_way(scene: Scene, bottom: Bottom, wishes: FloatArray, seed: int) -> FloatArray:
+    """Return the team's next positions (n_vehicles, 3): the wishes (n_vehicles, 2), a step aside, or where it is.
+
+    One after the other, beginning with another one each step, vehicles take the first place at which no limit is
+    broken while the others go where they have decided to, or stand. Standing breaks none, since it changes nothing.
+    """
+    team, positions = scene.team, scene.team.positions.copy()
+    for i in np.roll(np.arange(len(positions)), -team.step):
+        here = positions[i, :2].copy()
+
+        def may(ends: FloatArray, i: int = int(i), others: FloatArray = positions) -> FloatArray | None:
+            options = np.repeat(others[None], len(ends), axis=0)
+            options[:, i, :2] = ends
+            ok = team.constraints.feasible(team.positions, options, bottom)
+            return options[int(np.argmax(ok))] if ok.any() else None
+
+        decided = may(wishes[i : i + 1])
+        if decided is None:  # a step aside is dear to work out
+            aside = _aside(scene, int(i), wishes[i], seed) if len(positions) > 1 else np.zeros((0, 2))
+            decided = may(np.vstack([aside, here]))
+        positions = positions if decided is None else decided
+    return positions
+
+
+def _aside(scene: Scene, i: int, wish: FloatArray, seed: int) -> FloatArray:
+    """Return places (k, 2) a step away, those closest to the wish first, from where the vehicle is still in time."""
+    here = scene.team.positions[i, :2]
+    turn = vehicle_rng(seed, scene.team.vehicles[i]).uniform(0.0, 2.0 * np.pi)
+    bearing = turn + np.linspace(0.0, 2.0 * np.pi, ASIDE, endpoint=False)
+    ends = here + scene.step_m * np.column_stack([np.sin(bearing), np.cos(bearing)])
+    ends = ends[scene.ground.clear(here, ends)]
+    ends = ends[np.argsort(np.hypot(*(ends - wish).T))]
+    return ends[[scene.in_time(end, scene.step_m) for end in ends]] if len(ends) else ends
+
+
+def hold(scene: Scene) -> FloatArray:
+    """Return where the vehicles are, (n_vehicles, 2)."""
+    return np.array(scene.team.positions[:, :2])

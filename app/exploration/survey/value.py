@@ -1,0 +1,277 @@
+"""What a survey plan is worth: the squared interpolation error that is expected after it.
+
+A node at distance D from the nearest sounding has an expected squared error of a x / (1 + x) with x = (D / l)^p, where
+``a`` is the local roughness, ``l`` the correlation length, and p the exponent of short distances. It grows with the
+distance and ends at ``a``, the most that can be wrong there: far less on sand than among rocks. ``U`` is the sum over
+the nodes. Soundings are taken all along the legs.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from app.exploration.core.routes import fly
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+BUCKETS_PER_SIDE = 12
+
+
+class Nodes(NamedTuple):
+    """Where uncertainty is summed up, sorted by square buckets, so that a leg only asks the nodes around it.
+
+    Attributes
+    ----------
+    x, y : (m,)
+        East and north.
+    weight : (m,)
+        Roughness.
+    first : (rows * cols + 1,)
+        Where each bucket, row by row from the south-west, begins.
+    west, south, side : float
+        Corner of the first bucket and side of all.
+    rows, cols : int
+        Their number.
+    """
+
+    x: FloatArray
+    y: FloatArray
+    weight: FloatArray
+    first: IntArray
+    west: float
+    south: float
+    side: float
+    rows: int
+    cols: int
+
+    @property
+    def en_m(self) -> FloatArray:
+        """Positions (m, 2)."""
+        return np.column_stack([self.x, self.y])
+
+
+class Objective(NamedTuple):
+    """How a plan is judged: the largest leg, legs per vehicle, l and p as above, and what a reversal costs.
+
+    Nodes farther than ``reach_m`` from all soundings count as quite unknown.
+    """
+
+    step: float
+    steps: int
+    scale_m: float
+    power: float
+    turn_penalty: float
+    reach_m: float
+
+
+def make_nodes(en_m: FloatArray, weight: FloatArray) -> Nodes:
+    """Sort nodes at ``en_m`` (m, 2) with their ``weight`` (m,) into buckets."""
+    if len(en_m) == 0:
+        none = np.zeros(0)
+        return Nodes(none, none, none, np.zeros(2, dtype=np.int64), 0.0, 0.0, 1.0, 1, 1)
+    low, high = en_m.min(axis=0), en_m.max(axis=0)
+    side = max(float((high - low).max()) / BUCKETS_PER_SIDE, 1e-6)
+    cols, rows = (int(k) + 1 for k in (high - low) / side)
+    at = np.minimum(((en_m - low) / side).astype(np.int64), [cols - 1, rows - 1])
+    bucket = at[:, 1] * cols + at[:, 0]
+    order = np.argsort(bucket, kind="stable")
+    first = np.searchsorted(bucket[order], np.arange(rows * cols + 1)).astype(np.int64)
+    x, y, w = (np.ascontiguousarray(v[order], dtype=np.float64) for v in (en_m[:, 0], en_m[:, 1], weight))
+    return Nodes(x, y, w, first, float(low[0]), float(low[1]), side, rows, cols)
+
+
+@njit(cache=True, nogil=True, fastmath=True)
+def _lower(
+    d2: FloatArray, x: FloatArray, y: FloatArray, first: int, end: int, ax: float, ay: float, dx: float, dy: float
+) -> None:
+    length2 = dx * dx + dy * dy
+    inverse = 1.0 / length2 if length2 > 1e-12 else 0.0
+    for i in range(first, end):
+        rx = x[i] - ax
+        ry = y[i] - ay
+        t = (rx * dx + ry * dy) * inverse
+        t = 0.0 if t < 0.0 else t
+        t = 1.0 if t > 1.0 else t
+        ex = rx - t * dx
+        ey = ry - t * dy
+        e2 = ex * ex + ey * ey
+        d2[i] = e2 if e2 < d2[i] else d2[i]
+
+
+@njit(cache=True, nogil=True)
+def lower_to_segment(d2: FloatArray, nodes: Nodes, ax: float, ay: float, bx: float, by: float, reach: float) -> None:
+    """Lower squared distances ``d2`` (m,) of the nodes to those to the segment a-b, in place.
+
+    Nodes farther away than ``reach`` may be left as they are.
+    """
+    dx = bx - ax
+    dy = by - ay
+    length2 = dx * dx + dy * dy
+    side = nodes.side
+    c0 = max(0, int((min(ax, bx) - reach - nodes.west) / side))
+    c1 = min(nodes.cols - 1, int((max(ax, bx) + reach - nodes.west) / side))
+    r0 = max(0, int((min(ay, by) - reach - nodes.south) / side))
+    r1 = min(nodes.rows - 1, int((max(ay, by) + reach - nodes.south) / side))
+    far = reach + 0.7072 * side
+    for r in range(r0, r1 + 1):
+        # Of a row of buckets the nodes are contiguous: find its part that the segment comes close to.
+        low, high = -1, -1
+        my = nodes.south + (r + 0.5) * side
+        for c in range(c0, c1 + 1):
+            rx = nodes.west + (c + 0.5) * side - ax
+            ry = my - ay
+            t = (rx * dx + ry * dy) / length2 if length2 > 1e-12 else 0.0
+            t = min(1.0, max(0.0, t))
+            ex = rx - t * dx
+            ey = ry - t * dy
+            if ex * ex + ey * ey <= far * far:
+                if low < 0:
+                    low = c
+                high = c
+        if low >= 0:
+            row = r * nodes.cols
+            _lower(d2, nodes.x, nodes.y, nodes.first[row + low], nodes.first[row + high + 1], ax, ay, dx, dy)
+
+
+@njit(cache=True, nogil=True)
+def lower_to_route(
+    d2: FloatArray,
+    nodes: Nodes,
+    objective: Objective,
+    x: float,
+    y: float,
+    heading: float,
+    route: FloatArray,
+    count: int,
+    vertices: FloatArray,
+) -> float:
+    """Lower ``d2`` to what it is after flying a route from (x, y), in place; return how much it turns.
+
+    ``vertices`` is scratch space of at least ``objective.steps + 2`` rows.
+    """
+    n, _ = fly(x, y, route, count, objective.step, objective.steps, vertices)
+    for k in range(1, n):
+        lower_to_segment(
+            d2, nodes, vertices[k - 1, 0], vertices[k - 1, 1], vertices[k, 0], vertices[k, 1], objective.reach_m
+        )
+    return turning(vertices, n, heading)
+
+
+@njit(cache=True, nogil=True, inline="always")
+def expected_error(d2: float, weight: float, inverse2: float, power: float) -> float:
+    """Return a x / (1 + x) for a squared distance and the roughness a, ``weight``; ``inverse2`` is 1 / l^2."""
+    r2 = d2 * inverse2
+    if r2 > 1e6:
+        return weight
+    x = r2 if power == 2.0 else r2 * np.sqrt(r2) if power == 3.0 else r2 ** (0.5 * power)
+    part: float = weight * x / (1.0 + x)
+    return part
+
+
+@njit(cache=True, nogil=True)
+def uncertainty(d2: FloatArray, weight: FloatArray, scale_m: float, power: float) -> float:
+    """Return U for squared distances ``d2`` (m,) and roughness ``weight`` (m,)."""
+    total = 0.0
+    inverse2 = 1.0 / (scale_m * scale_m)
+    for i in range(len(d2)):
+        total += expected_error(d2[i], weight[i], inverse2, power)
+    return total
+
+
+@njit(cache=True, nogil=True)
+def turning(vertices: FloatArray, n: int, heading: float) -> float:
+    """Return the sum over corners of how far they turn beyond 100 degrees, in half turns; NaN heading: unknown."""
+    total = 0.0
+    previous = np.nan
+    if not np.isnan(heading):
+        previous = 0.5 * np.pi - heading
+    for k in range(1, n):
+        course = np.arctan2(vertices[k, 1] - vertices[k - 1, 1], vertices[k, 0] - vertices[k - 1, 0])
+        if not np.isnan(previous):
+            turn = abs((course - previous + np.pi) % (2 * np.pi) - np.pi)
+            total += max(0.0, turn - 1.75) / np.pi
+        previous = course
+    return total
+
+
+@njit(cache=True, nogil=True)
+def plan_value(
+    d2: FloatArray,
+    nodes: Nodes,
+    objective: Objective,
+    starts: FloatArray,
+    headings: FloatArray,
+    vias: FloatArray,
+    counts: IntArray,
+) -> float:
+    """Return U after flying a plan, plus a penalty for reversals.
+
+    Parameters
+    ----------
+    d2 : (m,)
+        Squared distances of the nodes to the soundings taken so far (not changed).
+    starts : (n_vehicles, 2)
+        Positions now.
+    headings : (n_vehicles,)
+        Clockwise from north; NaN unknown.
+    vias : (n_vehicles, k, 2)
+        Via points; the first ``counts[j]`` count.
+    """
+    after = d2.copy()
+    vertices = np.empty((objective.steps + 2, 2))
+    turns = 0.0
+    for j in range(len(starts)):
+        turns += lower_to_route(
+            after, nodes, objective, starts[j, 0], starts[j, 1], headings[j], vias[j], counts[j], vertices
+        )
+    value = uncertainty(after, nodes.weight, objective.scale_m, objective.power)
+    return value * (1.0 + objective.turn_penalty * turns)
+
+
+@njit(cache=True, nogil=True)
+def values_after_first_leg(
+    d2: FloatArray,
+    nodes: Nodes,
+    objective: Objective,
+    starts: FloatArray,
+    headings: FloatArray,
+    targets: FloatArray,
+    vias: FloatArray,
+    counts: IntArray,
+) -> FloatArray:
+    """Return, per team target, U after the first leg alone and U after going on with the plan from there: (c, 2).
+
+    ``targets`` (c, n_vehicles, 2) are the ends of the first legs; ``vias`` (c, n_vehicles, k, 2) and ``counts``
+    (c, n_vehicles) what each would follow afterwards; the rest as in :func:`plan_value`.
+    """
+    c, n, _ = targets.shape
+    out = np.empty((c, 2))
+    courses = np.empty(n)
+    rest = Objective(
+        objective.step,
+        objective.steps - 1,
+        objective.scale_m,
+        objective.power,
+        objective.turn_penalty,
+        objective.reach_m,
+    )
+    for i in range(c):
+        after = d2.copy()
+        turns = 0.0
+        for j in range(n):
+            ax, ay = starts[j, 0], starts[j, 1]
+            bx, by = targets[i, j, 0], targets[i, j, 1]
+            lower_to_segment(after, nodes, ax, ay, bx, by, objective.reach_m)
+            courses[j] = headings[j]
+            if np.hypot(bx - ax, by - ay) > 1e-6:
+                courses[j] = 0.5 * np.pi - np.arctan2(by - ay, bx - ax)
+                if not np.isnan(headings[j]):
+                    turn = abs((courses[j] - headings[j] + np.pi) % (2 * np.pi) - np.pi)
+                    turns += max(0.0, turn - 1.75) / np.pi
+        out[i, 0] = uncertainty(after, nodes.weight, objective.scale_m, objective.power)
+        later = plan_value(after, nodes, rest, targets[i], courses, vias[i], counts[i])
+        out[i, 1] = later * (1.0 + objective.turn_penalty * turns)
+    return out
