@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 from mapping_terrains import terrains
 
-from app.evaluation.tables.facts import made
+from app.evaluation.runs.facts import made
 from app.mapping.georeference import LocalFrame
 from app.mapping.gp import warm_up
 from app.missions.forecast.request import starts_of

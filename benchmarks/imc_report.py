@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from app.evaluation.tables.facts import made
+from app.evaluation.runs.facts import made
 
 LOAD = Path(__file__).parents[1] / "docs" / "results" / "load.md"
 LOAD_HEAD = """# Load and endurance: what was measured

@@ -19,7 +19,7 @@ from mapping_methods import METHODS, Method, ours
 from mapping_speed import exactness, speed
 from mapping_terrains import DESIGNS, PATCHY, sound, terrains, with_outliers
 
-from app.evaluation.tables.facts import made
+from app.evaluation.runs.facts import made
 from app.mapping.compare import difference, interval_coverage
 from app.mapping.gp import warm_up
 from app.mapping.outliers import flag_outliers

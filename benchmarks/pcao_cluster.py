@@ -14,12 +14,12 @@ import time
 import psutil
 from distributed import Client, LocalCluster
 
-from app.evaluation.cluster import Cluster
 from app.evaluation.pcao.scoring import DaskScorer
 from app.evaluation.pcao.task import TrainingTask
 from app.evaluation.pcao.terrains import sea_floor
 from app.evaluation.pcao.training import make_optimiser
 from app.evaluation.pcao.world import SeaFloor
+from app.evaluation.runs.cluster import Cluster
 
 ROUNDS = 2
 CONTROLLERS = 8

@@ -12,9 +12,9 @@ from pathlib import Path
 
 import numpy as np
 
-from app.evaluation.survey import judge
-from app.evaluation.survey_world import SurveyScenario, fly_planner
-from app.evaluation.symmetry import turned
+from app.evaluation.survey.run import judge
+from app.evaluation.survey.symmetry import turned
+from app.evaluation.survey.world import SurveyScenario, fly_planner
 from app.exploration.planner.options import PlannerOptions
 from simulator.terrain_files import load_terrain
 

@@ -38,11 +38,11 @@ import orjson
 from rich.progress import Progress as ProgressBar
 from survey_study import PATCHY, STEPS, VEHICLES, StudyJob, chosen_floors, numbers, study_jobs
 
-from app.evaluation.jobs import Progress, run_jobs
-from app.evaluation.survey import judge
-from app.evaluation.survey_world import SOUNDING_RATE_HZ, SPEED_MPS, FloatArray, SurveyScenario, fly_routes
-from app.evaluation.tables.facts import made
-from app.evaluation.tables.store import Results
+from app.evaluation.runs.facts import made
+from app.evaluation.runs.jobs import Progress, run_jobs
+from app.evaluation.runs.store import Results
+from app.evaluation.survey.run import judge
+from app.evaluation.survey.world import SOUNDING_RATE_HZ, SPEED_MPS, FloatArray, SurveyScenario, fly_routes
 from app.exploration.lines.lawnmower import lawnmower_routes
 from app.mapping.types import Soundings
 

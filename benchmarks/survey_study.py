@@ -18,14 +18,14 @@ import numpy as np
 from rich.progress import Progress as ProgressBar
 
 from app.estimation import Sensor
-from app.evaluation.jobs import Progress, run_jobs
-from app.evaluation.recorded import recorded_soundings
-from app.evaluation.summary import spread
-from app.evaluation.survey_job import SurveyJob
-from app.evaluation.survey_world import Sampling, Sounder, SurveyScenario
-from app.evaluation.symmetry import turned, turned_soundings
-from app.evaluation.tables.facts import made
-from app.evaluation.tables.store import Results
+from app.evaluation.runs.facts import made
+from app.evaluation.runs.jobs import Progress, run_jobs
+from app.evaluation.runs.store import Results
+from app.evaluation.runs.summary import spread
+from app.evaluation.survey.job import SurveyJob
+from app.evaluation.survey.recorded import recorded_soundings
+from app.evaluation.survey.symmetry import turned, turned_soundings
+from app.evaluation.survey.world import Sampling, Sounder, SurveyScenario
 from app.exploration.planner.options import PlannerOptions
 from app.mapping.types import Soundings
 from simulator.seafloors import generate

@@ -14,17 +14,17 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 
 from app.estimation import Sensor
-from app.evaluation.cluster import ClusterError
-from app.evaluation.cube_world import COM_RANGE, ExploreScenario
-from app.evaluation.explore import EXPLORERS, OSARSES, run_explore
-from app.evaluation.jobs import Job, run_jobs
-from app.evaluation.jobs import Progress as StepProgress
-from app.evaluation.recorded import recorded_soundings
-from app.evaluation.summary import summarise
-from app.evaluation.survey_job import SurveyJob
-from app.evaluation.survey_world import Sampling, Sounder, SurveyScenario
-from app.evaluation.symmetry import SYMMETRIES, turned, turned_soundings
-from app.evaluation.team_changes import TeamChanges, parse_changes
+from app.evaluation.explore.run import EXPLORERS, OSARSES, run_explore
+from app.evaluation.explore.team_changes import TeamChanges, parse_changes
+from app.evaluation.explore.world import COM_RANGE, ExploreScenario
+from app.evaluation.runs.cluster import ClusterError
+from app.evaluation.runs.jobs import Job, run_jobs
+from app.evaluation.runs.jobs import Progress as StepProgress
+from app.evaluation.runs.summary import summarise
+from app.evaluation.survey.job import SurveyJob
+from app.evaluation.survey.recorded import recorded_soundings
+from app.evaluation.survey.symmetry import SYMMETRIES, turned, turned_soundings
+from app.evaluation.survey.world import Sampling, Sounder, SurveyScenario
 from app.exploration.communication.messages import MAX_ENTRIES
 from app.exploration.core.objective import TERMS
 from app.exploration.pcao.model import PcaoModel
@@ -240,12 +240,12 @@ def tables(
     no_run: Annotated[bool, typer.Option("--no-run", help="Only report the results that are there.")] = False,
 ) -> None:
     """Rerun the papers' tables and figures over many seeds, beside our planners and the lawnmower, and report."""
-    from app.evaluation.tables.facts import made
-    from app.evaluation.tables.plots import draw
-    from app.evaluation.tables.report import Report, markdown
-    from app.evaluation.tables.setups import jobs_of, sections
-    from app.evaluation.tables.store import Results
-    from app.evaluation.tables.terrains import report_terrains
+    from app.evaluation.explore.plots import draw
+    from app.evaluation.explore.report import Report, markdown
+    from app.evaluation.explore.setups import jobs_of, sections
+    from app.evaluation.explore.terrains import report_terrains
+    from app.evaluation.runs.facts import made
+    from app.evaluation.runs.store import Results
 
     known = sections(steps, quick=quick)
     names = [section.name for section in known] if only is None else [name.strip() for name in only.split(",")]

@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 from distributed import LocalCluster
 
-from app.evaluation.cluster import Cluster, ClusterError
-from app.evaluation.jobs import run_jobs
 from app.evaluation.pcao.experiments import FlightJob
 from app.evaluation.pcao.scoring import DaskScorer, LocalScorer
 from app.evaluation.pcao.task import TrainingTask
 from app.evaluation.pcao.terrains import sea_floor
 from app.evaluation.pcao.training import Checkpoint, make_optimiser, train
 from app.evaluation.pcao.world import SeaFloor
+from app.evaluation.runs.cluster import Cluster, ClusterError
+from app.evaluation.runs.jobs import run_jobs
 from app.exploration.pcao.model import default_model
 
 TASK = TrainingTask((SeaFloor(sea_floor("ridge:3")),), (0, 1, 2, 3), robots=2, landmarks=60, steps=12)
@@ -61,6 +61,6 @@ def test_evaluations_on_a_cluster_are_those_made_here(workers):
 
 
 def test_a_scheduler_that_is_not_there_is_named(unused_tcp_port, monkeypatch):
-    monkeypatch.setattr("app.evaluation.cluster.CONNECT_S", 0.3)
+    monkeypatch.setattr("app.evaluation.runs.cluster.CONNECT_S", 0.3)
     with pytest.raises(ClusterError, match=rf"no Dask cluster answers at 'tcp://127.0.0.1:{unused_tcp_port}'"):
         Cluster(f"tcp://127.0.0.1:{unused_tcp_port}")

@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
-from app.evaluation.cube_world import CubeTerrain, ExploreScenario, World
-from app.evaluation.explore import run_explore
-from app.evaluation.team_changes import TeamChanges
+from app.evaluation.explore.run import run_explore
+from app.evaluation.explore.team_changes import TeamChanges
+from app.evaluation.explore.world import CubeTerrain, ExploreScenario, World
 from app.exploration.core.constraints import inside_area
 from app.exploration.planner.options import PlannerOptions
 from simulator.seafloors import generate

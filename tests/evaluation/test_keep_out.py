@@ -6,7 +6,7 @@ from shapely import box
 from shapely.geometry import Polygon
 from shapely.ops import unary_union
 
-from app.evaluation.keep_out import PASSAGE, draw_keep_out
+from app.evaluation.explore.keep_out import PASSAGE, draw_keep_out
 
 START = np.array([[-0.9, -0.9], [-0.7, -0.7]])
 

@@ -6,10 +6,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
-from app.evaluation.baselines import lawnmower_baseline, lawnmower_baselines
-from app.evaluation.flown import fly_lawnmower
-from app.evaluation.survey import run_survey
-from app.evaluation.survey_world import SurveyScenario, along, default_map, fly_planner, rmse_m
+from app.evaluation.survey.baselines import lawnmower_baseline, lawnmower_baselines
+from app.evaluation.survey.flown import fly_lawnmower
+from app.evaluation.survey.run import run_survey
+from app.evaluation.survey.world import SurveyScenario, along, default_map, fly_planner, rmse_m
 from app.exploration.planner.options import PlannerOptions
 from simulator.seafloors import generate
 
@@ -106,7 +106,7 @@ def test_the_default_planner_beats_the_lawnmower_where_detail_is_concentrated():
 
 @pytest.mark.terrains
 def test_recorded_track_is_compared_where_the_terrain_has_one(terrains):
-    from app.evaluation.recorded import recorded_soundings
+    from app.evaluation.survey.recorded import recorded_soundings
 
     assert len(recorded_soundings(terrains / "leixoes_sharp.npz")) == 2560
     assert recorded_soundings(terrains / "leixoes_slope.npz") is None

@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
-from app.evaluation.oracle import oracle_soundings
-from app.evaluation.survey_world import SurveyScenario, default_map, rmse_m
-from app.evaluation.symmetry import SYMMETRIES, turned, turned_soundings
+from app.evaluation.survey.oracle import oracle_soundings
+from app.evaluation.survey.symmetry import SYMMETRIES, turned, turned_soundings
+from app.evaluation.survey.world import SurveyScenario, default_map, rmse_m
 from app.mapping.types import Soundings
 from simulator.seafloors import generate
 from simulator.terrain import Terrain

@@ -4,10 +4,10 @@ import pytest
 from typer.testing import CliRunner
 
 from app.evaluation.cli import evaluate_app
-from app.evaluation.tables.report import Report, markdown
-from app.evaluation.tables.setups import Section, Setup, TableJob, jobs_of, run_key, sections
-from app.evaluation.tables.store import Results
-from app.evaluation.tables.terrains import report_terrains
+from app.evaluation.explore.report import Report, markdown
+from app.evaluation.explore.setups import Section, Setup, TableJob, jobs_of, run_key, sections
+from app.evaluation.explore.terrains import report_terrains
+from app.evaluation.runs.store import Results
 from simulator.seafloors import generate
 from simulator.terrain_files import save_npz
 

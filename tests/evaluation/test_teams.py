@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
 
-from app.evaluation.cube_world import ExploreScenario, World
-from app.evaluation.explore import run_explore
-from app.evaluation.team_changes import TeamChanges
-from app.evaluation.teams import SILENT_AFTER, LimitedTeam, UnlimitedTeam
+from app.evaluation.explore.run import run_explore
+from app.evaluation.explore.team_changes import TeamChanges
+from app.evaluation.explore.teams import SILENT_AFTER, LimitedTeam, UnlimitedTeam
+from app.evaluation.explore.world import ExploreScenario, World
 from app.exploration.planner.options import PlannerOptions
 from simulator.seafloors import generate
 

@@ -9,14 +9,13 @@ import pytest
 from typer.testing import CliRunner
 
 from app.estimation import Fading, Landmarks3D
-from app.evaluation.plain_ekf import PlainEkf
-from app.evaluation.presumed import Presumed
-from app.evaluation.trace_greedy import foretold_trace
-from app.evaluation.track import run_track
-from app.evaluation.track_cli import evaluate_app
-from app.evaluation.track_world import TrackScenario, TrackWorld
-from app.evaluation.tracking import consistency
-from app.evaluation.tracking.setups import TrackJob
+from app.evaluation.track.cli import evaluate_app
+from app.evaluation.track.plain_ekf import PlainEkf
+from app.evaluation.track.presumed import Presumed
+from app.evaluation.track.run import consistency, run_track
+from app.evaluation.track.setups import TrackJob
+from app.evaluation.track.trace_greedy import foretold_trace
+from app.evaluation.track.world import TrackScenario, TrackWorld
 from app.exploration.planner.options import PlannerOptions
 from simulator.seafloors import generate
 

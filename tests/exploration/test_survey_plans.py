@@ -8,7 +8,7 @@ from scipy.spatial import cKDTree
 from situations import make_situation
 
 from app.estimation import SingleBeam
-from app.evaluation.survey_world import SurveyScenario, fly_planner
+from app.evaluation.survey.world import SurveyScenario, fly_planner
 from app.exploration.core.constraints import Constraints
 from app.exploration.core.routes import fly, next_waypoint
 from app.exploration.planner.options import PlannerOptions

@@ -11,13 +11,13 @@ import orjson
 from numpy.typing import NDArray
 
 from app.estimation import RangeSensor, Sensor
-from app.evaluation.cube_world import ExploreScenario
-from app.evaluation.explore import OSARSES, run_explore
-from app.evaluation.jobs import Job, Progress
+from app.evaluation.explore.run import OSARSES, run_explore
+from app.evaluation.explore.world import ExploreScenario
 from app.evaluation.pcao.optimisers import METHODS
 from app.evaluation.pcao.task import TrainingTask
 from app.evaluation.pcao.tried import FDSA, SE, SPSA, fly_tried, tries_per_step
 from app.evaluation.pcao.world import LANDMARKS, ROBOTS, STEPS, SeaFloor
+from app.evaluation.runs.jobs import Job, Progress
 from app.exploration.pcao.model import PcaoModel
 from app.exploration.planner.options import PlannerOptions
 from simulator.terrain import Terrain

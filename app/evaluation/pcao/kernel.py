@@ -1,6 +1,6 @@
 """PCAO18's simulation, compiled: a team over a sea floor, swath sonars, landmarks, and the controller that leads it.
 
-Frame: the cube [-1, 1]^3 of :mod:`app.evaluation.cube_world`; depth positive down.
+Frame: the cube [-1, 1]^3 of :mod:`app.evaluation.explore.world`; depth positive down.
 """
 
 from typing import NamedTuple

@@ -8,7 +8,7 @@ import numpy as np
 
 from app.evaluation.pcao.experiments import MAPS, TEAMS, PaperMap
 from app.evaluation.pcao.published import BEST, MEANS, TABLE2, TABLES
-from app.evaluation.summary import spread
+from app.evaluation.runs.summary import spread
 from app.exploration.pcao.model import PcaoModel
 
 Run = Mapping[str, Any]

@@ -7,8 +7,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from app.evaluation.cluster import Cluster
 from app.evaluation.pcao.task import TrainingTask
+from app.evaluation.runs.cluster import Cluster
 
 FloatArray = NDArray[np.float64]
 Cases = tuple[tuple[int, int], ...]

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 
 from app.estimation.beams import Multibeam
-from app.evaluation.cube_world import (
+from app.evaluation.explore.world import (
     CEILING,
     CLEARANCE,
     DEEPEST,

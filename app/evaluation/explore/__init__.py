@@ -1,0 +1,1 @@
+"""The papers' landmark experiment (AURO15), over many seeds: world, runs, yardsticks, report and pictures."""

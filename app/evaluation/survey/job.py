@@ -1,0 +1,43 @@
+"""One run of the field experiment as a job for :mod:`app.evaluation.runs.jobs`."""
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from app.estimation import Sensor, SingleBeam
+from app.evaluation.runs.jobs import Progress
+from app.evaluation.survey.run import run_survey
+from app.evaluation.survey.world import SurveyScenario
+from app.exploration.planner.options import PlannerOptions
+from app.mapping.types import Soundings
+
+
+@dataclass(frozen=True)
+class SurveyJob:
+    """One run of ``survey``."""
+
+    scenario: SurveyScenario
+    planner: str
+    options: PlannerOptions
+    recorded: Soundings | None
+
+    @property
+    def title(self) -> str:
+        """What it is, for the progress bar."""
+        return f"{self.planner}, seed {self.scenario.seed}, symmetry {self.scenario.symmetry}"
+
+    @property
+    def steps(self) -> int:
+        """Its length."""
+        return self.scenario.steps
+
+    @property
+    def sensor(self) -> Sensor:
+        """What its vehicles measure with."""
+        return SingleBeam(self.scenario.relative_noise)
+
+    def run(self, progress: Progress) -> dict[str, Any]:
+        """Run it."""
+        result = asdict(run_survey(self.scenario, self.planner, self.options, progress, self.recorded))
+        if self.recorded is None:
+            del result["recorded_track"], result["ratio_recorded"]
+        return result

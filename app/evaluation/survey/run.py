@@ -1,0 +1,195 @@
+"""The papers' field experiment on any terrain: a planner beside the usual practice, even coverage and an oracle."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from app.evaluation.survey.oracle import oracle_soundings
+from app.evaluation.survey.world import (
+    SOUNDING_RATE_HZ,
+    SPEED_MPS,
+    SurveyScenario,
+    default_map,
+    fly_planner,
+    fly_routes,
+    rmse_m,
+    stationary_map,
+    unknown_belief,
+)
+from app.exploration.lines.lawnmower import lawnmower_routes
+from app.exploration.planner.options import PlannerOptions
+from app.exploration.survey.backbone import backbone
+from app.exploration.survey.value import make_nodes
+from app.mapping.types import FloatArray, Soundings
+
+TVU_A_M, TVU_B = 0.25, 0.0075
+"""IHO S-44 special order: total vertical uncertainty at 95 % is sqrt(a^2 + (b depth)^2)."""
+
+
+@dataclass(frozen=True)
+class SurveyResult:
+    """How good the map of some soundings is; ``coverage_pct``: cells known to S-44 special order.
+
+    ``rmse_m`` and ``l2_norm`` are those of the default map. A yardstick is given the better of the default map and
+    the stationary one, whose figure is ``rmse_stationary_m``.
+    """
+
+    rmse_m: float
+    l2_norm: float
+    samples: int
+    distance_m: float
+    time_s: float
+    coverage_pct: float
+    rmse_stationary_m: float
+
+
+@dataclass(frozen=True)
+class RecordedTrack:
+    """The better of the two maps from a track that was really flown, where the terrain file has one."""
+
+    samples: int
+    rmse_m: float
+
+
+@dataclass(frozen=True)
+class SurveyRun:
+    """One run; names as in the command's JSON.
+
+    ``ratio``: RMSE over that of the better of the two patterns. ``gap_closed``: how far the RMSE has come from that of
+    the better pattern (0) to that of the oracle (1).
+    """
+
+    planner: str
+    terrain: str
+    seed: int
+    symmetry: int
+    vehicles: int
+    steps: int
+    max_step_m: float
+    sampling: str
+    sounder: str
+    rmse_m: float
+    l2_norm: float
+    samples: int
+    distance_m: float
+    time_s: float
+    coverage_pct: float
+    rmse_stationary_m: float
+    plan_ms_median: float
+    plan_ms_p99: float
+    plan_s: float
+    usual_practice: SurveyResult
+    coverage: SurveyResult
+    random: SurveyResult
+    oracle: SurveyResult
+    ratio: float
+    gap_closed: float
+    recorded_track: RecordedTrack | None = None
+    ratio_recorded: float | None = None
+
+
+def run_survey(
+    scenario: SurveyScenario,
+    planner: str,
+    options: PlannerOptions,
+    progress: Callable[[int], None] = lambda step: None,
+    recorded: Soundings | None = None,
+) -> SurveyRun:
+    """Fly the planner and everything that it is compared with.
+
+    The patterns travel as far as the planner did, on average over the vehicles; the oracle places as many soundings.
+    ``recorded`` are the soundings of a track that was really flown over this terrain.
+    """
+    track = fly_planner(scenario, planner, options, progress)
+    ours = judge(scenario, track.soundings, track.distance_m)
+    limit = float(track.distance_m.mean())
+    usual = _pattern(scenario, lawnmower_routes(scenario.constraints, scenario.starts_m[:, :2], limit), limit)
+    even = _pattern(scenario, even_coverage(scenario, limit), limit)
+    walk = fly_planner(scenario, "random", PlannerOptions(), known=unknown_belief(scenario.belief_grid))
+    placed = oracle_soundings(
+        scenario.log(3), scenario.terrain, len(track.soundings), float(scenario.starts_m[:, 2].mean())
+    )
+    oracle = judge(scenario, placed, np.zeros(scenario.vehicles), yardstick=True)
+    beside = None
+    if recorded is not None:
+        beside = RecordedTrack(len(recorded), judge(scenario, recorded, np.zeros(1), yardstick=True).rmse_m)
+    pattern = min(usual.rmse_m, even.rmse_m)
+    return SurveyRun(
+        planner=planner,
+        terrain=scenario.terrain.name,
+        seed=scenario.seed,
+        symmetry=scenario.symmetry,
+        vehicles=scenario.vehicles,
+        steps=scenario.steps,
+        max_step_m=scenario.max_step_m,
+        sampling=scenario.sampling,
+        sounder=scenario.sounder,
+        rmse_m=ours.rmse_m,
+        l2_norm=ours.l2_norm,
+        samples=ours.samples,
+        distance_m=ours.distance_m,
+        time_s=ours.time_s,
+        coverage_pct=ours.coverage_pct,
+        rmse_stationary_m=ours.rmse_stationary_m,
+        plan_ms_median=1e3 * float(np.median(track.plan_s)),
+        plan_ms_p99=1e3 * float(np.quantile(track.plan_s, 0.99)),
+        plan_s=float(track.plan_s.sum()),
+        usual_practice=usual,
+        coverage=even,
+        random=judge(scenario, walk.soundings, walk.distance_m, yardstick=True),
+        oracle=oracle,
+        ratio=ours.rmse_m / pattern,
+        gap_closed=(pattern - ours.rmse_m) / (pattern - oracle.rmse_m) if oracle.rmse_m < pattern else float("nan"),
+        recorded_track=beside,
+        ratio_recorded=None if beside is None else ours.rmse_m / beside.rmse_m,
+    )
+
+
+def judge(
+    scenario: SurveyScenario, soundings: Soundings, distance_m: FloatArray, *, yardstick: bool = False
+) -> SurveyResult:
+    """Map the soundings and compare with the truth; ``distance_m`` (vehicles,) is what each travelled.
+
+    A yardstick may choose the better of the default and the stationary map.
+    """
+    estimate, stationary = default_map(soundings, scenario.grid), stationary_map(soundings, scenario.grid)
+    rmse, l2 = rmse_m(estimate, scenario.terrain)
+    rmse_stationary, l2_stationary = rmse_m(stationary, scenario.terrain)
+    if yardstick and rmse_stationary < rmse:
+        estimate, rmse, l2 = stationary, rmse_stationary, l2_stationary
+    allowed = np.hypot(TVU_A_M, TVU_B * estimate.depth_m) / 1.96
+    return SurveyResult(
+        rmse,
+        l2,
+        len(soundings),
+        float(np.sum(distance_m)),
+        float(np.max(distance_m)) / SPEED_MPS,
+        100.0 * float(np.mean(estimate.sd_m <= allowed)),
+        rmse_stationary,
+    )
+
+
+def even_coverage(scenario: SurveyScenario, distance_m: float) -> list[FloatArray]:
+    """Return routes of equal area per vehicle, in the direction and order that come closest to every place."""
+    belief = unknown_belief(scenario.belief_grid)
+    steps = max(1, int(distance_m / scenario.max_step_m))
+    nodes = make_nodes(belief.xy_m, belief.weight)
+    spacing = scenario.terrain.width_m * scenario.terrain.height_m / (scenario.vehicles * distance_m)
+    shares = backbone(
+        scenario.constraints,
+        np.ascontiguousarray(scenario.starts_m[:, :2]),
+        steps,
+        nodes,
+        max(belief.correlation_length_m, spacing),
+        2.0,
+        to_border=0.5,
+    )
+    return [share.stops for share in shares]
+
+
+def _pattern(scenario: SurveyScenario, routes: list[FloatArray], distance_m: float) -> SurveyResult:
+    log = scenario.log(2)
+    spacing = SPEED_MPS / SOUNDING_RATE_HZ if scenario.sampling == "continuous" else distance_m / scenario.steps
+    flown = fly_routes(log, scenario.starts_m, routes, distance_m, spacing)
+    return judge(scenario, log.soundings, flown, yardstick=True)

@@ -1,1 +1,0 @@
-"""The papers' tables and figures, and what goes beyond them, over many seeds: runs, report and pictures."""
