@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
 
 FloatArray = NDArray[np.float64]
 
@@ -92,7 +91,7 @@ class TeamPosition:
 
 def radius(sd_m: FloatArray, probability: float) -> FloatArray:
     """Return within which horizontal distance a vehicle is with at least this probability."""
-    return np.asarray(np.sqrt(chi2.ppf(probability, 2)) * np.asarray(sd_m))
+    return np.asarray(np.sqrt(-2.0 * np.log(1.0 - probability)) * np.asarray(sd_m))
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
 from shapely import contains_xy
 from shapely.geometry import Polygon
 
@@ -16,7 +15,7 @@ from app.missions.views.targets import EllipseView, TargetState, TargetView
 FloatArray = NDArray[np.float64]
 
 PROBABILITY = 0.95
-_SCALE = math.sqrt(float(chi2.ppf(PROBABILITY, 2)))
+_SCALE = math.sqrt(-2.0 * math.log(1.0 - PROBABILITY))
 
 
 def target_views(
