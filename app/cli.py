@@ -19,7 +19,7 @@ from app.commands.logs import import_logs
 from app.commands.train import train
 
 if TYPE_CHECKING:
-    from imc_bridge.doctor import Diagnosis
+    from imc_bridge.doctor.doctor import Diagnosis
 
 app = typer.Typer(
     name="bathyfleet",
@@ -259,8 +259,8 @@ def doctor(
     settings = command_settings()
     from app.missions.fleet.links.imc import bridge_settings
     from app.missions.views.doctor import doctor_view
-    from imc_bridge.doctor import Diagnosis, diagnose, diagnose_recording
-    from imc_bridge.replay import RecordingError
+    from imc_bridge.doctor.doctor import Diagnosis, diagnose, diagnose_recording
+    from imc_bridge.doctor.replay import RecordingError
 
     try:
         bridge = bridge_settings(settings.imc, settings.time_scale)
@@ -301,7 +301,7 @@ def _show_diagnosis(diagnosis: "Diagnosis") -> None:
     from rich.table import Table
     from rich.text import Text
 
-    from imc_bridge.doctor import Severity
+    from imc_bridge.doctor.doctor import Severity
     from imc_bridge.printable import printable
 
     def plain(words: str) -> Text:

@@ -40,10 +40,10 @@ from app.missions.soundings.corrections import Corrections
 from app.missions.soundings.gate import MAX_OCEAN_DEPTH_M, Gate
 from app.missions.spec.mission import Tide
 from imc_bridge import Bridge, BridgeSettings, LinkChange, RefusedError, Sounding, StateReport, Waypoint
-from imc_bridge.codec import message_ids, message_name
 from imc_bridge.events import SoundingRefused
-from imc_bridge.hearing import WANTED
-from imc_bridge.transport import Address
+from imc_bridge.network.codec import message_ids, message_name
+from imc_bridge.network.transport import Address
+from imc_bridge.receiver import WANTED
 
 VEHICLE_ID, VEHICLE, ALTIMETER = 0x1E, ("127.0.0.1", 6002), 11
 PLACE_DEG = (41.185, -8.706)

@@ -20,8 +20,8 @@ from imc_bridge.events import (
     WaypointChange,
     WaypointStatus,
 )
+from imc_bridge.network.transport import PortInUseError
 from imc_bridge.settings import BridgeSettings
-from imc_bridge.transport import PortInUseError
 
 __all__ = [
     "BottomPoint",

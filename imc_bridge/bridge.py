@@ -9,9 +9,8 @@ import time
 from collections import Counter
 from collections.abc import Callable
 
-from imc_bridge.control import Phase
-from imc_bridge.crew import Crew
-from imc_bridge.drops import DropMeter
+from imc_bridge.control.control import Phase
+from imc_bridge.control.controls import Crew
 from imc_bridge.events import (
     BridgeEvent,
     EventCallback,
@@ -23,12 +22,13 @@ from imc_bridge.events import (
     StopResult,
     Waypoint,
 )
-from imc_bridge.hearing import Hearing
 from imc_bridge.links import Links
-from imc_bridge.roster import Roster
+from imc_bridge.network.drops import DropMeter
+from imc_bridge.network.transport import Address, Transport
+from imc_bridge.nodes.roster import Roster
+from imc_bridge.receiver import Hearing
+from imc_bridge.sender import Speaker
 from imc_bridge.settings import BridgeSettings
-from imc_bridge.speaking import Speaker
-from imc_bridge.transport import Address, Transport
 from imc_bridge.views import view_of
 
 log = logging.getLogger(__name__)
@@ -125,7 +125,7 @@ class Bridge:
 
         Raises
         ------
-        imc_bridge.transport.PortInUseError
+        imc_bridge.network.transport.PortInUseError
             When a port belongs to another program.
         ValueError
             When a configured interface is absent.

@@ -62,7 +62,7 @@ class Waypoint:
     to pass the waypoint straight. DUNE flies straight to a reference only until some 7 m before it, and circles
     at once around one that is closer than 15 m.
 
-    ``circle_lat_deg``, ``circle_lon_deg``: centre of a circle with :data:`imc_bridge.plans.CIRCLE_RADIUS_M` in which it
+    ``circle_lat_deg``, ``circle_lon_deg``: centre of a circle with a radius of :data:`.CIRCLE_RADIUS_M` in which it
     may descend before it goes there; without one it does not circle.
     """
 

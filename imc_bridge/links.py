@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 
-from imc_bridge.control import Control
+from imc_bridge.control.control import Control
 from imc_bridge.events import LinkChange, NodeState
-from imc_bridge.nodes import Node
+from imc_bridge.nodes.node import Node
 
 KEPT = 32
 """Changes of a link that are kept, with their times and reasons."""

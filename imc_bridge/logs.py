@@ -17,7 +17,8 @@ from typing import cast
 
 import imcpy
 
-from imc_bridge.codec import (
+from imc_bridge.events import Sounding, SoundingRefused, StateReport
+from imc_bridge.network.codec import (
     FOOTER_SIZE,
     HEADER_SIZE,
     SYNC,
@@ -27,13 +28,12 @@ from imc_bridge.codec import (
     PacketFault,
     message_ids,
 )
-from imc_bridge.discovery import read_announce
-from imc_bridge.events import Sounding, SoundingRefused, StateReport
-from imc_bridge.nodes import Node, listed_entities
+from imc_bridge.network.discovery import read_announce
+from imc_bridge.network.text_fields import text
+from imc_bridge.nodes.node import Node, listed_entities
+from imc_bridge.nodes.vehicle_clock import Tick, VehicleClock
 from imc_bridge.settings import BridgeSettings
-from imc_bridge.soundings import offer_distance
-from imc_bridge.texts import text
-from imc_bridge.vehicle_clock import Tick, VehicleClock
+from imc_bridge.telemetry.soundings import offer_distance
 
 BLOCK_BYTES = 1 << 20
 GZIP_MAGIC = b"\x1f\x8b"

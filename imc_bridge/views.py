@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from imc_bridge.events import LinkChange, NodeView
-from imc_bridge.nodes import Node
+from imc_bridge.nodes.node import Node
 
 
 def view_of(

@@ -16,7 +16,7 @@ from imc_bridge.neptus.ftp import FtpCalls, FtpEndpoint, LogInRefusedError, Uplo
 from imc_bridge.neptus.http import HttpEndpoint, listening_socket
 from imc_bridge.neptus.protocol import NeptusDataError, count_vehicles, read_map, read_session, read_step, write_actions
 from imc_bridge.neptus.values import Area, Conventions, Place, StepData
-from imc_bridge.transport import PortInUseError
+from imc_bridge.network.transport import PortInUseError
 
 MAX_SESSIONS = 100
 ANSWER_WITHIN_S = 20.0
@@ -156,7 +156,7 @@ class NeptusGateway:
 
         Raises
         ------
-        imc_bridge.transport.PortInUseError
+        imc_bridge.network.transport.PortInUseError
             Saying which port cannot be had and what to do.
         """
         settings = self._settings

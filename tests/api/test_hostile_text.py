@@ -25,7 +25,7 @@ from app.mapping.products.tracks import Track, TrackPoint, tracks_gpx
 from app.settings import Settings
 from app.storage.database import Database
 from app.storage.prepare import prepare_database
-from imc_bridge.diagnosis import Cause, Diagnosis, NodeDiagnosis, problem
+from imc_bridge.doctor.diagnosis import Cause, Diagnosis, NodeDiagnosis, problem
 from imc_bridge.events import NodeState
 from imc_bridge.printable import printable
 from tests.api.conftest import make_client, mission_spec, running, soundings

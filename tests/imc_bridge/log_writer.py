@@ -8,7 +8,7 @@ from pathlib import Path
 import imcpy
 from imcpy.coordinates import WGS84
 
-from imc_bridge.codec import encode
+from imc_bridge.network.codec import encode
 
 VEHICLE_ID, OTHER_ID = 0x1E, 0x1F
 NAME = "lauv-log-1"

@@ -7,7 +7,7 @@ import imcpy
 import pytest
 
 from imc_bridge import BridgeSettings, Guidance, NodeState, RefusedError, Waypoint, WaypointStatus
-from imc_bridge.acoustics import (
+from imc_bridge.control.acoustics import (
     DEADLINE_S,
     INSTANT_BYTES,
     REPORT_PERIOD_S,
@@ -16,7 +16,7 @@ from imc_bridge.acoustics import (
     report_request,
     transmission,
 )
-from imc_bridge.plans import OPERATION_START, OPERATION_STOP, goto_maneuver, leg_plan, plan_control
+from imc_bridge.control.plans import OPERATION_START, OPERATION_STOP, goto_maneuver, leg_plan, plan_control
 from simulator.dune.node import FakeDune
 from tests.imc_bridge.conftest import Peer, Sea, open_sea, read_capture, until
 

@@ -49,7 +49,7 @@ async def test_a_plan_by_references_is_brought_back_while_its_vehicle_goes_on():
 
 async def test_a_vehicle_that_takes_no_stop_is_stopped_by_an_abort(monkeypatch):
     # As if it could not be brought back before the stop.
-    monkeypatch.setattr("imc_bridge.follow.BLOCKED_S", 1e9)
+    monkeypatch.setattr("imc_bridge.control.follow.BLOCKED_S", 1e9)
     async with open_sea() as sea:
         [name] = await sea.ready()
         await sea.bridge.engage(name)

@@ -9,8 +9,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from imc_bridge.codec import Decoder, Header, PacketFault, checksum, encode, message_name, peek, without_argument
-from imc_bridge.hearing import WANTED
+from imc_bridge.network.codec import (
+    Decoder,
+    Header,
+    PacketFault,
+    checksum,
+    encode,
+    message_name,
+    peek,
+    without_argument,
+)
+from imc_bridge.receiver import WANTED
 from tests.imc_bridge.conftest import read_capture
 
 SESSIONS = ["udp_session", "acoustic_session", "wifi_gap_x5"]

@@ -6,7 +6,7 @@ import math
 import imcpy
 
 from imc_bridge import Bridge
-from imc_bridge.consoles import MAX_MARKS, SHOW_PERIOD_S, Board, Mark
+from imc_bridge.network.consoles import MAX_MARKS, SHOW_PERIOD_S, Board, Mark
 from tests.imc_bridge.conftest import Peer, open_sea, until
 
 

@@ -13,11 +13,11 @@ import imcpy
 import pytest
 
 from imc_bridge import Bridge, BridgeSettings, NodeState
-from imc_bridge.capacity import MAX_NODES, MAX_UNANNOUNCED, MAX_UNANNOUNCED_OF_HOST, MAX_UNHEARD_OF_HOST
-from imc_bridge.doctor import Cause, judge
-from imc_bridge.newcomers import MAX_NEWCOMERS, MAX_NEWCOMERS_OF_HOST, Newcomers
-from imc_bridge.refusals import Refused
-from imc_bridge.roster import Roster
+from imc_bridge.doctor.doctor import Cause, judge
+from imc_bridge.nodes.capacity import MAX_NODES, MAX_UNANNOUNCED, MAX_UNANNOUNCED_OF_HOST, MAX_UNHEARD_OF_HOST
+from imc_bridge.nodes.newcomers import MAX_NEWCOMERS, MAX_NEWCOMERS_OF_HOST, Newcomers
+from imc_bridge.nodes.refusals import Refused
+from imc_bridge.nodes.roster import Roster
 from simulator import seafloors
 from simulator.dune import default_specs
 from tests.imc_bridge.conftest import open_sea, until
@@ -301,7 +301,7 @@ def test_a_newcomer_answers_from_the_address_that_it_announced():
 
 
 def _announcement():
-    from imc_bridge.discovery import Announcement
+    from imc_bridge.network.discovery import Announcement
 
     return Announcement(0x1E, "lauv-noptilus-1", 2, (("127.0.0.1", 6002),))
 
@@ -313,7 +313,7 @@ def test_names_that_nobody_could_read_are_made_readable():
     message.src, message.sys_type = 0x1E, imcpy.SystemType.UUV
     message.sys_name = "lauv\x1b[2J\x9b\n" + "x" * 1000
     message.services = "imc+udp://127.0.0.1:6002/;imc+info://0.0.0.0/version/5.4\x1b[31m"
-    from imc_bridge.discovery import read_announce
+    from imc_bridge.network.discovery import read_announce
 
     announcement = read_announce(message)
     assert roster.find_place(announcement, "127.0.0.1", now)

@@ -7,8 +7,8 @@ from dataclasses import replace
 import imcpy
 import pytest
 
-from imc_bridge.doctor import Cause, diagnose, diagnose_recording, judge
-from imc_bridge.replay import RecordingError
+from imc_bridge.doctor.doctor import Cause, diagnose, diagnose_recording, judge
+from imc_bridge.doctor.replay import RecordingError
 from imc_bridge.settings import BridgeSettings
 from simulator.dune import DuneFleet, DuneOptions, VehicleSpec
 from simulator.network import NetworkFaults
@@ -258,7 +258,7 @@ def test_file_that_is_no_recording_is_refused_with_its_line(tmp_path, content, w
 
 
 async def test_a_machine_without_a_network_is_well_when_its_vehicles_live_on_it(monkeypatch):
-    monkeypatch.setattr("imc_bridge.transport.list_interfaces", list)
+    monkeypatch.setattr("imc_bridge.network.transport.list_interfaces", list)
     async with open_sea(bridge={"loopback_only": False}) as sea:
         await sea.ready()
         await until(lambda: judge(sea.bridge, 1.0).healthy, "nothing is wrong")
@@ -267,7 +267,7 @@ async def test_a_machine_without_a_network_is_well_when_its_vehicles_live_on_it(
 
 
 async def test_a_machine_without_a_network_that_hears_nobody_is_told_to_connect(monkeypatch):
-    monkeypatch.setattr("imc_bridge.transport.list_interfaces", list)
+    monkeypatch.setattr("imc_bridge.network.transport.list_interfaces", list)
     *announce_ports, port = free_ports(3)
     diagnosis = await diagnose(BridgeSettings(port=port, announce_ports=tuple(announce_ports)), 0.1)
     assert Cause.NO_INTERFACE in diagnosis.causes

@@ -8,9 +8,9 @@ import pytest
 from app.missions import metrics
 from app.missions.fleet.links.imc import ImcFleetLink
 from imc_bridge import Bridge, BridgeSettings, PacketsDropped, PortInUseError
-from imc_bridge.doctor import Cause, judge
-from imc_bridge.drops import RECENT_WALL_S, DropMeter
-from imc_bridge.sieve import LOUD
+from imc_bridge.doctor.doctor import Cause, judge
+from imc_bridge.network.drops import RECENT_WALL_S, DropMeter
+from imc_bridge.network.sieve import LOUD
 from tests.imc_bridge.conftest import open_sea, until
 from tests.ports import free_ports
 

@@ -6,12 +6,12 @@ import math
 import imcpy
 import pytest
 
-from imc_bridge.control import Phase
-from imc_bridge.discovery import Announcement
+from imc_bridge.control.control import Phase
+from imc_bridge.control.follow import Follower
+from imc_bridge.control.legs import LegFollower
 from imc_bridge.events import Waypoint, WaypointStatus
-from imc_bridge.follow import Follower
-from imc_bridge.legs import LegFollower
-from imc_bridge.nodes import Node, OperationMode, PlanState
+from imc_bridge.network.discovery import Announcement
+from imc_bridge.nodes.node import Node, OperationMode, PlanState
 from imc_bridge.settings import BridgeSettings
 
 ADDRESS = ("127.0.0.1", 6002)

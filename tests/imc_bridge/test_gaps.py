@@ -3,7 +3,7 @@
 import pytest
 
 from imc_bridge import LinkChange, NodeState, Sounding, SoundingRefused, WaypointChange, WaypointStatus
-from imc_bridge.doctor import Cause, judge
+from imc_bridge.doctor.doctor import Cause, judge
 from tests.imc_bridge.conftest import open_sea, until
 
 RANGE_M = 5000.0

@@ -6,10 +6,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from imc_bridge.control.guard import AltitudeGuard
+from imc_bridge.control.places import distance_m
+from imc_bridge.control.seabed import CELL_M, Seabed
 from imc_bridge.events import BottomPoint
-from imc_bridge.guard import AltitudeGuard
-from imc_bridge.places import distance_m
-from imc_bridge.seabed import CELL_M, Seabed
 
 LAT, LON = 41.185, -8.705
 NORTH_100_M = 100.0 / 111_000.0

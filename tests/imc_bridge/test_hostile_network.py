@@ -11,7 +11,7 @@ import imcpy
 import pytest
 
 from imc_bridge import Bridge, BridgeSettings, NodeState, Sounding, StateReport, WaypointStatus
-from imc_bridge.refusals import Refused
+from imc_bridge.nodes.refusals import Refused
 from tests.imc_bridge.conftest import open_sea, until
 from tests.ports import free_ports
 

@@ -16,7 +16,7 @@ from imc_bridge import (
     WaypointChange,
     WaypointStatus,
 )
-from imc_bridge.plans import leg_plan, leg_time_s
+from imc_bridge.control.plans import leg_plan, leg_time_s
 from tests.imc_bridge.conftest import Sea, open_sea, until
 
 RADIO_M = 2000.0

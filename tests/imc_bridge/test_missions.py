@@ -8,8 +8,8 @@ import imcpy
 import pytest
 
 from imc_bridge import Bridge, LinkChange, NodeState, RefusedError, Sounding, WaypointChange, WaypointStatus
-from imc_bridge.codec import encode
-from imc_bridge.plans import OPERATION_START, plan_control
+from imc_bridge.control.plans import OPERATION_START, plan_control
+from imc_bridge.network.codec import encode
 from tests.imc_bridge.conftest import Peer, open_sea, until
 from tests.ports import free_ports
 

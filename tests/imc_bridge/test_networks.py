@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from imc_bridge import Bridge, BridgeSettings, NodeState, WaypointStatus
-from imc_bridge.streams import PacketSplitter
-from imc_bridge.transport import Interface, list_interfaces
+from imc_bridge.network.streams import PacketSplitter
+from imc_bridge.network.transport import Interface, list_interfaces
 from tests.imc_bridge.conftest import Peer, open_sea, until
 from tests.ports import free_ports
 
@@ -29,7 +29,7 @@ def settings_on(**changes):
 async def two_interfaces(monkeypatch):
     """A bridge on a machine that seems to have two interfaces; both lie on the loopback device."""
     present = [LOOPBACK, SECOND]
-    monkeypatch.setattr("imc_bridge.transport.list_interfaces", lambda: list(present))
+    monkeypatch.setattr("imc_bridge.network.transport.list_interfaces", lambda: list(present))
     bridge = Bridge(settings_on(position_deg=(41.0, -8.0)))
     await bridge.start(lambda event: None)
     yield bridge, present
@@ -112,7 +112,7 @@ async def test_interface_that_comes_later_is_taken_up_and_one_that_goes_is_left(
 
 
 async def test_only_the_chosen_interfaces_are_used(monkeypatch):
-    monkeypatch.setattr("imc_bridge.transport.list_interfaces", lambda: [LOOPBACK, SECOND])
+    monkeypatch.setattr("imc_bridge.network.transport.list_interfaces", lambda: [LOOPBACK, SECOND])
     bridge = Bridge(settings_on(interfaces=("127.0.0.2",)))
     await bridge.start(lambda event: None)
     try:

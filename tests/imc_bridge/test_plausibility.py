@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from imc_bridge.plausibility import ALLOWANCE_M, CONFIRM_S, CONFIRMATIONS, EARTH_M, FASTEST_MPS, PlaceGate, Step
-from imc_bridge.soundings import StateSample
+from imc_bridge.nodes.plausibility import ALLOWANCE_M, CONFIRM_S, CONFIRMATIONS, EARTH_M, FASTEST_MPS, PlaceGate, Step
+from imc_bridge.telemetry.soundings import StateSample
 
 LAT = math.radians(41.0)
 

@@ -9,12 +9,12 @@ import imcpy
 import pytest
 
 from imc_bridge import Bridge, BridgeEvent, BridgeSettings, LinkChange, NodeState, Sounding, StateReport, Waypoint
-from imc_bridge.codec import encode
-from imc_bridge.discovery import own_announce
-from imc_bridge.plans import OPERATION_START, goto_maneuver, goto_plan, plan_control
-from imc_bridge.references import REFERENCE_FLAGS, SentReference
-from imc_bridge.replay import read_recording, replay
-from imc_bridge.speaking import entity_query
+from imc_bridge.control.plans import OPERATION_START, goto_maneuver, goto_plan, plan_control
+from imc_bridge.control.references import REFERENCE_FLAGS, SentReference
+from imc_bridge.doctor.replay import read_recording, replay
+from imc_bridge.network.codec import encode
+from imc_bridge.network.discovery import own_announce
+from imc_bridge.sender import entity_query
 
 CONSOLE = ("127.0.0.1", 6101)
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from imcpy.coordinates import WGS84
 
 from imc_bridge.events import Sounding, SoundingRefused
-from imc_bridge.soundings import (
+from imc_bridge.telemetry.soundings import (
     Beam,
     SoundingGate,
     StateHistory,

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from imc_bridge.texts import text
+from imc_bridge.network.text_fields import text
 
 
 @given(st.text(st.characters(max_codepoint=127), max_size=300))

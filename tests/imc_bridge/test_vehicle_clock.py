@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from imc_bridge.vehicle_clock import CONFIRMATIONS, QUIET_S, Tick, VehicleClock
+from imc_bridge.nodes.vehicle_clock import CONFIRMATIONS, QUIET_S, Tick, VehicleClock
 
 T = 1.7e9
 

@@ -152,7 +152,7 @@ class WaypointOrder:
     itself; the waypoint stays the place where they arrive.
 
     ``circle`` is the centre of a circle, inside the area and apart from everything else, in which a vehicle that is led
-    by whole legs may descend before it goes there; the radius is :data:`imc_bridge.plans.CIRCLE_RADIUS_M`.
+    by whole legs may descend before it goes there; the radius is :data:`imc_bridge.control.plans.CIRCLE_RADIUS_M`.
 
     ``bottom`` is what the map knows of the sea floor on that way, below the surface as it is now and on the safe side.
     """

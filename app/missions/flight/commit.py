@@ -17,7 +17,7 @@ from app.missions.views.mission import Level
 from app.storage import missions as mission_queries
 from app.storage.models import StepRow, WaypointRow
 from app.storage.shielding import to_the_end
-from imc_bridge.plans import CIRCLE_RADIUS_M
+from imc_bridge.control.plans import CIRCLE_RADIUS_M
 
 LEAD_M = 25.0
 """How far beyond a waypoint a vehicle may be sent to pass it straight; more than the 15 m from which DUNE circles."""

@@ -37,7 +37,7 @@ from app.missions.team import SETTLED, Member
 from app.missions.views.mission import Level
 from app.storage import missions as mission_queries
 from app.storage.shielding import to_the_end
-from imc_bridge.plans import leg_time_s
+from imc_bridge.control.plans import leg_time_s
 
 PACE_MEMORY = 0.9
 """Weight of the past in the running mean of a step's duration."""

@@ -28,7 +28,7 @@ from app.storage import soundings as sounding_queries
 from app.storage.grouping import Grouped
 from app.storage.models import BatchRow
 from app.storage.soundings import LOG_KEY
-from imc_bridge.soundings import Beam, StateSample, footprint
+from imc_bridge.telemetry.soundings import Beam, StateSample, footprint
 
 MAX_BATCH = 10_000
 

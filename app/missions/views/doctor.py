@@ -5,8 +5,8 @@ from datetime import UTC, datetime
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from imc_bridge.diagnosis import Cause, Diagnosis, NodeDiagnosis, Severity, problem
-from imc_bridge.diagnosis import Finding as BridgeFinding
+from imc_bridge.doctor.diagnosis import Cause, Diagnosis, NodeDiagnosis, Severity, problem
+from imc_bridge.doctor.diagnosis import Finding as BridgeFinding
 from imc_bridge.events import NodeState
 
 Examine = Callable[[], Diagnosis]

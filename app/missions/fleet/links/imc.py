@@ -43,9 +43,9 @@ from imc_bridge import (
     Waypoint,
     WaypointChange,
 )
-from imc_bridge.consoles import Mark
-from imc_bridge.diagnosis import drop_words, radio_gap_words
-from imc_bridge.doctor import Diagnosis, judge
+from imc_bridge.doctor.diagnosis import drop_words, radio_gap_words
+from imc_bridge.doctor.doctor import Diagnosis, judge
+from imc_bridge.network.consoles import Mark
 
 _UNENGAGED = {
     NodeState.HEARD: LinkState.HEARD,

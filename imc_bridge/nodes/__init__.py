@@ -1,0 +1,1 @@
+"""Who is out there: one ``Node`` per vehicle or console, the roster of all, and whose packets count."""

@@ -1,0 +1,538 @@
+"""What is known of one node: who it is, how it is heard, what it does, where it is.
+
+A :class:`Node` is fed messages and the time they arrived and keeps no clock of its own. Arrival times are in
+seconds of the bridge's clock, which runs ``time_scale`` times faster than the wall clock; the vehicle's own
+timestamps order its messages.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass
+from enum import IntEnum
+
+from imcpy.coordinates import toWGS84
+
+from imc_bridge.events import NodeState, StateReport
+from imc_bridge.network.codec import Message
+from imc_bridge.network.discovery import MAX_NAME, Announcement
+from imc_bridge.network.text_fields import text
+from imc_bridge.network.transport import Address
+from imc_bridge.nodes.plausibility import PlaceGate, Step
+from imc_bridge.nodes.refusals import Refused
+from imc_bridge.nodes.vehicle_clock import Tick, VehicleClock
+from imc_bridge.printable import printable
+from imc_bridge.settings import BridgeSettings
+from imc_bridge.telemetry.ranges import RangeGate
+from imc_bridge.telemetry.soundings import SoundingGate, StateHistory, StateSample, beam_table
+
+UNCERTAINTY_VALID_S = 10.0
+SUBMERGED_DEPTH_M = 0.3
+"""Radio is gone that far below; the depth sensor's noise at the surface is about 0.1 m."""
+ANNOUNCES_MISSED = 3
+SLOWEST_ASCENT_MPS = 0.1
+"""How fast a vehicle without motor floats up, at least."""
+CONTACT_AGAIN_S = 20.0
+"""DUNE looks for contacts every 5 s; a few of our heartbeats may be lost."""
+LONGEST_BOND_S = 3600.0
+"""A vehicle that was under water for longer may come back under another address."""
+RATE_WINDOW_S = 10.0
+STATE_MESSAGES_FRESH_S = 3.0
+MAX_TEXT = 500
+"""Characters kept of what a vehicle says in words."""
+
+
+class OperationMode(IntEnum):
+    """VehicleState.op_mode."""
+
+    SERVICE = 0
+    CALIBRATION = 1
+    ERROR = 2
+    MANEUVER = 3
+    EXTERNAL = 4
+    BOOT = 5
+
+
+class PlanState(IntEnum):
+    """PlanControlState.state."""
+
+    BLOCKED = 0
+    READY = 1
+    INITIALIZING = 2
+    EXECUTING = 3
+
+
+NO_OUTCOME = 0
+"""PlanControlState.last_outcome of a plan control that has had no plan yet."""
+MEDIUM_UNDERWATER = 3
+ANY_CONSOLE = 0xFFFF
+
+
+@dataclass(frozen=True, slots=True)
+class Status:
+    """A link state with the reason an operator can act on."""
+
+    state: NodeState
+    reason: str = ""
+
+
+class RateMeter:
+    """Messages per second over the last window, by name."""
+
+    def __init__(self) -> None:
+        self._arrivals: dict[str, deque[float]] = {}
+
+    def count(self, name: str, now: float) -> None:
+        """Note one message."""
+        arrivals = self._arrivals.get(name)
+        if arrivals is None:
+            arrivals = self._arrivals[name] = deque(maxlen=256)
+        arrivals.append(now)
+
+    def rates_hz(self, now: float) -> dict[str, float]:
+        """Rate of every message seen within the window."""
+        rates = {}
+        for name, arrivals in self._arrivals.items():
+            while arrivals and now - arrivals[0] > RATE_WINDOW_S:
+                arrivals.popleft()
+            if len(arrivals) > 1:
+                rates[name] = (len(arrivals) - 1) / max(now - arrivals[0], 1e-3)
+            elif arrivals:
+                rates[name] = 1.0 / RATE_WINDOW_S
+        return rates
+
+
+class Node:
+    """One node of the IMC network.
+
+    Parameters
+    ----------
+    imc_id
+    name
+        As announced, or the hexadecimal id of a node that never announced.
+    settings
+    now
+        Time of the first packet.
+    """
+
+    def __init__(self, imc_id: int, name: str, settings: BridgeSettings, now: float) -> None:
+        self.imc_id = imc_id
+        self.name = name
+        self.first_heard = now
+        self.announcement: Announcement | None = None
+        self.announced_at: float | None = None
+        self.first_announced_at: float | None = None
+        self.addresses: tuple[Address, ...] = ()
+        self.address: Address | None = None
+        self.host = ""
+        """Where its last announce, or without one its first packet, came from."""
+        self.hosts: frozenset[str] = frozenset()
+        """Where its announces may come from: the host of the last one that counted, and those it announced."""
+        self.conflict: str | None = None
+        self.boots = 0
+        """How often it has restarted."""
+        self.started_at: float | None = None
+        """When it announced a restart."""
+        self.ordered_depth_m = 0.0
+        """How deep it may be by our orders: it goes on down after it was last heard."""
+        self._restart_seen = False
+        """Whether its last restart showed before it announced itself anew."""
+
+        self.packets = 0
+        self.heard_at: float | None = None
+        self.telemetry_at: float | None = None
+        self.echoes = 0
+        self.relayed = 0
+        """How many packets of others it passed on."""
+        self.foreign_address = 0
+        self.last_foreign: Address | None = None
+        """Where packets under its id came from last that is not an address of its own."""
+        self.rates = RateMeter()
+
+        self.clock = VehicleClock()
+
+        self.entities: dict[int, str] | None = None
+        self.entities_asked_at = -math.inf
+        self.operation_mode: int | None = None
+        self.operation_mode_at: float | None = None
+        self.error_text = ""
+        self.plan_state: int | None = None
+        self.plan_state_at: float | None = None
+        self.plan_id = ""
+        self.plan_outcome: int | None = None
+        self.plan_state_time_s = -math.inf
+        """When it was in that state, by the vehicle's clock."""
+        self.radio_gaps = 0
+        """How often radio ended under water while it was led by references."""
+        self.expected_back: float | None = None
+        """Until when its silence is part of a plan of ours, seconds of the bridge's clock."""
+        self.controller: int | None = None
+        """Whose references its FollowReference maneuver takes, by its own account."""
+        self.medium: int | None = None
+        self.battery_pct: float | None = None
+        self.history = StateHistory()
+        self.places = PlaceGate()
+        self.report: StateReport | None = None
+        self.gate = SoundingGate(name, beam_table(settings.altimeter), settings.max_range_m)
+        self.ranges = RangeGate(name)
+        self._uncertainty: tuple[float, float] | None = None
+        self._settings = settings
+        self._latest: dict[str, float] = {}
+
+    @property
+    def is_vehicle(self) -> bool:
+        """Whether it announced itself as a vehicle, or has not said what it is."""
+        return self.announcement is None or self.announcement.is_vehicle
+
+    # Discovery
+
+    def announced(self, announcement: Announcement, addresses: tuple[Address, ...], now: float) -> bool:
+        """Take an announce in; True when the node has restarted since the last one."""
+        previous = self.announcement
+        self.announcement = announcement
+        self.announced_at = now
+        if self.first_announced_at is None:
+            self.first_announced_at = now
+        self.addresses = addresses
+        if self.address not in addresses:
+            self.address = addresses[0] if addresses else None
+        rebooted = (
+            previous is not None
+            and previous.uid is not None
+            and announcement.uid is not None
+            and previous.uid != announcement.uid
+        )
+        if rebooted and self._restart_seen:
+            # Its telemetry told of that already.
+            self._restart_seen = False
+            return False
+        if rebooted:
+            self.boots += 1
+            self.started_at = now
+            self._forget_plan()
+        return rebooted
+
+    def restarted(self) -> None:
+        """Note that its telemetry shows a restart, of which its announce will tell later."""
+        self.boots += 1
+        self._restart_seen = True
+        self.entities = None
+        self.entities_asked_at = -math.inf
+
+    def _forget_plan(self) -> None:
+        self.entities = None
+        self.entities_asked_at = -math.inf
+        self.operation_mode = self.plan_state = None
+        self.operation_mode_at = self.plan_state_at = None
+        self.telemetry_at = None
+        self.plan_id = ""
+        self.controller = None
+        self._latest.clear()
+
+    def given_up(self, now: float) -> bool:
+        """Whether it was silent for so long that another host may announce its id."""
+        last = max((at for at in (self.heard_at, self.announced_at) if at is not None), default=-math.inf)
+        patience = max(ANNOUNCES_MISSED * self._settings.announce_period_s, min(self.patience_s, LONGEST_BOND_S))
+        return now - last > patience
+
+    # Packets and the vehicle's clock
+
+    def heard(self, now: float, address: Address) -> None:
+        """Note that a packet of its own arrived from one of its addresses."""
+        self.packets += 1
+        self.heard_at = now
+        self.address = address
+
+    def excuse(self, seconds: float, now: float) -> None:
+        """Take out of its silence the time in which we were held up ourselves and could hear nothing."""
+
+        def later(at: float | None) -> float | None:
+            return None if at is None else min(at + seconds, now)
+
+        self.heard_at, self.announced_at = later(self.heard_at), later(self.announced_at)
+        self.operation_mode_at, self.plan_state_at = later(self.operation_mode_at), later(self.plan_state_at)
+        if self.expected_back is not None:
+            self.expected_back += seconds
+
+    def in_order(self, name: str, timestamp: float) -> bool:
+        """Whether a message is newer, by the vehicle's clock, than the last of its kind."""
+        if timestamp <= self._latest.get(name, -math.inf):
+            return False
+        self._latest[name] = timestamp
+        return True
+
+    def take_time(self, timestamp: float, now: float, wall_time_s: float) -> Tick:
+        """Keep up with the vehicle's clock; after a jump everything that was ordered by it is forgotten."""
+        tick = self.clock.take(timestamp, now, wall_time_s)
+        if tick is Tick.JUMPED:
+            self._latest.clear()
+            self.places.clear()
+            self.history.clear()
+            self.gate.clear()
+            self.ranges.clear()
+            self._uncertainty = None
+        return tick
+
+    # Telemetry
+
+    def take_state(self, message: Message) -> StateReport | Refused | None:
+        """EstimatedState: None when it is out of order, repeated or not finite, Refused where it cannot be."""
+        lat, lon, _height = toWGS84(message)
+        values = (lat, lon, message.depth, message.phi, message.theta, message.psi)
+        if not all(map(math.isfinite, values)) or abs(lat) > math.pi / 2:
+            return None
+        time_s = message.timestamp
+        sample = StateSample(
+            time_s, lat, lon, message.depth, message.phi, message.theta, math.remainder(message.psi, math.tau)
+        )
+        step = self.places.take(sample)
+        if step is Step.DOUBTFUL:
+            return Refused.PLACE
+        if step is Step.MOVED:
+            # Nothing was measured on a line between the two places.
+            self.history.clear()
+        if not self.history.add(sample) or not self.in_order("EstimatedState", time_s):
+            return None
+        speed = math.hypot(message.vx, message.vy)
+        altitude = float(message.alt)
+        self.report = StateReport(
+            vehicle=self.name,
+            time_s=time_s,
+            lat_deg=math.degrees(lat),
+            lon_deg=math.degrees(lon),
+            depth_m=sample.depth_m,
+            heading_rad=sample.yaw_rad,
+            speed_mps=speed if math.isfinite(speed) else 0.0,
+            altitude_m=altitude if math.isfinite(altitude) and altitude >= 0.0 else None,
+            battery_pct=self.battery_pct,
+            position_sd_m=self.position_sd_m(),
+        )
+        return self.report
+
+    def take_uncertainty(self, message: Message) -> None:
+        """NavigationUncertainty: x and y are variances of the position."""
+        variance = 0.5 * (message.x + message.y)
+        if math.isfinite(variance) and variance >= 0.0:
+            self._uncertainty = (message.timestamp, math.sqrt(variance))
+
+    def position_sd_m(self) -> float | None:
+        """Standard deviation of the position per axis, None when the vehicle has not told it lately."""
+        if self._uncertainty is None or self.clock.time_s is None:
+            return None
+        at_s, sd = self._uncertainty
+        return sd if self.clock.time_s - at_s <= UNCERTAINTY_VALID_S else None
+
+    def take_fuel(self, message: Message) -> None:
+        """FuelLevel: per cent."""
+        value = float(message.value)
+        if 0.0 <= value <= 100.0:
+            self.battery_pct = value
+
+    def take_vehicle_state(self, message: Message, now: float) -> bool:
+        """VehicleState: the operation mode and the errors that explain it; True when it has just begun to boot."""
+        boots = int(message.op_mode) == OperationMode.BOOT
+        restarted = boots and self.operation_mode not in (None, OperationMode.BOOT) and not self._restart_seen
+        self.operation_mode = int(message.op_mode)
+        self.operation_mode_at = now
+        errors = ", ".join(filter(None, (text(message, "error_ents"), text(message, "last_error"))))
+        self.error_text = printable(errors, most=MAX_TEXT)
+        return restarted
+
+    def take_plan_state(self, message: Message, now: float) -> bool:
+        """PlanControlState; True when it shows a restart: a plan was in execution, and now there never was one."""
+        restarted = (
+            self.plan_state in (PlanState.EXECUTING, PlanState.INITIALIZING)
+            and bool(self.plan_id)
+            and int(message.state) in (PlanState.READY, PlanState.BLOCKED)
+            and not text(message, "plan_id")
+            and int(message.last_outcome) == NO_OUTCOME
+        )
+        self.plan_state = int(message.state)
+        self.plan_state_at = now
+        self.plan_id = printable(text(message, "plan_id"), most=MAX_TEXT)
+        self.plan_outcome = int(message.last_outcome)
+        self.plan_state_time_s = float(message.timestamp)
+        if self.plan_state not in (PlanState.EXECUTING, PlanState.INITIALIZING):
+            self.controller = None
+        return restarted
+
+    @property
+    def foreign_controller(self) -> int | None:
+        """The console that its maneuver listens to when that is not us."""
+        return None if self.controller in (None, ANY_CONSOLE, self._settings.imc_id) else self.controller
+
+    def take_entities(self, message: Message) -> None:
+        """EntityList report: ``Name=id;…``."""
+        self.entities = listed_entities(message) or self.entities
+
+    def entity_name(self, entity: int) -> str | None:
+        """Name of an entity, None while names are unknown; an id the list lacks has the name ``entity N``."""
+        return None if self.entities is None else self.entities.get(entity, f"entity {entity}")
+
+    # Judgement
+
+    @property
+    def submerged(self) -> bool:
+        """Whether it was under water when last heard."""
+        return self.medium == MEDIUM_UNDERWATER or (self.report is not None and self.report.depth_m > SUBMERGED_DEPTH_M)
+
+    @property
+    def references_needed(self) -> bool:
+        """Whether what it executes is our FollowReference plan, which ends by itself when references cease."""
+        return self.executing(self._settings.plan_id) and self.expected_back is None
+
+    @property
+    def patience_s(self) -> float:
+        """How long it may be silent before its silence means a loss."""
+        if not self.submerged:
+            return self._settings.release_after_s
+        if not self.references_needed:
+            return math.inf
+        return self._settings.follow_timeout_s + self.ascent_s
+
+    @property
+    def ascent_s(self) -> float:
+        """How long it takes, at the most, to float up from where it was last heard and to be heard again."""
+        depth = self.report.depth_m if self.report is not None else 0.0
+        return max(depth, self.ordered_depth_m, 0.0) / SLOWEST_ASCENT_MPS + CONTACT_AGAIN_S
+
+    @property
+    def maneuvering_blocked(self) -> bool:
+        """Whether plan control calls itself blocked while a maneuver goes on.
+
+        DUNE does so when its own VehicleState is late, and stays so: the vehicle goes on with what it does, takes no
+        STOP, and takes an Abort or another plan.
+        """
+        return self.plan_state == PlanState.BLOCKED and self.operation_mode == OperationMode.MANEUVER
+
+    def can_start(self, now: float) -> bool:
+        """In service and ready for a plan, by messages that are not old."""
+        limit = max(STATE_MESSAGES_FRESH_S, self._settings.lost_after_wall_s * self._settings.time_scale)
+        return (
+            self.operation_mode == OperationMode.SERVICE
+            and self.plan_state == PlanState.READY
+            and _fresh(self.operation_mode_at, now, limit)
+            and _fresh(self.plan_state_at, now, limit)
+        )
+
+    def executing(self, plan_id: str) -> bool:
+        """Whether it executes a plan of this name, as far as it says, and not at another console's behest."""
+        running = self.plan_state in (PlanState.EXECUTING, PlanState.INITIALIZING)
+        return running and self.plan_id == plan_id and self.foreign_controller is None
+
+    @property
+    def ours(self) -> bool:
+        """Whether it executes our plan."""
+        return self.executing(self._settings.plan_id)
+
+    def status(self, now: float) -> Status:
+        """The link's state and the reason for it."""
+        settings = self._settings
+        lost_after = max(settings.lost_after_s, settings.lost_after_wall_s * settings.time_scale)
+        if self.announcement is None:
+            ports = f"{settings.announce_ports[0]}-{settings.announce_ports[-1]}"
+            return Status(
+                NodeState.HEARD,
+                f"packets arrive but no announce: let it announce itself to UDP ports {ports} of this machine",
+            )
+        if self.address is None:
+            return Status(NodeState.HEARD, "its announce names no imc+udp address: enable its UDP transport")
+        if self.heard_at is None and self.announced_at is not None and self.first_announced_at is not None:
+            return self._without_telemetry(now, self.announced_at, self.first_announced_at)
+        silence = math.inf if self.heard_at is None else now - self.heard_at
+        if silence > lost_after:
+            return self._silent(silence, now)
+        if self.operation_mode is None or self.plan_state is None:
+            return Status(NodeState.ACTIVE, "waiting for its VehicleState and PlanControlState")
+        if self.plan_state in (PlanState.EXECUTING, PlanState.INITIALIZING):
+            if self.plan_state == PlanState.INITIALIZING:
+                return Status(NodeState.IN_PLAN, "starts a plan")
+            whose = "our plan"
+            if self.plan_id != settings.plan_id or self.foreign_controller is not None:
+                controller = f" (0x{self.foreign_controller:04X})" if self.foreign_controller is not None else ""
+                whose = f"plan {self.plan_id!r} of another console{controller}"
+            return Status(NodeState.IN_PLAN, f"executes {whose}")
+        if self.operation_mode == OperationMode.SERVICE and self.plan_state == PlanState.READY:
+            return Status(NodeState.READY)
+        return Status(NodeState.ACTIVE, self._why_not_ready())
+
+    def telemetry_overdue(self, now: float) -> bool:
+        """Whether it announced itself long ago and nothing else came."""
+        since = self.first_announced_at
+        return self.heard_at is None and since is not None and now - since > self._settings.telemetry_timeout_s
+
+    def _without_telemetry(self, now: float, announced_at: float, first_announced_at: float) -> Status:
+        if now - announced_at > ANNOUNCES_MISSED * self._settings.announce_period_s:
+            return Status(NodeState.LOST, "it announced itself and then fell silent")
+        if now - first_announced_at <= self._settings.telemetry_timeout_s:
+            return Status(NodeState.ANNOUNCED, "announced; its telemetry starts within 5 s of our heartbeats")
+        return Status(
+            NodeState.ANNOUNCED,
+            "announced but sends nothing to us: it may remember "
+            f"id 0x{self._settings.imc_id:04X} at another port (restart DUNE or return to that port), "
+            f"or a firewall blocks UDP port {self._settings.port}",
+        )
+
+    def _silent(self, silence: float, now: float) -> Status:
+        seconds = silence / self._settings.time_scale
+        if self.expected_back is not None and now <= self.expected_back:
+            left = (self.expected_back - now) / self._settings.time_scale
+            return Status(
+                NodeState.EXPECTED_OFFLINE,
+                f"silent for {seconds:.0f} s on a leg of ours, expected back within {left:.0f} s",
+            )
+        away = self.expected_back is None and self.plan_state == PlanState.EXECUTING
+        if away and self.submerged and silence <= self.patience_s:
+            whose = "our plan" if self.executing(self._settings.plan_id) else f"plan {self.plan_id!r}"
+            comes_up = "; without references that ends and it comes up" if self.references_needed else ""
+            return Status(
+                NodeState.EXPECTED_OFFLINE,
+                f"silent for {seconds:.0f} s, under water in {whose}: radio ends at the surface{comes_up}",
+            )
+        afloat = self.plan_state not in (PlanState.INITIALIZING, PlanState.EXECUTING)
+        since_start = math.inf if self.started_at is None else now - self.started_at
+        if afloat and self.submerged and min(silence, since_start) <= self.ascent_s:
+            words = f"silent for {seconds:.0f} s, under water without a plan: it floats up"
+            return Status(NodeState.EXPECTED_OFFLINE, words)
+        where = "under water" if self.submerged else "at the surface"
+        return Status(NodeState.LOST, f"silent for {seconds:.0f} s, last heard {where}")
+
+    def _why_not_ready(self) -> str:
+        mode = _enum_name(OperationMode, self.operation_mode)
+        if self.operation_mode == OperationMode.ERROR:
+            return f"in error: {self.error_text or 'no text given'}"
+        if self.plan_state == PlanState.BLOCKED:
+            return f"refuses plans (plan control blocked, mode {mode})"
+        return f"mode {mode}, plan control {_enum_name(PlanState, self.plan_state)}"
+
+    @property
+    def operation_mode_name(self) -> str | None:
+        """The operation mode in words."""
+        return None if self.operation_mode is None else _enum_name(OperationMode, self.operation_mode)
+
+    @property
+    def plan_state_name(self) -> str | None:
+        """The state of plan control in words."""
+        return None if self.plan_state is None else _enum_name(PlanState, self.plan_state)
+
+
+def listed_entities(message: Message) -> dict[int, str]:
+    """Names by id of an EntityList report; empty when it lists none."""
+    entities = {}
+    for item in text(message, "list").split(";"):
+        name, separator, number = item.rpartition("=")
+        if separator and number.isdigit():
+            entities[int(number)] = printable(name, most=MAX_NAME)
+    return entities
+
+
+def _fresh(at: float | None, now: float, limit_s: float) -> bool:
+    return at is not None and now - at <= limit_s
+
+
+def _enum_name(kind: type[IntEnum], value: int | None) -> str:
+    try:
+        return kind(value).name.lower() if value is not None else "unknown"
+    except ValueError:
+        return f"unknown ({value})"

@@ -1,0 +1,63 @@
+"""Where a vehicle can be, by where it was: a forged position stands alone among those of the vehicle itself."""
+
+from __future__ import annotations
+
+import math
+from enum import Enum
+
+from imc_bridge.telemetry.soundings import StateSample
+
+FASTEST_MPS = 10.0
+"""Faster than any vehicle, currents and noise included."""
+ALLOWANCE_M = 20.0
+"""A correction of the navigation, as by a GPS fix after a short dive, is believed at once up to this size."""
+CONFIRMATIONS = 4
+CONFIRM_S = 1.0
+"""A place far away is believed when so many states over at least this time agree, and none came from the old one."""
+EARTH_M = 6_371_000.0
+
+
+class Step(Enum):
+    """What a position tells."""
+
+    GOOD = "good"
+    DOUBTFUL = "doubtful"
+    """Too far from where it was, and not confirmed: not to be used."""
+    MOVED = "moved"
+    """It really is elsewhere; nothing lies between the places."""
+
+
+class PlaceGate:
+    """Judges the positions of one vehicle, in the order in which they arrive."""
+
+    def __init__(self) -> None:
+        self._last: StateSample | None = None
+        self._odd: list[StateSample] = []
+
+    def take(self, sample: StateSample) -> Step:
+        """Say whether the vehicle can be there."""
+        if self._last is None or _within_reach(self._last, sample):
+            self._odd.clear()
+            if self._last is None or sample.time_s >= self._last.time_s:
+                self._last = sample
+            return Step.GOOD
+        if self._odd and not _within_reach(self._odd[-1], sample):
+            self._odd.clear()
+        self._odd.append(sample)
+        if len(self._odd) < CONFIRMATIONS or sample.time_s - self._odd[0].time_s < CONFIRM_S:
+            return Step.DOUBTFUL
+        self._odd.clear()
+        self._last = sample
+        return Step.MOVED
+
+    def clear(self) -> None:
+        """Forget where it was, as after a jump of its clock."""
+        self._last = None
+        self._odd.clear()
+
+
+def _within_reach(before: StateSample, after: StateSample) -> bool:
+    north = (after.lat_rad - before.lat_rad) * EARTH_M
+    east = math.remainder(after.lon_rad - before.lon_rad, math.tau) * EARTH_M * math.cos(before.lat_rad)
+    down = after.depth_m - before.depth_m
+    return math.hypot(north, east, down) <= ALLOWANCE_M + FASTEST_MPS * abs(after.time_s - before.time_s)

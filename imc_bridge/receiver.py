@@ -1,0 +1,347 @@
+"""Everything that arrives: whose word a packet is, and who has to know of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import imcpy
+
+from imc_bridge.control.control import Control
+from imc_bridge.control.controls import Crew
+from imc_bridge.events import BridgeEvent, Restarted, Sounding
+from imc_bridge.links import Links
+from imc_bridge.network.codec import BROADCAST_ID, Decoder, Header, Message, without_argument
+from imc_bridge.network.discovery import Announcement, read_announce
+from imc_bridge.network.transport import Address
+from imc_bridge.nodes.admission import Admission
+from imc_bridge.nodes.node import Node
+from imc_bridge.nodes.refusals import Refused
+from imc_bridge.nodes.roster import Roster
+from imc_bridge.nodes.vehicle_clock import Tick
+from imc_bridge.sender import Speaker
+from imc_bridge.settings import BridgeSettings
+from imc_bridge.telemetry.ranges import MESSAGES as RANGE_MESSAGES
+from imc_bridge.telemetry.soundings import offer_distance
+
+WANTED = (
+    "Abort",
+    "Distance",
+    "EntityList",
+    "EntityParameters",
+    "EstimatedState",
+    "FollowRefState",
+    "FuelLevel",
+    "Heartbeat",
+    "NavigationUncertainty",
+    "PlanControl",
+    "PlanControlState",
+    "TransmissionStatus",
+    "VehicleMedium",
+    "VehicleState",
+    *RANGE_MESSAGES,
+)
+SIMULATED_STATE = int(imcpy.SimulatedState().msg_id)
+MAX_PLAUSIBLE_VEHICLE_TIME_S = 4e9
+ANNOUNCE_AGAIN_S = 1.0
+
+
+class Hearing:
+    """Takes packets in. Nothing that arrives can raise out of it.
+
+    Parameters
+    ----------
+    settings
+    roster, crew, links
+        Who is known, who is under control, and how their links are; all of them are told.
+    tell
+        Receives events for the bridge's user.
+    failed
+        Receives errors of our own.
+    clock
+        Seconds of the wall clock that never step back.
+    wall_clock
+        Unix seconds.
+    speaker
+        Answers newcomers.
+    """
+
+    def __init__(
+        self,
+        settings: BridgeSettings,
+        roster: Roster,
+        crew: Crew,
+        links: Links,
+        tell: Callable[[BridgeEvent], None],
+        failed: Callable[[Exception], None],
+        clock: Callable[[], float],
+        wall_clock: Callable[[], float],
+        speaker: Speaker,
+    ) -> None:
+        self.decoder = Decoder(WANTED)
+        self.announces = Decoder(("Announce",))
+        self.double = ""
+        """Who else announces our own id, empty when nobody does."""
+        self._settings = settings
+        self._roster = roster
+        self._crew = crew
+        self._links = links
+        self._tell = tell
+        self._note_error = failed
+        self._clock = clock
+        self._wall_clock = wall_clock
+        self._speaker = speaker
+        self._state_reported: dict[int, float] = {}
+        self.admission = Admission(settings, roster, clock)
+
+    def _now(self) -> float:
+        return self._clock() * self._settings.time_scale
+
+    def on_announce(self, packet: bytes, address: Address) -> None:
+        """Take a packet of the announce socket; also the way to replay a recording."""
+        try:
+            if self.admission.admits(address, announce=True):
+                self._take_announce(packet, address)
+        except Exception as error:
+            self._note_error(error)
+
+    def _take_announce(self, packet: bytes, address: Address) -> None:
+        header = self.announces.header(packet, address[0])
+        if header is None or not self.announces.wants(header):
+            return
+        message = self.announces.message(packet)
+        if message is None:
+            return
+        announcement = read_announce(message)
+        if announcement.imc_id == self._settings.imc_id:
+            self._look_for_double(announcement, address)
+            return
+        now = self._now()
+        if not self._counts(announcement.imc_id, message.timestamp, address, now):
+            self._roster.note_rival(announcement, now)
+            if self._roster.may_be_another(announcement.imc_id):
+                self._greet(announcement, address, now)
+            return
+        if not self._roster.find_place(announcement, address[0], now):
+            self.admission.refuse(Refused.CROWDED, address)
+            self._greet(announcement, address, now)
+            return
+        self._take_up(announcement, address[0], now)
+
+    def _greet(self, announcement: Announcement, address: Address, now: float) -> None:
+        """Speak once to a system without a place: one that is there answers, and has shown thereby that it is."""
+        self._roster.newcomers.note(announcement, address[0])
+        self._speaker.greet(announcement, address[0])
+        self._answer(now)
+
+    def _answer(self, now: float) -> None:
+        """Announce ourselves, so that a newcomer need not wait for our next announce."""
+        if now - self._speaker.announced_at > ANNOUNCE_AGAIN_S:
+            self._speaker.announce(now)
+
+    def _take_up(self, announcement: Announcement, host: str, now: float) -> None:
+        arrival = self._roster.announced(announcement, host, now)
+        if arrival is None:
+            return
+        node = arrival.node
+        if announcement.is_vehicle:
+            # Its guard learns the bottom from the first sounding on.
+            self._crew.of(node)
+        streams = self._speaker.transport.streams
+        for stale in arrival.stale:
+            streams.drop(stale)
+        if node.address is not None and node.address in announcement.streams:
+            streams.want(node.address)
+        if arrival.rebooted:
+            self._reboot(node, now)
+        if arrival.first or arrival.rebooted:
+            self._answer(now)
+        self._links.check(node, self._crew.get(node), now)
+
+    def _counts(self, imc_id: int, timestamp: float, address: Address, now: float) -> bool:
+        """Whether an announce may change where a node is: neither a stranger's, nor one that was recorded before."""
+        if not self.admission.admits_id(imc_id, address):
+            return False
+        if self._roster.comes_from_elsewhere(imc_id, address[0], now):
+            return self.admission.refuse(Refused.MOVED, address)
+        return not self._roster.is_old(imc_id, timestamp, now) or self.admission.refuse(Refused.OLD, address)
+
+    def _look_for_double(self, announcement: Announcement, address: Address) -> None:
+        """Our own announces come back to us; those of another system under our id are trouble."""
+        ours = (*self._speaker.transport.own_addresses(), address[0])
+        if announcement.name == self._settings.name and any(
+            host in ours and port == self._settings.port for host, port in announcement.addresses
+        ):
+            return
+        self.double = f"{announcement.name!r} at {address[0]}"
+
+    def _reboot(self, node: Node, now: float) -> None:
+        self._tell(Restarted(node.name, node.submerged))
+        control = self._crew.get(node)
+        if control is not None:
+            control.rebooted(now)
+            if control.engaged:
+                self._crew.rates_of(node).begin()
+
+    def on_packet(self, packet: bytes, address: Address) -> None:
+        """Take a packet of the traffic socket; also the way to replay a recording."""
+        try:
+            if self.admission.admits(address):
+                self._take_packet(packet, address)
+        except Exception as error:
+            self._note_error(error)
+
+    def _take_packet(self, packet: bytes, address: Address) -> None:
+        header = self.decoder.header(packet, address[0])
+        if header is None:
+            return
+        now = self._now()
+        sender = self._roster.speaker(header.src, address) or self._newcomer(header.src, address, now)
+        if sender is None:
+            self._pass_on(header, packet, address, now)
+            return
+        if sender.packets == 0:
+            if not self._roster.capacity.may_be_heard(sender, address[0]):
+                self.admission.refuse(Refused.CROWDED, address)
+                return
+            self._roster.first_heard(sender)
+        if header.msg_id != SIMULATED_STATE and not sender.clock.is_old(header.timestamp):
+            # DUNE's simulation lets that one through where radio would not reach.
+            sender.heard(now, address)
+        if not self.decoder.wants(header):
+            return
+        message = self.decoder.message(without_argument(packet))
+        if message is not None and 0.0 < message.timestamp < MAX_PLAUSIBLE_VEHICLE_TIME_S:
+            self._take_message(sender, message, now, address)
+
+    def _newcomer(self, imc_id: int, address: Address, now: float) -> Node | None:
+        """The system that had no place when it announced itself and now speaks, if it gets one."""
+        announcement = self._roster.newcomers.answered(imc_id, address)
+        if announcement is None:
+            return None
+        if not self._roster.find_place(announcement, address[0], now, heard=True):
+            self.admission.refuse(Refused.CROWDED, address)
+            return None
+        self._take_up(announcement, address[0], now)
+        return self._roster.speaker(imc_id, address)
+
+    def forget(self, node: Node) -> None:
+        """Keep nothing of a node that has lost its place."""
+        self._state_reported.pop(node.imc_id, None)
+
+    def _pass_on(self, header: Header, packet: bytes, address: Address, now: float) -> None:
+        """Take a packet that is not its sender's own word: an echo of ours, one relayed by a node, a stranger's."""
+        via = self._roster.at(address)
+        if via is None:
+            self._from_unknown_address(header.src, address, now)
+            self.decoder.wants(header)
+        elif header.src == self._settings.imc_id:
+            via.echoes += 1
+        else:
+            via.relayed += 1
+            if header.dst in (via.imc_id, BROADCAST_ID) and self.decoder.wants(header):
+                self._relayed(via, packet, now)
+
+    def _from_unknown_address(self, imc_id: int, address: Address, now: float) -> None:
+        if imc_id in (self._settings.imc_id, 0, BROADCAST_ID) or not self.admission.admits_id(imc_id, address):
+            return
+        node = self._roster.stranger(imc_id, address[0], now)
+        if node is None:
+            self.admission.refuse(Refused.CROWDED, address)
+            return
+        node.foreign_address += 1
+        node.last_foreign = address
+        if node.announcement is None:
+            node.heard_at = now
+
+    def _relayed(self, via: Node, packet: bytes, now: float) -> None:
+        control = self._crew.get(via)
+        message = self.decoder.message(without_argument(packet))
+        if isinstance(message, imcpy.EstimatedState):
+            self._heard_by_sound(via, message, now)
+        if control is None or message is None:
+            return
+        if isinstance(message, imcpy.Abort):
+            control.foreign_abort(int(message.src), now)
+        elif isinstance(message, imcpy.PlanControl) and message.type == imcpy.PlanControl.TypeEnum.REQUEST:
+            control.foreign_plan_control(int(message.src), int(message.op))
+
+    def _heard_by_sound(self, gateway: Node, message: Message, now: float) -> None:
+        """Take a vehicle's report that its gateway has made an EstimatedState of."""
+        for control in self._crew.by_sound_through(gateway):
+            if control.node.imc_id == int(message.src) and control.sound is not None:
+                report = control.sound.take_report(message)
+                if report is not None:
+                    control.reported_by_sound(report, now)
+
+    def _take_message(self, node: Node, message: Message, now: float, address: Address) -> None:
+        name = type(message).__name__
+        control = self._crew.get(node)
+        rates = self._crew.asked_rates(node)
+        tick = node.take_time(message.timestamp, now, self._wall_clock())
+        if tick is Tick.DOUBTFUL:
+            self.admission.refuse(Refused.OLD, address)
+            return
+        node.telemetry_at = now
+        node.rates.count(name, now)
+        if tick is Tick.JUMPED and control is not None:
+            control.clock_jumped()
+        match name:
+            case "EstimatedState":
+                self._take_state(node, control, message, now, address)
+            case "Distance":
+                self._take_distance(node, message)
+            case "NavigationUncertainty":
+                node.take_uncertainty(message)
+            case _ if name in RANGE_MESSAGES:
+                node.ranges.offer(name, message)
+            case "PlanControlState" if node.in_order(name, message.timestamp):
+                if node.take_plan_state(message, now):
+                    node.restarted()
+                    self._reboot(node, now)
+                if control is not None:
+                    control.plan_state_changed(now)
+            case "VehicleState" if node.in_order(name, message.timestamp):
+                if node.take_vehicle_state(message, now):
+                    node.restarted()
+                    self._reboot(node, now)
+                if control is not None:
+                    control.vehicle_state_changed(now)
+            case "FollowRefState" if control is not None:
+                control.follow_state(message, now)
+            case "PlanControl" if control is not None and int(message.dst) == self._settings.imc_id:
+                control.plan_control_reply(message, now)
+            case "VehicleMedium":
+                node.medium = int(message.medium)
+            case "TransmissionStatus":
+                for other in self._crew.by_sound_through(node):
+                    if other.sound is not None:
+                        other.left_by_sound(other.sound.status(message), now)
+            case "FuelLevel":
+                node.take_fuel(message)
+            case "EntityList" if message.op == imcpy.EntityList.OperationEnum.REPORT:
+                node.take_entities(message)
+            case "EntityParameters" if rates is not None:
+                rates.answered(message, now)
+
+    def _take_state(self, node: Node, control: Control | None, message: Message, now: float, address: Address) -> None:
+        report = node.take_state(message)
+        if isinstance(report, Refused):
+            self.admission.refuse(report, address)
+        elif report is not None:
+            if control is not None:
+                control.moved(report, now)
+            wall = self._clock()
+            if wall - self._state_reported.get(node.imc_id, float("-inf")) >= 1.0 / self._settings.state_events_per_s:
+                self._state_reported[node.imc_id] = wall
+                self._tell(report)
+        for result in node.gate.resolve(node.history, node.position_sd_m()):
+            if control is not None and isinstance(result, Sounding):
+                control.guard.add(result.time_s, result.lat_deg, result.lon_deg, result.bottom_depth_m, now)
+            self._tell(result)
+        for measured in node.ranges.resolve(node.history, node.position_sd_m()):
+            self._tell(measured)
+
+    def _take_distance(self, node: Node, message: Message) -> None:
+        refused = offer_distance(node.gate, node.entity_name(int(message.src_ent)), message)
+        if refused is not None:
+            self._tell(refused)

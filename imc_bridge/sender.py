@@ -1,0 +1,161 @@
+"""What is sent to everyone: announces, heartbeats, questions for names, marks for other consoles."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import imcpy
+
+from imc_bridge.network.codec import Message, encode
+from imc_bridge.network.consoles import Board
+from imc_bridge.network.discovery import Announcement, own_announce
+from imc_bridge.network.transport import Address, Transport
+from imc_bridge.nodes.node import Node
+from imc_bridge.nodes.roster import Roster
+from imc_bridge.settings import BridgeSettings
+
+ENTITY_QUERY_S = 2.0
+
+
+def entity_query() -> Message:
+    """The question for the names of a node's entities."""
+    query = imcpy.EntityList()
+    query.op = imcpy.EntityList.OperationEnum.QUERY
+    return query
+
+
+class Speaker:
+    """Speaks to the network.
+
+    Parameters
+    ----------
+    settings
+    transport, roster
+    commanding
+        False for a listener, which shows nothing to other consoles.
+    wall_clock
+        Unix seconds, for our messages' times.
+    """
+
+    def __init__(
+        self,
+        settings: BridgeSettings,
+        transport: Transport,
+        roster: Roster,
+        *,
+        commanding: bool,
+        wall_clock: Callable[[], float],
+    ) -> None:
+        self.settings = settings
+        self.transport = transport
+        self.board = Board(settings.name)
+        """What other consoles are shown."""
+        self.announced_at = -math.inf
+        self._roster = roster
+        self._commanding = commanding
+        self._wall_clock = wall_clock
+        self._announce_due = 0.0
+        self._heartbeat_due = 0.0
+        self._greeted: set[Address] = set()
+
+    def begin(self, now: float) -> None:
+        """Announce from now on, or as soon as it is known where we are."""
+        if self.settings.position_deg is None:
+            # The first vehicle heard tells where we are and is answered at once; see own_announce.
+            self._announce_due = now + self.settings.announce_period_s
+
+    def tick(self, now: float) -> None:
+        """Send whatever is due."""
+        if now >= self._announce_due:
+            self.announce(now)
+        if now >= self._heartbeat_due:
+            self._heartbeat_due = now + self.settings.heartbeat_period_s
+            self._greeted.clear()
+            for node in self._roster:
+                # Who was announced and never heard may not exist: whoever has its address is not bothered for long.
+                if self.talks_to(node) and (node.packets or not node.given_up(now)):
+                    self._beat(node)
+        for node in self._roster:
+            if node.is_vehicle and self.talks_to(node):
+                self._ask_for_names(node, now)
+        for message in self.board.due(now):
+            for node in self._roster:
+                if self._is_other_console(node):
+                    self.send(node, message)
+
+    def _ask_for_names(self, node: Node, now: float) -> None:
+        if node.entities is None and node.heard_at is not None and now - node.entities_asked_at >= ENTITY_QUERY_S:
+            node.entities_asked_at = now
+            self.send(node, entity_query())
+
+    def _beat(self, node: Node) -> None:
+        if node.heard_at is not None or not node.addresses:
+            self.send(node, imcpy.Heartbeat())
+            return
+        # Which of its addresses leads to it from here shows only once it answers.
+        packet = self._encoded(imcpy.Heartbeat(), node.imc_id)
+        for address in node.addresses:
+            self.transport.send(packet, address)
+
+    def greet(self, announcement: Announcement, host: str) -> None:
+        """Send a heartbeat to a system that announced itself, at the host that its announce came from.
+
+        However many systems claim an address, it gets one a period.
+        """
+        here = next((address for address in announcement.addresses if address[0] == host), None)
+        if here is not None and here not in self._greeted and announcement.system_type != int(imcpy.SystemType.CCU):
+            self._greeted.add(here)
+            self.transport.send(self._encoded(imcpy.Heartbeat(), announcement.imc_id), here)
+
+    def announce(self, now: float) -> None:
+        """Announce ourselves on every port and interface."""
+        self._announce_due = now + self.settings.announce_period_s
+        self.announced_at = now
+        self.transport.look_for_interfaces()
+        position = self.position_rad()
+        self.transport.announce(
+            lambda addresses: encode(
+                own_announce(self.settings, addresses, position),
+                src=self.settings.imc_id,
+                dst=0,
+                dst_ent=0,
+                time_s=self._wall_clock(),
+            )
+        )
+
+    def _encoded(self, message: Message, dst: int) -> bytes:
+        return encode(message, src=self.settings.imc_id, dst=dst, time_s=self._wall_clock())
+
+    def position_rad(self) -> tuple[float, float]:
+        """The place that we announce as ours."""
+        if self.settings.position_deg is not None:
+            lat, lon = self.settings.position_deg
+            return math.radians(lat), math.radians(lon)
+        for node in self._roster:
+            if node.announcement is not None and node.announcement.is_vehicle:
+                place = node.announcement.lat_rad, node.announcement.lon_rad
+                if place != (0.0, 0.0):
+                    return place
+        return 0.0, 0.0
+
+    def _is_other_console(self, node: Node) -> bool:
+        return (
+            self._commanding
+            and node.address is not None
+            and node.announcement is not None
+            and node.announcement.system_type == int(imcpy.SystemType.CCU)
+        )
+
+    def talks_to(self, node: Node) -> bool:
+        """Whether a node is one that we speak to."""
+        wanted = self.settings.vehicles
+        if node.address is None or node.announcement is None:
+            return False
+        # A console announces, too, but has nothing to tell us.
+        return node.name in wanted if wanted else node.announcement.system_type != int(imcpy.SystemType.CCU)
+
+    def send(self, node: Node, message: Message) -> None:
+        """Send a message to a node; nothing while it has no address."""
+        if node.address is not None:
+            self.transport.send(self._encoded(message, node.imc_id), node.address)

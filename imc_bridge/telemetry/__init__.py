@@ -1,0 +1,1 @@
+"""What vehicles measured: soundings and ranges to targets, from their messages."""
