@@ -20,8 +20,8 @@ from sqlalchemy import make_url
 from starlette.middleware.cors import CORSMiddleware
 
 from app import __version__
+from app.api import audit_routes as auditing
 from app.api import (
-    auditing,
     corrections,
     fleet,
     forecasts,
@@ -58,7 +58,7 @@ from app.api.tokens import Role, TokenStore
 from app.api.unread import UnreadBodyMiddleware
 from app.dashboard.serve import mount_dashboard
 from app.descriptors import allow_descriptors
-from app.memory import keep_memory_together, settled
+from app.malloc import keep_memory_together, settled
 from app.missions.service import MissionService
 from app.settings import Settings, StartupError, is_loopback, load_settings
 from app.storage.audit import Command

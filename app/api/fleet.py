@@ -4,10 +4,10 @@ from fastapi import APIRouter, Request
 from pydantic import TypeAdapter
 
 from app.api.auth import Reader
+from app.api.peer_lists import from_peers
 from app.api.problems import problems
 from app.api.schemas import API
 from app.api.state import Service, State
-from app.api.whole_lists import from_peers
 from app.missions.views.doctor import DoctorView
 from app.missions.views.mission import PlannerView, VehicleView
 

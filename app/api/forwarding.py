@@ -16,9 +16,9 @@ from websockets.typing import Subprotocol
 
 from app.api.auth import authenticate, until_unwelcome
 from app.api.bodies import READING
+from app.api.first_completed import first_of
 from app.api.problems import ProblemError, instance_of, make_problem, problem_response
 from app.api.processes import Deliveries, comes_from_peer, end_to_end, recognise, target_without_token, tls_of
-from app.api.racing import first_of
 from app.api.schemas import API
 from app.api.spool import Spool, spool_folder
 from app.api.state import EdgeState

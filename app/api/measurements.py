@@ -5,9 +5,9 @@ from typing import Annotated
 from fastapi import APIRouter, Header, Query, Request, Response
 
 from app.api.auth import VehicleOrOperator, check_vehicle
+from app.api.first_completed import first_of
 from app.api.json_route import JsonRoute
 from app.api.problems import ProblemError, problems
-from app.api.racing import first_of
 from app.api.schemas import API, MeasurementBatch, MissionId, VehicleName
 from app.api.state import Service, State
 from app.missions.soundings.measurement import Measurement

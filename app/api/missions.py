@@ -8,10 +8,10 @@ from pydantic import TypeAdapter
 
 from app.api.auth import Operator, Reader
 from app.api.json_route import JsonRoute
+from app.api.peer_lists import from_peers
 from app.api.problems import problems
 from app.api.schemas import API, ActionRequest, MissionId, NoteRequest, VehicleName
 from app.api.state import Service, State
-from app.api.whole_lists import from_peers
 from app.missions.spec.mission import MissionSpec, VehicleSpec
 from app.missions.views.mission import ActionView, EventView, MissionSummary, MissionView, PreflightView, StepView
 from app.missions.views.telemetry import TelemetryView

@@ -32,7 +32,7 @@ from app.missions.errors import (
     VehicleNotFoundError,
 )
 from app.missions.states import MoveRefusedError
-from app.storage.trouble import trouble_of
+from app.storage.db_errors import trouble_of
 
 T = TypeVar("T")
 

@@ -15,8 +15,8 @@ from starlette.types import Scope
 from app.api.problems import ProblemError
 from app.api.tokens import Principal, Role, token_hash
 from app.storage import sessions
-from app.storage.at_once import AtOnce
 from app.storage.database import Database
+from app.storage.fast_read import AtOnce
 from app.storage.models import SessionRow
 
 SESSION_DAYS = 30

@@ -12,8 +12,8 @@ from pydantic import TypeAdapter
 from sse_starlette import EventSourceResponse, ServerSentEvent
 
 from app.api.auth import Reader, authenticate, until_unwelcome
+from app.api.first_completed import first_of
 from app.api.problems import ProblemError, describe_mission_error, problems
-from app.api.racing import first_of
 from app.api.schemas import API, MissionId
 from app.api.state import EdgeState, Service, State, edge_state
 from app.missions.errors import MissionError

@@ -10,11 +10,11 @@ from enum import StrEnum
 from pathlib import Path
 
 from app.storage import private, tokens
-from app.storage.at_once import AtOnce
 from app.storage.database import Database
+from app.storage.fast_read import AtOnce
 from app.storage.models import TokenRow
 from app.storage.prepare import FIRST_TOKEN_FILE
-from app.storage.sharing import Shared
+from app.storage.single_flight import Shared
 
 TOKEN_PREFIX = "bf_"  # noqa: S105 - makes leaked tokens easy to search for
 DIGESTS_READ_AGAIN_S = 0.1

@@ -105,8 +105,8 @@ from app.storage import events as event_queries
 from app.storage import missions as mission_queries
 from app.storage import soundings as sounding_queries
 from app.storage import telemetry as telemetry_queries
-from app.storage.at_once import AtOnce
 from app.storage.database import Database
+from app.storage.fast_read import AtOnce
 from app.storage.models import MissionRow, SoundingRow
 
 NO_FORECAST = "what a search will find cannot be forecast: it depends on what stands there"

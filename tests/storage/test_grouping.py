@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import pytest
 
-from app.storage.grouping import Grouped
+from app.storage.group_commit import Grouped
 
 
 class Work:

@@ -4,7 +4,7 @@ import asyncio
 
 import pytest
 
-from app.storage.sharing import Shared
+from app.storage.single_flight import Shared
 
 
 async def test_all_who_ask_while_an_answer_is_made_share_the_next_one() -> None:

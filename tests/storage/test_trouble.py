@@ -10,7 +10,7 @@ from sqlalchemy.exc import DBAPIError
 
 from app.storage import database as database_module
 from app.storage.database import Database
-from app.storage.trouble import trouble_of
+from app.storage.db_errors import trouble_of
 from tests.storage.rows import mission
 
 

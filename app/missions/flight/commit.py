@@ -16,7 +16,7 @@ from app.missions.team import Member
 from app.missions.views.mission import Level
 from app.storage import missions as mission_queries
 from app.storage.models import StepRow, WaypointRow
-from app.storage.shielding import to_the_end
+from app.storage.uncancellable import to_the_end
 from imc_bridge.control.plans import CIRCLE_RADIUS_M
 
 LEAD_M = 25.0

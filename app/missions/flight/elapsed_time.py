@@ -6,7 +6,7 @@ from app.missions.clock import now
 from app.missions.live.mission import LiveMission
 from app.missions.views.mission import Level
 from app.storage import missions as mission_queries
-from app.storage.shielding import to_the_end
+from app.storage.uncancellable import to_the_end
 
 PERIOD_S = 5.0
 """How often the seconds are stored: so many are lost at most when the machine fails."""

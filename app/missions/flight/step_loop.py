@@ -36,7 +36,7 @@ from app.missions.spec.mission import Guidance
 from app.missions.team import SETTLED, Member
 from app.missions.views.mission import Level
 from app.storage import missions as mission_queries
-from app.storage.shielding import to_the_end
+from app.storage.uncancellable import to_the_end
 from imc_bridge.control.plans import leg_time_s
 
 PACE_MEMORY = 0.9

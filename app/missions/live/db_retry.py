@@ -6,7 +6,7 @@ from typing import TypeVar
 
 import structlog
 
-from app.storage.trouble import trouble_of
+from app.storage.db_errors import trouble_of
 
 RETRY_S = 1.0
 

@@ -34,7 +34,7 @@ from app.storage import soundings as sounding_queries
 from app.storage import telemetry as telemetry_queries
 from app.storage.database import Database
 from app.storage.models import EventRow
-from app.storage.shielding import to_the_end
+from app.storage.uncancellable import to_the_end
 
 FLUSH_PERIOD_S = 0.1
 TRACK_SPACING_M = 1.0

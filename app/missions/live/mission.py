@@ -58,9 +58,9 @@ from app.missions.views.targets import TargetView
 from app.storage import events as event_queries
 from app.storage import soundings as sounding_queries
 from app.storage.database import Database
-from app.storage.grouping import Grouped
+from app.storage.group_commit import Grouped
 from app.storage.models import MissionRow
-from app.storage.sharing import Shared
+from app.storage.single_flight import Shared
 
 RISES = "rises"
 """Marks events that tell of a vehicle sent up for a fix."""

@@ -23,7 +23,7 @@ from app.missions.views.soundings import ItemVerdict, Verdict
 from app.storage import target_ranges as range_queries
 from app.storage.database import Database
 from app.storage.models import StepRow
-from app.storage.shielding import to_the_end
+from app.storage.uncancellable import to_the_end
 
 GATHER_S = 0.3
 """How long ranges are gathered before they are judged: those of several vehicles come in any order."""

@@ -16,8 +16,8 @@ from app.storage import soundings as sounding_queries
 from app.storage import stored_maps
 from app.storage.bulk import read_in_pieces
 from app.storage.database import Database
-from app.storage.shielding import to_the_end
 from app.storage.stored_maps import Stored
+from app.storage.uncancellable import to_the_end
 
 WORTH_KEEPING = 20_000
 """While a mission runs its map is stored from so many soundings on: of fewer it is made anew in a moment."""

@@ -26,7 +26,7 @@ from app.missions.views.mission import Level
 from app.storage import soundings as sounding_queries
 from app.storage import stored_maps
 from app.storage.models import ImportRow, ReferenceRow
-from app.storage.shielding import to_the_end
+from app.storage.uncancellable import to_the_end
 
 MAX_PRIOR = 100_000
 """Imported soundings per file that the map takes one by one; where there are more they are merged per cell."""

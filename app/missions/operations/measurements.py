@@ -25,7 +25,7 @@ from app.missions.states import MissionState
 from app.missions.targets.filters import Arrived
 from app.missions.views.soundings import BatchVerdict, ItemVerdict, Verdict, batch_verdict
 from app.storage import soundings as sounding_queries
-from app.storage.grouping import Grouped
+from app.storage.group_commit import Grouped
 from app.storage.models import BatchRow
 from app.storage.soundings import LOG_KEY
 from imc_bridge.telemetry.soundings import Beam, StateSample, footprint

@@ -29,7 +29,7 @@ from app.mapping.readers.types import (
 )
 from app.missions.errors import ImportUnavailableError, InvalidRequestError
 from app.missions.operations.uploads import Upload, unnamed_file
-from app.storage.shielding import to_the_end
+from app.storage.uncancellable import to_the_end
 
 log = structlog.get_logger(__name__)
 

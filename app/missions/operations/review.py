@@ -15,7 +15,7 @@ from app.missions.views.soundings import Ruling, SoundingPage, SoundingState, So
 from app.storage import soundings as sounding_queries
 from app.storage import stored_maps
 from app.storage.models import EventRow, SoundingRow
-from app.storage.shielding import to_the_end
+from app.storage.uncancellable import to_the_end
 
 Doubts = dict[int, str]
 """Why the map leaves accepted soundings out, by their ids."""

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from app.missions.errors import FileTooLargeError, ImportUnavailableError
-from app.storage.shielding import to_the_end
+from app.storage.uncancellable import to_the_end
 
 MAX_AT_ONCE = 8
 """Of each the disk holds at most ``max_import_bytes``."""

@@ -21,7 +21,7 @@ from app.missions.team import Member
 from app.missions.views.mission import Level
 from app.storage import missions as mission_queries
 from app.storage.database import Guard
-from app.storage.shielding import to_the_end
+from app.storage.uncancellable import to_the_end
 
 PATIENCE_S = 0.5
 """How long a stop waits for the database, so that a restart knows of it too; vehicles wait no longer for a disk."""
