@@ -20,8 +20,8 @@ from sqlalchemy import make_url
 from starlette.middleware.cors import CORSMiddleware
 
 from app import __version__
-from app.api import audit_routes as auditing
 from app.api import (
+    audit_routes,
     corrections,
     fleet,
     forecasts,
@@ -164,7 +164,7 @@ def create_app(settings: Settings | None = None, *, port: int | None = None) -> 
         searches.router,
         streams.router,
         fleet.router,
-        auditing.router,
+        audit_routes.router,
         signing_in.router,
         health_router(API),
     )

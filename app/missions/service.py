@@ -46,9 +46,9 @@ from app.missions.maps.products import (
     product_kind,
 )
 from app.missions.maps.snapshot import MapSnapshot
-from app.missions.operations import imports as importing
+from app.missions.operations import imports
 from app.missions.operations.history import map_at_step, steps_after
-from app.missions.operations.imports import Importing
+from app.missions.operations.imports import Imports
 from app.missions.operations.measurements import measure
 from app.missions.operations.polling import waypoint
 from app.missions.operations.reading import Reader
@@ -61,8 +61,8 @@ from app.missions.preflight.survey import preflight
 from app.missions.running.admission import check_spec
 from app.missions.running.claims import Claims, Lead, ShowArea, free_elsewhere
 from app.missions.running.deletion import check_deletable, delete_mission
-from app.missions.running.failover import Watch
-from app.missions.running.final_maps import MapKeeper
+from app.missions.running.failover import Failover
+from app.missions.running.final_maps import FinalMaps
 from app.missions.running.mission_views import (
     action_view,
     beginning_with,
@@ -71,9 +71,9 @@ from app.missions.running.mission_views import (
     snapshot_message,
 )
 from app.missions.running.ownership import Ownership
-from app.missions.running.registry import Memory
-from app.missions.running.supervisor import Conductor
-from app.missions.running.team_changes import Crews, refuse_ended, vehicle_row
+from app.missions.running.registry import MissionRegistry
+from app.missions.running.supervisor import MissionSupervisor
+from app.missions.running.team_changes import TeamChanges, refuse_ended, vehicle_row
 from app.missions.search.obstacles import obstacles_geojson
 from app.missions.search.progress import grid_view
 from app.missions.search.scan_schema import Scan
@@ -166,21 +166,21 @@ class MissionService:
         self._hub = FleetHub(links)
         self._executor = ThreadPoolExecutor(WORKERS, thread_name_prefix="planning")
         self._claims = Claims(self._hub, self._sim, lead, show_area)
-        self._maps = MapKeeper()
+        self._maps = FinalMaps()
         self._forecaster = Forecaster()
         self._compilation = Compilation(self._executor)
-        self._conductor = Conductor(
+        self._supervisor = MissionSupervisor(
             self._hub, self._claims, self._executor, self._maps, self._compilation, settings.time_scale
         )
-        self._runs = self._conductor.runs
-        self._crews = Crews(self._hub, self._claims, self._conductor)
-        self._memory = Memory(database, self._hub, self._executor, self._maps, settings.time_scale)
+        self._runs = self._supervisor.runs
+        self._team_changes = TeamChanges(self._hub, self._claims, self._supervisor)
+        self._registry = MissionRegistry(database, self._hub, self._executor, self._maps, settings.time_scale)
         self.process = Ownership(database, url, certificate)
         """This process among those that share the database."""
-        self._watch = Watch(database, self._hub, self.process, self._memory, self._conductor, self._claims)
+        self._failover = Failover(database, self._hub, self.process, self._registry, self._supervisor, self._claims)
         self.uploads = Uploads()
         """Files on their way in."""
-        self._importing = Importing(Reader(unconfined=settings.unconfined_imports), self._executor)
+        self._imports = Imports(Reader(unconfined=settings.unconfined_imports), self._executor)
         self._started = False
 
     # Life of the service
@@ -189,8 +189,8 @@ class MissionService:
         """Open the links, join the processes that share the database and go on with missions that nobody has."""
         self._compilation.begin()
         await self._hub.start()
-        self._memory.share(self.process, self._watch.may_take_up, self._watch.resume)
-        await self._watch.begin()
+        self._registry.share(self.process, self._failover.may_take_up, self._failover.resume)
+        await self._failover.begin()
         self._started = True
 
     async def shutdown(self) -> None:
@@ -199,12 +199,12 @@ class MissionService:
         Running missions stay running: another process takes them up, or this one at its next start.
         """
         self._started = False
-        await self._watch.end()
-        await asyncio.gather(*(self._conductor.halt(live) for live in self._memory if live.id in self._runs))
+        await self._failover.end()
+        await asyncio.gather(*(self._supervisor.halt(live) for live in self._registry if live.id in self._runs))
         await self._maps.close()
         await self._hub.close()
-        await self._conductor.close()
-        await self._memory.close()
+        await self._supervisor.close()
+        await self._registry.close()
         await self.process.leave()
         self._executor.shutdown(wait=True, cancel_futures=True)
         self._forecaster.close()
@@ -248,7 +248,7 @@ class MissionService:
         """Return every mission that no other process has, newest first."""
         # One that ended and left memory is as it was then: taking it up again for every list would be slow.
         found = [
-            self._memory.left(one) or await self._summary(one) for (one,) in await self._at_once(mission_queries.ALL)
+            self._registry.left(one) or await self._summary(one) for (one,) in await self._at_once(mission_queries.ALL)
         ]
         return [summary for summary in found if summary is not None]
 
@@ -260,7 +260,7 @@ class MissionService:
 
     async def check_exists(self, mission_id: str) -> None:
         """Raise MissionNotFoundError where there is no such mission; costs little, whoever has it."""
-        await self._memory.check_exists(mission_id)
+        await self._registry.check_exists(mission_id)
 
     async def mission(self, mission_id: str) -> MissionView:
         """Return one mission. Raises MissionNotFoundError."""
@@ -275,7 +275,7 @@ class MissionService:
             The latter when a vehicle is not ready or takes part in another mission.
         """
         live = await self._get(mission_id)
-        async with self._conductor.acting(mission_id):
+        async with self._supervisor.acting(mission_id):
             target = states.move(live.header.state, action)
             stops: list[StopReceipt] = []
             if action in ("start", "resume"):
@@ -285,45 +285,45 @@ class MissionService:
                     self._claims.check_links(live)
                 self._claims.claim_team(live)
                 try:
-                    await self._conductor.set_state(live, target, note, actor, check=free_elsewhere(live))
+                    await self._supervisor.set_state(live, target, note, actor, check=free_elsewhere(live))
                 except BaseException:
                     if action == "start":
                         self._claims.release_team(live)
                     raise
-                self._conductor.run(live)
+                self._supervisor.run(live)
             else:
-                stops = await self._conductor.stand_down(live, target, note, actor)
+                stops = await self._supervisor.stand_down(live, target, note, actor)
                 if target in ENDED:
-                    self._conductor.dismiss(live)
+                    self._supervisor.dismiss(live)
                 live.publish_summary()
         return action_view(live, stops)
 
     async def delete(self, mission_id: str) -> None:
         """Remove a mission in which nothing was measured. Raises MissionNotFoundError, ConflictError."""
         live = await self._get(mission_id)
-        async with self._conductor.acting(mission_id):
+        async with self._supervisor.acting(mission_id):
             check_deletable(live)
             self._maps.forget(mission_id)
             await delete_mission(live)
-            await self._memory.forget(mission_id)
+            await self._registry.forget(mission_id)
 
     async def add_vehicle(self, mission_id: str, vehicle: VehicleSpec, *, actor: str = "operator") -> MissionView:
         """Let a vehicle join, while the mission runs too. Raises ConflictError, InvalidRequestError."""
         live = await self._get(mission_id)
-        await self._crews.join(live, vehicle, actor)
+        await self._team_changes.join(live, vehicle, actor)
         return mission_view(live)
 
     async def rejoin_vehicle(self, mission_id: str, name: str, *, actor: str = "operator") -> MissionView:
         """Let a vehicle that left take part again. Raises VehicleNotFoundError, ConflictError."""
         live = await self._get(mission_id)
-        await self._crews.rejoin(live, name, actor)
+        await self._team_changes.rejoin(live, name, actor)
         return mission_view(live)
 
     async def remove_vehicle(self, mission_id: str, name: str, *, actor: str = "operator") -> MissionView:
         """Stop a vehicle and take it out of the mission. Raises VehicleNotFoundError, ConflictError."""
         live = await self._get(mission_id)
         refuse_ended(live, "keeps its vehicles")
-        await self._crews.stop_one(live, name, actor)
+        await self._team_changes.stop_one(live, name, actor)
         return mission_view(live)
 
     async def abort_vehicle(self, mission_id: str, name: str, *, actor: str = "operator") -> ActionView:
@@ -332,7 +332,7 @@ class MissionService:
         When the mission has ended the vehicle stays in it and is told once more.
         """
         live = await self._get(mission_id)
-        return action_view(live, await self._crews.stop_one(live, name, actor))
+        return action_view(live, await self._team_changes.stop_one(live, name, actor))
 
     async def preflight(self, mission_id: str) -> PreflightView:
         """Return what stands before a mission's start."""
@@ -495,26 +495,26 @@ class MissionService:
 
     async def imports(self, mission_id: str) -> list[ImportView]:
         """Return what was imported, oldest first."""
-        return await importing.imports_of(await self._get(mission_id))
+        return await imports.imports_of(await self._get(mission_id))
 
     async def expect_file(self, mission_id: str, options: ImportOptions) -> None:
         """Say before a file comes what would be wrong with it. Raises MissionNotFoundError, InvalidRequestError."""
         await self._get(mission_id)
-        importing.kind_of(options)
+        imports.kind_of(options)
 
     async def import_soundings(
         self, mission_id: str, upload: Upload, options: ImportOptions, *, actor: str = "operator"
     ) -> ImportView:
-        """Begin with the soundings of a file; see ``importing.Importing.add``."""
+        """Begin with the soundings of a file; see ``imports.Imports.add``."""
         live = await self._get(mission_id)
-        view = await self._importing.add(live, upload, options, actor)
+        view = await self._imports.add(live, upload, options, actor)
         self._map_imports(live)
         return view
 
     async def delete_import(self, mission_id: str, import_id: str, *, actor: str = "operator") -> None:
         """Take an import back. Raises ImportNotFoundError."""
         live = await self._get(mission_id)
-        await self._importing.delete(live, import_id, actor)
+        await self._imports.delete(live, import_id, actor)
         self._map_imports(live)
 
     def _map_imports(self, live: LiveMission) -> None:
@@ -524,17 +524,17 @@ class MissionService:
 
     async def reference(self, mission_id: str) -> ReferenceView:
         """Return what the map is compared with. Raises ImportNotFoundError."""
-        return await importing.reference_of(await self._get(mission_id))
+        return await imports.reference_of(await self._get(mission_id))
 
     async def set_reference(
         self, mission_id: str, upload: Upload, options: ImportOptions, *, actor: str = "operator"
     ) -> ReferenceView:
-        """Compare the map with the grid in a file from now on; see ``importing.Importing.set_reference``."""
-        return await self._importing.set_reference(await self._get(mission_id), upload, options, actor)
+        """Compare the map with the grid in a file from now on; see ``imports.Imports.set_reference``."""
+        return await self._imports.set_reference(await self._get(mission_id), upload, options, actor)
 
     async def delete_reference(self, mission_id: str, *, actor: str = "operator") -> None:
         """Compare the map with nothing any more. Raises ImportNotFoundError."""
-        await self._importing.delete_reference(await self._get(mission_id), actor)
+        await self._imports.delete_reference(await self._get(mission_id), actor)
 
     # What came of it
 
@@ -662,7 +662,7 @@ class MissionService:
     # Helpers
 
     async def _get(self, mission_id: str) -> LiveMission:
-        return await self._memory.get(mission_id)
+        return await self._registry.get(mission_id)
 
 
 async def _nobody(_password: str, _host: str, _own_user: bool) -> str | None:

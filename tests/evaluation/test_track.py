@@ -9,10 +9,11 @@ import pytest
 from typer.testing import CliRunner
 
 from app.estimation import Fading, Landmarks3D
+from app.evaluation.track import consistency
 from app.evaluation.track.cli import evaluate_app
 from app.evaluation.track.plain_ekf import PlainEkf
 from app.evaluation.track.presumed import Presumed
-from app.evaluation.track.run import consistency, run_track
+from app.evaluation.track.run import run_track
 from app.evaluation.track.setups import TrackJob
 from app.evaluation.track.trace_greedy import foretold_trace
 from app.evaluation.track.world import TrackScenario, TrackWorld

@@ -5,9 +5,9 @@ from datetime import UTC, datetime
 
 import pytest
 
+from app.missions.live import broadcast
 from app.missions.live.broadcast import Broadcaster, Subscription, WatchEndedError
 from app.missions.live.feed import live_period_s
-from app.missions.live.mission import broadcast
 from app.missions.views.messages import EventMessage, LiveMessage, VehiclesMessage, WaypointsMessage
 from app.missions.views.mission import EventView, Level
 

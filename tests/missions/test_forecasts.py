@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from app.missions.errors import ConflictError, InvalidRequestError
-from app.missions.forecast import request as forecasts
+from app.missions.forecast import request
 from app.missions.forecast.floor import Floor, floors_of
 from app.missions.forecast.simulate import Flown, Forecast, forecast
 from app.missions.service import MissionService
@@ -27,8 +27,8 @@ async def test_a_forecast_is_near_what_comes_and_says_what_it_assumes(
     service: MissionService, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # On a slow machine, too, all steps are simulated over all floors.
-    monkeypatch.setattr(forecasts, "BUDGET_S", 600.0)
-    monkeypatch.setattr(forecasts, "PATIENCE_S", 600.0)
+    monkeypatch.setattr(request, "BUDGET_S", 600.0)
+    monkeypatch.setattr(request, "PATIENCE_S", 600.0)
     spec = lines()
     before = await service.forecast(spec)
     assert before.steps == before.steps_simulated == before.steps_flown == 8
@@ -72,7 +72,7 @@ async def test_one_who_leaves_ends_the_simulation(service: MissionService, monke
         ended.set()
         raise RuntimeError("nobody waits")
 
-    monkeypatch.setattr(forecasts, "forecast", endless)
+    monkeypatch.setattr(request, "forecast", endless)
     asked = asyncio.create_task(service.forecast(lines()))
     await until(begun.is_set, "it is begun")
     asked.cancel()
@@ -83,12 +83,12 @@ async def test_one_who_leaves_ends_the_simulation(service: MissionService, monke
 
 def test_time_that_is_up_leaves_a_forecast_that_says_so() -> None:
     spec = lines()
-    team = forecasts.Team()
+    team = request.Team()
     members = [team.join(vehicle, slot) for slot, vehicle in enumerate(spec.vehicles)]
-    starts, _ = forecasts.starts_of(spec, members)
+    starts, _ = request.starts_of(spec, members)
     found = forecast(spec, members, starts, NONE, budget_s=0.0)
     assert found.steps_flown == 1
-    view = forecasts._view(spec, found, "", 8)
+    view = request._view(spec, found, "", 8)
     # Drawn out: as if every step were as long as the first.
     assert view.duration_s == pytest.approx(8 * min(8.0 / spec.speed_mps + 2.0, 60.0), rel=0.2)
     assert any("1 of 8 steps" in words for words in view.assumptions)
@@ -99,12 +99,12 @@ def test_time_that_is_up_leaves_a_forecast_that_says_so() -> None:
 
 def test_without_patience_one_floor_is_flown_and_that_is_said() -> None:
     spec = lines()
-    team = forecasts.Team()
+    team = request.Team()
     members = [team.join(vehicle, slot) for slot, vehicle in enumerate(spec.vehicles)]
-    starts, _ = forecasts.starts_of(spec, members)
+    starts, _ = request.starts_of(spec, members)
     found = forecast(spec, members, starts, NONE, budget_s=0.0, patience_s=0.0)
     assert (len(found.flights), len(found.floors)) == (1, 1)
-    view = forecasts._view(spec, found, "", 8)
+    view = request._view(spec, found, "", 8)
     assert view.floors == 1
     assert any("one floor only" in words for words in view.assumptions)
 
@@ -116,7 +116,7 @@ def test_ranges_span_what_came_over_the_floors() -> None:
         Flown(100.0 + 10.0 * k, {"a": 50.0 + k, "b": 40.0}, 20.0 * k, 100.0 - 20.0 * k, 0.1 * k if k else None, 8)
         for k in range(len(floors))
     ]
-    view = forecasts._view(spec, Forecast(flights, floors), "", 8)
+    view = request._view(spec, Forecast(flights, floors), "", 8)
     assert view.coverage_pct == 40.0
     assert (view.coverage_pct_range.low, view.coverage_pct_range.high) == (pytest.approx(8.0), pytest.approx(72.0))
     assert view.duration_s_range.low < view.duration_s < view.duration_s_range.high

@@ -28,7 +28,7 @@ from app.missions.errors import (
     VehicleNotFoundError,
 )
 from app.missions.fleet.interface import LinkState, WaypointStatus
-from app.missions.live.mission import feed as telling
+from app.missions.live import feed
 from app.missions.maps.products import PRODUCTS
 from app.missions.service import MissionService
 from app.missions.settings import ServiceSettings
@@ -729,10 +729,10 @@ async def test_a_watcher_gets_a_snapshot_first_and_then_every_event_in_order(ser
 async def test_a_crowd_is_told_of_a_new_map_less_often_but_always_of_the_last(
     service: MissionService, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(telling, "CROWD_MAP_S", math.inf)
+    monkeypatch.setattr(feed, "CROWD_MAP_S", math.inf)
     mission = await service.create(sim_spec(steps=3))
     async with AsyncExitStack() as crowd, asyncio.timeout(90):
-        for _ in range(telling.CROWD - 1):
+        for _ in range(feed.CROWD - 1):
             await crowd.enter_async_context(service.subscribe(mission.id))
         messages = await crowd.enter_async_context(service.subscribe(mission.id))
         await service.act(mission.id, "start", actor="Ana")
@@ -741,7 +741,7 @@ async def test_a_crowd_is_told_of_a_new_map_less_often_but_always_of_the_last(
         async for message in messages:
             if isinstance(message, EventMessage) and message.event.data.get("state") == "finished":
                 while_running = len(told)
-                monkeypatch.setattr(telling, "CROWD_MAP_S", 0.0)
+                monkeypatch.setattr(feed, "CROWD_MAP_S", 0.0)
             if isinstance(message, MapMessage):
                 told.append(message.version)
                 if while_running is not None:

@@ -6,8 +6,8 @@ import pytest
 
 from app.missions.fleet.hub import FleetHub
 from app.missions.fleet.interface import LinkState, VehicleRefusedError
-from app.missions.flight import step_loop as runner
-from app.missions.flight.commit import Committing
+from app.missions.flight import step_loop
+from app.missions.flight.commit import StepCommit
 from app.missions.flight.decision import Decision
 from app.missions.service import MissionService
 from app.missions.states import MissionState
@@ -19,7 +19,7 @@ REASON = "leaves no safe depth"
 async def test_a_step_in_which_every_order_is_refused_does_not_count(
     service: MissionService, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    decide, spoilt, asked = runner.decide, True, 0
+    decide, spoilt, asked = step_loop.decide, True, 0
 
     def refusing(*arguments: object, **more: object) -> Decision:
         nonlocal asked
@@ -27,7 +27,7 @@ async def test_a_step_in_which_every_order_is_refused_does_not_count(
         decision = decide(*arguments, **more)
         return replace(decision, legs=[replace(leg, refusal=REASON) for leg in decision.legs]) if spoilt else decision
 
-    monkeypatch.setattr(runner, "decide", refusing)
+    monkeypatch.setattr(step_loop, "decide", refusing)
     mission = (await service.create(sim_spec(steps=3))).id
     await service.act(mission, "start", actor="Ana")
     await until(lambda: asked >= 4, "it was decided again and again")
@@ -61,7 +61,7 @@ async def test_a_step_that_every_vehicle_turns_down_is_sent_again(
     view = await until_state(service, mission, MissionState.FINISHED)
     assert refused == 4
     async with service._database.reading() as session:
-        steps = [await runner.mission_queries.waypoints_of_step(session, mission, number) for number in (1, 2)]
+        steps = [await step_loop.mission_queries.waypoints_of_step(session, mission, number) for number in (1, 2)]
     assert view.progress.step == 2
     assert {row.status for rows in steps for row in rows} == {"reached"}
 
@@ -69,18 +69,18 @@ async def test_a_step_that_every_vehicle_turns_down_is_sent_again(
 async def test_a_waypoint_that_is_committed_while_the_link_is_away_is_sent(
     service: MissionService, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    commit = Committing.commit
+    commit = StepCommit.commit
 
-    async def committed_in_a_gap(self: Committing, decision: Decision) -> None:
+    async def committed_in_a_gap(self: StepCommit, decision: Decision) -> None:
         await commit(self, decision)
         for member in self._live.team:
             member.link = LinkState.LOST
 
-    monkeypatch.setattr(Committing, "commit", committed_in_a_gap)
+    monkeypatch.setattr(StepCommit, "commit", committed_in_a_gap)
     mission = (await service.create(sim_spec(steps=2, step_deadline_s=200))).id
     await service.act(mission, "start", actor="Ana")
     await until_state(service, mission, MissionState.FINISHED)
     async with service._database.reading() as session:
-        steps = [await runner.mission_queries.waypoints_of_step(session, mission, number) for number in (1, 2)]
+        steps = [await step_loop.mission_queries.waypoints_of_step(session, mission, number) for number in (1, 2)]
     assert all(row.status in ("sent", "acknowledged", "reached") for rows in steps for row in rows)
     assert all(row.status == "reached" for row in steps[0]) or any(row.status != "planned" for row in steps[1])

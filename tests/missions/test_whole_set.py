@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.missions.live.mission import sounding_store as whole_set
+from app.missions.live import sounding_store
 from app.missions.maps.builder import MapBuilder
 from app.missions.maps.codec import pack, unpack
 from app.missions.service import MissionService
@@ -67,7 +67,7 @@ def test_while_soundings_are_read_the_map_stays_and_those_that_come_meanwhile_co
     given_up = builder.arrivals.expect()
     coming = builder.arrivals.expect()
     builder.add(later)
-    everything = whole_set.Everything(first, np.zeros((0, 4)), np.zeros(60, dtype=bool))
+    everything = sounding_store.Replacement(first, np.zeros((0, 4)), np.zeros(60, dtype=bool))
     builder.arrivals.arrived(given_up, everything)
     assert builder.build() is shown
     builder.arrivals.arrived(coming, everything)
@@ -146,7 +146,7 @@ async def test_soundings_that_another_process_stored_are_found(harbour: Harbour,
 async def test_many_soundings_leave_memory_when_the_mission_has_ended(
     harbour: Harbour, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(whole_set, "TOO_MANY_TO_HOLD", 50)
+    monkeypatch.setattr(sounding_store, "TOO_MANY_TO_HOLD", 50)
     mission = await mapped(harbour.service)
     await harbour.service.act(mission, "start", actor="test")
     await harbour.service.act(mission, "abort", actor="test")

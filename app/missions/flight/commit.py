@@ -31,7 +31,7 @@ UNIT_SQUARE = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0], [-1.
 FloatArray = NDArray[np.float64]
 
 
-class Committing:
+class StepCommit:
     """Writes one running mission's steps down and gives its vehicles their orders; sends nothing.
 
     Parameters

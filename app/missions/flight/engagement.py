@@ -31,7 +31,7 @@ class _Refused:
     link: LinkState
 
 
-class Engaging:
+class Engagement:
     """Asks every vehicle that does not follow us to do so, each on its own and without ever giving up.
 
     Nothing that a link answers is the last word: radio comes back, a busy machine catches up, a fault is cleared.

@@ -16,7 +16,7 @@ Wait = Callable[[Callable[[], bool], float | None], Awaitable[bool]]
 """Waits until a condition holds, or until the event loop's time; tells whether it does."""
 
 
-class Lookout:
+class SearchHooks:
     """Keeps one running mission from going where something stands, and tells when a search is over.
 
     Parameters

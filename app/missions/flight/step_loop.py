@@ -24,11 +24,11 @@ from app.missions.fleet.interface import (
     WaypointReport,
     WaypointStatus,
 )
-from app.missions.flight.commit import Committing
+from app.missions.flight.commit import StepCommit
 from app.missions.flight.decision import Decision, Place, decide, make_constraints
 from app.missions.flight.elapsed_time import keep_time, save_elapsed
-from app.missions.flight.engagement import Engaging
-from app.missions.flight.search_hooks import Lookout
+from app.missions.flight.engagement import Engagement
+from app.missions.flight.search_hooks import SearchHooks
 from app.missions.flight.step_maps import StepMaps
 from app.missions.flight.telemetry_sampler import keep_telemetry
 from app.missions.live.mission import LiveMission
@@ -77,8 +77,8 @@ class Runner:
         self._turned_down: set[str] = set()
         """Vehicles that refused the step's waypoint when it was sent."""
         self._maps = StepMaps(live, executor, time_scale)
-        self._lookout = Lookout(live, time_scale, self._wait)
-        self._committing = Committing(live, self._constraints, leads=not self._lookout.needed)
+        self._lookout = SearchHooks(live, time_scale, self._wait)
+        self._committing = StepCommit(live, self._constraints, leads=not self._lookout.needed)
 
     async def run(self) -> str:
         """Fly all remaining steps. Returns why there are no more; raises whatever went wrong."""
@@ -86,7 +86,7 @@ class Runner:
         live.running_since_s = asyncio.get_running_loop().time()
         metrics.RUNNING.inc()
         keepers = [
-            asyncio.create_task(Engaging(live, self._hub, self._time_scale, self._send_to).keep()),
+            asyncio.create_task(Engagement(live, self._hub, self._time_scale, self._send_to).keep()),
             asyncio.create_task(keep_time(live)),
             asyncio.create_task(keep_telemetry(live, self._time_scale)),
         ]

@@ -15,7 +15,7 @@ log = structlog.get_logger(__name__)
 T = TypeVar("T")
 
 
-class Outlasting:
+class DatabaseRetry:
     """Tries again for as long as the database cannot be used.
 
     Parameters

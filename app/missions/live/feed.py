@@ -23,7 +23,7 @@ CROWD_MAP_S = 4.0
 """Least time between two maps that a crowd is told of."""
 
 
-class Telling:
+class LiveFeed:
     """Publishes vehicles and targets at a steady rate while anyone watches, maps and searches when they changed.
 
     Parameters

@@ -22,7 +22,7 @@ from app.missions.errors import MissionElsewhereError
 from app.missions.fleet.interface import ScanReport, SoundingReport, VehicleReport, WaypointReport
 from app.missions.large_batches import made_of
 from app.missions.live.broadcast import Broadcaster
-from app.missions.live.db_retry import RETRY_S, Outlasting
+from app.missions.live.db_retry import RETRY_S, DatabaseRetry
 from app.missions.soundings.corrections import NO_LEVEL
 from app.missions.soundings.gate import Gate, GatedSounding
 from app.missions.views.messages import EventMessage
@@ -90,7 +90,7 @@ class Journal:
         self._statuses: list[WaypointReport] = []
         self._telemetry: list[dict[str, Any]] = []
         self._lines: list[EventRow] = []
-        self.storage = Outlasting(mission_id, lambda: self.on_trouble(), self._note_trouble)
+        self.storage = DatabaseRetry(mission_id, lambda: self.on_trouble(), self._note_trouble)
         """Waits where the database cannot be used."""
         self.on_trouble: Callable[[], None] = lambda: None
         """Called when the database cannot be used any more, or can be again."""

@@ -30,13 +30,13 @@ from app.missions.fleet.interface import (
 )
 from app.missions.live.boundaries import Boundaries
 from app.missions.live.broadcast import Broadcaster
-from app.missions.live.feed import Telling
+from app.missions.live.feed import LiveFeed
 from app.missions.live.journal import Counts, Journal
 from app.missions.live.range_journal import RangeJournal
-from app.missions.live.sounding_store import WholeSet
+from app.missions.live.sounding_store import SoundingStore
 from app.missions.live.trails import Trails
-from app.missions.live.vehicles import VehicleShowing, local_place
-from app.missions.live.waypoints import WaypointBoard
+from app.missions.live.vehicles import VehicleViews, local_place
+from app.missions.live.waypoints import WaypointViews
 from app.missions.maps.builder import BuiltMap, MapBuilder
 from app.missions.maps.live_grid import map_of
 from app.missions.maps.snapshot import NOT_MADE, MapSnapshot, MissionFacts
@@ -125,7 +125,7 @@ class LiveMission:
         take_scans = None if self.search is None else partial(take, self.search, row.id, self.changed.set)
         self.journal = Journal(database, row.id, self.gate, counts, self.broadcaster, self._take_soundings, take_scans)
         self.journal.on_trouble = self.publish_summary
-        self.whole = WholeSet(database, row.id, self.builder, self.journal)
+        self.whole = SoundingStore(database, row.id, self.builder, self.journal)
         """All its soundings, and its map as it is stored."""
         self.ranges = RangeJournal(database, row.id, Tracking(spec, self.frame), self.journal, time_scale)
         """Ranges to moving targets, and what they tell."""
@@ -143,11 +143,11 @@ class LiveMission:
         self.running_since_s: float | None = None
         self.database = database
         """What is written through it is refused once another process has the mission."""
-        self.waypoints = WaypointBoard(spec, self.broadcaster)
+        self.waypoints = WaypointViews(spec, self.broadcaster)
         self.boundaries = Boundaries(self.area, [spec.to_local(zone) for zone in spec.keep_out])
-        self.vehicles = VehicleShowing(row.id, spec, self.frame, hub, self.team, self.boundaries.breach)
+        self.vehicles = VehicleViews(row.id, spec, self.frame, hub, self.team, self.boundaries.breach)
         targets = self.target_views if spec.targets else None
-        self.telling = Telling(self.broadcaster, self.vehicles.all, targets, self.search_progress)
+        self.telling = LiveFeed(self.broadcaster, self.vehicles.all, targets, self.search_progress)
         self._time_scale = time_scale
         self._executor = executor
         self.notice_imports = Shared(self._notice_imports)

@@ -11,7 +11,7 @@ from app.missions.clock import now
 from app.missions.live.journal import Journal
 from app.missions.maps.builder import BuiltMap, MapBuilder
 from app.missions.maps.codec import pack, unpack
-from app.missions.maps.queue import Everything
+from app.missions.maps.queue import Replacement
 from app.storage import soundings as sounding_queries
 from app.storage import stored_maps
 from app.storage.bulk import read_in_pieces
@@ -31,7 +31,7 @@ TOO_MANY_TO_HOLD = 200_000
 log = structlog.get_logger(__name__)
 
 
-class WholeSet:
+class SoundingStore:
     """The soundings of one mission between the database and the builder of its map.
 
     The builder has all of them or, while they are at rest, none but those that came since.
@@ -97,7 +97,7 @@ class WholeSet:
                 newest = await stored_maps.newest_sounding(session, self._mission_id)
                 prior = await sounding_queries.imported_arrays(session, self._mission_id)
         found = await accepted(self._database, self._mission_id, self._journal.counts.accepted, until_id=newest)
-        self._builder.arrivals.arrived(coming, Everything(found.table, prior, found.trusted))
+        self._builder.arrivals.arrived(coming, Replacement(found.table, prior, found.trusted))
 
     async def keep_when_grown(self, step: int) -> None:
         """Store the map of a mission that runs, unless it is small or was stored of almost as many soundings."""

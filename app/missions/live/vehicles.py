@@ -13,7 +13,7 @@ from app.missions.team import Member, Team
 from app.missions.views.mission import VehicleView
 
 
-class VehicleShowing:
+class VehicleViews:
     """Shows the vehicles of one mission as their links know them now.
 
     Parameters

@@ -10,7 +10,7 @@ from app.missions.views.mission import WaypointView
 from app.storage.models import WaypointRow
 
 
-class WaypointBoard:
+class WaypointViews:
     """Shows where vehicles were sent last and what became of it."""
 
     def __init__(self, spec: MissionSpec, broadcaster: Broadcaster) -> None:

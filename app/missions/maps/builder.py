@@ -17,7 +17,7 @@ from app.mapping.gp import GaussianProcessMap
 from app.mapping.outliers import flag_outliers
 from app.mapping.types import BathymetricMap, BoolArray, FloatArray, Grid, Soundings
 from app.missions.maps.live_grid import LiveGrid
-from app.missions.maps.queue import Arrivals, Everything
+from app.missions.maps.queue import MapQueue, Replacement
 
 MAX_LANDMARKS = 4000
 """More landmarks make planning slower, not better: neighbouring cells are almost the same question."""
@@ -105,7 +105,7 @@ class MapBuilder:
         if not self._nodes.any():
             self._nodes = self.mask.copy()
         self._nodes_xy = self.grid.centres_m[self._nodes.ravel()]
-        self.arrivals = Arrivals()
+        self.arrivals = MapQueue()
         self.live = LiveGrid(self.grid, self.mask) if live else None
         """What came since the newest map was made; None: nobody asks for it."""
         self._soundings = np.zeros((0, 4))
@@ -194,11 +194,11 @@ class MapBuilder:
                     self.live.settle(upto)
             return self._newest
 
-    def _take_in(self, came: list[NDArray[np.float64] | Everything]) -> None:
+    def _take_in(self, came: list[NDArray[np.float64] | Replacement]) -> None:
         """Add what came."""
         arrived: list[NDArray[np.float64]] = []
         for item in came:
-            if isinstance(item, Everything):
+            if isinstance(item, Replacement):
                 self._prior = prior_map(_as_soundings(item.prior), self.grid, self.mask) if len(item.prior) else None
                 if item.soundings is not None:
                     self._generation += 1

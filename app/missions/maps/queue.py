@@ -14,7 +14,7 @@ Rows = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Everything:
+class Replacement:
     """Soundings that take the place of all that were there, and those that were imported.
 
     ``soundings`` None: the mission's own stay. ``trusted`` (n,) is True for those that are never taken for outliers.
@@ -25,11 +25,11 @@ class Everything:
     trusted: BoolArray
 
 
-class Coming:
+class Pending:
     """Stands for all soundings so far while they are being read."""
 
 
-class Arrivals:
+class MapQueue:
     """What came since the map was begun.
 
     Attributes
@@ -43,7 +43,7 @@ class Arrivals:
     """
 
     def __init__(self) -> None:
-        self._queue: deque[Rows | Everything | Coming] = deque()
+        self._queue: deque[Rows | Replacement | Pending] = deque()
         self._lock = threading.Lock()
         self.at_rest = False
         self.replaced = 0
@@ -65,19 +65,19 @@ class Arrivals:
         known = np.zeros(len(soundings), dtype=bool) if trusted is None else trusted
         with self._lock:
             self._queue.clear()
-            self._queue.append(Everything(soundings, prior, known))
+            self._queue.append(Replacement(soundings, prior, known))
             self.at_rest = False
             self.replaced += 1
 
     def replace_prior(self, prior: Rows) -> None:
         """Take these in place of all imported soundings so far."""
         with self._lock:
-            self._queue.append(Everything(None, prior, np.zeros(0, dtype=bool)))
+            self._queue.append(Replacement(None, prior, np.zeros(0, dtype=bool)))
             self.replaced += 1
 
-    def expect(self) -> Coming:
+    def expect(self) -> Pending:
         """Await all soundings so far, imported ones too, which are about to be read; until then nothing is taken in."""
-        coming = Coming()
+        coming = Pending()
         with self._lock:
             self._queue.clear()
             self._queue.append(coming)
@@ -85,7 +85,7 @@ class Arrivals:
             self.replaced += 1
         return coming
 
-    def arrived(self, coming: Coming, everything: Everything) -> None:
+    def arrived(self, coming: Pending, everything: Replacement) -> None:
         """Take what was read for ``coming``, unless all is to be read once more."""
         with self._lock:
             if self._queue and self._queue[0] is coming:
@@ -98,12 +98,12 @@ class Arrivals:
             self.at_rest = self.at_rest or not self._queue
             return self.at_rest
 
-    def take(self) -> tuple[list[Rows | Everything], int] | None:
+    def take(self) -> tuple[list[Rows | Replacement], int] | None:
         """Return what came, and ``replaced`` as of that; None while the soundings are not in memory."""
         with self._lock:
             if self.at_rest:
                 return None
-            taken = [item for item in self._queue if not isinstance(item, Coming)]
+            taken = [item for item in self._queue if not isinstance(item, Pending)]
             self._queue.clear()
             self.taken = self.came
             return taken, self.replaced

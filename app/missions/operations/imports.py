@@ -40,7 +40,7 @@ def kind_of(options: ImportOptions) -> str:
         raise InvalidRequestError(error.field, str(error), error.remedy) from None
 
 
-class Importing:
+class Imports:
     """Takes files into missions and out of them again.
 
     Parameters

@@ -12,8 +12,8 @@ from app.missions.fleet.hub import FleetHub
 from app.missions.live.mission import LiveMission
 from app.missions.running.claims import Claims
 from app.missions.running.ownership import AT_SEA, PERIOD_S, Ownership
-from app.missions.running.registry import Memory
-from app.missions.running.supervisor import Conductor
+from app.missions.running.registry import MissionRegistry
+from app.missions.running.supervisor import MissionSupervisor
 from app.missions.states import MissionState
 from app.missions.views.mission import Level
 from app.storage import missions as mission_queries
@@ -24,12 +24,12 @@ from app.storage.models import MissionRow
 log = structlog.get_logger(__name__)
 
 
-class Watch:
+class Failover:
     """Keeps this process' part of the missions going.
 
     Parameters
     ----------
-    ownership, memory
+    ownership, registry
         What this process may have, and what it has.
     """
 
@@ -38,15 +38,15 @@ class Watch:
         database: Database,
         hub: FleetHub,
         ownership: Ownership,
-        memory: Memory,
-        conductor: Conductor,
+        registry: MissionRegistry,
+        supervisor: MissionSupervisor,
         claims: Claims,
     ) -> None:
         self._database = database
         self._hub = hub
         self._ownership = ownership
-        self._memory = memory
-        self._conductor = conductor
+        self._registry = registry
+        self._supervisor = supervisor
         self._claims = claims
         self._task: asyncio.Task[None] | None = None
 
@@ -78,10 +78,10 @@ class Watch:
             self._claims.claim_team(live)
         except ConflictError as error:
             # The settings changed while nobody had it: one mission's trouble is not the others'.
-            await self._conductor.set_state(live, MissionState.FAILED, str(error), "service", Level.ALARM)
+            await self._supervisor.set_state(live, MissionState.FAILED, str(error), "service", Level.ALARM)
             return
         if live.header.state is MissionState.RUNNING:
-            self._conductor.run(live)
+            self._supervisor.run(live)
 
     async def _keep(self) -> None:
         while True:
@@ -104,14 +104,15 @@ class Watch:
         # Where several processes take up what one left behind, each comes by its share.
         for mission_id in random.sample(missions, len(missions)):
             try:
-                await self._memory.get(mission_id)
+                await self._registry.get(mission_id)
             except MissionElsewhereError:
                 continue
             log.warning("mission taken up", mission=mission_id)
 
     async def _stand_aside(self) -> None:
         """Stop the vehicles before others take the missions up; go on as soon as that is allowed again."""
-        await asyncio.gather(*(self._conductor.halt(live) for live in self._memory if live.id in self._conductor.runs))
+        ours = [live for live in self._registry if live.id in self._supervisor.runs]
+        await asyncio.gather(*(self._supervisor.halt(live) for live in ours))
         while True:
             try:
                 unchanged = await self._ownership.enter()
@@ -120,13 +121,13 @@ class Watch:
                 log.error("not among the living yet", error=str(error))
                 await asyncio.sleep(PERIOD_S)
         if not unchanged:
-            for live in self._memory:
+            for live in self._registry:
                 self._claims.release_team(live)
-            self._memory.drop()
+            self._registry.drop()
             return
-        for live in self._memory:
-            if live.header.state is MissionState.RUNNING and live.id not in self._conductor.runs:
+        for live in self._registry:
+            if live.header.state is MissionState.RUNNING and live.id not in self._supervisor.runs:
                 await live.journal.log(
                     Level.WARNING, "resumed", "the database was out of reach; the vehicles were stopped meanwhile"
                 )
-                self._conductor.run(live)
+                self._supervisor.run(live)

@@ -11,7 +11,7 @@ from app.missions.live.mission import LiveMission
 log = structlog.get_logger(__name__)
 
 
-class MapKeeper:
+class FinalMaps:
     """Makes maps beside everything else: no state changes and no vehicle waits for one."""
 
     def __init__(self) -> None:

@@ -11,7 +11,7 @@ from app.missions.errors import MissionElsewhereError, MissionNotFoundError
 from app.missions.fleet.hub import FleetHub
 from app.missions.live.load import take_up
 from app.missions.live.mission import LiveMission
-from app.missions.running.final_maps import MapKeeper
+from app.missions.running.final_maps import FinalMaps
 from app.missions.running.ownership import Ownership
 from app.missions.states import ENDED
 from app.missions.views.mission import MissionSummary
@@ -23,7 +23,7 @@ ENDED_MISSIONS_IN_MEMORY = 8
 log = structlog.get_logger(__name__)
 
 
-class Memory:
+class MissionRegistry:
     """Takes missions up from the database when they are asked for, and lets those go that ended.
 
     Until ``share`` is called it belongs to a process that only looks something up beside the others.
@@ -34,7 +34,7 @@ class Memory:
         database: Database,
         hub: FleetHub,
         executor: Executor,
-        maps: MapKeeper,
+        maps: FinalMaps,
         time_scale: float,
     ) -> None:
         self._database = database

@@ -15,7 +15,7 @@ from app.missions.fleet.interface import LinkState, StopReceipt
 from app.missions.flight.step_loop import Runner
 from app.missions.live.mission import LiveMission
 from app.missions.running.claims import Claims
-from app.missions.running.final_maps import MapKeeper
+from app.missions.running.final_maps import FinalMaps
 from app.missions.states import MissionState
 from app.missions.team import Member
 from app.missions.views.mission import Level
@@ -32,7 +32,7 @@ NOT_WRITTEN = "not written down yet, a restart of the service would go on with t
 log = structlog.get_logger(__name__)
 
 
-class Conductor:
+class MissionSupervisor:
     """Runs missions and ends them.
 
     Attributes
@@ -46,7 +46,7 @@ class Conductor:
         hub: FleetHub,
         claims: Claims,
         executor: Executor,
-        maps: MapKeeper,
+        maps: FinalMaps,
         compilation: Compilation,
         time_scale: float,
     ) -> None:

@@ -12,7 +12,7 @@ from app.missions.live.mission import LiveMission
 from app.missions.running.admission import check_vehicle
 from app.missions.running.claims import Claims, free_elsewhere
 from app.missions.running.ownership import AT_SEA
-from app.missions.running.supervisor import PATIENCE_S, Conductor
+from app.missions.running.supervisor import PATIENCE_S, MissionSupervisor
 from app.missions.spec.mission import VehicleSpec
 from app.missions.states import ENDED, MissionState
 from app.missions.team import Member
@@ -21,17 +21,17 @@ from app.storage import missions as mission_queries
 from app.storage.models import MissionVehicleRow
 
 
-class Crews:
+class TeamChanges:
     """Changes which vehicles take part in missions."""
 
-    def __init__(self, hub: FleetHub, claims: Claims, conductor: Conductor) -> None:
+    def __init__(self, hub: FleetHub, claims: Claims, supervisor: MissionSupervisor) -> None:
         self._hub = hub
         self._claims = claims
-        self._conductor = conductor
+        self._supervisor = supervisor
 
     async def join(self, live: LiveMission, vehicle: VehicleSpec, actor: str) -> None:
         """Let a vehicle join. Raises ConflictError, InvalidRequestError."""
-        async with self._conductor.acting(live.id):
+        async with self._supervisor.acting(live.id):
             refuse_ended(live, "takes no more vehicles")
             check_vehicle(vehicle, live.spec, self._hub.kinds)
             if live.team.get(vehicle.name) is not None:
@@ -47,7 +47,7 @@ class Crews:
                 raise
             live.team.join(vehicle, slot)
             if live.header.state is MissionState.DRAFT:
-                await self._conductor.set_state(live, states.move(MissionState.DRAFT, "complete_draft"), "", actor)
+                await self._supervisor.set_state(live, states.move(MissionState.DRAFT, "complete_draft"), "", actor)
             await live.journal.log(Level.INFO, "vehicle", f"{vehicle.name} joined", vehicle=vehicle.name, actor=actor)
             live.changed.set()
 
@@ -67,7 +67,7 @@ class Crews:
         VehicleNotFoundError, ConflictError
             The latter when it takes part in another mission meanwhile.
         """
-        async with self._conductor.acting(live.id):
+        async with self._supervisor.acting(live.id):
             member = live.team.get(name)
             if member is None:
                 present = ", ".join(m.name for m in live.team) or "none"
@@ -85,7 +85,7 @@ class Crews:
                 f"the mission is {live.header.state}, and vehicle {member.name!r} takes part in mission {owner} now",
                 f"stop it there: POST /api/v1/missions/{owner}/vehicles/{member.name}/abort",
             )
-        return await self._conductor.stop_vehicle(live, member)
+        return await self._supervisor.stop_vehicle(live, member)
 
     async def _take_out(self, live: LiveMission, member: Member, actor: str) -> list[StopReceipt]:
         stops: list[StopReceipt] = []
@@ -99,12 +99,12 @@ class Crews:
         live.changed.set()
         live.publish_summary()
         if claimed:
-            stops = [await self._conductor.stop_vehicle(live, member)]
+            stops = [await self._supervisor.stop_vehicle(live, member)]
             self._hub.release(member.key, live.id)
         await written
         if live.header.state is MissionState.READY and not list(live.team):
             move = states.move(MissionState.READY, "reopen_draft")
-            await self._conductor.set_state(live, move, "no vehicle left", actor)
+            await self._supervisor.set_state(live, move, "no vehicle left", actor)
         await live.journal.log(Level.INFO, "vehicle", f"{member.name} left", vehicle=member.name, actor=actor)
         return stops
 
