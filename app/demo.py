@@ -23,11 +23,12 @@ from rich.progress import BarColumn, Progress, ProgressColumn, Task, TextColumn,
 from rich.table import Table
 from rich.text import Text
 
+from app.arrays import FloatArray
 from app.demo_service import DemoError, check, client, get, post, serve_during
 from app.evaluation.survey.baselines import Baseline, lawnmower_baselines
 from app.exploration.core.constraints import Constraints
 from app.mapping.compare import difference
-from app.mapping.types import FloatArray, Grid
+from app.mapping.types import Grid
 from app.settings import Settings
 from app.storage import private
 from simulator.seafloors import generate

@@ -19,11 +19,12 @@ from mapping_methods import METHODS, Method, ours
 from mapping_speed import exactness, speed
 from mapping_terrains import DESIGNS, PATCHY, sound, terrains, with_outliers
 
+from app.arrays import FloatArray
 from app.evaluation.runs.facts import made
 from app.mapping.compare import difference, interval_coverage
 from app.mapping.gp import warm_up
 from app.mapping.outliers import flag_outliers
-from app.mapping.types import FloatArray, Grid, Soundings
+from app.mapping.types import Grid, Soundings
 
 Terrains = list[tuple[str, FloatArray]]
 PROBABILITIES = (0.68, 0.95)

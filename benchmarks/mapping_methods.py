@@ -7,10 +7,11 @@ from collections.abc import Callable
 import numpy as np
 from scipy.interpolate import RBFInterpolator
 
+from app.arrays import FloatArray
 from app.mapping.gaussian import GaussianInterpolator, choose_width
 from app.mapping.gp import GaussianProcessMap
 from app.mapping.supersoundings import merge_soundings
-from app.mapping.types import FloatArray, Grid, Soundings
+from app.mapping.types import Grid, Soundings
 
 Method = Callable[[Soundings, Grid], tuple[FloatArray, FloatArray | None]]
 """Depth and, where the method states one, deviation, (rows, cols) each."""

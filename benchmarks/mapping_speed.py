@@ -8,11 +8,12 @@ from collections.abc import Callable, Iterable
 import numpy as np
 from mapping_terrains import sound, wide_floor
 
+from app.arrays import FloatArray
 from app.mapping.compare import difference, interval_coverage
 from app.mapping.gaussian import GaussianInterpolator, choose_width
 from app.mapping.gp import GaussianProcessMap, warm_up
 from app.mapping.likelihood import SLOPE_SD, Hyperparameters
-from app.mapping.types import FloatArray, Grid, Soundings
+from app.mapping.types import Grid, Soundings
 
 Table = Callable[[Iterable[str], Iterable[Iterable[str]]], list[str]]
 CHECKED_EVERY = 3  # rows and columns of large maps

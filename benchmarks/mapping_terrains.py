@@ -6,7 +6,8 @@ from pathlib import Path
 import numpy as np
 from scipy.ndimage import map_coordinates
 
-from app.mapping.types import FloatArray, Grid, Soundings
+from app.arrays import FloatArray
+from app.mapping.types import Grid, Soundings
 from simulator.seafloors import generate
 
 GENERATED = ("reef", "harbour", "ridge", "smooth")

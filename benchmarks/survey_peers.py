@@ -38,11 +38,12 @@ import orjson
 from rich.progress import Progress as ProgressBar
 from survey_study import PATCHY, STEPS, VEHICLES, StudyJob, chosen_floors, numbers, study_jobs
 
+from app.arrays import FloatArray
 from app.evaluation.runs.facts import made
 from app.evaluation.runs.jobs import Progress, run_jobs
 from app.evaluation.runs.store import Results
 from app.evaluation.survey.run import judge
-from app.evaluation.survey.world import SOUNDING_RATE_HZ, SPEED_MPS, FloatArray, SurveyScenario, fly_routes
+from app.evaluation.survey.world import SOUNDING_RATE_HZ, SPEED_MPS, SurveyScenario, fly_routes
 from app.exploration.lines.lawnmower import lawnmower_routes
 from app.mapping.types import Soundings
 

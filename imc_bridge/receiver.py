@@ -281,7 +281,6 @@ class Hearing:
         if tick is Tick.DOUBTFUL:
             self.admission.refuse(Refused.OLD, address)
             return
-        node.telemetry_at = now
         node.rates.count(name, now)
         if tick is Tick.JUMPED and control is not None:
             control.clock_jumped()

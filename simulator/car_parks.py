@@ -7,11 +7,9 @@ parked cars are not; the third one holds a wall of vehicles that traps whoever g
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from simulator.arrays import BoolArray
 from simulator.obstacles import ObstacleWorld
-
-BoolArray = NDArray[np.bool_]
 
 SIDE = 150
 """Cells of 1 m per side."""

@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 import pyproj
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-FloatArray = NDArray[np.float64]
+from simulator.arrays import FloatArray
 
 LEIXOES_LAT_DEG = 41.185
 LEIXOES_LON_DEG = -8.705
@@ -58,8 +58,3 @@ class LocalFrame:
         """East and north (m), each of the inputs' shape."""
         east, north = self._proj(np.asarray(lon_deg, dtype=float), np.asarray(lat_deg, dtype=float))
         return np.asarray(east, dtype=float), np.asarray(north, dtype=float)
-
-    def to_geodetic_many(self, east_m: ArrayLike, north_m: ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """Latitude and longitude (degrees), each of the inputs' shape."""
-        lon, lat = self._proj(np.asarray(east_m, dtype=float), np.asarray(north_m, dtype=float), inverse=True)
-        return np.asarray(lat, dtype=float), np.asarray(lon, dtype=float)

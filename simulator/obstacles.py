@@ -10,8 +10,7 @@ from numba import njit
 from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
+from simulator.arrays import BoolArray, FloatArray
 
 
 @dataclass(frozen=True)

@@ -5,12 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from simulator.arrays import FloatArray
 from simulator.obstacles import ObstacleWorld
 from simulator.world import Place
-
-FloatArray = NDArray[np.float64]
 
 HULL_M = 0.4
 """Half the length of the hull: closer than that to an obstacle is a collision."""

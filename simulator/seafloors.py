@@ -6,11 +6,10 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from simulator.arrays import FloatArray
 from simulator.terrain import Terrain, TerrainError
 
-FloatArray = NDArray[np.float64]
 Family = Callable[[FloatArray, FloatArray, float, np.random.Generator], FloatArray]
 """Depths of a family: (east_m, north_m, extent_m, rng) -> z_m, all of shape (rows, cols)."""
 

@@ -7,13 +7,11 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
-from numpy.typing import NDArray
 
+from simulator.arrays import FloatArray
 from simulator.raycasting import march
 from simulator.terrain import Terrain
 from simulator.vehicle import Motion
-
-FloatArray = NDArray[np.float64]
 
 DVL_TILT_RAD = math.radians(22.5)
 

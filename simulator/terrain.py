@@ -7,11 +7,10 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from simulator.arrays import FloatArray
 from simulator.geodesy import LEIXOES_LAT_DEG, LEIXOES_LON_DEG, LocalFrame
-
-FloatArray = NDArray[np.float64]
 
 
 class TerrainError(ValueError):
@@ -163,18 +162,3 @@ class Terrain:
                 if weight > 0.0:
                     depth += weight * item(i + di, j + dj)
         return depth
-
-    def shallowest_within(self, east_m: float, north_m: float, radius_m: float) -> float:
-        """Least known depth over the cells whose centre lies within a radius, NaN where none is known."""
-        reach = radius_m + self.cell_m
-        c0, c1 = int((east_m - reach) // self.cell_m), int((east_m + reach) // self.cell_m) + 1
-        r0, r1 = int((north_m - reach) // self.cell_m), int((north_m + reach) // self.cell_m) + 1
-        rows = np.arange(max(r0, 0), min(r1, self.rows))
-        cols = np.arange(max(c0, 0), min(c1, self.cols))
-        if rows.size == 0 or cols.size == 0:
-            return math.nan
-        z = self.z_m[rows[0] : rows[-1] + 1, cols[0] : cols[-1] + 1]
-        dy = ((rows + 0.5) * self.cell_m - north_m)[:, None]
-        dx = ((cols + 0.5) * self.cell_m - east_m)[None, :]
-        near = z[(dx * dx + dy * dy <= radius_m * radius_m) & np.isfinite(z)]
-        return float(near.min()) if near.size else math.nan

@@ -13,10 +13,10 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from simulator.arrays import FloatArray
 from simulator.geodesy import LocalFrame
 from simulator.terrain import Terrain, TerrainError
 
-FloatArray = NDArray[np.float64]
 Vertical = Literal["down", "up"]
 
 MAX_CELLS = 25_000_000

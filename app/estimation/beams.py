@@ -8,11 +8,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
-IntArray = NDArray[np.int64]
+from app.arrays import BoolArray, FloatArray, IntArray
 
 Floor = Callable[[FloatArray], FloatArray]
 """Depths at positions (..., 2), for instance of a raster; NaN where unknown."""

@@ -11,13 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from app.arrays import BoolArray, FloatArray, IntArray
 from app.estimation.sensors import RangeSensor, Ranging
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
-IntArray = NDArray[np.int64]
 
 BUNDLE = 48
 """Filters that a first look starts."""

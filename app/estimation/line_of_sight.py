@@ -2,10 +2,8 @@
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
+from app.arrays import BoolArray, FloatArray
 
 SAMPLES_PER_CELL = 2.0
 GRAZE = 1e-6

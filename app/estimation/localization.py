@@ -11,9 +11,8 @@ that knows where it is.
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from app.arrays import FloatArray
 
 AXES = 4
 """States of one vehicle: east, north, drift along east and north."""
@@ -142,18 +141,6 @@ class CooperativeLocalizer:
             H[0, AXES * first + k], H[0, AXES * second + k] = d[k] / r, -d[k] / r
         return self._take_range(team, H, d, r, distance_m, self._relative_covariance(team, first, second))
 
-    def meet_beacon(
-        self, team: TeamPosition, vehicle: int, beacon_m: FloatArray, distance_m: float, beacon_sd_m: float = 0.0
-    ) -> TeamPosition:
-        """Take in a range to something that knows where it is (3,), such as a surface vehicle with GPS."""
-        d = team.positions_m[vehicle] - beacon_m
-        r = max(float(np.linalg.norm(d)), 1e-9)
-        H = np.zeros((1, len(team.mean)))
-        H[0, AXES * vehicle : AXES * vehicle + 2] = d[:2] / r
-        k = AXES * vehicle
-        block = team.covariance[k : k + 2, k : k + 2] + beacon_sd_m**2 * np.eye(2)
-        return self._take_range(team, H, d, r, distance_m, block)
-
     def _take_range(
         self, team: TeamPosition, H: FloatArray, d: FloatArray, r: float, y: float, relative: FloatArray
     ) -> TeamPosition:
@@ -162,7 +149,7 @@ class CooperativeLocalizer:
         hessian = (np.eye(2) - np.outer(u, u)) / r
         curved = hessian @ relative
         predicted = r + 0.5 * float(np.trace(curved))
-        # What the range sees beyond the joint filter's own states: second order, noise, and a beacon's own error.
+        # What the range sees beyond the joint filter's own states: second order and noise.
         along = float(u @ relative @ u)
         rest = 0.5 * float(np.trace(curved @ curved)) + self.fading.range_noise**2 * (predicted**2 + along)
         rest += max(0.0, along - float((H @ team.covariance @ H.T)[0, 0]))

@@ -7,8 +7,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
+from app.arrays import BoolArray, FloatArray
 
 HIT, MISS = 1.2, -0.4
 """Logarithmic odds that one scan adds to a cell where a beam ended, or that beams only passed."""

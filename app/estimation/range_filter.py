@@ -7,9 +7,8 @@ symmetric and positive whatever rounding does.
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from app.arrays import FloatArray
 
 NEAREST_M = 1e-9
 

@@ -4,13 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from app.arrays import BoolArray, FloatArray
 from app.estimation.beams import BeamSonar
 from app.estimation.occupancy import Scanner
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)

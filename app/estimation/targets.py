@@ -11,13 +11,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from app.arrays import FloatArray
 from app.estimation.range_filter import update_by_range
 from app.estimation.sensors import RangeSensor
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 EVERYWHERE = np.inf
 

@@ -4,14 +4,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from app.arrays import BoolArray, FloatArray
 from app.estimation.beams import Attitude, BeamSonar
 from app.estimation.landmarks import LandmarkEstimator, Landmarks
 from app.estimation.sensors import RangeSensor
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)

@@ -8,11 +8,12 @@ from scipy.ndimage import gaussian_filter
 from scipy.spatial import cKDTree
 from scipy.special import ndtri
 
+from app.arrays import FloatArray, IntArray
 from app.mapping.fields import Field
 from app.mapping.kernels import KERNEL_CODES
 from app.mapping.kriging import Conditioned, krige_holes
 from app.mapping.neighbours import nearest
-from app.mapping.types import FloatArray, Grid, IntArray
+from app.mapping.types import Grid
 
 STEEPNESS_EXPONENT = 0.25
 """Variance grows with this power of the squared slope: a process that is right on average errs at edges."""

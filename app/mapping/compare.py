@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import ndtri
 
-from app.mapping.types import BoolArray, FloatArray
+from app.arrays import BoolArray, FloatArray
 
 
 @dataclass(frozen=True)

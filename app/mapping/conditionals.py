@@ -11,9 +11,9 @@ import numpy as np
 from numba import njit
 from scipy.spatial import cKDTree
 
+from app.arrays import FloatArray, IntArray
 from app.mapping.kernels import FAST, cholesky_in_place, correlation_and_slope, solve_lower_in_place
 from app.mapping.neighbours import nearest
-from app.mapping.types import FloatArray, IntArray
 
 RANKS = (1, 2, 3, 4, 5, 6, 7, 8, 10, 13, 17, 23, 31, 42, 57, 76)
 """Which of its neighbours, counted by distance, a sounding is predicted from: mostly near ones, some farther off."""

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from app.mapping.types import Grid, IntArray, Soundings
+from app.arrays import IntArray
+from app.mapping.types import Grid, Soundings
 
 
 def cell_numbers(grid: Grid, soundings: Soundings) -> IntArray:

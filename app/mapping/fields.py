@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import map_coordinates
 
-from app.mapping.types import FloatArray, Grid, IntArray
+from app.arrays import FloatArray, IntArray
+from app.mapping.types import Grid
 
 
 @dataclass(frozen=True)

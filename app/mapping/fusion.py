@@ -6,9 +6,10 @@ import numpy as np
 from scipy.ndimage import distance_transform_edt
 from scipy.spatial import cKDTree
 
+from app.arrays import BoolArray, FloatArray
 from app.mapping.counting import count_per_cell
 from app.mapping.gp import GaussianProcessMap
-from app.mapping.types import BathymetricMap, BoolArray, FloatArray, Grid, Soundings
+from app.mapping.types import BathymetricMap, Grid, Soundings
 
 
 def prior_map(prior: Soundings, grid: Grid, mask: BoolArray) -> BathymetricMap:

@@ -7,11 +7,12 @@ import numpy as np
 from numba import njit
 from scipy.spatial import cKDTree
 
+from app.arrays import BoolArray, FloatArray, IntArray
 from app.mapping.counting import cell_numbers
 from app.mapping.kernels import exp_minus
 from app.mapping.neighbours import nearest
 from app.mapping.threads import each
-from app.mapping.types import BathymetricMap, BoolArray, FloatArray, Grid, IntArray, Soundings
+from app.mapping.types import BathymetricMap, Grid, Soundings
 
 REACH = 4.0
 """Kernel widths beyond which a sounding says nothing (its weight there is 1e-7)."""

@@ -4,9 +4,9 @@ import threading
 
 import numpy as np
 import pyproj
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-FloatArray = NDArray[np.float64]
+from app.arrays import FloatArray
 
 MAX_EXTENT_M = 200_000.0
 """Farther from the origin than this the flat frame is no longer meant to be used (scale error above 5e-4)."""

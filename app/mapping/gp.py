@@ -6,6 +6,7 @@ from typing import Literal, Self
 
 import numpy as np
 
+from app.arrays import BoolArray, FloatArray, IntArray
 from app.mapping.calibration import (
     Calibration,
     HeldOut,
@@ -41,7 +42,7 @@ from app.mapping.reach import (
 from app.mapping.roughness import hole_errors, local_ratio
 from app.mapping.scales import LocalScales, local_scales, stretch_from_relief, uniform_scales
 from app.mapping.support import support
-from app.mapping.types import BathymetricMap, BoolArray, FloatArray, Grid, IntArray, Soundings
+from app.mapping.types import BathymetricMap, Grid, Soundings
 
 COARSE_FACTOR = 3.0  # side of the squares of merged soundings over that of single ones
 LEAST_RESOLUTION = 100  # squares of single soundings along the extent; more where there are more soundings

@@ -6,7 +6,7 @@ from typing import Literal
 import numpy as np
 from numba import njit
 
-from app.mapping.types import FloatArray
+from app.arrays import FloatArray
 
 KernelName = Literal["matern32", "matern52", "exponential", "gaussian"]
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
+from app.arrays import BoolArray, FloatArray, IntArray
 from app.mapping.kernels import (
     KERNEL_CODES,
     KernelName,
@@ -19,7 +20,7 @@ from app.mapping.levels import TwoLevels
 from app.mapping.likelihood import Trend
 from app.mapping.scales import LocalScales, uniform_scales
 from app.mapping.threads import each
-from app.mapping.types import BoolArray, FloatArray, Grid, IntArray
+from app.mapping.types import Grid
 
 STRIP_CELLS = 60_000
 """A grid is predicted in strips of about this many cells: bounds the memory, and threads share the strips."""

@@ -4,8 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from app.arrays import FloatArray
 from app.mapping.s44 import Order, tvu_fraction
-from app.mapping.types import BathymetricMap, FloatArray
+from app.mapping.types import BathymetricMap
 
 INTERPOLATED, SOUNDED, PRIOR = 0, 1, 2
 """Values of the layer ``sounded``."""

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from app.arrays import IntArray
 from app.mapping.calibration import gaps
 from app.mapping.conditionals import families
 from app.mapping.kernels import KERNEL_CODES, KernelName
@@ -10,7 +11,6 @@ from app.mapping.levels import TwoLevels
 from app.mapping.likelihood import Hyperparameters, RestrictedLikelihood, spread_subset
 from app.mapping.roughness import HOLE_NEIGHBOURS, neighbours_beyond
 from app.mapping.scales import LocalScales, uniform_scales
-from app.mapping.types import IntArray
 
 ROUGHEST: KernelName = "matern32"
 KERNEL_LADDER: tuple[KernelName, ...] = (ROUGHEST, "matern52", "gaussian")

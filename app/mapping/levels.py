@@ -7,9 +7,10 @@ import numpy as np
 from numba import njit
 from scipy.spatial import cKDTree
 
+from app.arrays import FloatArray, IntArray
 from app.mapping.neighbours import nearest
 from app.mapping.supersoundings import merge_soundings
-from app.mapping.types import FloatArray, IntArray, Soundings
+from app.mapping.types import Soundings
 
 
 @dataclass(frozen=True)

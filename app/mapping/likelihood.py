@@ -8,11 +8,11 @@ import numpy as np
 from scipy import linalg, optimize
 from scipy.spatial import cKDTree
 
+from app.arrays import FloatArray, IntArray
 from app.mapping.conditionals import conditional_terms
 from app.mapping.kernels import KERNEL_CODES, KernelName, correlation_matrices
 from app.mapping.neighbours import nearest
 from app.mapping.scales import LocalScales
-from app.mapping.types import FloatArray, IntArray
 
 LN_NOISE_SCALE_SD = 0.7
 """Prior spread of ln(noise scale): how far the stated sounding errors are trusted (a factor of two or so)."""

@@ -2,7 +2,7 @@
 
 from numba import njit
 
-from app.mapping.types import FloatArray
+from app.arrays import FloatArray
 
 
 @njit(cache=True, nogil=True)

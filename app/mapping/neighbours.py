@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.spatial import cKDTree
 
-from app.mapping.types import FloatArray, IntArray
+from app.arrays import FloatArray, IntArray
 
 MANY_PAIRS = 500_000
 """From so many on, all cores search."""

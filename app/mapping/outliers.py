@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
+from app.arrays import BoolArray, FloatArray, IntArray
 from app.mapping.kernels import KERNEL_CODES, KernelName
 from app.mapping.kriging import krige_holes
 from app.mapping.likelihood import Hyperparameters, RestrictedLikelihood, Trend, spread_subset
@@ -13,7 +14,7 @@ from app.mapping.planes import LEAST_COMPANY, SUSPICION, judge_squares, plane_re
 from app.mapping.scales import uniform_scales
 from app.mapping.supersoundings import merge_soundings
 from app.mapping.threads import each
-from app.mapping.types import BoolArray, FloatArray, IntArray, Soundings
+from app.mapping.types import Soundings
 
 PLANE_NEIGHBOURS = 16
 KRIGING_NEIGHBOURS = 24

@@ -3,8 +3,8 @@
 import numpy as np
 from numba import njit
 
+from app.arrays import BoolArray, FloatArray, IntArray
 from app.mapping.median import median
-from app.mapping.types import BoolArray, FloatArray, IntArray
 
 SUSPICION = 4.0
 """Robust standard deviations from a local plane that make a sounding suspect."""

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
+from app.arrays import FloatArray, IntArray
 from app.mapping.calibration import HeldOut
 from app.mapping.levels import TwoLevels
 from app.mapping.neighbours import nearest
-from app.mapping.types import FloatArray, IntArray
 
 RADIUS_STEP, FACTOR_STEP = 1.5, 2.25
 """Each distance that is looked at over the one before: for whether predictions can be checked, and to check them."""

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
+from app.arrays import FloatArray, IntArray
 from app.mapping.kriging import krige_holes
 from app.mapping.neighbours import nearest
-from app.mapping.types import FloatArray, IntArray
 
 HOLE_NEIGHBOURS = 24
 SMOOTHING_NEIGHBOURS = 30

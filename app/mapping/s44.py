@@ -10,7 +10,7 @@ from enum import StrEnum
 
 import numpy as np
 
-from app.mapping.types import BoolArray, FloatArray
+from app.arrays import BoolArray, FloatArray
 
 NORMAL_95 = 1.959963984540054
 """Half width of the central 95 % of a normal distribution, in standard deviations."""

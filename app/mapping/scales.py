@@ -5,8 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import gaussian_filter
 
+from app.arrays import FloatArray, IntArray
 from app.mapping.fields import Field
-from app.mapping.types import FloatArray, Grid, IntArray
+from app.mapping.types import Grid
 
 AMPLITUDE_EXPONENT = 0.15
 LENGTH_EXPONENT = -0.7 / 4.0

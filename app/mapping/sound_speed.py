@@ -12,7 +12,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from app.mapping.types import FloatArray
+from app.arrays import FloatArray
 
 LEAST_TURN = 1e-7
 """Where the speed changes by less than this fraction of itself the ray is straight to a micrometre per ten metres."""

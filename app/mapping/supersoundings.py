@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from app.mapping.types import FloatArray, IntArray, Soundings
+from app.arrays import FloatArray, IntArray
+from app.mapping.types import Soundings
 
 
 def merge_soundings(soundings: Soundings, cell_m: float) -> tuple[Soundings, IntArray]:

@@ -6,11 +6,11 @@ continues every slope. There, and in the middle of holes wider than the survey's
 
 import numpy as np
 
+from app.arrays import FloatArray
 from app.mapping.calibration import gaps
 from app.mapping.fields import Field, coarse_grid
 from app.mapping.levels import TwoLevels
 from app.mapping.neighbours import nearest
-from app.mapping.types import FloatArray
 
 AROUND = 12
 """Merged soundings that tell whether a place is surrounded."""

@@ -8,7 +8,7 @@ from datetime import UTC, datetime, timedelta
 import numpy as np
 from numpy.typing import ArrayLike
 
-from app.mapping.types import FloatArray
+from app.arrays import FloatArray
 
 MAX_LEVEL_M = 20.0
 MAX_GAP_S = 24.0 * 3600.0

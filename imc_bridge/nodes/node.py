@@ -119,7 +119,6 @@ class Node:
     def __init__(self, imc_id: int, name: str, settings: BridgeSettings, now: float) -> None:
         self.imc_id = imc_id
         self.name = name
-        self.first_heard = now
         self.announcement: Announcement | None = None
         self.announced_at: float | None = None
         self.first_announced_at: float | None = None
@@ -141,7 +140,6 @@ class Node:
 
         self.packets = 0
         self.heard_at: float | None = None
-        self.telemetry_at: float | None = None
         self.echoes = 0
         self.relayed = 0
         """How many packets of others it passed on."""
@@ -225,7 +223,6 @@ class Node:
         self.entities_asked_at = -math.inf
         self.operation_mode = self.plan_state = None
         self.operation_mode_at = self.plan_state_at = None
-        self.telemetry_at = None
         self.plan_id = ""
         self.controller = None
         self._latest.clear()

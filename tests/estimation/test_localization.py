@@ -77,18 +77,6 @@ def test_a_fix_of_one_helps_those_that_range_to_it_and_nobody_else():
     assert (fixed_together.sd_m[1:] < 0.8 * together.sd_m[1:]).all()
 
 
-def test_ranges_to_a_surface_vehicle_relocalize():
-    """From several directions they are as good as a fix; its own error counts."""
-    localizer = CooperativeLocalizer()
-    lost = list(dive(2, 60, Fading()))[-1][1]
-    for own, expected in ((0.0, 0.02), (0.02, 0.04)):
-        team = lost
-        for beacon in (np.array([0.5, 0.0, -1.0]), np.array([0.0, 0.7, -1.0]), np.array([-0.6, -0.4, -1.0])):
-            r = float(np.linalg.norm(lost.positions_m[0] - beacon))
-            team = localizer.meet_beacon(team, 0, beacon, r, own)
-        assert own < team.sd_m[0] < min(expected, lost.sd_m[0])
-
-
 def test_a_joint_update_is_that_of_a_slow_reference():
     """Information form, with the filter's own linearisation."""
     localizer = CooperativeLocalizer(Fading(range_noise=0.02))

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.mapping.types import FloatArray
+from app.arrays import FloatArray
 
 PROJECT = Path(__file__).resolve().parents[2]
 

@@ -8,11 +8,11 @@ from scipy.optimize import approx_fprime
 from scipy.spatial import cKDTree
 from scipy.stats import multivariate_normal
 
+from app.arrays import FloatArray
 from app.mapping.conditionals import RANKS, conditional_terms, families
 from app.mapping.kernels import KERNEL_CODES, KernelName
 from app.mapping.likelihood import RestrictedLikelihood, scaled_distances, spread_subset
 from app.mapping.scales import local_scales, uniform_scales
-from app.mapping.types import FloatArray
 
 RNG = np.random.default_rng(1)
 POINTS = RNG.uniform(0, 30, (120, 2))

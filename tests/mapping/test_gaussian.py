@@ -5,8 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from app.arrays import FloatArray
 from app.mapping.gaussian import REACH, GaussianInterpolator, choose_width
-from app.mapping.types import FloatArray, Grid, Soundings
+from app.mapping.types import Grid, Soundings
 
 GRID = Grid(west_m=5.0, south_m=-3.0, cell_m=0.5, rows=30, cols=40)
 

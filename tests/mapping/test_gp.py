@@ -9,10 +9,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from app.arrays import FloatArray
 from app.mapping.compare import difference
 from app.mapping.gp import GaussianProcessMap
 from app.mapping.likelihood import SLOPE_SD, Hyperparameters
-from app.mapping.types import FloatArray, Grid, Soundings
+from app.mapping.types import Grid, Soundings
 
 GRID = Grid(west_m=0.0, south_m=0.0, cell_m=2.0, rows=20, cols=25)
 

@@ -8,6 +8,7 @@ from scipy.optimize import approx_fprime
 from scipy.spatial import cKDTree
 from scipy.stats import multivariate_normal
 
+from app.arrays import FloatArray
 from app.mapping.kernels import KERNEL_CODES, KernelName, paciorek
 from app.mapping.likelihood import (
     LN_AMPLITUDE_SD,
@@ -18,7 +19,6 @@ from app.mapping.likelihood import (
     spread_subset,
 )
 from app.mapping.scales import LocalScales, local_scales, uniform_scales
-from app.mapping.types import FloatArray
 
 RNG = np.random.default_rng(0)
 POINTS = RNG.uniform(0, 30, (40, 2))

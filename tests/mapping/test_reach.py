@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 
+from app.arrays import FloatArray
 from app.mapping.calibration import HeldOut
 from app.mapping.gp import GaussianProcessMap
 from app.mapping.levels import two_levels
 from app.mapping.reach import SLOPE, UNCHECKED_FACTOR, likely_factor, likely_square, reach
-from app.mapping.types import BathymetricMap, FloatArray, Grid, Soundings
+from app.mapping.types import BathymetricMap, Grid, Soundings
 
 GRID = Grid(0.0, 0.0, 2.0, 50, 50)
 ACCURACY_M = 0.25

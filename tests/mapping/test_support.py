@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
+from app.arrays import FloatArray
 from app.mapping.gp import GaussianProcessMap
 from app.mapping.levels import TwoLevels, two_levels
 from app.mapping.support import support
-from app.mapping.types import FloatArray, Grid, Soundings
+from app.mapping.types import Grid, Soundings
 
 LINES_APART_M = 8.0
 

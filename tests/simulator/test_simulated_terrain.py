@@ -70,15 +70,6 @@ def test_depths_cannot_be_changed_from_outside():
         RANDOM.z_m[0, 0] = 3
 
 
-def test_the_shallowest_depth_within_a_radius():
-    z = np.full((20, 20), 10.0)
-    z[10, 15] = 2.0
-    terrain = Terrain(z, 1.0)
-    assert terrain.shallowest_within(10.5, 10.5, 5.0) == 2.0
-    assert terrain.shallowest_within(10.5, 10.5, 4.9) == 10.0
-    assert math.isnan(terrain.shallowest_within(100.0, 100.0, 3.0))
-
-
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

@@ -125,7 +125,7 @@ def test_scattered_soundings_are_triangulated(tmp_path, name, header, separator,
 
 def test_soundings_in_degrees_get_a_place(tmp_path):
     at, depth = soundings()
-    lat, lon = FLOOR.frame.to_geodetic_many(at[:, 0], at[:, 1])
+    lat, lon = np.transpose([FLOOR.frame.to_geodetic(e, n) for e, n in at])
     rows = "\n".join(f"{a:.9f},{b:.9f},{d:.4f}" for a, b, d in zip(lat, lon, depth, strict=True))
     path = tmp_path / "s.csv"
     path.write_text("lat,lon,depth_m\n" + rows)

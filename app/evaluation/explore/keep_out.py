@@ -1,9 +1,8 @@
 """Keep-out zones drawn at random for the papers' scenario: rectangles that a team of three can always get round."""
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from app.arrays import FloatArray
 
 PASSAGE = 0.35
 """Least width of every way between two zones, between a zone and the border, and around the start."""

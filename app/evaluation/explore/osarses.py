@@ -1,15 +1,13 @@
 """OSARSES (AURO15 algorithm 1): really try C random feasible moves in simulation, take the best. A yardstick only."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from app.arrays import FloatArray
 from app.evaluation.explore.tries import Trier
 from app.evaluation.explore.world import World
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.objective import Terms
 from app.exploration.core.problem import Proposal, Situation
-
-FloatArray = NDArray[np.float64]
 
 DRAWS = 64
 """Random moves drawn at once; those that are not feasible do not count as tries."""

@@ -4,11 +4,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from app.arrays import FloatArray
 from app.exploration.core.constraints import Constraints, inside_area
-
-FloatArray = NDArray[np.float64]
 
 NEAREST, FARTHEST = 0.5, 0.8
 """How far from a team member a newcomer is launched, as a fraction of the communication range."""

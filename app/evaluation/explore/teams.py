@@ -4,15 +4,12 @@ from dataclasses import replace
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from app.arrays import FloatArray, IntArray
 from app.estimation import Landmarks
 from app.evaluation.explore.world import MAX_STEP, World
 from app.exploration.communication import StationNode, VehicleNode, WireFormat
 from app.exploration.core.problem import Belief
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 APART = 0.02
 """Landmarks closer together than this are near-duplicates: as close as the accuracy that is asked for."""

@@ -7,8 +7,8 @@ configurations per step takes 1 + C times as long (PCAO18 table III).
 from abc import ABC, abstractmethod
 
 import numpy as np
-from numpy.typing import NDArray
 
+from app.arrays import FloatArray
 from app.estimation import Landmarks, landmark_sets
 from app.evaluation.explore.world import World
 from app.exploration.cao.gradient import Method, ascent, directions, gradient, perturbation, spsa_directions
@@ -16,8 +16,6 @@ from app.exploration.core.bottom import Bottom
 from app.exploration.core.objective import Objective, ObjectiveWeights, Terms, VehicleProgress, med13_objective
 from app.exploration.core.problem import Proposal, Situation
 from app.exploration.planner.base import settle
-
-FloatArray = NDArray[np.float64]
 
 
 class Trier(ABC):

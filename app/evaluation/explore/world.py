@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from app.arrays import BoolArray, FloatArray, IntArray
 from app.estimation import LandmarkEstimator, Landmarks, RangeSensor, in_sight, landmark_sets
 from app.evaluation.explore.keep_out import draw_keep_out
 from app.evaluation.explore.team_changes import TeamChanges, launch_site
@@ -18,10 +18,6 @@ from app.exploration.core.constraints import Constraints, inside_area
 from app.exploration.core.objective import Objective, ObjectiveWeights, VehicleProgress, objective
 from app.exploration.core.problem import Belief
 from simulator.terrain import Terrain
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
-IntArray = NDArray[np.int64]
 
 CLEARANCE = 0.05
 MAX_STEP = 0.05

@@ -8,8 +8,8 @@ from typing import Any, Protocol
 
 import numpy as np
 import orjson
-from numpy.typing import NDArray
 
+from app.arrays import FloatArray
 from app.estimation import RangeSensor, Sensor
 from app.evaluation.explore.run import OSARSES, run_explore
 from app.evaluation.explore.world import ExploreScenario
@@ -22,14 +22,9 @@ from app.exploration.pcao.model import PcaoModel
 from app.exploration.planner.options import PlannerOptions
 from simulator.terrain import Terrain
 
-FloatArray = NDArray[np.float64]
-
 HISTORY_EVERY = 10
 UNLIMITED = 10.0
 """A communication range beyond the cube: PCAO18 knows no such limit."""
-
-TRAINED_WITH_SEEDS_BELOW = 100
-"""Runs of the report have seeds from here on: landmarks, starts and noise that no training saw."""
 
 
 @dataclass(frozen=True)

@@ -7,15 +7,11 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from app.arrays import BoolArray, FloatArray, IntArray
 from app.estimation.landmarks import fit_depth
 from app.exploration.pcao.controller import control, within_step
 from app.exploration.pcao.state import reduced_state
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-BoolArray = NDArray[np.bool_]
 
 
 class Physics(NamedTuple):

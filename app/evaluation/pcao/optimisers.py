@@ -9,11 +9,9 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from app.arrays import FloatArray
 from app.exploration.pcao.controller import BLOCKS, SIZE, entries, gains, random_parameters, within_bounds
-
-FloatArray = NDArray[np.float64]
 
 CANDIDATES = 2 * SIZE
 """M: at least twice the number of variables (the paper's footnote 5)."""

@@ -4,13 +4,10 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
+from app.arrays import FloatArray
 from app.evaluation.pcao.task import TrainingTask
 from app.evaluation.runs.cluster import Cluster
 
-FloatArray = NDArray[np.float64]
 Cases = tuple[tuple[int, int], ...]
 
 

@@ -4,14 +4,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from app.arrays import FloatArray, IntArray
 from app.evaluation.pcao.kernel import fly
 from app.evaluation.pcao.world import LANDMARKS, ROBOTS, STEPS, SeaFloor
 from app.exploration.pcao.controller import gains
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 KAPPA = 10.0
 """Weight of what remains at the end; Omega'Omega of an unseen sea floor is 59."""

@@ -12,13 +12,11 @@ from typing import Any
 
 import numpy as np
 import orjson
-from numpy.typing import NDArray
 
+from app.arrays import FloatArray
 from app.evaluation.pcao.optimisers import METHODS, Optimiser
 from app.evaluation.pcao.scoring import Scorer
 from app.exploration.pcao.model import PcaoModel, Training
-
-FloatArray = NDArray[np.float64]
 
 
 class CheckpointError(Exception):

@@ -6,13 +6,9 @@ does ([20, algorithm 1]). A try is flown, pinged with and judged; its measuremen
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from app.arrays import BoolArray, FloatArray, IntArray
 from app.evaluation.pcao.kernel import Known, Physics, error_squared, move, sense, unknown
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-BoolArray = NDArray[np.bool_]
 
 SE, SPSA, FDSA = 0, 1, 2
 PERTURBATION, DECAY = 0.5, 0.101

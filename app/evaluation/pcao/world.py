@@ -4,9 +4,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 
+from app.arrays import FloatArray
 from app.estimation.beams import Multibeam
 from app.evaluation.explore.world import (
     CEILING,
@@ -21,8 +21,6 @@ from app.evaluation.explore.world import (
 )  # fmt: skip
 from app.evaluation.pcao.kernel import Physics
 from simulator.terrain import Terrain
-
-FloatArray = NDArray[np.float64]
 
 LANDMARKS = 1100
 STEPS = 500

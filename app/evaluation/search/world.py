@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import label
 
+from app.arrays import FloatArray
 from app.estimation.occupancy import Cell, OccupancyGrid, Scanner
 from app.exploration.core.constraints import Constraints
 from app.exploration.core.problem import Belief, Situation
@@ -16,8 +17,6 @@ from app.exploration.planner.options import PlannerOptions
 from app.exploration.planners import create_planner
 from app.exploration.site_search import SearchTask
 from simulator.obstacles import ObstacleWorld
-
-FloatArray = NDArray[np.float64]
 
 BODY_M = 0.35
 """Half the length of the robot: closer than that to an obstacle is a collision."""

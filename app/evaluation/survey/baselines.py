@@ -2,16 +2,12 @@
 
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
+from app.arrays import FloatArray
 from app.evaluation.survey.flown import fly_lawnmower
 from app.evaluation.survey.world import SOUNDING_RATE_HZ, SPEED_MPS, default_map, rmse_m
 from app.exploration.core.constraints import Constraints
 from app.mapping.types import Grid
 from simulator.terrain import Terrain
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -2,10 +2,11 @@
 
 import numpy as np
 
+from app.arrays import FloatArray
 from app.evaluation.survey.world import SPEED_MPS
 from app.exploration.core.constraints import Constraints
 from app.exploration.lines.lawnmower import lawnmower_routes
-from app.mapping.types import FloatArray, Soundings
+from app.mapping.types import Soundings
 from simulator.sensors import SonarNoise
 from simulator.terrain import Terrain
 from simulator.world import Measurement, SimulatedVehicle

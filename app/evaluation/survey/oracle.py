@@ -3,8 +3,9 @@
 import numpy as np
 from scipy.ndimage import gaussian_filter
 
+from app.arrays import FloatArray
 from app.evaluation.survey.world import Log, default_map, terrain_grid
-from app.mapping.types import FloatArray, Soundings
+from app.mapping.types import Soundings
 from simulator.terrain import Terrain
 
 FIRST_PART = 0.3

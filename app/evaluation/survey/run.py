@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from app.arrays import FloatArray
 from app.evaluation.survey.oracle import oracle_soundings
 from app.evaluation.survey.world import (
     SOUNDING_RATE_HZ,
@@ -21,7 +22,7 @@ from app.exploration.lines.lawnmower import lawnmower_routes
 from app.exploration.planner.options import PlannerOptions
 from app.exploration.survey.backbone import backbone
 from app.exploration.survey.value import make_nodes
-from app.mapping.types import FloatArray, Soundings
+from app.mapping.types import Soundings
 
 TVU_A_M, TVU_B = 0.25, 0.0075
 """IHO S-44 special order: total vertical uncertainty at 95 % is sqrt(a^2 + (b depth)^2)."""

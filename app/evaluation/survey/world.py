@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from app.arrays import FloatArray
 from app.estimation import Attitude, Multibeam, SingleBeam
 from app.exploration.core.constraints import Constraints
 from app.exploration.core.problem import Belief, Situation
@@ -18,7 +18,6 @@ from app.mapping.outliers import OutlierReport
 from app.mapping.types import BathymetricMap, Grid, Soundings
 from simulator.terrain import Terrain
 
-FloatArray = NDArray[np.float64]
 Sampling = Literal["step", "continuous"]
 Sounder = Literal["single", "dvl", "swath"]
 SIDE_BEAM_RAD = float(np.radians(22.5))

@@ -3,13 +3,11 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import chi2
 
+from app.arrays import FloatArray
 from app.estimation import CooperativeLocalizer, Fading, Landmark3DEstimator, Landmarks3D, RangeSensor
 from app.estimation.targets import TargetEstimator, TargetTrack, transition
-
-FloatArray = NDArray[np.float64]
 
 STEPS = 60
 STEP_LENGTH = 0.05

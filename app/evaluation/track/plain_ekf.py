@@ -6,12 +6,9 @@ MED13's figure 1 shows what comes of planning by such a filter. It is kept for t
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from app.arrays import FloatArray, IntArray
 from app.estimation import Landmarks3D
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 
 @dataclass(frozen=True)

@@ -5,11 +5,9 @@ ahead has to presume places; these are all that it may presume, because everythi
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
+from app.arrays import FloatArray
 from app.estimation.sensors import RangeSensor
-
-FloatArray = NDArray[np.float64]
 
 CELLS_PER_SIGHT = 5.0
 FEWEST_CELLS = 4

@@ -6,15 +6,12 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from app.evaluation.track.trace_greedy import TRACE_GREEDY, TraceGreedy
 from app.evaluation.track.world import TrackScenario, TrackWorld
 from app.exploration.core.problem import Proposal, Situation
 from app.exploration.planner.options import PlannerOptions
 from app.exploration.planners import PLANNERS, create_planner
-
-FloatArray = NDArray[np.float64]
 
 TRACKERS = (*sorted(PLANNERS), TRACE_GREEDY)
 SETTLED_AFTER = 100

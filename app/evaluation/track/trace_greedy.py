@@ -7,14 +7,12 @@ computing power"); otherwise the vehicles choose one after the other, three time
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from app.arrays import FloatArray
 from app.evaluation.track.world import TrackWorld
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.detours import neighbouring_moves
 from app.exploration.core.problem import Proposal, Situation
-
-FloatArray = NDArray[np.float64]
 
 TRACE_GREEDY = "ekf-trace"
 MOST_PAIRS = 800_000

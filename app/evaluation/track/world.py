@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from app.arrays import BoolArray, FloatArray
 from app.estimation import (
     CooperativeLocalizer,
     Fading,
@@ -39,9 +39,6 @@ from app.exploration.core.dynamic import Localization, Targets, dynamic_cost
 from app.exploration.core.objective import MED13_K, med13_objective
 from app.exploration.core.problem import Belief, Situation
 from simulator.terrain import Terrain
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 SURFACED = 1e-9
 START_ABOVE = 0.05

@@ -9,8 +9,8 @@ from collections.abc import Callable
 from typing import Any, ClassVar, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from app.arrays import FloatArray
 from app.estimation import Sensor
 from app.exploration.cao.regressors.landmarks import LandmarkRegressors
 from app.exploration.cao.regressors.survey import SurveyRegressors
@@ -19,7 +19,6 @@ from app.exploration.core.problem import Proposal, Situation
 from app.exploration.planner.base import PlannerBase, settle, vehicle_rng
 from app.exploration.planner.options import PlannerOptions
 
-FloatArray = NDArray[np.float64]
 Method = Literal["spsa", "fdsa"]
 Value = Callable[[FloatArray], FloatArray]
 """From configurations (c, n_vehicles, 3) to their values (c,)."""

@@ -9,8 +9,8 @@ each prediction deserves trust; ``polynomial`` uses powers of the raw positions,
 from typing import Any, ClassVar, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from app.arrays import FloatArray
 from app.estimation import Sensor
 from app.exploration.cao.estimator import Estimator, MoveSize
 from app.exploration.cao.regressors.landmarks import LandmarkRegressors
@@ -20,8 +20,6 @@ from app.exploration.core.bottom import Bottom
 from app.exploration.core.problem import Proposal, Situation
 from app.exploration.planner.base import PlannerBase, settle
 from app.exploration.planner.options import PlannerOptions
-
-FloatArray = NDArray[np.float64]
 
 WINDOW = 30
 POLYNOMIAL_WINDOW = 15

@@ -29,11 +29,8 @@ one entry replaces all earlier ones of the same sender, and an entry that arrive
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
-IntArray = NDArray[np.int64]
+from app.arrays import BoolArray, FloatArray, IntArray
 
 VERSION = 1
 HEADER_BYTES = 14

@@ -2,11 +2,8 @@
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
-IntArray = NDArray[np.int64]
+from app.arrays import BoolArray, FloatArray, IntArray
 
 
 def reachable(positions: FloatArray, visible_by: BoolArray, xy_m: FloatArray, travel_m: float) -> BoolArray:

@@ -4,9 +4,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from app.arrays import BoolArray, FloatArray, IntArray
 from app.estimation import RangeSensor
 from app.exploration.communication.messages import (
     MAX_ENTRIES,
@@ -20,10 +20,6 @@ from app.exploration.communication.messages import (
 from app.exploration.communication.selection import fill, reachable
 from app.exploration.communication.shared import Contribution, fuse
 from app.exploration.communication.vehicle import WORTH_TELLING
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
-IntArray = NDArray[np.int64]
 
 NOTHING = np.zeros(0, dtype=np.int64)
 

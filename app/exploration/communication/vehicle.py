@@ -3,16 +3,12 @@
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from app.arrays import BoolArray, FloatArray, IntArray
 from app.estimation import LandmarkEstimator, Landmarks
 from app.exploration.communication.messages import MAX_ENTRIES, STEPS, Entries, Order, Report, WireFormat
 from app.exploration.communication.selection import distance_to_receivers, fill
 from app.exploration.communication.shared import Contribution, fuse
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
-IntArray = NDArray[np.int64]
 
 WORTH_TELLING = 1.1
 """An estimate is sent again when its information has grown by this factor since the receiver confirmed it."""

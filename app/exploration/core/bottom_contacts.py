@@ -3,12 +3,9 @@
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from app.arrays import BoolArray, FloatArray
 from app.exploration.core.problem import Situation
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 FELT_OF_STEP = 0.01
 """Of a step: by how much shallower than asked a vehicle must be to have been lifted."""

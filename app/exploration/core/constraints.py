@@ -12,11 +12,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from app.arrays import BoolArray, FloatArray
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.geometry import convex, enters, inside, leaves, signed_distance
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 TOLERANCE_M = 1e-6
 LEG_CHECKS = 4

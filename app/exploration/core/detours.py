@@ -13,12 +13,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from app.arrays import FloatArray
 from app.estimation.targets import foretold_sd
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.constraints import Constraints
 from app.exploration.core.dynamic import Localization, Targets
-
-FloatArray = NDArray[np.float64]
 
 LEAVES_AT = 0.9
 """Part of the accuracy threshold at which a target is about to leave ``A``."""

@@ -9,8 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
+from app.arrays import BoolArray, FloatArray
 
 FICTITIOUS_WEIGHT = 10.0
 """What the fictitious target counts in the cost: NGCUV12 asks for a large weight, so that re-surfacing comes first."""

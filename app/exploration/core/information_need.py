@@ -10,9 +10,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from app.arrays import FloatArray
 from app.exploration.core.problem import Belief
-
-FloatArray = NDArray[np.float64]
 
 TRACE = 1e-6
 """Of what is enough: the least that is said to be lacking of a landmark that is not accurate."""

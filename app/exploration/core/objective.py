@@ -14,10 +14,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from app.arrays import BoolArray, FloatArray
 from app.estimation.landmarks import LandmarkSets
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 Terms = Literal["J", "J+J1", "J+J2", "J+J3", "J+J1+J2", "J+J1+J3", "J+J2+J3", "full", "med13"]
 """The objectives that can be chosen: AURO15's, term by term (its figure 2), or MED13's cost."""

@@ -8,14 +8,11 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from app.arrays import BoolArray, FloatArray
 from app.exploration.core.constraints import Constraints
 from app.exploration.core.dynamic import Localization, Targets
 from app.exploration.core.search_task import SearchTask
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)

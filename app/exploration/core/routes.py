@@ -3,17 +3,14 @@
 import numpy as np
 import shapely
 from numba import njit
-from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 from shapely import Point, Polygon
 from shapely.geometry.base import BaseGeometry
 from shapely.ops import nearest_points
 
+from app.arrays import BoolArray, FloatArray
 from app.exploration.core.constraints import Constraints
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 CORNER_TOLERANCE = 0.15
 """A corner may be cut when the leg passes it within this fraction of a step."""

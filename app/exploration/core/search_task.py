@@ -6,10 +6,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from app.arrays import BoolArray, FloatArray
 from app.estimation.occupancy import Cell, OccupancyGrid, Scanner
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)

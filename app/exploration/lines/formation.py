@@ -3,8 +3,8 @@
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from app.arrays import BoolArray, FloatArray
 from app.estimation import RangeSensor, Sensor
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.bottom_contacts import FeltBottom
@@ -14,9 +14,6 @@ from app.exploration.lines.formation_lines import EDGE, RowSpace, lines_over
 from app.exploration.lines.lattice import longer_axis_rad
 from app.exploration.planner.base import PlannerBase, at_depth, settle
 from app.exploration.planner.options import PlannerOptions
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 GAP_OF_RANGE, GAP_OF_VISIBILITY = 0.85, 0.64
 LINK_OF_RANGE = 0.97

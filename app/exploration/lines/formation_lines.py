@@ -9,16 +9,13 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from shapely import LineString, MultiLineString, MultiPoint, Polygon
 from shapely.geometry.base import BaseGeometry
 from shapely.prepared import PreparedGeometry, prep
 
+from app.arrays import BoolArray, FloatArray
 from app.exploration.core.constraints import Constraints, inside_area
 from app.exploration.core.routes import FreeSpace
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 EDGE = 0.01
 """How far from a zone a vehicle stays at least, as a fraction of the visibility."""

@@ -1,11 +1,9 @@
 """Routes when the team changes: nobody's rest is lost, a newcomer gets a share."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from app.arrays import FloatArray
 from app.exploration.lines.lattice import route_length
-
-FloatArray = NDArray[np.float64]
 
 
 def hand_over(routes: dict[str, FloatArray], vehicles: tuple[str, ...], en_m: FloatArray) -> dict[str, FloatArray]:

@@ -5,13 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 from shapely import Polygon, minimum_rotated_rectangle
 
+from app.arrays import FloatArray
 from app.exploration.core.constraints import Constraints, inside_area
 from app.exploration.core.routes import FreeSpace
-
-FloatArray = NDArray[np.float64]
 
 SHARE_SAMPLES = 200
 MAX_LINES = 2000

@@ -3,9 +3,9 @@
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
+from app.arrays import FloatArray
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.constraints import Constraints
 from app.exploration.core.problem import Proposal, Situation
@@ -13,8 +13,6 @@ from app.exploration.core.routes import CORNER_TOLERANCE, FreeSpace, next_waypoi
 from app.exploration.lines.handover import hand_over
 from app.exploration.lines.lattice import Sweep, boustrophedon, longer_axis_rad, route_length
 from app.exploration.planner.base import PlannerBase, settle
-
-FloatArray = NDArray[np.float64]
 
 BORDER_MARGIN_M = 0.5
 

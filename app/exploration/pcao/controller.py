@@ -9,11 +9,9 @@ displacement and into the height. The mixing signals depend on what is left only
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from app.arrays import FloatArray
 from app.exploration.pcao.state import N_FIGURES, N_VECTORS
-
-FloatArray = NDArray[np.float64]
 
 L = 3
 """Mixing signals: plenty left here; little left here, but much elsewhere; little left anywhere."""

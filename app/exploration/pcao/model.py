@@ -5,13 +5,12 @@ from importlib.resources import files
 from typing import Annotated, Literal, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
+from app.arrays import FloatArray
 from app.exploration.pcao.controller import BLOCKS, E1, E2, L, blocks, entries, gains
 from app.exploration.pcao.state import FIGURES, N_FIGURES, N_VECTORS, VECTORS
 
-FloatArray = NDArray[np.float64]
 Number = Annotated[float, Field(ge=-1e6, le=1e6, allow_inf_nan=False)]
 Matrix = Annotated[tuple[tuple[Number, ...], ...], Field(max_length=64)]
 

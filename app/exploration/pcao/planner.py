@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 from shapely import Polygon
 
+from app.arrays import FloatArray
 from app.estimation import RangeSensor, Sensor
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.constraints import inside_area
@@ -17,8 +18,6 @@ from app.exploration.pcao.model import default_model
 from app.exploration.pcao.state import reduced_state
 from app.exploration.planner.base import PlannerBase, at_depth, settle
 from app.exploration.planner.options import PlannerOptions
-
-FloatArray = NDArray[np.float64]
 
 UNIT_OF_SIGHT = 0.25
 """The state's unit where landmarks are seen from afar, as a part of the sight; in training, of the swath's range."""

@@ -10,9 +10,8 @@ of what a vehicle maps to its sides.
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from app.arrays import FloatArray
 
 VECTORS = (
     "nearest", "close", "far", "short_gain", "long_gain", "apart", "momentum",
@@ -24,7 +23,7 @@ units holds most of what is left. apart: towards the other vehicles. momentum: a
 FIGURES = ("height", "rise", "one", "left_here")
 """height above the bottom; rise of the known bottom within 2 units; a constant; the share left within 2.5 units."""
 
-N_VECTORS, N_FIGURES, N_SCHEDULE = len(VECTORS), len(FIGURES), 2
+N_VECTORS, N_FIGURES = len(VECTORS), len(FIGURES)
 
 DIRECTIONS = 16
 CLOSE, FAR, HERE = 2.0, 8.0, 2.5

@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from app.arrays import FloatArray
 from app.estimation import RangeSensor, Sensor
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.constraints import LEG_CHECKS, Constraints
@@ -15,8 +16,6 @@ from app.exploration.core.detours import Errand, Errands, errand_move
 from app.exploration.core.problem import Proposal, Situation
 from app.exploration.core.snapshot_codec import pack, unpack
 from app.exploration.planner.options import PlannerOptions
-
-FloatArray = NDArray[np.float64]
 
 DEPTH_MARGIN_M = 1e-3
 PASSES = 2

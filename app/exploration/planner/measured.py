@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from app.arrays import FloatArray
 from app.estimation import LandmarkSets, RangeSensor
 from app.exploration.core.dynamic import dynamic_cost
 from app.exploration.core.objective import (
@@ -17,8 +18,6 @@ from app.exploration.core.objective import (
 )
 from app.exploration.core.problem import Belief, Situation
 from app.exploration.planner.options import PlannerOptions
-
-FloatArray = NDArray[np.float64]
 
 
 class MeasuredObjective:

@@ -9,12 +9,9 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from app.arrays import FloatArray, IntArray
 from app.exploration.rollout.floor import Floor, sample
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 WORTH_OF_EARLY = 2.5
 """What the sum over time of the part that remains counts, against a step more in the end: early gains are surer."""

@@ -4,14 +4,12 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 from scipy.spatial import cKDTree
 
+from app.arrays import FloatArray
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.problem import Belief
-
-FloatArray = NDArray[np.float64]
 
 CELLS_PER_VISIBILITY = 8.0
 MAX_CELLS_PER_SIDE = 96

@@ -8,10 +8,9 @@ from numpy.typing import NDArray
 from scipy.ndimage import binary_erosion, distance_transform_edt
 from shapely import Polygon
 
+from app.arrays import FloatArray
 from app.exploration.core.constraints import Constraints, inside_area
 from app.exploration.rollout.flight import Plan
-
-FloatArray = NDArray[np.float64]
 
 CELLS_PER_SIDE = 160
 DETOURS = 6

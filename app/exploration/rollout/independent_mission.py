@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from app.arrays import FloatArray
 from app.estimation import RangeSensor
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.problem import Situation
@@ -26,8 +27,6 @@ from app.exploration.rollout.independent_routes import (
 from app.exploration.rollout.local_search import DRAWS
 from app.exploration.rollout.points import Points, make_points
 from app.exploration.rollout.sectors import sectors
-
-FloatArray = NDArray[np.float64]
 
 ROOM = 48
 SAMPLE, SAMPLE_GRID = 400, 20

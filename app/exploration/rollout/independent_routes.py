@@ -8,16 +8,13 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from app.arrays import FloatArray, IntArray
 from app.exploration.rollout.flight import PER_WAYPOINT, SINKING, WORTH_OF_EARLY, Plan, Rules, advance
 from app.exploration.rollout.floor import Floor, sample
 from app.exploration.rollout.free_space import Free, clear_ways, settle_waypoint
 from app.exploration.rollout.local_search import change
 from app.exploration.rollout.points import Points, lacks, look_whole
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 ALL_LEFT = 10_000.0
 """Steps charged for leaving every landmark over: one of a thousand is worth a way of ten steps."""

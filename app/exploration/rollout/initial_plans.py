@@ -5,9 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from app.arrays import FloatArray
 from app.exploration.lines.lattice import longer_axis_rad
-
-FloatArray = NDArray[np.float64]
 
 MOST_STRIPS = 5
 INSET = 0.4

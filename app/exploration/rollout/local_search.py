@@ -2,13 +2,11 @@
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from app.arrays import FloatArray
 from app.exploration.rollout.flight import Course, Plan, Rules, Work, fly_plan
 from app.exploration.rollout.floor import Floor
 from app.exploration.rollout.free_space import Free, clear_ways, insert, settle_waypoint
-
-FloatArray = NDArray[np.float64]
 
 DRAWS = 8
 """Random numbers that one change uses, uniform in [0, 1)."""

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from shapely import Polygon
 
+from app.arrays import FloatArray
 from app.estimation import RangeSensor, Sensor
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.bottom_contacts import FeltBottom
@@ -27,8 +28,6 @@ from app.exploration.rollout.free_space import Free, clear_ways, free_space, set
 from app.exploration.rollout.independent_mission import WORTH, apart_mission
 from app.exploration.rollout.initial_plans import Backbone, backbones, with_team
 from app.exploration.rollout.local_search import DRAWS, improve
-
-FloatArray = NDArray[np.float64]
 
 ROOM = 40
 HEIGHT = 0.45

@@ -11,11 +11,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from app.arrays import BoolArray, FloatArray
 from app.exploration.core.problem import Belief
 from app.exploration.rollout.flight import NEAREST, Work, make_work
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 DEPTH_PRESUMED = 0.5
 """Deviation, in visibilities, of the depth that a landmark is presumed to have before anybody has seen it."""

@@ -5,11 +5,9 @@ from collections.abc import Iterator
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from app.arrays import FloatArray
 from app.exploration.lines.lattice import longer_axis_rad
-
-FloatArray = NDArray[np.float64]
 
 MOST_LINES = 5
 """Lines tried per strip and direction."""

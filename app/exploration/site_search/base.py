@@ -7,14 +7,13 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from app.arrays import FloatArray
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.problem import Proposal, Situation
 from app.exploration.core.search_task import SearchTask
 from app.exploration.planner.base import PlannerBase, vehicle_rng
 from app.exploration.site_search.criteria import Weights, terms
 from app.exploration.site_search.ground import Ground
-
-FloatArray = NDArray[np.float64]
 
 HOME_STEPS = 3.0
 """Steps from the entry, times vehicles, within which a vehicle counts as being there."""

@@ -4,8 +4,8 @@ from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from app.arrays import FloatArray
 from app.estimation import Sensor
 from app.exploration.cao.estimator import Estimator
 from app.exploration.core.search_task import SearchTask
@@ -14,8 +14,6 @@ from app.exploration.planner.options import PlannerOptions
 from app.exploration.site_search.base import Scene, SearchPlanner, hold
 from app.exploration.site_search.criteria import Standstill, Supervisor, Weights, terms
 from app.exploration.site_search.gains import gains
-
-FloatArray = NDArray[np.float64]
 
 WINDOW = 30
 """Steps to which theta is fitted unless the options say otherwise (``L + T_h`` of eq. 19)."""

@@ -4,11 +4,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from app.arrays import FloatArray
 from app.exploration.core.search_task import SearchTask
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -5,13 +5,11 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from app.arrays import FloatArray, IntArray
 from app.estimation import Cell
 from app.exploration.site_search.base import Scene, SearchPlanner, hold
 from app.exploration.site_search.gains import Gains, take
 from app.exploration.site_search.ground import UNREACHED, Ground
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 ELSEWHERE = 0.15
 """Worth of a cell outside the goal area while something in it is left to see; within it 1."""

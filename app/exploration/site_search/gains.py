@@ -7,12 +7,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from app.arrays import FloatArray, IntArray
 from app.estimation.occupancy import Cell
 from app.exploration.core.search_task import SearchTask
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-
 
 NOTHING = 1e-6
 """Worth below which there is nothing to see; sums of many cells' worths are no more exact than that."""

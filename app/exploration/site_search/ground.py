@@ -7,12 +7,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from app.arrays import BoolArray, FloatArray, IntArray
 from app.estimation.occupancy import Cell
 from app.exploration.core.search_task import SearchTask
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
-IntArray = NDArray[np.int64]
 
 STRAIGHT, DIAGONAL = 5, 7
 """Lengths of moves between cells in fifths of a cell: at most 8 % above or below the true length of a way."""

@@ -3,12 +3,10 @@
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from app.arrays import FloatArray
 from app.exploration.planner.base import vehicle_rng
 from app.exploration.site_search.base import Scene, SearchPlanner, hold
-
-FloatArray = NDArray[np.float64]
 
 EXPONENT = 2.0
 """Of the distribution of flights' lengths: the one that finds most where targets are sparse."""

@@ -5,14 +5,12 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from app.arrays import FloatArray
 from app.exploration.core.constraints import Constraints
 from app.exploration.core.routes import FreeSpace, fly
 from app.exploration.lines.lattice import Sweep, even_lines, longer_axis_rad, most_lines
 from app.exploration.survey.value import Nodes, Objective, make_nodes, plan_value
-
-FloatArray = NDArray[np.float64]
 
 MARGIN_M = 0.5
 FAR_M = 1e6

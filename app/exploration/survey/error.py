@@ -14,14 +14,11 @@ ones and about as well on the others.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt, gaussian_filter
 from scipy.spatial import cKDTree
 
+from app.arrays import FloatArray, IntArray
 from app.exploration.core.problem import Belief, Situation
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 VARIANCE_POWER, ROUGHNESS_POWER, DISTANCE_POWER, SLOPE_POWER, BEND_POWER = 0.67, 0.35, 0.15, 0.18, 0.13
 SLOPE_SMOOTHING, BEND_SMOOTHING = 2.5, 1.0

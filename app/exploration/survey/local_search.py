@@ -2,13 +2,10 @@
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from app.arrays import FloatArray, IntArray
 from app.exploration.core.geometry import enters, leaves, signed_distance
 from app.exploration.survey.value import Nodes, Objective, expected_error, lower_to_route
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 DRAWS = 6
 """Random numbers that one change uses."""

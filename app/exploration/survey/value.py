@@ -10,12 +10,9 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from app.arrays import FloatArray, IntArray
 from app.exploration.core.routes import fly
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 BUCKETS_PER_SIDE = 12
 

@@ -4,7 +4,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from app.mapping.types import BathymetricMap, FloatArray
+from app.arrays import FloatArray
+from app.mapping.types import BathymetricMap
 
 if TYPE_CHECKING:
     from matplotlib.colors import Colormap

@@ -8,8 +8,9 @@ from typing import cast
 import numpy as np
 from contourpy import LineType, contour_generator
 
+from app.arrays import FloatArray
 from app.mapping.georeference import LocalFrame
-from app.mapping.types import BathymetricMap, FloatArray
+from app.mapping.types import BathymetricMap
 
 MAX_LEVELS = 500
 

@@ -5,9 +5,10 @@ import io
 import numpy as np
 from PIL import Image
 
+from app.arrays import BoolArray, FloatArray
 from app.mapping.georeference import LocalFrame
 from app.mapping.products.colours import palette, scaled
-from app.mapping.types import BoolArray, FloatArray, Grid
+from app.mapping.types import Grid
 
 INTERPOLATED_ALPHA = 0.72
 """Opacity of cells that were not sounded, so that sounded tracks show."""

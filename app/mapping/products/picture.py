@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from app.arrays import FloatArray
 from app.mapping.products.colours import depth_range, palette
-from app.mapping.types import BathymetricMap, FloatArray
+from app.mapping.types import BathymetricMap
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

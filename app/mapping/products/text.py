@@ -4,8 +4,9 @@ import io
 
 import numpy as np
 
+from app.arrays import FloatArray
 from app.mapping.georeference import LocalFrame
-from app.mapping.types import BathymetricMap, FloatArray, Soundings
+from app.mapping.types import BathymetricMap, Soundings
 
 
 def map_xyz(

@@ -8,9 +8,9 @@ import pyproj
 from affine import Affine
 from netCDF4 import Dataset
 
+from app.arrays import FloatArray
 from app.mapping.readers.hdf5 import check_contained
 from app.mapping.readers.types import MAX_RASTER_CELLS, Positive, Raster, ReadError
-from app.mapping.types import FloatArray
 
 DEPTH_NAMES = ("depth", "elevation", "bathymetry", "z", "height", "topo", "band1")
 SD_NAMES = ("uncertainty", "sd", "depth_uncertainty", "standard_deviation")

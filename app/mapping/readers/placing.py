@@ -12,6 +12,7 @@ from rasterio._err import CPLE_BaseError
 from rasterio.errors import RasterioError
 from rasterio.warp import Resampling, reproject
 
+from app.arrays import FloatArray
 from app.mapping.counting import cell_numbers
 from app.mapping.readers.types import (
     LOCAL,
@@ -28,7 +29,7 @@ from app.mapping.readers.types import (
     ReadOptions,
 )
 from app.mapping.s44 import NORMAL_95, Order, max_tvu_m
-from app.mapping.types import FloatArray, Grid, Soundings
+from app.mapping.types import Grid, Soundings
 
 _BOTH = 0.99
 """Where this share of the values has one sign, the sign says which way they grow."""

@@ -7,10 +7,10 @@ import pyproj
 import rasterio
 from rasterio.errors import RasterioError
 
+from app.arrays import FloatArray
 from app.mapping.readers.endings import DRIVERS
 from app.mapping.readers.hdf5 import check_contained
 from app.mapping.readers.types import MAX_RASTER_CELLS, Positive, Raster, ReadError
-from app.mapping.types import FloatArray
 
 DEPTH_BANDS = ("depth", "elevation", "height", "z")
 SD_BANDS = ("uncertainty", "sd", "standard deviation", "standard_deviation")

@@ -4,11 +4,12 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
+from app.arrays import FloatArray
 from app.mapping.georeference import LocalFrame
 from app.mapping.readers.files import read_file
 from app.mapping.readers.placing import place_reference, place_soundings
 from app.mapping.readers.types import Place, ReadOptions
-from app.mapping.types import FloatArray, Grid
+from app.mapping.types import Grid
 
 
 def place_file(file: BinaryIO, task: dict[str, Any], out: BinaryIO) -> dict[str, Any]:

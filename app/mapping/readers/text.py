@@ -7,9 +7,9 @@ from typing import BinaryIO, Literal
 import numpy as np
 import pyproj
 
+from app.arrays import FloatArray
 from app.mapping.readers.lines import Block, blocks
 from app.mapping.readers.types import LOCAL, MAX_SOUNDINGS, Points, Positive, ReadError
-from app.mapping.types import FloatArray
 
 NAMES = {
     "lon": ("lon", "lon_deg", "longitude", "long", "lng"),

@@ -8,8 +8,9 @@ import pyproj
 from affine import Affine
 from numpy.typing import NDArray
 
+from app.arrays import FloatArray
 from app.mapping.georeference import LocalFrame
-from app.mapping.types import FloatArray, Grid
+from app.mapping.types import Grid
 
 MAX_SOUNDINGS = 2_000_000
 MAX_RASTER_CELLS = 30_000_000

@@ -1,9 +1,9 @@
 """Makes a step durable, and turns what is stored of it into the vehicles' orders."""
 
 import numpy as np
-from numpy.typing import NDArray
 from sqlalchemy.orm import make_transient
 
+from app.arrays import FloatArray
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.constraints import Constraints
 from app.missions import metrics, safety
@@ -27,8 +27,6 @@ CIRCLE_M = CIRCLE_RADIUS_M + 2.5
 
 UNIT_SQUARE = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0]])
 """About a circle of radius 1: what lies apart from the square lies apart from the circle."""
-
-FloatArray = NDArray[np.float64]
 
 
 class StepCommit:

@@ -4,9 +4,9 @@ import math
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from shapely.geometry import Polygon
 
+from app.arrays import FloatArray
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.constraints import Constraints
 from app.exploration.core.detours import due_to_rise
@@ -16,8 +16,6 @@ from app.exploration.site_search import SearchTask
 from app.missions import safety
 from app.missions.search.course import hold_before_hazards
 from app.missions.spec.mission import MissionSpec, SurfacePolicy, VehicleKind
-
-FloatArray = NDArray[np.float64]
 
 NEARBY_OUTSIDE_M = 10.0
 """A vehicle that drifted or overshot this little is planned for as if it were at the border."""

@@ -11,8 +11,8 @@ from collections.abc import Callable
 from concurrent.futures import Executor
 
 import numpy as np
-from numpy.typing import NDArray
 
+from app.arrays import FloatArray
 from app.exploration.core.problem import Planner
 from app.exploration.planners import create_planner
 from app.missions import metrics
@@ -53,8 +53,6 @@ DECIDE_AGAIN_S = 5.0
 
 REPORT_DELAY_S = 0.1
 """How old a vehicle's last report is at most, on the wall clock."""
-
-FloatArray = NDArray[np.float64]
 
 
 class Runner:

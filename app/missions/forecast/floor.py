@@ -7,8 +7,9 @@ import numpy as np
 from scipy.ndimage import distance_transform_edt
 from shapely.geometry import Polygon
 
+from app.arrays import FloatArray
 from app.mapping.fusion import prior_map
-from app.mapping.types import FloatArray, Soundings
+from app.mapping.types import Soundings
 from app.missions.maps.builder import make_grid
 from app.missions.spec.mission import MissionSpec
 from simulator.seafloors import generate

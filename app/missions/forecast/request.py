@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field
 from shapely.geometry import Point, Polygon
 
-from app.mapping.types import FloatArray
+from app.arrays import FloatArray
 from app.missions.errors import InvalidRequestError
 from app.missions.forecast.simulate import Forecast, forecast
 from app.missions.spec.mission import MissionSpec

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from app.arrays import FloatArray
 from app.exploration.planners import create_planner
-from app.mapping.types import FloatArray
 from app.missions.flight.decision import Place, decide, make_constraints
 from app.missions.forecast.floor import Floor, floors_of, forecast_cell_m
 from app.missions.maps.builder import MapBuilder

@@ -3,14 +3,11 @@
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
 import shapely
-from numpy.typing import NDArray
 from shapely.geometry import Point, Polygon
 
+from app.arrays import FloatArray
 from app.missions.views.mission import Level
-
-FloatArray = NDArray[np.float64]
 
 OUTSIDE_ALARM_M = 20.0
 """Vehicles that wait circle across the border; farther outside than this they have gone astray."""

@@ -11,10 +11,10 @@ from typing import Any, TypeVar
 import structlog
 from shapely.geometry import Polygon
 
+from app.arrays import FloatArray
 from app.estimation import Sensor, SingleBeam
 from app.mapping.georeference import LocalFrame
 from app.mapping.tides import TideTable
-from app.mapping.types import FloatArray
 from app.missions.clock import now
 from app.missions.fleet.hub import FleetHub
 from app.missions.fleet.interface import (

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import structlog
 
-from app.mapping.types import BoolArray, FloatArray
+from app.arrays import BoolArray, FloatArray
 from app.missions.clock import now
 from app.missions.live.journal import Journal
 from app.missions.maps.builder import BuiltMap, MapBuilder

@@ -8,6 +8,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from app.arrays import FloatArray
 from app.missions.live.journal import METRES_PER_DEGREE
 from app.storage import missions as mission_queries
 from app.storage.bulk import read_in_pieces
@@ -21,7 +22,6 @@ DIGITS = 7
 """Decimals of a degree: about a centimetre."""
 
 Trail = list[tuple[float, float, float]]
-FloatArray = NDArray[np.float64]
 
 
 class Trails:

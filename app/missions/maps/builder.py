@@ -11,11 +11,12 @@ import shapely
 from numpy.typing import NDArray
 from shapely.geometry import Polygon
 
+from app.arrays import BoolArray, FloatArray
 from app.exploration.core.problem import Belief
 from app.mapping.fusion import fuse, prior_map
 from app.mapping.gp import GaussianProcessMap
 from app.mapping.outliers import flag_outliers
-from app.mapping.types import BathymetricMap, BoolArray, FloatArray, Grid, Soundings
+from app.mapping.types import BathymetricMap, Grid, Soundings
 from app.missions.maps.live_grid import LiveGrid
 from app.missions.maps.queue import MapQueue, Replacement
 
@@ -80,6 +81,11 @@ def make_grid(area: FloatArray, cell_m: float) -> tuple[Grid, BoolArray]:
     centres = grid.centres_m
     inside = shapely.contains_xy(Polygon(area), centres[:, 0], centres[:, 1])
     return grid, inside.reshape(rows, cols)
+
+
+def digest_of(bathymetry: BathymetricMap) -> str:
+    """Return what tells maps apart, steps and restarts included."""
+    return hashlib.sha256(bathymetry.depth_m.tobytes()).hexdigest()
 
 
 class MapBuilder:
@@ -219,7 +225,7 @@ class MapBuilder:
         if bathymetry is None:
             raise ValueError("there is no sounding to make a map of")
         bathymetry = self._with_margin(bathymetry)
-        digest = hashlib.sha256(bathymetry.depth_m.tobytes()).hexdigest()
+        digest = digest_of(bathymetry)
         self._version += 1
         return BuiltMap(self._version, len(self._soundings), bathymetry, digest, thorough)
 

@@ -1,6 +1,5 @@
 """A mission's map as bytes: every layer exactly as it was made."""
 
-import hashlib
 import io
 import json
 import zlib
@@ -9,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.mapping.types import BathymetricMap, Grid
-from app.missions.maps.builder import BuiltMap
+from app.missions.maps.builder import BuiltMap, digest_of
 
 Doubted = list[tuple[NDArray[np.float64], str]]
 """Soundings, rows of shape (4,), that a map leaves out, each with the reason."""
@@ -18,11 +17,6 @@ LAYERS = ("depth_m", "sd_m", "count", "sounded", "roughness")
 OPTIONAL = ("prior", "process_sd_m", "bound_sd_m")
 FASTEST = 1
 """Depths hardly get smaller; what lies outside of the area does at any level."""
-
-
-def digest_of(bathymetry: BathymetricMap) -> str:
-    """Return what tells maps apart, steps and restarts included."""
-    return hashlib.sha256(bathymetry.depth_m.tobytes()).hexdigest()
 
 
 def pack(bathymetry: BathymetricMap, doubted: Doubted) -> bytes:

@@ -12,9 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from app.arrays import BoolArray, FloatArray, IntArray
 from app.mapping.counting import cell_numbers
 from app.mapping.gaussian import MODEL, GaussianInterpolator, choose_width
-from app.mapping.types import BathymetricMap, BoolArray, FloatArray, Grid, IntArray, Soundings
+from app.mapping.types import BathymetricMap, Grid, Soundings
 
 Rows = NDArray[np.float64]
 """Soundings, shape (n, 4): east, north, depth, standard deviation in metres."""

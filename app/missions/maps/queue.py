@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from app.mapping.types import BoolArray
+from app.arrays import BoolArray
 
 Rows = NDArray[np.float64]
 """Soundings, shape (n, 4): east, north, depth, standard deviation in metres."""

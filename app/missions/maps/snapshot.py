@@ -5,10 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from app.arrays import FloatArray
 from app.mapping.georeference import LocalFrame
 from app.mapping.layers import Layer
 from app.mapping.products.overlay import overlay_corners
-from app.mapping.types import FloatArray
 from app.mapping.vertical import VerticalDatum
 from app.missions.maps.builder import BuiltMap
 from app.missions.maps.live_grid import LiveCells, LiveGrid

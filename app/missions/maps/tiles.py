@@ -12,10 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 
+from app.arrays import BoolArray
 from app.mapping.layers import make_layers
 from app.mapping.products.overlay import overlay_corners
 from app.mapping.s44 import Order
-from app.mapping.types import BathymetricMap, BoolArray
+from app.mapping.types import BathymetricMap
 from app.missions.maps.live_grid import LiveCells
 from app.missions.maps.snapshot import NOT_MADE, MapSnapshot
 
@@ -36,7 +37,6 @@ SCALES = {
 """Whole numbers are sent: a layer's value times this."""
 
 BASE = ("depth", "uncertainty", "count", "flags")
-FURTHER = ("slope", "tvu_fraction", "difference")
 SOUNDED, PRIOR, ACCURATE, VISIBLE = 1, 2, 4, 8
 """Bits of the layer ``flags``: sounded; imported soundings in it; known to the asked accuracy and supported by
 soundings; near a sounding."""

@@ -4,16 +4,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from app.arrays import FloatArray
 from app.exploration.site_search import SearchTask
 from app.exploration.site_search.ground import Ground
 from app.mapping.georeference import LocalFrame
 from app.missions.search.state import Search
 from app.missions.spec.mission import MissionSpec
 from app.missions.team import Member
-
-FloatArray = NDArray[np.float64]
 
 FIRST_PACE = 0.5
 """Part of the asked speed at which a team is taken to get on before that was measured: it turns, and waits."""

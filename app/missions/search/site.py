@@ -4,11 +4,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 from shapely.geometry import Polygon, box
 from shapely.geometry.base import BaseGeometry
 
+from app.arrays import BoolArray, FloatArray
 from app.estimation.occupancy import OccupancyGrid, Scanner
 from app.mapping.georeference import LocalFrame
 from app.mapping.outlines import touched
@@ -16,9 +16,6 @@ from app.missions.safety import widened
 from app.missions.spec.mission import MissionSpec
 from app.missions.spec.search import SearchSpec
 from simulator.obstacles import ObstacleWorld
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from datetime import datetime
 
 import numpy as np
-from numpy.typing import NDArray
 
+from app.arrays import FloatArray
 from app.estimation.occupancy import Cell, OccupancyGrid
 from app.exploration.site_search import SearchTask
 from app.exploration.site_search.base import HOME_STEPS
@@ -19,8 +19,6 @@ from app.missions.fleet.interface import ScanReport
 from app.missions.search.site import Site, site_of
 from app.missions.spec.mission import MissionSpec
 from app.missions.spec.search import SearchSpec
-
-FloatArray = NDArray[np.float64]
 
 DOUBT_CELLS = 1.0
 """An echo so close in front of a known obstacle comes from that."""

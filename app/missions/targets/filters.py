@@ -10,8 +10,8 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from app.arrays import FloatArray
 from app.estimation.sensors import RangeSensor
 from app.estimation.targets import TargetEstimator, TargetTrack, expected_range
 from app.exploration.core.dynamic import Targets
@@ -20,8 +20,6 @@ from app.mapping.georeference import LocalFrame
 from app.missions.fleet.interface import RangeReport
 from app.missions.spec.mission import MissionSpec
 from app.missions.spec.targets import TargetSpec
-
-FloatArray = NDArray[np.float64]
 
 MEMORY = "targets"
 GREATEST_RANGE_M = 20_000.0

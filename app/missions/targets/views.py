@@ -3,16 +3,14 @@
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 from shapely import contains_xy
 from shapely.geometry import Polygon
 
+from app.arrays import FloatArray
 from app.estimation.targets import TargetTrack
 from app.mapping.georeference import LocalFrame
 from app.missions.targets.filters import Known, Tracking
 from app.missions.views.targets import EllipseView, TargetState, TargetView
-
-FloatArray = NDArray[np.float64]
 
 PROBABILITY = 0.95
 _SCALE = math.sqrt(-2.0 * math.log(1.0 - PROBABILITY))

@@ -3,8 +3,9 @@
 from collections.abc import Callable
 from datetime import UTC, datetime
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
+from app.missions.views.base import View
 from imc_bridge.doctor.diagnosis import Cause, Diagnosis, NodeDiagnosis, Severity, problem
 from imc_bridge.doctor.diagnosis import Finding as BridgeFinding
 from imc_bridge.events import NodeState
@@ -12,11 +13,7 @@ from imc_bridge.events import NodeState
 Examine = Callable[[], Diagnosis]
 
 
-class _View(BaseModel):
-    model_config = ConfigDict(frozen=True, json_schema_serialization_defaults_required=True)
-
-
-class Finding(_View):
+class Finding(View):
     """One observation, and what to do about it."""
 
     severity: Severity
@@ -25,7 +22,7 @@ class Finding(_View):
     remedy: str = ""
 
 
-class LinkRecord(_View):
+class LinkRecord(View):
     """One change of a vehicle's link."""
 
     at: datetime
@@ -34,7 +31,7 @@ class LinkRecord(_View):
     reason: str = ""
 
 
-class VehicleDiagnosis(_View):
+class VehicleDiagnosis(View):
     """What was found of one vehicle."""
 
     name: str
@@ -46,7 +43,7 @@ class VehicleDiagnosis(_View):
     history: list[LinkRecord] = Field(description="The last changes of its link, oldest first")
 
 
-class DoctorView(_View):
+class DoctorView(View):
     """What keeps vehicles on the IMC network from working with this service."""
 
     healthy: bool = Field(description="At least one vehicle is there, and nothing stands in any one's way")

@@ -13,7 +13,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from app.arrays import FloatArray
+
 Float32Array = NDArray[np.float32]
 IntArray = NDArray[np.int32]
 

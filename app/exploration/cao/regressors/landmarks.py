@@ -9,9 +9,9 @@ different ones under a communication limit would hold each other back for ever.
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from app.arrays import FloatArray
 from app.estimation import RangeSensor, Sensor
 from app.exploration.cao.regressors.landmark_predictions import predict, within_reach
 from app.exploration.cao.regressors.moves import team_moves
@@ -20,8 +20,6 @@ from app.exploration.core.information_need import lacking
 from app.exploration.core.problem import Situation
 from app.exploration.planner.measured import MeasuredObjective
 from app.exploration.planner.options import PlannerOptions
-
-FloatArray = NDArray[np.float64]
 
 PATIENCE = 3
 """Steps without a new accurate landmark after which the team heads for one common landmark."""

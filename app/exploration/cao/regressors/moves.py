@@ -1,11 +1,9 @@
 """Random candidate moves of a team (AURO15 eq. 22)."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from app.arrays import FloatArray
 from app.exploration.planner.base import vehicle_rng
-
-FloatArray = NDArray[np.float64]
 
 
 def team_moves(seed: int, vehicles: tuple[str, ...], n: int, dims: int, step: float, alpha: float) -> FloatArray:

@@ -5,8 +5,8 @@ from itertools import combinations_with_replacement
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from app.arrays import FloatArray
 from app.estimation import RangeSensor, Sensor
 from app.exploration.cao.regressors.moves import team_moves
 from app.exploration.core.bottom import Bottom
@@ -14,7 +14,6 @@ from app.exploration.core.problem import Situation
 from app.exploration.planner.measured import MeasuredObjective
 from app.exploration.planner.options import PlannerOptions
 
-FloatArray = NDArray[np.float64]
 AtCruise = Callable[[Situation, Bottom, FloatArray], FloatArray]
 
 

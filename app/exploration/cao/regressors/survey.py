@@ -15,10 +15,10 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 from shapely import Polygon, unary_union
 
+from app.arrays import BoolArray, FloatArray, IntArray
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.constraints import Constraints, inside_area
 from app.exploration.core.geometry import convex
@@ -32,9 +32,6 @@ from app.exploration.survey.error import expected_roughness, with_second_looks
 from app.exploration.survey.local_search import DRAWS, improve
 from app.exploration.survey.value import Nodes, Objective, make_nodes, plan_value, values_after_first_leg
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-BoolArray = NDArray[np.bool_]
 AtCruise = Callable[[Situation, Bottom, FloatArray], FloatArray]
 
 MAX_NODES = 2500

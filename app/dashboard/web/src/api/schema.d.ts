@@ -2331,12 +2331,6 @@ export interface components {
              */
             search: number;
             /**
-             * Turn Radius M
-             * @description Tightest turn the vehicles fly; sharper ones are penalised.
-             * @default 6
-             */
-            turn_radius_m: number;
-            /**
              * Cruise Depth M
              * @description Depth at which vehicles survey; by default the depth at which each joined.
              */
