@@ -108,9 +108,12 @@ def serve(
         log_format=log_format and log_format.value,
     )
     from app.api import logs
-    from app.main import Server, serve
+    from app.storage.prepare import prepare_database
 
     logs.configure(settings.log_level, settings.log_format)
+    # Before the rest is loaded, which takes seconds: most starts that fail do so here.
+    asyncio.run(prepare_database(settings.database_url, may_upgrade=settings.migrates_itself))
+    from app.main import Server, serve
 
     def started(server: Server) -> None:
         token = f" An operator token for others is in {server.first_token}." if server.first_token is not None else ""

@@ -64,6 +64,15 @@ class Attacked:
             await api.post(f"/missions/{self.mission}/measurements", json={"items": [item(0), item(1, "probe")]})
             (await api.post(f"/missions/{self.mission}/start")).raise_for_status()
 
+    async def survey(self) -> None:
+        """Send honest soundings, and wait for the map that they are in."""
+        async with self.client("vehicle") as api:
+            path = f"/missions/{self.mission}/measurements"
+            (await api.post(path, json={"items": [item(10 + i) for i in range(10_000)]})).raise_for_status()
+        async with self.client("operator", patience_s=60) as api:
+            # Answered once a map is made of what is there.
+            (await api.get(f"/missions/{self.mission}/map.csv")).raise_for_status()
+
     async def command(self, *arguments: str) -> str:
         own = {name: value for name, value in os.environ.items() if not name.startswith("BATHYFLEET_")}
         process = await asyncio.create_subprocess_exec(
@@ -280,14 +289,14 @@ async def heartbeats(attacked: Attacked) -> Found:
                 names = json.dumps(listed)
                 if seen_after_s is None and "lauv-xplore-1" in names:
                     seen_after_s = time.monotonic() - began - 8
-                causes |= {
-                    finding.get("cause", "") for finding in (await api.get("/doctor")).json().get("findings", [])
-                }
+                doctor = (await api.get("/doctor")).json()
+                causes |= {finding["cause"] for finding in doctor["own"]}
             await asyncio.sleep(0.05)
     forger.close()
     vehicle.close()
     gained = [] if seen_after_s is not None else ["the real vehicle is not seen"]
-    return {"gained": gained, "forged": sent, "seen_after_s": seen_after_s, "causes": sorted(causes - {""})}
+    gained += [] if "crowded" in causes else ["the doctor does not tell of it"]
+    return {"gained": gained, "forged": sent, "seen_after_s": seen_after_s, "causes": sorted(causes)}
 
 
 async def wrong_tokens(attacked: Attacked) -> Found:
@@ -320,7 +329,7 @@ async def connections(attacked: Attacked) -> Found:
     for writer in held:
         writer.close()
     gained = [] if status == "200" else [f"abort: {status}"]
-    return {"gained": gained, "held": len(held), "abort": status}
+    return {"gained": gained, "connections_held": len(held), "abort": status}
 
 
 async def views(attacked: Attacked) -> Found:

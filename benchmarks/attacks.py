@@ -137,7 +137,9 @@ async def play(name: str) -> dict[str, Any]:
     with tempfile.TemporaryDirectory(prefix="bathyfleet-attacks-") as folder:
         os.chmod(folder, 0o755)  # noqa: PTH101, S103 - open to others: it is the service's own files that have to be closed
         async with attacked_service(Path(folder)) as attacked:
-            await ATTACKS["nothing"][1](attacked)  # so that everything was used once
+            # So that everything was used once, and a map of many soundings was made.
+            await ATTACKS["nothing"][1](attacked)
+            await attacked.survey()
             figures: dict[str, Any] = {}
             async with watched(attacked.service, figures):
                 found = await ATTACKS[name][1](attacked)
