@@ -108,11 +108,14 @@ def serve(
         log_format=log_format and log_format.value,
     )
     from app.api import logs
+    from app.compiled import compile_beside
+    from app.exploration import DEFAULT_PLANNER
     from app.storage.prepare import prepare_database
 
     logs.configure(settings.log_level, settings.log_format)
     # Before the rest is loaded, which takes seconds: most starts that fail do so here.
     asyncio.run(prepare_database(settings.database_url, may_upgrade=settings.migrates_itself))
+    compile_beside(DEFAULT_PLANNER)
     from app.main import Server, serve
 
     def started(server: Server) -> None:
@@ -361,6 +364,10 @@ def demo(
     output: Annotated[Path, typer.Option(file_okay=False, help="Folder for the files.")] = DEMO_FOLDER,
 ) -> None:
     """Try it without a vehicle: a whole mission with simulated AUVs that speak IMC, from start to map."""
+    from app.compiled import compile_beside
+    from app.exploration import DEFAULT_PLANNER
+
+    compile_beside(DEFAULT_PLANNER)
     from app.demo import DemoOptions, run_demo
     from app.demo_service import DemoError
 

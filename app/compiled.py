@@ -1,12 +1,23 @@
-"""Where compiled functions are kept from one start to the next."""
+"""Where compiled functions are kept from one start to the next, and compiling them beside a start that is under way."""
 
 import atexit
+import hashlib
 import os
 import shutil
+import subprocess
+import sys
 import tempfile
+from contextlib import suppress
+from importlib.metadata import version
 from pathlib import Path
 
 VARIABLE = "NUMBA_CACHE_DIR"
+PACKAGES = ("exploration", "estimation")
+"""What planners are made of."""
+PATIENCE_S = 180.0
+
+_PROGRAM = "import sys; from app.compiled import compile_planner; compile_planner(sys.argv[1], sys.argv[2])"
+_beside: list[subprocess.Popen[bytes]] = []
 
 
 def keep_compiled() -> Path | None:
@@ -30,6 +41,51 @@ def keep_compiled() -> Path | None:
     atexit.register(_remove, folder, os.getpid())
     os.environ[VARIABLE] = str(folder)
     return folder
+
+
+def compile_beside(planner: str) -> None:
+    """Have another process compile what a planner needs, unless it was done by an earlier start of the same code.
+
+    Importing the service takes as long as half of the compiling, and one process can do only one of them at a time.
+    Nothing is lost where it fails: what is missing then is compiled when it is first used.
+    """
+    with suppress(OSError, StopIteration):
+        mark = _mark(planner)
+        if mark.exists() or any(process.poll() is None for process in _beside):
+            return
+        command = [sys.executable, "-P", "-c", _PROGRAM, planner, str(mark)]
+        quiet = subprocess.DEVNULL
+        process = subprocess.Popen(command, stdin=quiet, stdout=quiet, stderr=quiet)
+        atexit.register(process.kill)
+        _beside.append(process)
+
+
+def wait_for_compiling() -> None:
+    """Return when the other process is done: numba's cache has no lock, so only one may compile the same functions."""
+    for process in _beside:
+        with suppress(subprocess.TimeoutExpired):
+            process.wait(PATIENCE_S)
+
+
+def compile_planner(planner: str, mark: str) -> None:
+    """Compile what a planner needs for surveys, and make the file ``mark`` when it is done."""
+    from app.estimation import SingleBeam
+    from app.exploration.planners import warm_up_planner
+
+    warm_up_planner(planner, SingleBeam())
+    Path(mark).touch()
+
+
+def _mark(planner: str) -> Path:
+    """The file that says that everything was compiled, by the code as it is: raises StopIteration without a folder."""
+    code = hashlib.sha256(f"{sys.version} {version('numba')} {planner}".encode())
+    for package in PACKAGES:
+        for path in sorted(Path(__file__).parent.joinpath(package).rglob("*.py")):
+            stat = path.stat()
+            code.update(f"{path} {stat.st_mtime_ns} {stat.st_size}".encode())
+    chosen = os.environ.get(VARIABLE)
+    folder = next(folder for folder in ([Path(chosen)] if chosen else _usual()) if _writable(folder))
+    return folder / f"bathyfleet-{code.hexdigest()[:16]}.compiled"
 
 
 def _usual() -> list[Path]:

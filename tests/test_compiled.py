@@ -1,14 +1,15 @@
-"""The service starts for a user who may write nothing but temporary files."""
+"""The service starts for a user who may write nothing but temporary files, and compiles beside its start."""
 
+import os
 import subprocess
 import sys
 import tempfile
 from pathlib import Path
 
+from app import compiled
+from app.compiled import compile_beside, wait_for_compiling
 from tests.conftest import PROJECT
 from tests.faults.other_users import SERVICE, as_user, needs_root
-
-pytestmark = needs_root
 
 PROGRAM = """
 from app.compiled import keep_compiled
@@ -29,6 +30,7 @@ def imported(home: str) -> list[str]:
     return ended.stdout.split()
 
 
+@needs_root
 def test_functions_are_compiled_where_nothing_can_be_kept() -> None:
     folder, mode = imported("/proc/none")
     assert Path(folder).parent == Path(tempfile.gettempdir())
@@ -36,7 +38,23 @@ def test_functions_are_compiled_where_nothing_can_be_kept() -> None:
     assert not Path(folder).exists(), "it ends with the process"
 
 
+@needs_root
 def test_a_folder_of_the_user_is_used() -> None:
     with tempfile.TemporaryDirectory() as home:
         Path(home).chmod(0o777)
         assert imported(home) == ["None", "-"]
+
+
+def test_what_an_earlier_start_compiled_is_not_compiled_again() -> None:
+    folder = Path(os.environ["NUMBA_CACHE_DIR"])
+    for mark in folder.glob("bathyfleet-*.compiled"):
+        mark.unlink()
+    try:
+        compile_beside("random")
+        compile_beside("random")
+        wait_for_compiling()
+        compile_beside("random")
+        assert [process.returncode for process in compiled._beside] == [0]
+        assert len(list(folder.glob("bathyfleet-*.compiled"))) == 1
+    finally:
+        compiled._beside.clear()

@@ -3,3 +3,6 @@
 ``core`` is what all planners share, ``planner`` what a planner is, each other folder a family of planners, and
 ``planners`` their names: adding one is a class derived from ``planner.base.PlannerBase`` and a line there.
 """
+
+DEFAULT_PLANNER = "cao"
+"""Of surveys, unless an operator asks for another one."""

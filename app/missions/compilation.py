@@ -5,6 +5,7 @@ from concurrent.futures import Executor, Future
 
 import structlog
 
+from app.compiled import wait_for_compiling
 from app.estimation import Sensor, SingleBeam
 from app.exploration.planners import warm_up_planner
 from app.mapping.gp import warm_up as warm_up_maps
@@ -45,7 +46,7 @@ class Compilation:
 
     def _planner(self, name: str, sensor: Sensor) -> Future[None]:
         if (name, sensor) not in self._planners:
-            begun = self._executor.submit(warm_up_planner, name, sensor)
+            begun = self._executor.submit(_warm_up, name, sensor)
             begun.add_done_callback(_log_failure)
             self._planners[name, sensor] = begun
         return self._planners[name, sensor]
@@ -58,6 +59,11 @@ class Compilation:
             return
         begun.add_done_callback(_log_failure)
         begun.add_done_callback(lambda _: self._maps.set_result(None))
+
+
+def _warm_up(name: str, sensor: Sensor) -> None:
+    wait_for_compiling()
+    warm_up_planner(name, sensor)
 
 
 def _log_failure(done: Future[None]) -> None:

@@ -10,7 +10,7 @@ from situations import make_situation
 from app.estimation import SingleBeam
 from app.evaluation.survey.world import SurveyScenario, fly_planner
 from app.exploration.core.constraints import Constraints
-from app.exploration.core.routes import fly, next_waypoint
+from app.exploration.core.routes import CORNER_TOLERANCE, fly, next_waypoint
 from app.exploration.planner.options import PlannerOptions
 from app.exploration.planners import create_planner
 from app.exploration.survey.error import MOST_DOUBTS, SECOND_LOOK, with_second_looks
@@ -66,7 +66,7 @@ def test_a_route_is_flown_leg_by_leg_however_many_are_taken_at_once(seed, corner
     n, used = fly(3.0, 4.0, route, len(route), step, steps, vertices)
     x, y, first, legs = 3.0, 4.0, 0, 0
     while legs < steps and first < len(route):
-        nx, ny, first = next_waypoint(x, y, route, first, len(route), step)
+        nx, ny, first = next_waypoint(x, y, route, first, len(route), step, CORNER_TOLERANCE)
         if np.hypot(nx - x, ny - y) < 1e-9:
             break
         x, y, legs = nx, ny, legs + 1
@@ -76,7 +76,7 @@ def test_a_route_is_flown_leg_by_leg_however_many_are_taken_at_once(seed, corner
 
 def test_vertices_close_together_are_flown_in_one_leg():
     arc = np.array([[0.0, 8.0], [0.02, 8.05], [0.06, 8.1], [0.12, 8.14], [0.2, 8.16], [30.0, 8.16]])
-    x, y, first = next_waypoint(0.0, 0.0, arc, 0, len(arc), 10.0)
+    x, y, first = next_waypoint(0.0, 0.0, arc, 0, len(arc), 10.0, CORNER_TOLERANCE)
     assert (x, y, first) == pytest.approx((0.2, 8.16, 5))
     x, y, first = next_waypoint(0.0, 0.0, arc, 0, len(arc), 10.0, 0.0)
     assert (x, y, first) == (0.0, 8.0, 1)

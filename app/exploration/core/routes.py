@@ -20,7 +20,7 @@ SAME_CORNER = 0.03
 
 @njit(cache=True, nogil=True)
 def next_waypoint(
-    x: float, y: float, route: FloatArray, first: int, count: int, step: float, cut: float = CORNER_TOLERANCE
+    x: float, y: float, route: FloatArray, first: int, count: int, step: float, cut: float
 ) -> tuple[float, float, int]:
     """Return the end of the next leg along a route and the index of the first vertex still to be reached.
 
@@ -99,7 +99,7 @@ def fly(
             nx, ny = x + f * (route[i, 0] - x), y + f * (route[i, 1] - y)
             used += legs
         else:
-            nx, ny, i = next_waypoint(x, y, route, i, count, step)
+            nx, ny, i = next_waypoint(x, y, route, i, count, step, CORNER_TOLERANCE)
             if np.hypot(nx - x, ny - y) < 1e-9:
                 break
             used += 1

@@ -13,6 +13,7 @@ from pydantic import FailFast, Field, field_validator, model_validator
 from shapely.geometry import Point, Polygon
 from shapely.geometry.polygon import orient
 
+from app.exploration import DEFAULT_PLANNER
 from app.exploration.planner.options import PlannerOptions
 from app.mapping.georeference import LocalFrame
 from app.mapping.vertical import LOWEST_ASTRONOMICAL_TIDE, check_depth_datum
@@ -189,7 +190,7 @@ class SurfacePolicy(Model):
 class PlannerSpec(Model):
     """Which planner decides, and its options."""
 
-    name: str = Field(default="cao", description="One of the planners of GET /api/v1/planners")
+    name: str = Field(default=DEFAULT_PLANNER, description="One of the planners of GET /api/v1/planners")
     options: PlannerOptions = Field(default_factory=PlannerOptions, description="Its settings")
 
 

@@ -314,7 +314,9 @@ class SurveyRegressors:
         on_plan = self._on_plan(candidates)
         for i in range(n):
             route = plan_vias[i, : plan_counts[i]]
-            *_, passed = next_waypoint(self._en[i, 0], self._en[i, 1], route, 0, len(route), self._step_m)
+            *_, passed = next_waypoint(
+                self._en[i, 0], self._en[i, 1], route, 0, len(route), self._step_m, CORNER_TOLERANCE
+            )
             for which, rest in ((on_plan[:, i], route[passed:]), (~on_plan[:, i], route)):
                 vias[which, i, : len(rest)] = rest
                 counts[which, i] = len(rest)
