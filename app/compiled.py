@@ -55,7 +55,7 @@ def compile_beside(planner: str) -> None:
             return
         command = [sys.executable, "-P", "-c", _PROGRAM, planner, str(mark)]
         quiet = subprocess.DEVNULL
-        process = subprocess.Popen(command, stdin=quiet, stdout=quiet, stderr=quiet)
+        process = subprocess.Popen(command, stdin=quiet, stdout=quiet, stderr=quiet)  # noqa: S603 - our own words
         atexit.register(process.kill)
         _beside.append(process)
 
