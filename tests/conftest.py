@@ -4,6 +4,7 @@ from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
 
 from .databases import KINDS, Databases
 from .numba_cache import share
@@ -11,6 +12,9 @@ from .numba_cache import share
 PROJECT = Path(__file__).resolve().parents[1]
 
 share()
+# Nothing is said about how fast a machine is.
+settings.register_profile("project", deadline=None)
+settings.load_profile("project")
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

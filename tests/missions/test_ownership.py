@@ -98,7 +98,7 @@ async def test_a_process_that_was_taken_for_dead_writes_nothing_and_lets_go(two:
     await asyncio.to_thread(query, two[0].database.url, "delete from processes")
     with pytest.raises(MissionElsewhereError):
         await live.journal.log(Level.INFO, "note", "never written")
-    await until(lambda: live not in list(one._memory), "it let go of it")
+    await until(lambda: live not in list(one._registry), "it let go of it")
     # It is a new member now, and as nobody else took the mission up, it does so itself.
     await until_state(one, mission.id, MissionState.RUNNING)
     assert "never written" not in [event.message for event in await one.events(mission.id)]

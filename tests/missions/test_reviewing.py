@@ -158,7 +158,7 @@ async def test_missions_that_left_memory_are_listed_as_they_were(harbour: Harbou
     first = await service.missions()
     assert [m.id for m in first] == ids[::-1]
     assert {m.state for m in first} == {"aborted"}
-    assert len(list(service._memory)) <= 9
+    assert len(list(service._registry)) <= 9
     assert await service.missions() == first
 
 

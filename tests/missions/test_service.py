@@ -187,7 +187,7 @@ async def test_an_abort_while_the_last_stops_go_out_is_refused_or_stays(service:
     await rover.post()
     await service.act(mission.id, "start", actor="Ana")
     await until(lambda: rover.poll(), "it was sent somewhere")  # and arrived: the loop ends, the stop waits for a poll
-    await until(lambda: service._memory._live[mission.id].halted, "its stop is on the way")
+    await until(lambda: service._registry._live[mission.id].halted, "its stop is on the way")
     try:
         await service.act(mission.id, "abort", actor="Ana")
     except MoveRefusedError:
@@ -209,7 +209,7 @@ async def test_a_service_that_is_shut_down_while_a_mission_ends_writes_the_end_f
     await rover.post()
     await service.act(mission.id, "start", actor="Ana")
     await until(lambda: rover.poll(), "it was sent somewhere")
-    await until(lambda: service._memory._live[mission.id].halted, "its stop is on the way")
+    await until(lambda: service._registry._live[mission.id].halted, "its stop is on the way")
     await harbour.close()
     async with database.reading() as session:
         row = await session.get(MissionRow, mission.id)
@@ -420,7 +420,7 @@ async def test_a_vehicle_that_comes_back_later_is_told_that_it_takes_no_part(ser
         await service.act(mission.id, "start", actor="Ana")
         await until(lambda: here.poll(), "it was sent somewhere")
         removing = asyncio.create_task(service.remove_vehicle(mission.id, "b"))
-        await until(lambda: service._memory._live[mission.id].team.get("b") is None, "it is out")
+        await until(lambda: service._registry._live[mission.id].team.get("b") is None, "it is out")
         with pytest.raises(VehicleNotFoundError) as caught:
             await here.poll()
         assert "stop" in caught.value.remedy

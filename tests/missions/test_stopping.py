@@ -151,7 +151,7 @@ async def test_a_vehicle_that_did_not_acknowledge_is_told_again_after_the_end(se
     first = await service.act(mission, "abort", actor="Ana")
     assert [stop.acknowledged for stop in first.stops] == [False]
     again = asyncio.create_task(service.abort_vehicle(mission, "a"))
-    await until(service._conductor.acting(mission).locked, "it is told again")
+    await until(service._supervisor.acting(mission).locked, "it is told again")
     with pytest.raises(ConflictError, match="aborted: stop and hold"):
         await rover.poll()
     assert [(stop.acknowledged, stop.detail) for stop in (await again).stops] == [(True, "told at its poll")]

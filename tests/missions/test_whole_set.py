@@ -24,7 +24,7 @@ async def stored(database: Database, mission: str) -> StoredMapRow | None:
 
 
 def arrivals(service: MissionService, mission: str):  # type: ignore[no-untyped-def]
-    return service._memory._live[mission].builder.arrivals
+    return service._registry._live[mission].builder.arrivals
 
 
 async def mapped(service: MissionService, count: int = 80) -> str:
@@ -136,7 +136,7 @@ async def test_soundings_that_another_process_stored_are_found(harbour: Harbour,
     async with database.writing() as session:
         # As if the process had been killed before it stored the map of all 81.
         await session.merge(kept)
-    live = harbour.service._memory._live[mission]
+    live = harbour.service._registry._live[mission]
     live.whole._kept = live.builder.newest
     await harbour.reopen()
     assert (await harbour.service.mission(mission)).progress.soundings == 81
