@@ -112,10 +112,10 @@ def serve(
     from app.exploration import DEFAULT_PLANNER
     from app.storage.prepare import prepare_database
 
+    compile_beside(DEFAULT_PLANNER)
     logs.configure(settings.log_level, settings.log_format)
     # Before the rest is loaded, which takes seconds: most starts that fail do so here.
     asyncio.run(prepare_database(settings.database_url, may_upgrade=settings.migrates_itself))
-    compile_beside(DEFAULT_PLANNER)
     from app.main import Server, serve
 
     def started(server: Server) -> None:
