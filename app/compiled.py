@@ -1,6 +1,7 @@
 """Where compiled functions are kept from one start to the next, and compiling them beside a start that is under way."""
 
 import atexit
+import fcntl
 import hashlib
 import os
 import shutil
@@ -14,7 +15,7 @@ from pathlib import Path
 VARIABLE = "NUMBA_CACHE_DIR"
 PACKAGES = ("exploration", "estimation")
 """What planners are made of."""
-PATIENCE_S = 180.0
+PATIENCE_S = 60.0
 
 _PROGRAM = "import sys; from app.compiled import compile_planner; compile_planner(sys.argv[1], sys.argv[2])"
 _beside: list[subprocess.Popen[bytes]] = []
@@ -68,12 +69,18 @@ def wait_for_compiling() -> None:
 
 
 def compile_planner(planner: str, mark: str) -> None:
-    """Compile what a planner needs for surveys, and make the file ``mark`` when it is done."""
+    """Compile what a planner needs for surveys, and make the file ``mark`` when it is done.
+
+    One process at a time does that, also of several services: the others wait for it.
+    """
     from app.estimation import SingleBeam
     from app.exploration.planners import warm_up_planner
 
-    warm_up_planner(planner, SingleBeam())
-    Path(mark).touch()
+    with Path(f"{mark}.lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if not Path(mark).exists():
+            warm_up_planner(planner, SingleBeam())
+            Path(mark).touch()
 
 
 def _mark(planner: str) -> Path:
