@@ -226,8 +226,10 @@ function RangeInputs({ range, onChange, children }: RangeProps) {
   }, [range.low, range.high]);
   const fault = rangeFault(low.value, high.value);
   const commit = () => {
+    // Judged anew: Enter may come before what was typed last has been drawn.
+    if (rangeFault(low.value, high.value)) return;
     const next = { low: Number(low.value), high: Number(high.value) };
-    if (!fault && (next.low !== range.low || next.high !== range.high)) onChange(next);
+    if (next.low !== range.low || next.high !== range.high) onChange(next);
   };
   const end = (value: Signal<string>, label: string, name: string) => (
     <input
