@@ -109,10 +109,9 @@ def serve(
     )
     from app.api import logs
     from app.compiled import compile_beside
-    from app.exploration import DEFAULT_PLANNER
     from app.storage.prepare import prepare_database
 
-    compile_beside(DEFAULT_PLANNER)
+    compile_beside()
     logs.configure(settings.log_level, settings.log_format)
     # Before the rest is loaded, which takes seconds: most starts that fail do so here.
     asyncio.run(prepare_database(settings.database_url, may_upgrade=settings.migrates_itself))
@@ -365,9 +364,8 @@ def demo(
 ) -> None:
     """Try it without a vehicle: a whole mission with simulated AUVs that speak IMC, from start to map."""
     from app.compiled import compile_beside
-    from app.exploration import DEFAULT_PLANNER
 
-    compile_beside(DEFAULT_PLANNER)
+    compile_beside()
     from app.demo import DemoOptions, run_demo
     from app.demo_service import DemoError
 

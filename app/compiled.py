@@ -9,16 +9,20 @@ import subprocess
 import sys
 import tempfile
 from contextlib import suppress
+from importlib import import_module
 from importlib.metadata import version
 from pathlib import Path
 
 VARIABLE = "NUMBA_CACHE_DIR"
-PACKAGES = ("exploration", "estimation")
-"""What planners are made of."""
+PARTS = {"constraints": "app.exploration.core.constraints", "plans": "app.exploration.survey.value"}
+"""What the first waypoint waits for, in parts of about the same size that share no function, with the modules whose
+``warm_up`` compiles them."""
+PACKAGE = "exploration"
+"""What these are made of."""
 PATIENCE_S = 60.0
 
-_PROGRAM = "import sys; from app.compiled import compile_planner; compile_planner(sys.argv[1], sys.argv[2])"
-_beside: list[subprocess.Popen[bytes]] = []
+_PROGRAM = "import sys; from app.compiled import compile_part; compile_part(sys.argv[1], sys.argv[2])"
+_beside: dict[str, subprocess.Popen[bytes]] = {}
 
 
 def keep_compiled() -> Path | None:
@@ -44,52 +48,49 @@ def keep_compiled() -> Path | None:
     return folder
 
 
-def compile_beside(planner: str) -> None:
-    """Have another process compile what a planner needs, unless it was done by an earlier start of the same code.
+def compile_beside() -> None:
+    """Have other processes compile what the first waypoint waits for, unless an earlier start of this code did.
 
-    Importing the service takes as long as half of the compiling, and one process can do only one of them at a time.
+    Importing the service takes as long as half of the compiling, and a process compiles one function at a time.
     Nothing is lost where it fails: what is missing then is compiled when it is first used.
     """
-    with suppress(OSError, StopIteration):
-        mark = _mark(planner)
-        if mark.exists() or any(process.poll() is None for process in _beside):
-            return
-        command = [sys.executable, "-P", "-c", _PROGRAM, planner, str(mark)]
-        quiet = subprocess.DEVNULL
-        process = subprocess.Popen(command, stdin=quiet, stdout=quiet, stderr=quiet)  # noqa: S603 - our own words
-        atexit.register(process.kill)
-        _beside.append(process)
+    for part in PARTS:
+        with suppress(OSError, StopIteration):
+            mark = _mark(part)
+            if mark.exists() or part in _beside:
+                continue
+            command = [sys.executable, "-P", "-c", _PROGRAM, part, str(mark)]
+            quiet = subprocess.DEVNULL
+            process = subprocess.Popen(command, stdin=quiet, stdout=quiet, stderr=quiet)  # noqa: S603 - our own words
+            atexit.register(process.kill)
+            _beside[part] = process
 
 
 def wait_for_compiling() -> None:
-    """Return when the other process is done: numba's cache has no lock, so only one may compile the same functions."""
-    for process in _beside:
+    """Return when the other processes are done: numba's cache has no lock, so only one may compile a function."""
+    for process in _beside.values():
         with suppress(subprocess.TimeoutExpired):
             process.wait(PATIENCE_S)
 
 
-def compile_planner(planner: str, mark: str) -> None:
-    """Compile what a planner needs for surveys, and make the file ``mark`` when it is done.
+def compile_part(part: str, mark: str) -> None:
+    """Compile one of ``PARTS``, and make the file ``mark`` when it is done.
 
     One process at a time does that, also of several services: the others wait for it.
     """
-    from app.estimation import SingleBeam
-    from app.exploration.planners import warm_up_planner
-
     with Path(f"{mark}.lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         if not Path(mark).exists():
-            warm_up_planner(planner, SingleBeam())
+            import_module(PARTS[part]).warm_up()
             Path(mark).touch()
 
 
-def _mark(planner: str) -> Path:
-    """The file that says that everything was compiled, by the code as it is: raises StopIteration without a folder."""
-    code = hashlib.sha256(f"{sys.version} {version('numba')} {planner}".encode())
-    for package in PACKAGES:
-        for path in sorted(Path(__file__).parent.joinpath(package).rglob("*.py")):
-            stat = path.stat()
-            code.update(f"{path} {stat.st_mtime_ns} {stat.st_size}".encode())
+def _mark(part: str) -> Path:
+    """The file that says that a part was compiled, by the code as it is: raises StopIteration without a folder."""
+    code = hashlib.sha256(f"{sys.version} {version('numba')} {part}".encode())
+    for path in sorted(Path(__file__).parent.joinpath(PACKAGE).rglob("*.py")):
+        stat = path.stat()
+        code.update(f"{path} {stat.st_mtime_ns} {stat.st_size}".encode())
     chosen = os.environ.get(VARIABLE)
     folder = next(folder for folder in ([Path(chosen)] if chosen else _usual()) if _writable(folder))
     return folder / f"bathyfleet-{code.hexdigest()[:16]}.compiled"

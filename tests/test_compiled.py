@@ -7,7 +7,7 @@ import tempfile
 from pathlib import Path
 
 from app import compiled
-from app.compiled import compile_beside, wait_for_compiling
+from app.compiled import PARTS, compile_beside, wait_for_compiling
 from tests.conftest import PROJECT
 from tests.faults.other_users import SERVICE, as_user, needs_root
 
@@ -50,11 +50,11 @@ def test_what_an_earlier_start_compiled_is_not_compiled_again() -> None:
     for mark in folder.glob("bathyfleet-*.compiled"):
         mark.unlink()
     try:
-        compile_beside("random")
-        compile_beside("random")
+        compile_beside()
+        compile_beside()
         wait_for_compiling()
-        compile_beside("random")
-        assert [process.returncode for process in compiled._beside] == [0]
-        assert len(list(folder.glob("bathyfleet-*.compiled"))) == 1
+        compile_beside()
+        assert {name: process.returncode for name, process in compiled._beside.items()} == dict.fromkeys(PARTS, 0)
+        assert len(list(folder.glob("bathyfleet-*.compiled"))) == len(PARTS)
     finally:
         compiled._beside.clear()

@@ -7,14 +7,16 @@ each other) may stay broken only while the move lessens the excess; every other 
 
 from dataclasses import dataclass
 from enum import IntEnum
+from typing import NamedTuple
 
 import numpy as np
+import shapely
 from numba import njit
-from numpy.typing import NDArray
+from shapely import Polygon
 
-from app.arrays import BoolArray, FloatArray
+from app.arrays import BoolArray, FloatArray, IntArray
 from app.exploration.core.bottom import Bottom
-from app.exploration.core.geometry import convex, enters, inside, leaves, signed_distance
+from app.exploration.core.geometry import convex, enters, leaves, signed_distance
 
 TOLERANCE_M = 1e-6
 LEG_CHECKS = 4
@@ -33,6 +35,10 @@ class Limit(IntEnum):
     ALTITUDE = 7
     COM_RANGE = 8
     SEPARATION = 9
+
+
+# Compiled functions index with plain numbers.
+AREA, AREA_LEG, KEEP_OUT, KEEP_OUT_LEG, STEP, MIN_DEPTH, MAX_DEPTH, ALTITUDE, COM_RANGE, SEPARATION = map(int, Limit)
 
 
 @dataclass(frozen=True)
@@ -109,28 +115,23 @@ class Constraints:
             Metres; 0 where the limit is kept, inf for a leg across a forbidden zone.
         """
         vertices, starts = _flatten(self.keep_out)
-        limits = np.array(
-            [
-                self.max_step_m,
-                self.min_depth_m,
-                self.max_depth_m,
-                self.min_altitude_m,
-                self.com_range_m,
-                self.min_separation_m,
-                self.min_vertical_separation_m,
-            ],
-            dtype=np.float64,
+        area = np.ascontiguousarray(self.area, dtype=np.float64)
+        region = _Region(area, convex(area), vertices, starts)
+        floor = _Floor(float(bottom.west_m), float(bottom.south_m), float(bottom.cell_m), bottom.depth_m)
+        limits = _Limits(
+            float(self.max_step_m),
+            float(self.min_depth_m),
+            float(self.max_depth_m),
+            float(self.min_altitude_m),
+            float(self.com_range_m),
+            float(self.min_separation_m),
+            float(self.min_vertical_separation_m),
         )
-        return _excess(
-            np.ascontiguousarray(origin, dtype=np.float64),
-            np.ascontiguousarray(candidates, dtype=np.float64),
-            np.ascontiguousarray(self.area, dtype=np.float64),
-            vertices,
-            starts,
-            limits,
-            np.array([bottom.west_m, bottom.south_m, bottom.cell_m]),
-            bottom.depth_m,
-        )
+        ends = np.ascontiguousarray(candidates, dtype=np.float64)
+        excess = np.zeros((*ends.shape[:2], len(Limit)))
+        outside_now = np.empty((len(origin), len(starts)))
+        _excess(np.ascontiguousarray(origin, dtype=np.float64), ends, region, floor, limits, outside_now, excess)
+        return excess
 
     def feasible(self, origin: FloatArray, candidates: FloatArray, bottom: Bottom | None = None) -> BoolArray:
         """Return which candidates obey every limit, (n_candidates,); shapes of the arguments as in :meth:`excess`."""
@@ -206,7 +207,7 @@ class Constraints:
         return Violation(vehicle, limit, value, allowed, what.format(v=value, a=allowed))
 
 
-def _flatten(polygons: tuple[FloatArray, ...]) -> tuple[FloatArray, NDArray[np.int64]]:
+def _flatten(polygons: tuple[FloatArray, ...]) -> tuple[FloatArray, IntArray]:
     """Return all vertices in one array and where each polygon starts (one more entry than polygons)."""
     starts = np.zeros(len(polygons) + 1, dtype=np.int64)
     if not polygons:
@@ -215,41 +216,83 @@ def _flatten(polygons: tuple[FloatArray, ...]) -> tuple[FloatArray, NDArray[np.i
     return np.ascontiguousarray(np.vstack(polygons), dtype=np.float64), starts
 
 
+class _Region(NamedTuple):
+    """Where vehicles may be: the area, and the vertices of all zones with where each begins (one entry more)."""
+
+    area: FloatArray
+    area_is_convex: bool
+    keep_out: FloatArray
+    starts: IntArray
+
+
+class _Floor(NamedTuple):
+    west: float
+    south: float
+    cell: float
+    depth: FloatArray
+
+
+class _Limits(NamedTuple):
+    step: float
+    min_depth: float
+    max_depth: float
+    altitude: float
+    com_range: float
+    separation: float
+    vertical_separation: float
+
+
 @njit(cache=True, nogil=True)
-def _clearance_excess(
-    ax: float,
-    ay: float,
-    az: float,
-    bx: float,
-    by: float,
-    bz: float,
-    min_altitude: float,
-    frame: FloatArray,
-    depth: FloatArray,
-) -> float:
-    worst = 0.0
+def _region_excess(a: FloatArray, b: FloatArray, region: _Region, outside_now: FloatArray, excess: FloatArray) -> None:
+    """Write what the leg a -> b breaks of area and zones; ``outside_now`` is how far ``a`` is outside each."""
+    outside = signed_distance(region.area, b[0], b[1])
+    if outside > 0.0:
+        excess[AREA] = outside
+    may_leave = outside_now[0] <= TOLERANCE_M and outside <= TOLERANCE_M and not region.area_is_convex
+    if may_leave and leaves(region.area, a[0], a[1], b[0], b[1], TOLERANCE_M):
+        excess[AREA_LEG] = np.inf
+    for z in range(len(region.starts) - 1):
+        zone = region.keep_out[region.starts[z] : region.starts[z + 1]]
+        within = -signed_distance(zone, b[0], b[1])
+        if within > excess[KEEP_OUT]:
+            excess[KEEP_OUT] = within
+        if outside_now[z + 1] >= -TOLERANCE_M and enters(zone, a[0], a[1], b[0], b[1], TOLERANCE_M):
+            excess[KEEP_OUT_LEG] = np.inf
+
+
+@njit(cache=True, nogil=True)
+def _clearance(a: FloatArray, b: FloatArray, floor: _Floor) -> float:
+    """Return the least height of the leg a -> b above the floor, inf where that is unknown."""
+    least = np.inf
     for k in range(1, LEG_CHECKS + 1):
         t = k / LEG_CHECKS
-        col = int(np.floor((ax + t * (bx - ax) - frame[0]) / frame[2]))
-        row = int(np.floor((ay + t * (by - ay) - frame[1]) / frame[2]))
-        if 0 <= row < depth.shape[0] and 0 <= col < depth.shape[1]:
-            floor = depth[row, col]
-            if not np.isnan(floor):
-                worst = max(worst, min_altitude - (floor - az - t * (bz - az)))
-    return worst
+        col = int(np.floor((a[0] + t * (b[0] - a[0]) - floor.west) / floor.cell))
+        row = int(np.floor((a[1] + t * (b[1] - a[1]) - floor.south) / floor.cell))
+        if 0 <= row < floor.depth.shape[0] and 0 <= col < floor.depth.shape[1]:
+            height = floor.depth[row, col] - a[2] - t * (b[2] - a[2])
+            if height < least:  # never where the depth is NaN
+                least = height
+    return least
 
 
 @njit(cache=True, nogil=True)
-def _closest_approach(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> float:
-    """Least horizontal distance of two vehicles that go a -> b and c -> d in the same time."""
+def _approach(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray, limits: _Limits) -> float:
+    """Return how close vehicles that go a -> b and c -> d in the same time come, horizontally; inf above each other."""
+    gap_now = a[2] - c[2]
+    gap = b[2] - d[2]
+    apart = abs(gap) >= limits.vertical_separation
+    if apart and abs(gap_now) >= limits.vertical_separation and gap * gap_now > 0.0:
+        return np.inf
     rx = a[0] - c[0]
     ry = a[1] - c[1]
     vx = (b[0] - a[0]) - (d[0] - c[0])
     vy = (b[1] - a[1]) - (d[1] - c[1])
-    v2 = vx * vx + vy * vy
-    t = 0.0
-    if v2 > 0.0:
-        t = min(1.0, max(0.0, -(rx * vx + ry * vy) / v2))
+    t = 1.0
+    if np.hypot(rx, ry) >= limits.separation:
+        v2 = vx * vx + vy * vy
+        t = min(1.0, max(0.0, -(rx * vx + ry * vy) / v2)) if v2 > 0.0 else 0.0
+    elif apart:  # already too close: what counts is where they end
+        return np.inf
     return float(np.hypot(rx + t * vx, ry + t * vy))
 
 
@@ -257,83 +300,56 @@ def _closest_approach(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray
 def _excess(
     origin: FloatArray,
     candidates: FloatArray,
-    area: FloatArray,
-    keep_out: FloatArray,
-    starts: NDArray[np.int64],
-    limits: FloatArray,
-    frame: FloatArray,
-    depth: FloatArray,
-) -> FloatArray:
-    n_candidates, n, _ = candidates.shape
-    out = np.zeros((n_candidates, n, 10))
-    area_now = np.empty(n)
-    round_area = convex(area)
-    outside_now = np.empty((n, len(starts) - 1))
+    region: _Region,
+    floor: _Floor,
+    limits: _Limits,
+    outside_now: FloatArray,
+    excess: FloatArray,
+) -> None:
+    """Write the excess of every candidate into ``excess``, zeros before; ``outside_now`` is scratch space."""
+    n = len(origin)
     for i in range(n):
-        area_now[i] = signed_distance(area, origin[i, 0], origin[i, 1])
-        for z in range(len(starts) - 1):
-            zone = keep_out[starts[z] : starts[z + 1]]
-            outside_now[i, z] = signed_distance(zone, origin[i, 0], origin[i, 1])
-    for c in range(n_candidates):
+        a = origin[i]
+        outside_now[i, 0] = signed_distance(region.area, a[0], a[1])
+        for z in range(len(region.starts) - 1):
+            zone = region.keep_out[region.starts[z] : region.starts[z + 1]]
+            outside_now[i, z + 1] = signed_distance(zone, a[0], a[1])
+    for candidate in range(len(candidates)):
+        ends = candidates[candidate]
         for i in range(n):
-            ax, ay, az = origin[i, 0], origin[i, 1], origin[i, 2]
-            bx, by, bz = candidates[c, i, 0], candidates[c, i, 1], candidates[c, i, 2]
-            outside = signed_distance(area, bx, by)
-            out[c, i, 0] = max(0.0, outside)
-            within = area_now[i] <= 1e-6 and outside <= 1e-6
-            if within and not round_area and leaves(area, ax, ay, bx, by, 1e-6):
-                out[c, i, 1] = np.inf
-            for z in range(len(starts) - 1):
-                zone = keep_out[starts[z] : starts[z + 1]]
-                out[c, i, 2] = max(out[c, i, 2], -signed_distance(zone, bx, by))
-                if outside_now[i, z] >= -1e-6 and enters(zone, ax, ay, bx, by, 1e-6):
-                    out[c, i, 3] = np.inf
-            out[c, i, 2] = max(0.0, out[c, i, 2])
-            step = np.sqrt((bx - ax) ** 2 + (by - ay) ** 2 + (bz - az) ** 2)
-            out[c, i, 4] = max(0.0, step - limits[0])
-            out[c, i, 5] = max(0.0, limits[1] - bz)
-            out[c, i, 6] = max(0.0, bz - limits[2])
-            out[c, i, 7] = _clearance_excess(ax, ay, az, bx, by, bz, limits[3], frame, depth)
-            if n > 1:
-                nearest = np.inf
-                for k in range(n):
-                    if k == i:
-                        continue
-                    other = candidates[c, k]
-                    d3 = np.sqrt((bx - other[0]) ** 2 + (by - other[1]) ** 2 + (bz - other[2]) ** 2)
-                    nearest = min(nearest, d3)
-                    if limits[5] <= 0.0:
-                        continue
-                    gap_now = az - origin[k, 2]
-                    gap = bz - other[2]
-                    if abs(gap) >= limits[6] and abs(gap_now) >= limits[6] and gap * gap_now > 0.0:
-                        continue
-                    here = np.hypot(ax - origin[k, 0], ay - origin[k, 1])
-                    if here < limits[5]:  # already too close: what counts is where they end
-                        approach = np.hypot(bx - other[0], by - other[1])
-                        if abs(gap) >= limits[6]:
-                            continue
-                    else:
-                        approach = _closest_approach(origin[i], candidates[c, i], origin[k], other)
-                    out[c, i, 9] = max(out[c, i, 9], limits[5] - approach)
-                if nearest > limits[4]:
-                    out[c, i, 8] = nearest - limits[4]
-    return out
+            a, b, row = origin[i], ends[i], excess[candidate, i]
+            _region_excess(a, b, region, outside_now[i], row)
+            step = np.sqrt((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2 + (b[2] - a[2]) ** 2)
+            row[STEP] = max(0.0, step - limits.step)
+            row[MIN_DEPTH] = max(0.0, limits.min_depth - b[2])
+            row[MAX_DEPTH] = max(0.0, b[2] - limits.max_depth)
+            row[ALTITUDE] = max(0.0, limits.altitude - _clearance(a, b, floor))
+            nearest = np.inf
+            for k in range(n):
+                if k == i:
+                    continue
+                other = ends[k]
+                nearest = min(
+                    nearest, np.sqrt((b[0] - other[0]) ** 2 + (b[1] - other[1]) ** 2 + (b[2] - other[2]) ** 2)
+                )
+                if limits.separation > 0.0:
+                    row[SEPARATION] = max(
+                        row[SEPARATION], limits.separation - _approach(a, b, origin[k], other, limits)
+                    )
+            if n > 1 and nearest > limits.com_range:
+                row[COM_RANGE] = nearest - limits.com_range
 
 
 def inside_area(constraints: Constraints, en_m: FloatArray) -> BoolArray:
     """Return which positions (n, 2) lie in the area and in no keep-out zone."""
-    zones = tuple(np.ascontiguousarray(z, dtype=np.float64) for z in constraints.keep_out)
-    return _inside_area(np.ascontiguousarray(en_m), np.ascontiguousarray(constraints.area), *_flatten(zones))
+    east, north = np.asarray(en_m, dtype=np.float64).T
+    inside: BoolArray = shapely.contains_xy(Polygon(constraints.area), east, north)
+    for zone in constraints.keep_out:
+        inside &= ~shapely.contains_xy(Polygon(zone), east, north)
+    return inside
 
 
-@njit(cache=True, nogil=True)
-def _inside_area(points: FloatArray, area: FloatArray, keep_out: FloatArray, starts: NDArray[np.int64]) -> BoolArray:
-    result = np.zeros(len(points), dtype=np.bool_)
-    for i in range(len(points)):
-        x, y = points[i, 0], points[i, 1]
-        free = inside(area, x, y)
-        for z in range(len(starts) - 1):
-            free = free and not inside(keep_out[starts[z] : starts[z + 1]], x, y)
-        result[i] = free
-    return result
+def warm_up() -> None:
+    """Compile what checks candidates, or load it from the cache of an earlier start."""
+    square = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+    Constraints(square).excess(np.zeros((2, 3)), np.zeros((1, 2, 3)), Bottom.unknown())

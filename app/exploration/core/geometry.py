@@ -55,15 +55,11 @@ def signed_distance(polygon: FloatArray, x: float, y: float) -> float:
     return -d if inside(polygon, x, y) else d
 
 
-@njit(cache=True, nogil=True)
 def convex(polygon: FloatArray) -> bool:
-    """Whether no vertex of the (simple, counter-clockwise) polygon points inwards."""
-    n = polygon.shape[0]
-    for i in range(n):
-        a, b, c = polygon[i], polygon[(i + 1) % n], polygon[(i + 2) % n]
-        if (b[0] - a[0]) * (c[1] - b[1]) - (b[1] - a[1]) * (c[0] - b[0]) < -1e-9:
-            return False
-    return True
+    """Whether no vertex of the (simple, counter-clockwise) polygon points inwards; not compiled."""
+    edges = np.roll(polygon, -1, axis=0) - polygon
+    following = np.roll(edges, -1, axis=0)
+    return bool((edges[:, 0] * following[:, 1] - following[:, 0] * edges[:, 1] >= -1e-9).all())
 
 
 @njit(cache=True, nogil=True)

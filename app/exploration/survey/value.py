@@ -272,3 +272,11 @@ def values_after_first_leg(
         later = plan_value(after, nodes, rest, targets[i], courses, vias[i], counts[i])
         out[i, 1] = later * (1.0 + objective.turn_penalty * turns)
     return out
+
+
+def warm_up() -> None:
+    """Compile what values plans, or load it from the cache of an earlier start."""
+    one, two = np.zeros(1), np.zeros((1, 1, 2))
+    nodes, objective = make_nodes(two[0], one), Objective(1.0, 1, 1.0, 2.0, 0.0, 1.0)
+    counts = np.zeros((1, 1), dtype=np.int64)
+    values_after_first_leg(one, nodes, objective, two[0], one, two, two[None], counts)
