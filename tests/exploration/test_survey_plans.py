@@ -14,7 +14,7 @@ from app.exploration.core.routes import CORNER_TOLERANCE, fly, next_waypoint
 from app.exploration.planner.options import PlannerOptions
 from app.exploration.planners import create_planner
 from app.exploration.survey.error import MOST_DOUBTS, SECOND_LOOK, with_second_looks
-from app.exploration.survey.local_search import DRAWS, improve
+from app.exploration.survey.local_search import DRAWS, Plan, Search, improve
 from app.exploration.survey.value import Objective, lower_to_segment, make_nodes, plan_value
 from simulator.seafloors import generate
 
@@ -106,9 +106,9 @@ def test_searching_never_worsens_a_plan_and_says_truly_what_it_is_worth():
     counts, locked = np.array([2, 2]), np.array([1, 0])
     before = plan_value(d2, nodes, objective, starts, headings, vias, counts)
     draws = np.random.default_rng(0).random((1500, DRAWS))
-    none = np.zeros((0, 2)), np.zeros(1, np.int64)
+    search = Search(5.0, Constraints(SQUARE).region, 0.5, 0.01)
     after, after_counts, value = improve(
-        d2, nodes, objective, starts, headings, vias, counts, locked, 5.0, SQUARE, *none, True, 0.5, 0.01, draws
+        d2, nodes, objective, starts, headings, Plan(vias, counts, locked), search, draws
     )
     assert value < 0.9 * before
     assert value == pytest.approx(plan_value(d2, nodes, objective, starts, headings, after, after_counts))

@@ -41,6 +41,27 @@ class Limit(IntEnum):
 AREA, AREA_LEG, KEEP_OUT, KEEP_OUT_LEG, STEP, MIN_DEPTH, MAX_DEPTH, ALTITUDE, COM_RANGE, SEPARATION = map(int, Limit)
 
 
+class Region(NamedTuple):
+    """Where vehicles may be, for compiled functions.
+
+    Attributes
+    ----------
+    area : (n_vertices, 2)
+        As in :class:`Constraints`.
+    area_is_convex : bool
+        Then no leg between two places inside leaves it.
+    keep_out : (n_vertices, 2)
+        The vertices of all zones.
+    starts : (n_zones + 1,)
+        Where each zone begins in them.
+    """
+
+    area: FloatArray
+    area_is_convex: bool
+    keep_out: FloatArray
+    starts: IntArray
+
+
 @dataclass(frozen=True)
 class Violation:
     """One broken limit of one vehicle; ``value_m`` is what was proposed, ``limit_m`` what is allowed."""
@@ -97,6 +118,15 @@ class Constraints:
         """Height above the sea floor below which vehicles never are."""
         return self.min_altitude_m if self.held_altitude_m is None else self.held_altitude_m
 
+    @property
+    def region(self) -> Region:
+        """Where vehicles may be."""
+        area = np.ascontiguousarray(self.area, dtype=np.float64)
+        starts = np.zeros(len(self.keep_out) + 1, dtype=np.int64)
+        starts[1:] = np.cumsum([len(zone) for zone in self.keep_out])
+        vertices = np.vstack(self.keep_out) if self.keep_out else np.zeros((0, 2))
+        return Region(area, convex(area), np.ascontiguousarray(vertices, dtype=np.float64), starts)
+
     def excess(self, origin: FloatArray, candidates: FloatArray, bottom: Bottom) -> FloatArray:
         """Return by how much each limit would be broken.
 
@@ -114,9 +144,7 @@ class Constraints:
         (n_candidates, n_vehicles, len(Limit))
             Metres; 0 where the limit is kept, inf for a leg across a forbidden zone.
         """
-        vertices, starts = _flatten(self.keep_out)
-        area = np.ascontiguousarray(self.area, dtype=np.float64)
-        region = _Region(area, convex(area), vertices, starts)
+        region = self.region
         floor = _Floor(float(bottom.west_m), float(bottom.south_m), float(bottom.cell_m), bottom.depth_m)
         limits = _Limits(
             float(self.max_step_m),
@@ -129,7 +157,7 @@ class Constraints:
         )
         ends = np.ascontiguousarray(candidates, dtype=np.float64)
         excess = np.zeros((*ends.shape[:2], len(Limit)))
-        outside_now = np.empty((len(origin), len(starts)))
+        outside_now = np.empty((len(origin), len(region.starts)))
         _excess(np.ascontiguousarray(origin, dtype=np.float64), ends, region, floor, limits, outside_now, excess)
         return excess
 
@@ -207,24 +235,6 @@ class Constraints:
         return Violation(vehicle, limit, value, allowed, what.format(v=value, a=allowed))
 
 
-def _flatten(polygons: tuple[FloatArray, ...]) -> tuple[FloatArray, IntArray]:
-    """Return all vertices in one array and where each polygon starts (one more entry than polygons)."""
-    starts = np.zeros(len(polygons) + 1, dtype=np.int64)
-    if not polygons:
-        return np.zeros((0, 2)), starts
-    starts[1:] = np.cumsum([len(p) for p in polygons])
-    return np.ascontiguousarray(np.vstack(polygons), dtype=np.float64), starts
-
-
-class _Region(NamedTuple):
-    """Where vehicles may be: the area, and the vertices of all zones with where each begins (one entry more)."""
-
-    area: FloatArray
-    area_is_convex: bool
-    keep_out: FloatArray
-    starts: IntArray
-
-
 class _Floor(NamedTuple):
     west: float
     south: float
@@ -243,7 +253,7 @@ class _Limits(NamedTuple):
 
 
 @njit(cache=True, nogil=True)
-def _region_excess(a: FloatArray, b: FloatArray, region: _Region, outside_now: FloatArray, excess: FloatArray) -> None:
+def _region_excess(a: FloatArray, b: FloatArray, region: Region, outside_now: FloatArray, excess: FloatArray) -> None:
     """Write what the leg a -> b breaks of area and zones; ``outside_now`` is how far ``a`` is outside each."""
     outside = signed_distance(region.area, b[0], b[1])
     if outside > 0.0:
@@ -300,7 +310,7 @@ def _approach(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray, limits
 def _excess(
     origin: FloatArray,
     candidates: FloatArray,
-    region: _Region,
+    region: Region,
     floor: _Floor,
     limits: _Limits,
     outside_now: FloatArray,

@@ -1,50 +1,110 @@
 """Improves a survey plan (via points per vehicle) by many small random changes, compiled."""
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
 
-from app.arrays import FloatArray, IntArray
+from app.arrays import BoolArray, FloatArray, IntArray
+from app.exploration.core.constraints import Region
 from app.exploration.core.geometry import enters, leaves, signed_distance
 from app.exploration.survey.value import Nodes, Objective, expected_error, lower_to_route
 
 DRAWS = 6
 """Random numbers that one change uses."""
 
+REPLACE = 0.3
+INSERT = 0.5
+TAKE_OUT = 0.55
+SHIFT = 0.75
+REVERSE = 0.85
+RELOCATE = 0.95
+"""Shares of the changes, added up: between 0.3 and 0.5 a via point is taken out and another one inserted. The rest
+leaves out a section."""
+
+
+class Plan(NamedTuple):
+    """Via points of every vehicle.
+
+    Attributes
+    ----------
+    vias : (n_vehicles, k, 2)
+        With room for more.
+    counts : (n_vehicles,)
+        How many of them count.
+    locked : (n_vehicles,)
+        How many of these stay as they are.
+    """
+
+    vias: FloatArray
+    counts: IntArray
+    locked: IntArray
+
+
+class Search(NamedTuple):
+    """How plans are changed.
+
+    Attributes
+    ----------
+    spread_m : float
+        Typical size of a shift of a via point.
+    region : Region
+        Where via points and legs may lie.
+    margin_m : float
+        How far inside its border via points lie.
+    heat : float
+        Part by which a change may worsen the plan at first.
+    """
+
+    spread_m: float
+    region: Region
+    margin_m: float
+    heat: float
+
 
 @njit(cache=True, nogil=True)
-def _insert(vias: FloatArray, count: int, at: int, x: float, y: float) -> None:
-    for k in range(count, at, -1):
+def _insert(plan: Plan, starts: FloatArray, x: float, y: float, luck: float, changed: BoolArray) -> None:
+    """Insert a via point where it lengthens a route least."""
+    v, at = _cheapest(plan, starts, x, y, luck)
+    if v < 0:
+        return
+    vias = plan.vias[v]
+    for k in range(plan.counts[v], at, -1):
         vias[k, 0] = vias[k - 1, 0]
         vias[k, 1] = vias[k - 1, 1]
     vias[at, 0] = x
     vias[at, 1] = y
+    plan.counts[v] += 1
+    changed[v] = True
 
 
 @njit(cache=True, nogil=True)
-def _remove(vias: FloatArray, count: int, at: int) -> None:
-    for k in range(at, count - 1):
+def _remove(plan: Plan, j: int, at: int, changed: BoolArray) -> None:
+    vias = plan.vias[j]
+    for k in range(at, plan.counts[j] - 1):
         vias[k, 0] = vias[k + 1, 0]
         vias[k, 1] = vias[k + 1, 1]
+    plan.counts[j] -= 1
+    changed[j] = True
 
 
 @njit(cache=True, nogil=True)
-def _cheapest(
-    starts: FloatArray, vias: FloatArray, counts: IntArray, locked: IntArray, x: float, y: float, luck: float
-) -> tuple[int, int]:
+def _cheapest(plan: Plan, starts: FloatArray, x: float, y: float, luck: float) -> tuple[int, int]:
     """Return the vehicle and place where a via point lengthens a route least; ``luck`` in [0, 1) blurs the choice."""
+    vias = plan.vias
     best = np.inf
     vehicle = -1
     place = 0
     for j in range(len(starts)):
-        if counts[j] >= vias.shape[1]:
+        if plan.counts[j] >= vias.shape[1]:
             continue
-        for k in range(locked[j], counts[j] + 1):
+        for k in range(plan.locked[j], plan.counts[j] + 1):
             if k == 0:
                 ax, ay = starts[j, 0], starts[j, 1]
             else:
                 ax, ay = vias[j, k - 1, 0], vias[j, k - 1, 1]
             extra = np.hypot(x - ax, y - ay)
-            if k < counts[j]:
+            if k < plan.counts[j]:
                 bx, by = vias[j, k, 0], vias[j, k, 1]
                 extra += np.hypot(bx - x, by - y) - np.hypot(bx - ax, by - ay)
             # A reproducible blur per place lets second-best insertions have their turn.
@@ -57,26 +117,68 @@ def _cheapest(
 
 
 @njit(cache=True, nogil=True)
-def _free(
-    start: FloatArray,
-    route: FloatArray,
-    count: int,
-    area: FloatArray,
-    keep_out: FloatArray,
-    zones: IntArray,
-    convex: bool,
-    margin: float,
-) -> bool:
+def _reverse(vias: FloatArray, a: int, b: int) -> None:
+    """Reverse the section between two via points."""
+    if a > b:
+        a, b = b, a
+    while a < b:
+        for q in range(2):
+            vias[a, q], vias[b, q] = vias[b, q], vias[a, q]
+        a += 1
+        b -= 1
+
+
+@njit(cache=True, nogil=True)
+def _change(
+    plan: Plan, starts: FloatArray, nodes: Nodes, running: FloatArray, spread: float, r: FloatArray, changed: BoolArray
+) -> None:
+    """Change a plan as the random numbers ``r`` (DRAWS,) say; ``running`` is what :func:`_left` returned."""
+    kind = r[0]
+    j = int(r[1] * len(starts))
+    vias, locked = plan.vias[j], plan.locked[j]
+    movable = plan.counts[j] - locked
+    if REPLACE <= kind < TAKE_OUT and movable > 0:
+        _remove(plan, j, locked + int(r[2] * movable), changed)
+    if kind < INSERT:  # where much uncertainty is left
+        i = min(np.searchsorted(running, r[3] * running[-1]), len(running) - 1)
+        x = nodes.x[i] + (r[4] - 0.5) * spread
+        y = nodes.y[i] + (r[5] - 0.5) * spread
+        _insert(plan, starts, x, y, r[2], changed)
+    elif kind < TAKE_OUT:
+        pass
+    elif kind < SHIFT and movable > 0:
+        k = locked + int(r[2] * movable)
+        vias[k, 0] += (r[3] + r[4] - 1.0) * 2.0 * spread
+        vias[k, 1] += (r[5] + r[4] - 1.0) * 2.0 * spread
+        changed[j] = True
+    elif kind < REVERSE and movable > 1:
+        _reverse(vias, locked + int(r[2] * movable), locked + int(r[3] * movable))
+        changed[j] = True
+    elif kind < RELOCATE and movable > 0:  # to another place in the order, or to another vehicle
+        k = locked + int(r[2] * movable)
+        x, y = vias[k, 0], vias[k, 1]
+        _remove(plan, j, k, changed)
+        _insert(plan, starts, x, y, r[3], changed)
+    elif movable > 1:  # leave out a section
+        k = locked + int(r[2] * movable)
+        for _ in range(1 + int(r[3] * 4)):
+            if k < plan.counts[j]:
+                _remove(plan, j, k, changed)
+        changed[j] = True
+
+
+@njit(cache=True, nogil=True)
+def _free(start: FloatArray, route: FloatArray, count: int, region: Region, margin: float) -> bool:
     """Whether all via points keep ``margin`` from the border and no leg leaves the area or enters a zone."""
     ax, ay = start[0], start[1]
     for k in range(count):
         bx, by = route[k, 0], route[k, 1]
-        if signed_distance(area, bx, by) > -margin:
+        if signed_distance(region.area, bx, by) > -margin:
             return False
-        if not convex and leaves(area, ax, ay, bx, by, 1e-6):
+        if not region.area_is_convex and leaves(region.area, ax, ay, bx, by, 1e-6):
             return False
-        for z in range(len(zones) - 1):
-            if enters(keep_out[zones[z] : zones[z + 1]], ax, ay, bx, by, 1e-6):
+        for z in range(len(region.starts) - 1):
+            if enters(region.keep_out[region.starts[z] : region.starts[z + 1]], ax, ay, bx, by, 1e-6):
                 return False
         ax, ay = bx, by
     return True
@@ -107,31 +209,19 @@ def improve(
     objective: Objective,
     starts: FloatArray,
     headings: FloatArray,
-    vias: FloatArray,
-    counts: IntArray,
-    locked: IntArray,
-    spread_m: float,
-    area: FloatArray,
-    keep_out: FloatArray,
-    zones: IntArray,
-    convex: bool,
-    margin: float,
-    heat: float,
+    begin: Plan,
+    search: Search,
     draws: FloatArray,
 ) -> tuple[FloatArray, IntArray, float]:
     """Change the plan at random, keeping changes that lower :func:`~app.exploration.survey.value.plan_value`.
 
     At first changes that worsen it by up to the part ``heat`` are kept too, so that the plan gets out of dead ends;
-    what is tolerated falls to nothing. The best plan met is returned.
+    what is tolerated falls to nothing. The best plan met is returned. The first five arguments are as there.
 
     Parameters
     ----------
-    vias : (n_vehicles, k, 2)
-        The plan to start from; the first ``locked[j]`` via points of a vehicle stay as they are.
-    spread_m : float
-        Typical size of a shift of a via point.
-    area, keep_out, zones, convex, margin
-        Where via points and legs may lie.
+    begin
+        The plan to start from.
     draws : (iterations, DRAWS)
         Uniform random numbers in [0, 1), one row per change.
 
@@ -143,117 +233,52 @@ def improve(
     n, m = len(starts), len(d2)
     scale, power, weight = objective.scale_m, objective.power, nodes.weight
     vertices = np.empty((objective.steps + 2, 2))
-    current, current_counts = vias.copy(), counts.copy()
+    current, current_counts = begin.vias.copy(), begin.counts.copy()
+    plan = Plan(begin.vias.copy(), begin.counts.copy(), begin.locked)
     after = np.full((n, m), np.inf)
     turns = np.zeros(n)
-    for j in range(n):
-        turns[j] = lower_to_route(
-            after[j], nodes, objective, starts[j, 0], starts[j, 1], headings[j], current[j], counts[j], vertices
+    for v in range(n):
+        turns[v] = lower_to_route(
+            after[v], nodes, objective, starts[v], headings[v], plan.vias[v], plan.counts[v], vertices
         )
     running = _left(d2, after, weight, scale, power)
     value = running[-1] * (1.0 + objective.turn_penalty * turns.sum())
     best, best_counts, best_value = current.copy(), current_counts.copy(), value
-    plan, plan_counts = current.copy(), current_counts.copy()
     trial, trial_turns = after.copy(), turns.copy()
     changed = np.zeros(n, np.bool_)
     for it in range(len(draws)):
-        r = draws[it]
         changed[:] = False
-        j = int(r[1] * n)
-        movable = plan_counts[j] - locked[j]
-        kind = r[0]
-        if kind < 0.55 and kind >= 0.3 and movable > 0:  # take one out, to make room for another
-            k = locked[j] + int(r[2] * movable)
-            _remove(plan[j], plan_counts[j], k)
-            plan_counts[j] -= 1
-            changed[j] = True
-        if kind < 0.5:  # insert where much uncertainty is left
-            i = np.searchsorted(running, r[3] * running[-1])
-            i = min(i, m - 1)
-            x = nodes.x[i] + (r[4] - 0.5) * spread_m
-            y = nodes.y[i] + (r[5] - 0.5) * spread_m
-            v, k = _cheapest(starts, plan, plan_counts, locked, x, y, r[2])
-            if v >= 0:
-                _insert(plan[v], plan_counts[v], k, x, y)
-                plan_counts[v] += 1
-                changed[v] = True
-        elif kind < 0.55:
-            pass
-        elif kind < 0.75 and movable > 0:  # shift one
-            k = locked[j] + int(r[2] * movable)
-            plan[j, k, 0] += (r[3] + r[4] - 1.0) * 2.0 * spread_m
-            plan[j, k, 1] += (r[5] + r[4] - 1.0) * 2.0 * spread_m
-            changed[j] = True
-        elif kind < 0.85 and movable > 1:  # reverse a section
-            a = locked[j] + int(r[2] * movable)
-            b = locked[j] + int(r[3] * movable)
-            if a > b:
-                a, b = b, a
-            while a < b:
-                for q in range(2):
-                    plan[j, a, q], plan[j, b, q] = plan[j, b, q], plan[j, a, q]
-                a += 1
-                b -= 1
-            changed[j] = True
-        elif kind < 0.95 and movable > 0:  # move a via point to another place in the order, or to another vehicle
-            k = locked[j] + int(r[2] * movable)
-            x, y = plan[j, k, 0], plan[j, k, 1]
-            _remove(plan[j], plan_counts[j], k)
-            plan_counts[j] -= 1
-            changed[j] = True
-            v, k = _cheapest(starts, plan, plan_counts, locked, x, y, r[3])
-            if v >= 0:
-                _insert(plan[v], plan_counts[v], k, x, y)
-                plan_counts[v] += 1
-                changed[v] = True
-        elif movable > 1:  # leave out a section
-            k = locked[j] + int(r[2] * movable)
-            for _ in range(1 + int(r[3] * 4)):
-                if k < plan_counts[j]:
-                    _remove(plan[j], plan_counts[j], k)
-                    plan_counts[j] -= 1
-            changed[j] = True
+        _change(plan, starts, nodes, running, search.spread_m, draws[it], changed)
         keep = bool(changed.any())
         for v in range(n):
-            if changed[v] and not _free(starts[v], plan[v], plan_counts[v], area, keep_out, zones, convex, margin):
+            if changed[v] and not _free(starts[v], plan.vias[v], plan.counts[v], search.region, search.margin_m):
                 keep = False
         if keep:
-            total_turns = 0.0
             for v in range(n):
                 if changed[v]:
                     trial[v, :] = np.inf
                     trial_turns[v] = lower_to_route(
-                        trial[v],
-                        nodes,
-                        objective,
-                        starts[v, 0],
-                        starts[v, 1],
-                        headings[v],
-                        plan[v],
-                        plan_counts[v],
-                        vertices,
+                        trial[v], nodes, objective, starts[v], headings[v], plan.vias[v], plan.counts[v], vertices
                     )
-                total_turns += trial_turns[v]
             left = _left(d2, trial, weight, scale, power)
-            new = left[-1] * (1.0 + objective.turn_penalty * total_turns)
-            keep = new < value * (1.0 + heat * (1.0 - (it + 1.0) / len(draws)) ** 2) - 1e-12
+            new = left[-1] * (1.0 + objective.turn_penalty * trial_turns.sum())
+            keep = new < value * (1.0 + search.heat * (1.0 - (it + 1.0) / len(draws)) ** 2) - 1e-12
             if keep:
                 value = new
                 running = left
                 if value < best_value:
                     best_value = value
-                    best[:] = plan
-                    best_counts[:] = plan_counts
+                    best[:] = plan.vias
+                    best_counts[:] = plan.counts
         for v in range(n):
-            if changed[v]:
-                if keep:
-                    current[v] = plan[v]
-                    current_counts[v] = plan_counts[v]
-                    after[v] = trial[v]
-                    turns[v] = trial_turns[v]
-                else:
-                    plan[v] = current[v]
-                    plan_counts[v] = current_counts[v]
-                    trial[v] = after[v]
-                    trial_turns[v] = turns[v]
+            if changed[v] and keep:
+                current[v] = plan.vias[v]
+                current_counts[v] = plan.counts[v]
+                after[v] = trial[v]
+                turns[v] = trial_turns[v]
+            elif changed[v]:
+                plan.vias[v] = current[v]
+                plan.counts[v] = current_counts[v]
+                trial[v] = after[v]
+                trial_turns[v] = turns[v]
     return best, best_counts, best_value

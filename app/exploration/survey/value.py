@@ -138,18 +138,17 @@ def lower_to_route(
     d2: FloatArray,
     nodes: Nodes,
     objective: Objective,
-    x: float,
-    y: float,
+    start: FloatArray,
     heading: float,
     route: FloatArray,
     count: int,
     vertices: FloatArray,
 ) -> float:
-    """Lower ``d2`` to what it is after flying a route from (x, y), in place; return how much it turns.
+    """Lower ``d2`` to what it is after flying a route from ``start`` (2,), in place; return how much it turns.
 
     ``vertices`` is scratch space of at least ``objective.steps + 2`` rows.
     """
-    n, _ = fly(x, y, route, count, objective.step, objective.steps, vertices)
+    n, _ = fly(start[0], start[1], route, count, objective.step, objective.steps, vertices)
     for k in range(1, n):
         lower_to_segment(
             d2, nodes, vertices[k - 1, 0], vertices[k - 1, 1], vertices[k, 0], vertices[k, 1], objective.reach_m
@@ -221,9 +220,7 @@ def plan_value(
     vertices = np.empty((objective.steps + 2, 2))
     turns = 0.0
     for j in range(len(starts)):
-        turns += lower_to_route(
-            after, nodes, objective, starts[j, 0], starts[j, 1], headings[j], vias[j], counts[j], vertices
-        )
+        turns += lower_to_route(after, nodes, objective, starts[j], headings[j], vias[j], counts[j], vertices)
     value = uncertainty(after, nodes.weight, objective.scale_m, objective.power)
     return value * (1.0 + objective.turn_penalty * turns)
 

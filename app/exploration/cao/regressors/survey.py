@@ -21,7 +21,6 @@ from shapely import Polygon, unary_union
 from app.arrays import BoolArray, FloatArray, IntArray
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.constraints import Constraints, inside_area
-from app.exploration.core.geometry import convex
 from app.exploration.core.problem import Belief, Situation
 from app.exploration.core.routes import CORNER_TOLERANCE, next_waypoint
 from app.exploration.lines.handover import hand_over
@@ -29,7 +28,7 @@ from app.exploration.planner.base import vehicle_rng
 from app.exploration.planner.options import PlannerOptions
 from app.exploration.survey.backbone import MARGIN_M, backbone
 from app.exploration.survey.error import expected_roughness, with_second_looks
-from app.exploration.survey.local_search import DRAWS, improve
+from app.exploration.survey.local_search import DRAWS, Plan, Search, improve
 from app.exploration.survey.value import Nodes, Objective, make_nodes, plan_value, values_after_first_leg
 
 AtCruise = Callable[[Situation, Bottom, FloatArray], FloatArray]
@@ -243,13 +242,10 @@ class SurveyRegressors:
         rng = np.random.default_rng([self._seed, 1, which])
         roomy = np.zeros((len(vias), vias.shape[1] + 32, 2))
         roomy[:, : vias.shape[1]] = vias
-        zones = [np.ascontiguousarray(z, dtype=np.float64) for z in constraints.keep_out]
-        starts = np.concatenate([[0], np.cumsum([len(z) for z in zones])]).astype(np.int64)
-        flat = np.vstack(zones) if zones else np.zeros((0, 2))
-        area = np.ascontiguousarray(constraints.area, dtype=np.float64)
+        search = Search(self._spacing, constraints.region, MARGIN_M, HEAT)
         return improve(
-            self._d2, self._nodes, self._objective, self._en, self._headings, roomy, counts, locked,
-            self._spacing, area, flat, starts, convex(area), MARGIN_M, HEAT, rng.random((self._options.search, DRAWS)),
+            self._d2, self._nodes, self._objective, self._en, self._headings, Plan(roomy, counts, locked), search,
+            rng.random((self._options.search, DRAWS)),
         )  # fmt: skip
 
     @property
