@@ -19,6 +19,8 @@ from app.exploration.rollout.floor import estimate_floor, let_stay, sample
 from app.exploration.rollout.free_space import free_space
 from app.exploration.rollout.independent_mission import apart_mission
 from app.exploration.rollout.independent_routes import (
+    RoutesFlown,
+    RoutesTask,
     fly_alone,
     improve_apart,
     judge,
@@ -139,10 +141,9 @@ def test_the_search_never_worsens_routes_and_reports_their_true_score(seed, zone
     free = free_space(Constraints(CUBE, (zone,) if zones else ()))
     before, paths, left = flown(routes, points, floor)
     draws = np.random.default_rng(seed).random((60, DRAWS + 1))
-    score = improve_apart(
-        START, FREE, routes, paths, no_routes(3, 12, HELD), no_paths(3, 300), before, left, draws, points, floor, RULES,
-        free, 1.0,
-    )  # fmt: skip
+    best = RoutesFlown(routes, paths, left)
+    trial = RoutesFlown(no_routes(3, 12, HELD), no_paths(3, 300), left.copy())
+    score = improve_apart(best, before, trial, draws, RoutesTask(START, FREE, points, floor, RULES), free, 1.0)
     assert score <= before
     again, _, left_again = flown(routes, points, floor)
     assert again == pytest.approx(score)

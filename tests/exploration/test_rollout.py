@@ -10,7 +10,18 @@ from app.exploration.core.bottom import Bottom
 from app.exploration.core.bottom_contacts import FeltBottom
 from app.exploration.core.constraints import Constraints
 from app.exploration.core.problem import Belief
-from app.exploration.rollout.flight import Plan, Rules, begin, fly_plan, fly_step, look, make_work, new_course
+from app.exploration.rollout.flight import (
+    Flown,
+    Plan,
+    Rules,
+    Task,
+    begin,
+    fly_plan,
+    fly_step,
+    look,
+    make_work,
+    new_checkpoints,
+)
 from app.exploration.rollout.floor import ENVELOPE_SLOPE, estimate_floor, sample
 from app.exploration.rollout.free_space import clear_ways, free_space, settle_waypoint
 from app.exploration.rollout.initial_plans import Backbone, backbones, with_team
@@ -59,13 +70,15 @@ def make_case(seed, vehicles=3, waypoints=5):
     return start, plan, waypoints, work, floor
 
 
-def flown(start, plan, count, work, floor, course=None, origin=0, bound=np.inf, save=None):
-    if course is None:
-        course = new_course(ROOM, len(start), len(work.need))
-        begin(course, start, work)
+def flown(start, plan, count, work, floor, checkpoints=None, origin=0, bound=np.inf, save=None):
+    if checkpoints is None:
+        checkpoints = new_checkpoints(ROOM, len(start), len(work.need))
+        begin(checkpoints, start, work)
     left = np.empty(len(work.need))
-    score = fly_plan(course, origin, plan, count, work, floor, RULES, 400.0, bound, left, save or course)
-    return score, left, course
+    score = fly_plan(
+        checkpoints, origin, plan, count, Task(work, floor, RULES, 400.0), bound, left, save or checkpoints
+    )
+    return score, left, checkpoints
 
 
 def copied(plan):
@@ -111,11 +124,11 @@ def test_flying_obeys_step_links_depths_and_the_estimated_floor(seed):
 @settings(max_examples=40, deadline=None)
 def test_a_changed_plan_flown_from_the_change_on_scores_as_if_flown_from_the_start(seed, changed):
     start, plan, count, work, floor = make_case(seed)
-    _, _, course = flown(start, plan, count, work, floor)
+    _, _, checkpoints = flown(start, plan, count, work, floor)
     other = copied(plan)
     other.at_m[changed] += np.random.default_rng(seed).uniform(-0.05, 0.05, 2)
-    scratch = new_course(ROOM, len(start), len(work.need))
-    resumed, left, _ = flown(start, other, count, work, floor, course, changed, save=scratch)
+    scratch = new_checkpoints(ROOM, len(start), len(work.need))
+    resumed, left, _ = flown(start, other, count, work, floor, checkpoints, changed, save=scratch)
     whole, left_whole, _ = flown(start, other, count, work, floor)
     assert resumed == pytest.approx(whole, abs=1e-9)
     np.testing.assert_allclose(left, left_whole, atol=1e-9)
@@ -136,12 +149,11 @@ def test_the_search_never_worsens_a_plan_and_reports_its_true_score(seed, zones)
     start, plan, count, work, floor = make_case(seed)
     zone = np.array([[-0.2, -0.2], [0.2, -0.2], [0.2, 0.2], [-0.2, 0.2]])
     free = free_space(Constraints(CUBE, (zone,) if zones else ()))
-    before, left, course = flown(start, plan, count, work, floor)
-    trial, scratch = copied(plan), new_course(ROOM, len(start), len(work.need))
+    before, left, checkpoints = flown(start, plan, count, work, floor)
+    trial, scratch = copied(plan), new_checkpoints(ROOM, len(start), len(work.need))
     draws = np.random.default_rng(seed).random((150, DRAWS))
-    count, score = improve(
-        course, plan, count, before, left, scratch, trial, left.copy(), draws, work, floor, RULES, 400.0, free, LINK
-    )
+    best, tried = Flown(plan, checkpoints, left), Flown(trial, scratch, left.copy())
+    count, score = improve(best, count, before, tried, draws, Task(work, floor, RULES, 400.0), free, LINK)
     assert score <= before
     again, _, _ = flown(start, plan, count, work, floor)
     # An appended waypoint is flown to from where the plan ended before, which may cost part of a step.

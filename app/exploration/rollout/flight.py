@@ -87,6 +87,15 @@ class Rules(NamedTuple):
     directed: bool = False
 
 
+class Task(NamedTuple):
+    """What plans are judged by: what is to be done, over which floor, by which rules, in how many steps."""
+
+    work: Work
+    floor: Floor
+    rules: Rules
+    horizon: float
+
+
 class Plan(NamedTuple):
     """A team plan with room for more waypoints than it has.
 
@@ -295,7 +304,7 @@ def fly_step(at: FloatArray, plan: Plan, k: int, count: int, floor: Floor, rules
     return after
 
 
-class Course(NamedTuple):
+class Checkpoints(NamedTuple):
     """The state in which a flight first looked at each waypoint, so that a changed plan is flown from there only.
 
     Attributes
@@ -313,63 +322,67 @@ class Course(NamedTuple):
     state: FloatArray
 
 
-def new_course(room: int, vehicles: int, landmarks: int) -> Course:
-    """Return an empty course."""
-    return Course(np.zeros((room + 1, vehicles, 3)), np.zeros((room + 1, landmarks)), np.zeros((room + 1, 4)))
+class Flown(NamedTuple):
+    """A plan with its flight; ``left_need`` (m,) is what the landmarks lack in the end."""
+
+    plan: Plan
+    checkpoints: Checkpoints
+    left_need: FloatArray
+
+
+def new_checkpoints(room: int, vehicles: int, landmarks: int) -> Checkpoints:
+    """Return an no checkpoints yet."""
+    return Checkpoints(np.zeros((room + 1, vehicles, 3)), np.zeros((room + 1, landmarks)), np.zeros((room + 1, 4)))
 
 
 @njit(cache=True, nogil=True)
-def begin(course: Course, at: FloatArray, work: Work) -> None:
+def begin(checkpoints: Checkpoints, at: FloatArray, work: Work) -> None:
     """Make the present the state from which waypoint 0 is first looked at."""
-    course.at_m[0] = at
-    course.need[0] = work.need
+    checkpoints.at_m[0] = at
+    checkpoints.need[0] = work.need
     left = 0.0
     for m in range(len(work.need)):
         if work.need[m] > 0.0:
             left += 1.0
-    course.state[0, 0] = 0.0
-    course.state[0, 1] = left
-    course.state[0, 2] = 0.0
-    course.state[0, 3] = 0.0
+    checkpoints.state[0, 0] = 0.0
+    checkpoints.state[0, 1] = left
+    checkpoints.state[0, 2] = 0.0
+    checkpoints.state[0, 3] = 0.0
 
 
 @njit(cache=True, nogil=True)
 def fly_plan(
-    course: Course,
+    checkpoints: Checkpoints,
     origin: int,
     plan: Plan,
     count: int,
-    work: Work,
-    floor: Floor,
-    rules: Rules,
-    horizon: float,
+    task: Task,
     bound: float,
     left_need: FloatArray,
-    save: Course,
+    save: Checkpoints,
 ) -> float:
     """Return the score of a plan in steps; less is better, inf as soon as it cannot be better than ``bound``.
 
     Parameters
     ----------
-    course : Course
+    checkpoints : Checkpoints
         Where to begin: the state at which waypoint ``origin`` is first looked at.
     plan : Plan
         With ``count`` waypoints.
-    horizon : float
-        Steps left of the mission.
     left_need : (m,)
         Overwritten: what the landmarks lack in the end.
-    save : Course
+    save : Checkpoints
         Rows after ``origin`` are overwritten by this flight's states.
     """
-    n = course.at_m.shape[1]
-    at = course.at_m[origin].copy()
+    work, floor, rules, horizon = task.work, task.floor, task.rules, task.horizon
+    n = checkpoints.at_m.shape[1]
+    at = checkpoints.at_m[origin].copy()
     after = np.empty((n, 3))
-    left_need[:] = course.need[origin]
-    t = course.state[origin, 0]
-    left = course.state[origin, 1]
-    cost = course.state[origin, 2]
-    k = int(course.state[origin, 3])
+    left_need[:] = checkpoints.need[origin]
+    t = checkpoints.state[origin, 0]
+    left = checkpoints.state[origin, 1]
+    cost = checkpoints.state[origin, 2]
+    k = int(checkpoints.state[origin, 3])
     saved = origin
     waypoints = PER_WAYPOINT * count
     while left > work.allowed and k < count and t < horizon:

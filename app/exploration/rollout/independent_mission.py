@@ -14,8 +14,9 @@ from app.exploration.rollout.flight import Rules
 from app.exploration.rollout.floor import HELD_NEAR, Floor, estimate_floor, fill_depths, let_stay, margin_m
 from app.exploration.rollout.free_space import Free, clear_ways, settle_waypoint
 from app.exploration.rollout.independent_routes import (
-    Paths,
     Routes,
+    RoutesFlown,
+    RoutesTask,
     fly_alone,
     improve_apart,
     judge,
@@ -57,12 +58,15 @@ AHEAD = 0.05
 
 @dataclass
 class Best:
-    """Routes with their paths, their score and what they leave, (m,)."""
+    """Routes with their paths and their score."""
 
-    routes: Routes
-    paths: Paths
+    flown: RoutesFlown
     score: float
-    left: FloatArray
+
+    @property
+    def routes(self) -> Routes:
+        """The routes."""
+        return self.flown.routes
 
 
 class ApartMission:
@@ -105,7 +109,7 @@ class ApartMission:
         left = np.empty(len(self._points.work.need))
         count_all = int(routes.counts.sum())
         score = float(judge(paths, self._free_part, count_all, self._points, self._rules, np.inf, left))
-        return Best(routes, paths, score, left)
+        return Best(RoutesFlown(routes, paths, left), score)
 
     def first(self) -> Best:
         """Return the best of the sweeps over what is left, improved."""
@@ -119,13 +123,14 @@ class ApartMission:
 
     def refine(self, best: Best, changes: int, worth: float = 0.0) -> Best:
         """Try so many changes; the routes are improved in place."""
-        trial, scratch = no_routes(len(self._start), ROOM, self._height), no_paths(len(self._start), self._horizon)
-        best.score = float(
-            improve_apart(
-                self._start, self._free_part, best.routes, best.paths, trial, scratch, best.score, best.left,
-                self._rng.random((changes, DRAWS + 1)), self._points, self._floor, self._rules, self._free, worth,
-            )
-        )  # fmt: skip
+        trial = RoutesFlown(
+            no_routes(len(self._start), ROOM, self._height),
+            no_paths(len(self._start), self._horizon),
+            np.empty(len(best.flown.left)),
+        )
+        task = RoutesTask(self._start, self._free_part, self._points, self._floor, self._rules)
+        draws = self._rng.random((changes, DRAWS + 1))
+        best.score = float(improve_apart(best.flown, best.score, trial, draws, task, self._free, worth))
         return best
 
     def steps(self, best: Best, i: int) -> tuple[FloatArray, list[int]]:

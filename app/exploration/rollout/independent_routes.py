@@ -168,67 +168,73 @@ def judge(
     return float(t + cost + ALL_LEFT * 0.5 * (open_ + missing) / points.work.total)
 
 
+class RoutesFlown(NamedTuple):
+    """Routes with their paths and what these leave of each landmark, (m,)."""
+
+    routes: Routes
+    paths: Paths
+    left: FloatArray
+
+
+class RoutesTask(NamedTuple):
+    """What routes are judged by.
+
+    Attributes
+    ----------
+    start : (n_vehicles, 3)
+        Where the vehicles are.
+    free_part : (n_vehicles,)
+        Of its time, what each is expected to have for its route.
+    """
+
+    start: FloatArray
+    free_part: FloatArray
+    points: Points
+    floor: Floor
+    rules: Rules
+
+
 @njit(cache=True, nogil=True)
 def improve_apart(
-    start: FloatArray,
-    free_part: FloatArray,
-    routes: Routes,
-    paths: Paths,
-    trial: Routes,
-    trial_paths: Paths,
-    score: float,
-    left: FloatArray,
-    draws: FloatArray,
-    points: Points,
-    floor: Floor,
-    rules: Rules,
-    free: Free,
-    worth: float,
+    best: RoutesFlown, score: float, trial: RoutesFlown, draws: FloatArray, task: RoutesTask, free: Free, worth: float
 ) -> float:
     """Try a change to one vehicle's route per row of ``draws`` and keep those that better the score by ``worth``.
 
-    ``routes``, ``paths`` and ``left`` (m,) are kept up to date, the ``trial`` ones are scratch; the first number of a
-    row chooses the vehicle. Returns the score.
+    ``best`` is kept up to date, ``trial`` is scratch; the first number of a row chooses the vehicle. Returns the score.
     """
+    start, points, rules = task.start, task.points, task.rules
     n = len(start)
-    trial_left = np.empty(len(left))
     for i in range(n):
-        _copy(routes, trial, i)
-        _copy_path(paths, trial_paths, i)
+        _copy(best, trial, i)
     for d in range(len(draws)):
         i = int(draws[d, 0] * n)
-        plan = route_of(trial, i)
+        plan = route_of(trial.routes, i)
         here = start[i : i + 1, :2].copy()
-        changed, first, last = change(plan, routes.counts[i], here, points.work, rules, left, draws[d, 1:])
-        if first >= 0:
-            ok = True
-            for k in range(first, min(last, changed - 1) + 1):
-                ok = ok and settle_waypoint(free, plan.at_m[k], plan.chain, np.inf)
-            changed = clear_ways(free, plan, changed, here, first, last + 1, np.inf) if ok else -1
-            if changed >= 0:
-                trial.counts[i] = changed
-                trace(start, i, trial, floor, rules, trial_paths)
-                value = judge(trial_paths, free_part, trial.counts.sum(), points, rules, score - worth, trial_left)
-                if value < score - worth:
-                    score = value
-                    left[:] = trial_left
-                    _copy(trial, routes, i)
-                    _copy_path(trial_paths, paths, i)
-                    continue
-                _copy_path(paths, trial_paths, i)
-        _copy(routes, trial, i)
+        changed, first, last = change(plan, best.routes.counts[i], here, points.work, rules, best.left, draws[d, 1:])
+        ok = first >= 0
+        for k in range(first, min(last, changed - 1) + 1):
+            ok = ok and settle_waypoint(free, plan.at_m[k], plan.chain, np.inf)
+        changed = clear_ways(free, plan, changed, here, first, last + 1, np.inf) if ok else -1
+        if changed >= 0:
+            trial.routes.counts[i] = changed
+            trace(start, i, trial.routes, task.floor, rules, trial.paths)
+            waypoints = trial.routes.counts.sum()
+            value = judge(trial.paths, task.free_part, waypoints, points, rules, score - worth, trial.left)
+            if value < score - worth:
+                score = value
+                best.left[:] = trial.left
+                _copy(trial, best, i)
+                continue
+        _copy(best, trial, i)
     return score
 
 
 @njit(cache=True, nogil=True)
-def _copy(source: Routes, target: Routes, i: int) -> None:
-    target.at_m[i] = source.at_m[i]
-    target.height_m[i] = source.height_m[i]
-    target.counts[i] = source.counts[i]
-
-
-@njit(cache=True, nogil=True)
-def _copy_path(source: Paths, target: Paths, i: int) -> None:
-    length = source.length[i]
-    target.at_m[i, :length] = source.at_m[i, :length]
-    target.length[i] = length
+def _copy(source: RoutesFlown, target: RoutesFlown, i: int) -> None:
+    """Copy a vehicle's route and path."""
+    target.routes.at_m[i] = source.routes.at_m[i]
+    target.routes.height_m[i] = source.routes.height_m[i]
+    target.routes.counts[i] = source.routes.counts[i]
+    length = source.paths.length[i]
+    target.paths.at_m[i, :length] = source.paths.at_m[i, :length]
+    target.paths.length[i] = length

@@ -4,8 +4,7 @@ import numpy as np
 from numba import njit
 
 from app.arrays import FloatArray
-from app.exploration.rollout.flight import Course, Plan, Rules, Work, fly_plan
-from app.exploration.rollout.floor import Floor
+from app.exploration.rollout.flight import Flown, Plan, Rules, Task, Work, fly_plan
 from app.exploration.rollout.free_space import Free, clear_ways, insert, settle_waypoint
 
 DRAWS = 8
@@ -92,174 +91,186 @@ def _visit(plan: Plan, count: int, start: FloatArray, x: float, y: float, u: Flo
 
 
 @njit(cache=True, nogil=True)
+def _shift(plan: Plan, first: int, last: int, dx: float, dy: float) -> None:
+    """Shift the whole team at waypoints ``first`` to ``last``."""
+    for w in range(first, last + 1):
+        for i in range(plan.at_m.shape[1]):
+            plan.at_m[w, i, 0] += dx
+            plan.at_m[w, i, 1] += dy
+
+
+@njit(cache=True, nogil=True)
+def _turn(plan: Plan, k: int, angle: float, scale: float) -> None:
+    """Turn the team around its middle, spread it or close it up."""
+    x, y = _middle(plan.at_m[k])
+    c, s = scale * np.cos(angle), scale * np.sin(angle)
+    for i in range(plan.at_m.shape[1]):
+        px = plan.at_m[k, i, 0] - x
+        py = plan.at_m[k, i, 1] - y
+        plan.at_m[k, i, 0] = x + c * px - s * py
+        plan.at_m[k, i, 1] = y + s * px + c * py
+
+
+@njit(cache=True, nogil=True)
+def _leave_out(plan: Plan, count: int, k: int) -> None:
+    for w in range(k, count - 1):
+        plan.at_m[w] = plan.at_m[w + 1]
+        plan.height_m[w] = plan.height_m[w + 1]
+
+
+@njit(cache=True, nogil=True)
+def _bend(plan: Plan, count: int, k: int, before: FloatArray, part: float, dx: float, dy: float) -> None:
+    """Insert a waypoint at a part of the leg to waypoint ``k``, shifted."""
+    middle = before + part * (plan.at_m[k] - before)
+    insert(plan, count, k)
+    for i in range(plan.at_m.shape[1]):
+        plan.at_m[k, i, 0] = middle[i, 0] + dx
+        plan.at_m[k, i, 1] = middle[i, 1] + dy
+
+
+@njit(cache=True, nogil=True)
+def _swap(a: FloatArray, b: FloatArray) -> None:
+    for c in range(2):
+        kept = a[c]
+        a[c] = b[c]
+        b[c] = kept
+
+
+@njit(cache=True, nogil=True)
+def _reverse(plan: Plan, low: int, high: int) -> None:
+    """Fly a section the other way round."""
+    while low < high:
+        for i in range(plan.at_m.shape[1]):
+            _swap(plan.at_m[low, i], plan.at_m[high, i])
+        kept = plan.height_m[low]
+        plan.height_m[low] = plan.height_m[high]
+        plan.height_m[high] = kept
+        low += 1
+        high -= 1
+
+
+@njit(cache=True, nogil=True)
+def _relocate(plan: Plan, k: int, to: int) -> None:
+    """Move one waypoint elsewhere in the order."""
+    moved = plan.at_m[k].copy()
+    height = plan.height_m[k]
+    step = 1 if k < to else -1
+    for w in range(k, to, step):
+        plan.at_m[w] = plan.at_m[w + step]
+        plan.height_m[w] = plan.height_m[w + step]
+    plan.at_m[to] = moved
+    plan.height_m[to] = height
+
+
+@njit(cache=True, nogil=True)
+def _swap_ends(plan: Plan, first: int, last: int) -> None:
+    """Swap the ends of the row at some waypoints."""
+    n = plan.at_m.shape[1]
+    for w in range(first, last + 1):
+        for e in range(n // 2):
+            _swap(plan.at_m[w, plan.chain[e]], plan.at_m[w, plan.chain[n - 1 - e]])
+
+
+@njit(cache=True, nogil=True)
+def _shorten(plan: Plan, k: int, before: FloatArray, part: float) -> None:
+    """Draw a waypoint towards the one before: lines need not be flown to their ends."""
+    for i in range(plan.at_m.shape[1]):
+        for c in range(2):
+            plan.at_m[k, i, c] += part * (before[i, c] - plan.at_m[k, i, c])
+
+
+@njit(cache=True, nogil=True)
 def change(
     plan: Plan, count: int, start: FloatArray, work: Work, rules: Rules, left_need: FloatArray, u: FloatArray
 ) -> tuple[int, int, int]:
     """Change the plan at random; return its number of waypoints and the first and last one changed (-1: nothing)."""
     n = plan.at_m.shape[1]
-    room = len(plan.height_m)
+    has_room = count < len(plan.height_m)
     kind = int(u[0] * KINDS)
     k = int(u[1] * count)
     size = rules.visibility_m * (0.06 if u[7] < 0.35 else (0.2 if u[7] < 0.75 else 0.7))
-    if kind == 0 or kind == 1:
-        # Shift a waypoint; or one with the next, which shifts a leg sideways.
+    before = start if k == 0 else plan.at_m[k - 1]
+    if kind == 0 or kind == 1:  # one waypoint; or one with the next, which shifts a leg sideways
         last = min(k + kind, count - 1)
-        dx = size * _bell(u[2], u[3])
-        dy = size * _bell(u[4], u[5])
-        for w in range(k, last + 1):
-            for i in range(n):
-                plan.at_m[w, i, 0] += dx
-                plan.at_m[w, i, 1] += dy
+        _shift(plan, k, last, size * _bell(u[2], u[3]), size * _bell(u[4], u[5]))
         return count, k, last
     if kind == 2:
-        # Turn the team, or spread or close it up, around its middle.
-        x, y = _middle(plan.at_m[k])
-        angle = 0.0
-        scale = 1.0
         if u[2] < 0.6:
-            angle = size / rules.visibility_m * 2.0 * _bell(u[3], u[4])
+            _turn(plan, k, size / rules.visibility_m * 2.0 * _bell(u[3], u[4]), 1.0)
         else:
-            scale = np.exp(0.3 * _bell(u[3], u[4]))
-        c, s = scale * np.cos(angle), scale * np.sin(angle)
-        for i in range(n):
-            px = plan.at_m[k, i, 0] - x
-            py = plan.at_m[k, i, 1] - y
-            plan.at_m[k, i, 0] = x + c * px - s * py
-            plan.at_m[k, i, 1] = y + s * px + c * py
+            _turn(plan, k, 0.0, np.exp(0.3 * _bell(u[3], u[4])))
         return count, k, k
-    if kind == 3 or kind == 4:
+    if kind == 3 or kind == 4:  # shift one vehicle
         i = int(u[2] * n)
         plan.at_m[k, i, 0] += size * _bell(u[3], u[4])
         plan.at_m[k, i, 1] += size * _bell(u[5], u[6])
         return count, k, k
-    if kind == 5:
+    if kind == 5:  # fly higher or lower
         height = plan.height_m[k] * np.exp(0.15 * _bell(u[2], u[3]))
         plan.height_m[k] = min(max(height, LEAST_HEIGHT * rules.visibility_m), GREATEST_HEIGHT * rules.visibility_m)
         return count, k, k
-    if kind == 6:
-        if count < 2:
-            return count, -1, -1
-        for w in range(k, count - 1):
-            plan.at_m[w] = plan.at_m[w + 1]
-            plan.height_m[w] = plan.height_m[w + 1]
+    if kind == 6 and count >= 2:
+        _leave_out(plan, count, k)
         return count - 1, k, k
-    if kind == 7:
-        if count >= room:
-            return count, -1, -1
-        before = start if k == 0 else plan.at_m[k - 1]
-        middle = before + u[2] * (plan.at_m[k] - before)
-        insert(plan, count, k)
-        dx = size * _bell(u[3], u[4])
-        dy = size * _bell(u[5], u[6])
-        for i in range(n):
-            plan.at_m[k, i, 0] = middle[i, 0] + dx
-            plan.at_m[k, i, 1] = middle[i, 1] + dy
+    if kind == 7 and has_room:
+        _bend(plan, count, k, before, u[2], size * _bell(u[3], u[4]), size * _bell(u[5], u[6]))
         return count + 1, k, k + 1
-    if kind == 8:
+    if kind == 8 and has_room:
         m = _unfinished(left_need, u[2])
-        if m < 0 or count >= room:
-            return count, -1, -1
-        place = _visit(plan, count, start, work.xyz[0, m], work.xyz[1, m], u)
-        return count + 1, place, place + 1
-    if kind == 9:
-        # Fly a section the other way round, or move one waypoint elsewhere.
-        other = int(u[2] * count)
+        if m >= 0:
+            place = _visit(plan, count, start, work.xyz[0, m], work.xyz[1, m], u)
+            return count + 1, place, place + 1
+    other = int(u[2] * count)
+    if kind == 9 and other != k:
         low, high = min(k, other), max(k, other)
-        if low == high:
-            return count, -1, -1
         if u[3] < 0.5:
-            a, b = low, high
-            while a < b:
-                for i in range(n):
-                    for c2 in range(2):
-                        swap = plan.at_m[a, i, c2]
-                        plan.at_m[a, i, c2] = plan.at_m[b, i, c2]
-                        plan.at_m[b, i, c2] = swap
-                swap = plan.height_m[a]
-                plan.height_m[a] = plan.height_m[b]
-                plan.height_m[b] = swap
-                a += 1
-                b -= 1
+            _reverse(plan, low, high)
         else:
-            moved = plan.at_m[k].copy()
-            height = plan.height_m[k]
-            if k < other:
-                for w in range(k, other):
-                    plan.at_m[w] = plan.at_m[w + 1]
-                    plan.height_m[w] = plan.height_m[w + 1]
-            else:
-                for w in range(k, other, -1):
-                    plan.at_m[w] = plan.at_m[w - 1]
-                    plan.height_m[w] = plan.height_m[w - 1]
-            plan.at_m[other] = moved
-            plan.height_m[other] = height
+            _relocate(plan, k, other)
         return count, low, min(high + 1, count - 1)
-    if kind == 10:
-        # Swap the ends of the row, at one waypoint or from there on.
+    if kind == 10:  # at one waypoint, or from there on
         last = count - 1 if u[2] < 0.5 else k
-        for w in range(k, last + 1):
-            for e in range(n // 2):
-                i, j = plan.chain[e], plan.chain[n - 1 - e]
-                for c2 in range(2):
-                    swap = plan.at_m[w, i, c2]
-                    plan.at_m[w, i, c2] = plan.at_m[w, j, c2]
-                    plan.at_m[w, j, c2] = swap
+        _swap_ends(plan, k, last)
         return count, k, min(last + 1, count - 1)
-    # Draw a waypoint towards the one before: lines need not be flown to their ends.
-    before = start if k == 0 else plan.at_m[k - 1]
-    f = 0.3 * u[2]
-    for i in range(n):
-        for c2 in range(2):
-            plan.at_m[k, i, c2] += f * (before[i, c2] - plan.at_m[k, i, c2])
-    return count, k, k
+    if kind == 11:
+        _shorten(plan, k, before, 0.3 * u[2])
+        return count, k, k
+    return count, -1, -1
 
 
 @njit(cache=True, nogil=True)
 def improve(
-    course: Course,
-    plan: Plan,
-    count: int,
-    score: float,
-    left_need: FloatArray,
-    trial_course: Course,
-    trial: Plan,
-    trial_need: FloatArray,
-    draws: FloatArray,
-    work: Work,
-    floor: Floor,
-    rules: Rules,
-    horizon: float,
-    free: Free,
-    link: float,
+    flown: Flown, count: int, score: float, trial: Flown, draws: FloatArray, task: Task, free: Free, link: float
 ) -> tuple[int, float]:
     """Try one change per row of ``draws`` and keep those that better the score.
 
-    ``course``, ``plan`` and ``left_need`` hold the best plan's flight and are kept up to date; the ``trial`` ones are
-    scratch. Returns the plan's number of waypoints and its score.
+    ``flown`` is the best plan and is kept up to date, ``trial`` scratch. Returns the plan's number of waypoints and its
+    score.
     """
-    start = course.at_m[0][:, :2].copy()
+    plan, checkpoints = flown.plan, flown.checkpoints
+    start = checkpoints.at_m[0][:, :2].copy()
     for d in range(len(draws)):
-        _copy(plan, trial, count)
-        changed, first, last = change(trial, count, start, work, rules, left_need, draws[d])
+        _copy(plan, trial.plan, count)
+        changed, first, last = change(trial.plan, count, start, task.work, task.rules, flown.left_need, draws[d])
         if first < 0:
             continue
         ok = True
         for k in range(first, min(last, changed - 1) + 1):
-            ok = ok and settle_waypoint(free, trial.at_m[k], trial.chain, link)
+            ok = ok and settle_waypoint(free, trial.plan.at_m[k], plan.chain, link)
         if not ok:
             continue
-        changed = clear_ways(free, trial, changed, start, first, last + 1, link)
+        changed = clear_ways(free, trial.plan, changed, start, first, last + 1, link)
         if changed < 0:
             continue
         origin = min(first, count)
-        value = fly_plan(course, origin, trial, changed, work, floor, rules, horizon, score, trial_need, trial_course)
+        value = fly_plan(checkpoints, origin, trial.plan, changed, task, score, trial.left_need, trial.checkpoints)
         if value < score:
             score = value
             count = changed
-            _copy(trial, plan, count)
-            left_need[:] = trial_need
+            _copy(trial.plan, plan, count)
+            flown.left_need[:] = trial.left_need
             for k in range(origin + 1, count + 1):
-                course.at_m[k] = trial_course.at_m[k]
-                course.need[k] = trial_course.need[k]
-                course.state[k] = trial_course.state[k]
+                checkpoints.at_m[k] = trial.checkpoints.at_m[k]
+                checkpoints.need[k] = trial.checkpoints.need[k]
+                checkpoints.state[k] = trial.checkpoints.state[k]
     return count, score

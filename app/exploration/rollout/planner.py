@@ -22,7 +22,19 @@ from app.exploration.core.problem import Belief, Proposal, Situation
 from app.exploration.core.routes import FreeSpace
 from app.exploration.planner.base import PlannerBase, settle
 from app.exploration.planner.options import PlannerOptions
-from app.exploration.rollout.flight import Course, Plan, Rules, Work, begin, fly_plan, fly_step, make_work, new_course
+from app.exploration.rollout.flight import (
+    Checkpoints,
+    Flown,
+    Plan,
+    Rules,
+    Task,
+    Work,
+    begin,
+    fly_plan,
+    fly_step,
+    make_work,
+    new_checkpoints,
+)
 from app.exploration.rollout.floor import Floor, estimate_floor, fill_depths, margin_m
 from app.exploration.rollout.free_space import Free, clear_ways, free_space, settle_waypoint
 from app.exploration.rollout.independent_mission import WORTH, apart_mission
@@ -80,11 +92,9 @@ LEAST_FREE = 0.1
 class _Best:
     """A plan with its flight."""
 
-    plan: Plan
+    flown: Flown
     count: int
     score: float
-    course: Course
-    left_need: FloatArray
 
 
 class RolloutPlanner(PlannerBase):
@@ -168,11 +178,14 @@ class RolloutPlanner(PlannerBase):
             positions, passed = wishes[feasible[0]], passed_by[feasible[0]]
         else:
             positions, passed = mission.way_out(team, bottom, wishes[0]), 0
-        self._kept = Backbone(best.plan.at_m[passed : best.count].copy(), best.plan.chain.copy())
-        self._heights = best.plan.height_m[passed : best.count].copy()
+        self._kept = Backbone(best.flown.plan.at_m[passed : best.count].copy(), best.flown.plan.chain.copy())
+        self._heights = best.flown.plan.height_m[passed : best.count].copy()
         self._planned = max(1, self._planned + 1)
         self._felt.ask(team.vehicles, positions)
-        terms = {"finish": team.step - 1 + float(best.course.state[best.count, 0]), "waypoints": float(best.count)}
+        terms = {
+            "finish": team.step - 1 + float(best.flown.checkpoints.state[best.count, 0]),
+            "waypoints": float(best.count),
+        }
         return Proposal(positions, -best.score, terms)
 
     def _decide_apart(self, team: Situation, bottom: Bottom, seed: int) -> Proposal:
@@ -294,6 +307,7 @@ class _Mission:
             belief.covariance_m2 is not None,
         )
         self._work: Work = self._left(belief, options)
+        self._task = Task(self._work, self._floor, self._rules, self._horizon)
 
     def _left(self, belief: Belief, options: PlannerOptions) -> Work:
         hedge = HEDGE if belief.covariance_m2 is None else 1.0
@@ -319,10 +333,10 @@ class _Mission:
         """Whether more is left than a plan may leave over."""
         return self._work.allowed > 0.0
 
-    def plan(self, backbone: Backbone, heights: FloatArray, course: Course | None = None) -> _Best | None:
+    def plan(self, backbone: Backbone, heights: FloatArray, checkpoints: Checkpoints | None = None) -> _Best | None:
         """Complete team waypoints to a plan and fly it; None when there is no allowed way.
 
-        A ``course`` given is overwritten instead of making a new one.
+        A ``checkpoints`` given is overwritten instead of making a new one.
         """
         n, count = len(self._start), min(len(backbone.at_m), ROOM - 4)
         plan = Plan(np.zeros((ROOM, n, 2)), np.zeros(ROOM), backbone.chain)
@@ -345,13 +359,11 @@ class _Mission:
             count = changed
         if count == 0:
             return None
-        course = new_course(ROOM, n, len(self._work.need)) if course is None else course
-        begin(course, self._start, self._work)
+        checkpoints = new_checkpoints(ROOM, n, len(self._work.need)) if checkpoints is None else checkpoints
+        begin(checkpoints, self._start, self._work)
         left_need = np.empty(len(self._work.need))
-        score = fly_plan(
-            course, 0, plan, count, self._work, self._floor, self._rules, self._horizon, np.inf, left_need, course
-        )
-        return _Best(plan, count, float(score), course, left_need)
+        score = fly_plan(checkpoints, 0, plan, count, self._task, np.inf, left_need, checkpoints)
+        return _Best(Flown(plan, checkpoints, left_need), count, float(score))
 
     def fresh_starts(self, most: int) -> list[_Best]:
         """Return the best of the sweeps over what is left."""
@@ -359,7 +371,7 @@ class _Mission:
             self._work.xyz[:2].T, self._start[:, :2], self._area, self._sight, self._com_range, self._link
         )
         heights = np.full(ROOM, self._height)
-        scratch = new_course(ROOM, len(self._start), len(self._work.need))
+        scratch = new_checkpoints(ROOM, len(self._start), len(self._work.need))
         flown = [(self.plan(sweep, heights, scratch), sweep) for sweep in sweeps]
         order = sorted(((best.score, k) for k, (best, _) in enumerate(flown) if best is not None))
         chosen = [self.plan(flown[k][1], heights) for _, k in order[:most]]
@@ -391,13 +403,16 @@ class _Mission:
     def refine(self, best: _Best, changes: int) -> _Best:
         """Try so many changes; the plan is improved in place."""
         n = len(self._start)
-        trial = Plan(np.zeros_like(best.plan.at_m), np.zeros(ROOM), best.plan.chain)
-        scratch = new_course(ROOM, n, len(self._work.need))
+        like = best.flown.plan
+        trial = Flown(
+            Plan(np.zeros_like(like.at_m), np.zeros(ROOM), like.chain),
+            new_checkpoints(ROOM, n, len(self._work.need)),
+            np.empty(len(self._work.need)),
+        )
+        draws = self._rng.random((changes, DRAWS))
         best.count, best.score = improve(
-            best.course, best.plan, best.count, best.score, best.left_need, scratch, trial,
-            np.empty(len(self._work.need)), self._rng.random((changes, DRAWS)), self._work, self._floor, self._rules,
-            self._horizon, self._free, self._link,
-        )  # fmt: skip
+            best.flown, best.count, best.score, trial, draws, self._task, self._free, self._link
+        )
         return best
 
     def first_step(self, best: _Best) -> tuple[FloatArray, list[int]]:
@@ -410,7 +425,7 @@ class _Mission:
         for part in PARTS:
             wish = np.empty_like(self._start)
             rules = self._rules._replace(step_m=part * self._rules.step_m)
-            after = int(fly_step(self._start, best.plan, 0, best.count, self._floor, rules, wish))
+            after = int(fly_step(self._start, best.flown.plan, 0, best.count, self._floor, rules, wish))
             spare = np.sqrt(self._rules.step_m**2 - np.minimum(part * self._rules.step_m, self._rules.step_m) ** 2)
             wishes.append(wish)
             passed.append(after)

@@ -1,0 +1,40 @@
+"""What takes long says so, and keeps nothing else from being done."""
+
+import pytest
+from playwright.sync_api import Page, Route, expect
+
+from .service import Service
+from .steps import by_id, show
+
+pytestmark = [pytest.mark.browser, pytest.mark.timeout(600)]
+
+
+def test_the_page_says_that_vehicles_wait_for_a_decision(page: Page, service: Service) -> None:
+    thorough = {"name": "cao", "options": {"search": 100_000}}
+    mission = service.create(name="Thinking", steps=40, planner=thorough)
+    service.act(mission, "start")
+    show(page, mission)
+    expect(by_id(page, "deciding")).to_contain_text("vehicles wait at their waypoints")
+    service.act(mission, "abort")
+    expect(by_id(page, "deciding")).to_be_hidden()
+
+
+def test_one_file_that_is_being_made_keeps_no_other_from_being_fetched(page: Page, service: Service) -> None:
+    mission = service.create(name="Files", steps=3)
+    service.act(mission, "start")
+    show(page, mission)
+    by_id(page, "toggle-files").click()
+    expect(by_id(page, "file-map.tif")).to_be_enabled()
+    held: list[Route] = []
+    page.route("**/soundings.csv", held.append)
+    by_id(page, "file-soundings.csv").click()
+    expect(by_id(page, "making")).to_contain_text("being made")
+    expect(by_id(page, "file-soundings.csv")).to_be_disabled()
+    with page.expect_download() as download:
+        by_id(page, "file-map.tif").click()
+    assert download.value.suggested_filename.endswith(".tif")
+    with page.expect_download() as late:
+        held[0].continue_()
+    assert late.value.suggested_filename.endswith(".csv")
+    expect(by_id(page, "making")).to_be_hidden()
+    expect(by_id(page, "file-soundings.csv")).to_be_enabled()
