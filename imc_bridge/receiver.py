@@ -52,7 +52,7 @@ class Hearing:
     ----------
     settings
     roster, crew, links
-        Who is known, who is under control, and how their links are; all of them are told.
+        Known nodes, controlled vehicles and their links; each is updated.
     tell
         Receives events for the bridge's user.
     failed
@@ -80,7 +80,7 @@ class Hearing:
         self.decoder = Decoder(WANTED)
         self.announces = Decoder(("Announce",))
         self.double = ""
-        """Who else announces our own id, empty when nobody does."""
+        """Names of other systems that announce our own id; usually empty."""
         self._settings = settings
         self._roster = roster
         self._crew = crew

@@ -1,4 +1,4 @@
-"""Files and folders for their owner only, whatever the user's umask: what the service stores is nobody else's."""
+"""Files and folders for their owner only, whatever the user's umask: what the service stores is private."""
 
 import contextlib
 import os
@@ -48,7 +48,7 @@ def open_new(path: Path, mode: Literal["w", "wb"] = "w") -> TextIO | BinaryIO:
 
 
 def write(path: Path, content: bytes | str) -> None:
-    """Write a file. One that was there is replaced when all is written, so nobody reads a half."""
+    """Write a file. One that was there is replaced when all is written, so that no reader gets a half."""
     data = content.encode() if isinstance(content, str) else content
     if path.exists() and not path.is_file():
         path.write_bytes(data)  # a terminal or a pipe that the user named

@@ -22,7 +22,7 @@ class Shared(Generic[T]):
         """Return the result, or raise what the work raised."""
         if self._next is None:
             self._next = asyncio.create_task(self._run(self._running))
-        # Whoever stops waiting does not end it for the others.
+        # A caller that stops waiting does not end it for the others.
         return await asyncio.shield(self._next)
 
     async def _run(self, before: asyncio.Task[T] | None) -> T:

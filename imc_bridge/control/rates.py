@@ -19,7 +19,7 @@ DUNE_DEFAULTS = (
     "CpuUsage:0.2, Distance:0.2, EntityState:1, EstimatedState:2, FuelLevel:0.1, Rpm:1, SimulatedState:0.5, "
     "StorageUsage:0.05, Temperature:0.1, Voltage:0.1"
 )
-"""What a vehicle that never told its rates most likely had."""
+"""Likely rates of a vehicle that never reported them."""
 RESTORE_TRIES = 3
 RESTORE_RETRY_S = 1.0
 

@@ -50,7 +50,7 @@ class Cause(StrEnum):
     RADIO_GAPS = "radio_gaps"
     """Radio ends under water, and the vehicle is led by references, which need it."""
     RESTARTED = "restarted"
-    """DUNE on board has begun anew while we listened."""
+    """DUNE on board restarted while we listened."""
     PACKETS_DROPPED = "packets_dropped"
     """This machine threw packets away because our socket was full."""
     LOW_RATE = "low_rate"
@@ -62,7 +62,7 @@ class Cause(StrEnum):
     SEND_ERRORS = "send_errors"
     BAD_PACKETS = "bad_packets"
     REFUSED = "refused"
-    """Packets that nobody who is trusted sent, or not now."""
+    """Packets from untrusted senders, or from another time."""
     UNKNOWN_MESSAGES = "unknown_messages"
     CROWDED = "crowded"
     """More systems claim to be there than places for them: somebody makes them up."""
@@ -138,7 +138,7 @@ def radio_gap_words(gaps: int) -> tuple[str, str]:
 
 
 def restart_words(restarts: int) -> tuple[str, str]:
-    """What is said of a vehicle whose DUNE has begun anew, and what to do about it."""
+    """The finding for a vehicle whose DUNE restarted, with its remedy."""
     times = "once" if restarts == 1 else f"{restarts} times"
     return (
         f"DUNE on board has restarted {times} since we listen; what it was doing is forgotten each time",
@@ -162,7 +162,7 @@ def ok(text: str) -> Finding:
 
 
 def note(cause: Cause, text: str, remedy: str = "") -> Finding:
-    """Worth knowing, in nobody's way."""
+    """Worth knowing, but harmless."""
     return Finding(Severity.NOTE, text, remedy, cause)
 
 

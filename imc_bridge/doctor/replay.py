@@ -66,7 +66,7 @@ def read_recording(path: str | Path) -> Iterator[Recorded]:
     number = 0
     try:
         with gzip.open(path, "rt") if path.suffix == ".gz" else path.open() as lines:
-            for number, line in enumerate(lines, 1):  # noqa: B007 - told when a line cannot be read
+            for number, line in enumerate(lines, 1):  # noqa: B007 - named when a line cannot be read
                 if line.strip():
                     item = json.loads(line)
                     packet = bytes.fromhex(item["hex"])

@@ -82,7 +82,7 @@ class SessionKeeper(Protocol):
     async def step(self, data: StepData, user: str, host: str, *, answered: bool) -> None:
         """Take a step; its answer is given with :meth:`NeptusGateway.answer`. Raises SessionRefusedError.
 
-        ``answered``: it came so late that the panel was told to stay meanwhile, and waits for nothing.
+        ``answered``: it came so late that the panel was sent a stay meanwhile, and waits for nothing.
         """
         ...
 
@@ -95,7 +95,7 @@ class SessionKeeper(Protocol):
         ...
 
     async def may_repeat(self, session: str, time_step: int) -> bool:
-        """Tell whether a panel that waits for the answer to a step that never came is to be told to stay."""
+        """Return whether a panel that waits for the answer to a step that never came needs the answer to stay."""
         ...
 
 
@@ -368,7 +368,7 @@ class NeptusGateway:
         if data.time_step < known.time_step:
             raise NeptusDataError("timeStep", f"{data.time_step} came after {known.time_step}: steps count up")
         if data.time_step == known.time_step:
-            # The panel did not hear that it was stored, and sends it again; the answer stays.
+            # The panel missed the confirmation and sends it again; the answer stays.
             return
         known.pairs = data.pairs
         await self._keeper.step(data, upload.user, upload.host, answered=data.time_step <= known.answered)

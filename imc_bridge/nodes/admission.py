@@ -1,4 +1,4 @@
-"""Whose packets are looked at: IMC knows no authentication, so addresses, ids and amounts are what is left."""
+"""Which packets are admitted: IMC has no authentication, so addresses, ids and rates decide."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Admission:
     ----------
     settings
     roster
-        Whoever announced an address has an allowance of its own there, which nobody at another port can use up.
+        A system that announced an address has an allowance of its own there, which no other port can use up.
     clock
         Seconds of the wall clock that never step back.
 

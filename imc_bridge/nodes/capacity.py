@@ -18,7 +18,7 @@ UNANNOUNCED_SILENT_S = 10.0
 """Of those who announce nothing, one that is silent for this long leaves for another."""
 UNANNOUNCED_KEPT_WALL_S = 60.0
 UNHEARD_KEPT_WALL_S = 300.0
-"""Silent ones are shown for so long, if nobody needs their places."""
+"""Silent ones are shown for this long, if their places are not needed."""
 
 
 class Standing(IntEnum):
@@ -77,7 +77,7 @@ class Capacity:
         return node.name in self.wanted or self.in_use(node)
 
     def expired(self, node: Node, now: float, time_scale: float) -> bool:
-        """Whether a node that was never heard is not even shown any longer."""
+        """Whether a node that never answered is no longer shown."""
         standing = standing_of(node)
         kept_s = UNANNOUNCED_KEPT_WALL_S if standing is Standing.UNANNOUNCED else UNHEARD_KEPT_WALL_S
         if standing is Standing.HEARD or now - _last_sign(node) <= kept_s * time_scale:
@@ -111,7 +111,7 @@ class Capacity:
         return found, leaver
 
     def may_be_heard(self, node: Node, host: str) -> bool:
-        """Whether a node that was never heard may change its place for one of those that are."""
+        """Whether a node that never answered may give its place to one that does."""
         if self.keeps(node):
             return True
         if (Standing.HEARD, host) in self._full:
@@ -127,7 +127,7 @@ class Capacity:
         return standing_of(node) is Standing.HEARD and not self.keeps(node)
 
     def _is_wanted(self, name: str, now: float) -> bool:
-        """Whether a name's place is still free: nobody speaks under it yet."""
+        """Whether a name's place is still free: no system uses it yet."""
         holder = next((node for node in self._nodes.values() if node.name == name), None)
         return name in self.wanted and (holder is None or standing_of(holder) is not Standing.HEARD)
 

@@ -1,4 +1,4 @@
-"""Systems that announced themselves while there was no place for them: they get one as soon as they are heard."""
+"""Systems that announced themselves while there was no place for them: they get one as soon as they answer."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ MAX_NEWCOMERS_OF_HOST = 8192
 class Newcomers:
     """The last announces that found no place, by host and id.
 
-    Anybody can announce any number of systems from one address. To be heard from the announced one as well takes a
+    Anyone can announce any number of systems from one address. To answer from the announced one as well takes a
     system that is there, so that is what gives a right to a place. Where too many announce, the host with the most
     loses its oldest.
     """

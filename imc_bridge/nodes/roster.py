@@ -15,7 +15,7 @@ from imc_bridge.settings import BridgeSettings
 MAX_CLAIMS = 8
 
 Claim = tuple[str, str]
-"""Name and uid (or addresses) by which one node is told from another of the same id."""
+"""Name and uid (or addresses) that distinguish nodes of the same id."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +80,7 @@ class Roster:
     def find_place(self, announcement: Announcement, host: str, now: float, *, heard: bool = False) -> bool:
         """Whether a system that announced itself has a place or gets one.
 
-        With ``heard`` it was heard from where it announced itself: one that was not gives the id up to it.
+        With ``heard`` packets came from its announced address: a node without any gives the id up to it.
         """
         node = self._nodes.get(announcement.imc_id)
         if heard and node is not None and standing_of(node) is Standing.UNHEARD and not self.capacity.in_use(node):
@@ -133,24 +133,24 @@ class Roster:
         return node if node is not None and address in node.addresses else None
 
     def at(self, address: Address) -> Node | None:
-        """The node that announced this address, whoever's packets it passes on."""
+        """The node that announced this address, even when it relays packets of others."""
         return self._by_address.get(address)
 
     def comes_from_elsewhere(self, imc_id: int, source_host: str, now: float) -> bool:
         """Whether an announce of a node that is there came from a host that is not its own.
 
-        A node is bound to the hosts of its announces as long as it is not silent for long: nobody else takes its place.
+        A node is bound to the hosts of its announces unless it is silent for long: no other node takes its place.
         """
         node = self._nodes.get(imc_id)
         return node is not None and bool(node.hosts) and source_host not in node.hosts and not node.given_up(now)
 
     def may_be_another(self, imc_id: int) -> bool:
-        """Whether the node of this id was never heard: who announces the id from elsewhere may be the real one."""
+        """Whether the node of this id never answered: another system that announces the id may be the real one."""
         node = self._nodes.get(imc_id)
         return node is not None and standing_of(node) is Standing.UNHEARD
 
     def is_old(self, imc_id: int, timestamp: float, now: float) -> bool:
-        """Whether a node that is heard sent this long ago. While it restarts, maybe with another time, it is silent."""
+        """Whether a node in contact sent this long ago. While it restarts, maybe with another time, it is silent."""
         node = self._nodes.get(imc_id)
         heard = node is not None and node.heard_at is not None and now - node.heard_at <= self._settings.lost_after_s
         return node is not None and heard and node.clock.is_old(timestamp)
@@ -207,7 +207,7 @@ class Roster:
         mine = _claim(new)
         rivals = [claim for claim in claims if claim != mine]
         known = node.announcement
-        # One that is not heard any more, as after a single forged announce, bars nobody.
+        # A silent one, as after a single forged announce, blocks no other.
         returned = mine in claims and known is not None and _claim(known) in rivals
         renamed = any(name != new.name for name, _ in rivals)
         if len(claims) < MAX_CLAIMS or mine in claims:

@@ -1,4 +1,4 @@
-"""Who a DUNE node knows and sends to: announced systems, of which those heard lately are active.
+"""Systems that a DUNE node knows and sends to: announced ones, of which those in recent contact are active.
 
 A system is known by its first Announce; one that comes back under the same id with another port stays ignored
 until the node restarts, as on a real vehicle.

@@ -36,7 +36,7 @@ class Radio:
         self._reached[imc_id] = self._in_reach((lat_rad, lon_rad))
 
     def forget(self) -> None:
-        """Know of nobody any more, as after a start."""
+        """Forget all systems, as after a start."""
         self._places.clear()
         self._reached.clear()
 

@@ -161,7 +161,7 @@ class ExploreScenario:
 
 
 class World:
-    """The truth: where the bottom is, what the sensors hear. ``landmarks`` is what the team knows.
+    """The truth: where the bottom is, what the sensors measure. ``landmarks`` is what the team knows.
 
     ``team`` (n_vehicles,) are the numbers of the vehicles that are there, counted from 0 in the order of their joining,
     which never change their meaning; ``positions`` (n_vehicles, 3) is where these are.

@@ -153,7 +153,7 @@ def error_squared(p: Physics, known: Known) -> float:
 
 @njit(cache=True, nogil=True)
 def unknown(m: int) -> Known:
-    """Return m landmarks that nobody has seen."""
+    """Return m landmarks that are still unseen."""
     return Known(
         np.full(m, np.nan),
         np.full(m, np.inf),

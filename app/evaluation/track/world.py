@@ -318,7 +318,7 @@ class TrackWorld:
 
     @property
     def belief(self) -> Belief:
-        """What a planner is told of the landmarks: estimates of those seen, presumed places of the others."""
+        """The landmarks as a planner gets them: estimates of those seen, presumed places of the others."""
         k, flat = self.known, self._cube is not None
         n, seen = len(k.looks), k.looks > 0
         point = np.where(seen[:, None], k.position_m, 0.0)
@@ -368,7 +368,7 @@ class TrackWorld:
         )
 
     def told_of_targets(self) -> Targets | None:
-        """Return what is known of the targets, foretold for the end of the next step."""
+        """Return what is known of the targets, predicted for the end of the next step."""
         if not self.tracks:
             return None
         ahead = [self.target_estimator.predict(track) for track in self.tracks]

@@ -56,7 +56,7 @@ def fill(order: IntArray, xy_m: FloatArray, capacity: int, apart_m: float) -> In
     """Return what goes into a message: the first ``capacity`` landmarks of ``order`` that are no near-duplicates.
 
     A landmark within ``apart_m`` of one already taken waits; beyond the paper, which drops it, it takes a place that
-    would stay free, because nothing else ever tells the receiver that this landmark is done.
+    would stay free, because nothing else informs the receiver that this landmark is done.
 
     Parameters
     ----------

@@ -115,7 +115,7 @@ class MeasuredObjective:
 
 
 def belief_sets(belief: Belief, visible_by: NDArray[np.bool_]) -> LandmarkSets:
-    """Return the sets of AURO15 as far as a belief knows them: nobody is credited with a landmark."""
+    """Return the sets of AURO15 as far as a belief knows them: no vehicle is credited with a landmark."""
     hidden = ~visible_by.any(axis=0) & ~belief.accurate
     seen = hidden & np.isfinite(belief.depth_m)
     nobody = np.zeros(len(visible_by), dtype=np.int64)

@@ -2,7 +2,7 @@
 
 A range tells something along its own direction only, so that what a flight teaches of a landmark is a matrix. A
 straight line, however long, leaves the direction across it and across the line of sight unknown; a second line at the
-side, or across, settles it. Flights that foretell the matrices know that; single figures do not.
+side, or across, settles it. Flights that predict the matrices know that; single figures do not.
 """
 
 from typing import NamedTuple
