@@ -395,7 +395,7 @@ def _meant(upload: Upload) -> tuple[str, _Taking]:
 
 def _port_error(kind: str, host: str, port: int, error: OSError) -> PortInUseError:
     remedy = (
-        "ports below 1024 need a privilege: see the operator's guide, or set others and redirect these"
+        "ports below 1024 need a privilege: see docs/neptus.md, or set others and redirect these"
         if isinstance(error, PermissionError)
         else "stop what listens there, or set another address or port"
     )
