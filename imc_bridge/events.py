@@ -13,7 +13,7 @@ class NodeState(StrEnum):
     HEARD = "heard"
     """Packets arrive, but it never announced where it can be reached."""
     ANNOUNCED = "announced"
-    """It said where it can be reached; no telemetry yet."""
+    """Its address is known; no telemetry yet."""
     ACTIVE = "active"
     """Telemetry arrives, but it cannot take a plan now."""
     READY = "ready"

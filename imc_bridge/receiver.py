@@ -1,4 +1,4 @@
-"""Everything that arrives: whose word a packet is, and who has to know of it."""
+"""Everything that arrives: the sender of a packet, and what it changes."""
 
 from __future__ import annotations
 
@@ -214,7 +214,7 @@ class Hearing:
             self._take_message(sender, message, now, address)
 
     def _newcomer(self, imc_id: int, address: Address, now: float) -> Node | None:
-        """The system that had no place when it announced itself and now speaks, if it gets one."""
+        """The system that had no place when it announced itself and now sends, if it gets one."""
         announcement = self._roster.newcomers.answered(imc_id, address)
         if announcement is None:
             return None

@@ -148,7 +148,7 @@ class Speaker:
         )
 
     def talks_to(self, node: Node) -> bool:
-        """Whether a node is one that we speak to."""
+        """Whether we send to a node."""
         wanted = self.settings.vehicles
         if node.address is None or node.announcement is None:
             return False

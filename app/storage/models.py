@@ -173,7 +173,7 @@ class SoundingRow(Base):
     verdict: Mapped[str] = mapped_column(String(16))
     reason: Mapped[str] = mapped_column(Text, default="")
     ruling: Mapped[str | None] = mapped_column(String(16))
-    """What an operator said of it, whatever gate and map think: restored or rejected."""
+    """An operator's decision, which overrules gate and map: restored or rejected."""
 
 
 class TargetRangeRow(Base):
@@ -376,7 +376,7 @@ class ProcessRow(Base):
     secret: Mapped[str] = mapped_column(String(64))
     """What they show to it; it ends with the process."""
     certificate: Mapped[str | None] = mapped_column(Text)
-    """PEM of the certificate that it serves TLS with; None: plain HTTP, or one that everybody can check."""
+    """PEM of the certificate that it serves TLS with; None: plain HTTP, or one signed by a public authority."""
     began_at: Mapped[datetime]
 
 

@@ -72,7 +72,7 @@ def create(path: Path) -> None:
 
 
 def mend(paths: Iterable[Path]) -> dict[Path, str]:
-    """Take from everybody else what they may do with files of ours; returns those that were open, with their mode."""
+    """Remove other users' rights on our files; returns those that were open, with their mode."""
     mended = {}
     for path in paths:
         try:

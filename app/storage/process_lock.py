@@ -122,7 +122,7 @@ def is_held(path: Path, owner: int | None = None) -> bool:
             path.unlink()
         return False
     except FileNotFoundError:
-        return False  # removed by somebody else meanwhile
+        return False  # removed by another process meanwhile
     finally:
         os.close(descriptor)
 

@@ -10,7 +10,7 @@ T = TypeVar("T")
 class Shared(Generic[T]):
     """Work whose result is the same for everyone who asks at the same time.
 
-    Nobody gets an answer that was begun before he asked: what was written before is in it. So this is no cache.
+    No caller gets an answer that was begun before the request: earlier writes are in it. So this is no cache.
     """
 
     def __init__(self, work: Callable[[], Awaitable[T]]) -> None:

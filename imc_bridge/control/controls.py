@@ -1,4 +1,4 @@
-"""The vehicles under control: who is led how, by which way, and at which rates it reports."""
+"""The vehicles under control: how each is led, over which link, and at which rates it reports."""
 
 from __future__ import annotations
 
@@ -135,7 +135,7 @@ class Crew:
             )
 
     def by_sound_through(self, gateway: Node) -> Iterator[LegFollower]:
-        """The vehicles that are spoken to through a gateway."""
+        """The vehicles reached through a gateway."""
         for control in self._controls.values():
             if isinstance(control, LegFollower) and control.sound and control.sound.gateway == gateway.name:
                 yield control

@@ -85,7 +85,7 @@ def replay(
 ) -> Session:
     """Feed a recording to a bridge at the recording's pace.
 
-    The recorded console is the one of our id, or else whom most packets went to; the bridge takes its id and port.
+    The recorded console is the one of our id, or else the receiver of most packets; the bridge takes its id and port.
     The clocks of simulated vehicles that ran faster than the recording's set the time scale.
     """
     records = list(read_recording(path))

@@ -60,11 +60,11 @@ class SessionKeeper(Protocol):
     """Who knows what sessions are for; called from the event loop."""
 
     def is_own_user(self, connection: socket.socket) -> bool:
-        """Tell of a connection that was just accepted whether the user made it who runs this process; any thread."""
+        """Return whether a connection just accepted belongs to the user who runs this process; any thread."""
         ...
 
     async def log_in(self, user: str, password: str, host: str, *, own_user: bool) -> str | None:
-        """Return who that is; None: not let in. Raises SessionRefusedError to say why."""
+        """Return the user; None: not admitted. Raises SessionRefusedError with the reason."""
         ...
 
     async def begin(self, session: str, vehicles: int, user: str, host: str) -> None:
@@ -121,7 +121,7 @@ class _Session:
 class NeptusGateway:
     """An FTP and an HTTP endpoint that look to Neptus' ConvCAO panel like the service it was written for.
 
-    A session belongs to who made its folder; its answers are served only to hosts that logged in for it, because the
+    A session belongs to the user that made its folder; its answers are served only to hosts that logged in for it: the
     panel sends no password with HTTP.
 
     The panel uploads each step once, looks at no reply, and polls until an answer comes whose ``timeStep`` is not less
@@ -271,7 +271,7 @@ class NeptusGateway:
             known = self._sessions[session] = _Session(session, restored.user, set(restored.hosts))
             known.vehicles = restored.vehicles
             known.time_step = restored.time_step
-            # What its last step was answered, if it was, is said again by the mission when that goes on.
+            # The mission repeats the answer to its last step, if there was one, when it goes on.
             known.answered = max(restored.time_step - 1, 0)
             self._forget_some()
         return known

@@ -29,7 +29,7 @@ LOOPBACK = "127.0.0.1"
 _RECEIVE_BUFFER_BYTES = 16 << 20
 _SO_REUSEPORT = getattr(socket, "SO_REUSEPORT", 0)
 _SO_RCVBUFFORCE = 33
-"""Linux: a receive buffer beyond what the system allows everybody, for programs that may have it."""
+"""Linux: a receive buffer beyond the system's limit, for programs with that privilege."""
 _SO_MEMINFO = 55
 _MEMINFO = struct.Struct("=9I")
 """Linux: what a socket holds; the last figure counts packets that it had no room for."""

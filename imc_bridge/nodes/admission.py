@@ -15,7 +15,7 @@ from imc_bridge.settings import BridgeSettings
 
 WINDOW_S = 1.0
 STRANGERS_SHARE = 4
-"""All who announced nothing, at one host together, get this part of what a vehicle may send."""
+"""All systems at one host without an announce share this part of a vehicle's allowance."""
 MAX_SOURCES = 1024
 """Sources of one window that are counted one by one; the others share a count."""
 _TRAFFIC, _ANNOUNCES = 0, -1
@@ -76,7 +76,7 @@ class Admission:
         return True
 
     def admits_id(self, imc_id: int, address: Address) -> bool:
-        """Whether a node of this id is taken up."""
+        """Whether a node of this id is admitted."""
         return not self._ids or imc_id in self._ids or self.refuse(Refused.ID, address)
 
     def refuse(self, reason: Refused, address: Address) -> bool:

@@ -1,4 +1,4 @@
-"""How many nodes are kept, and who leaves when there are too many: IMC has no authentication, and ids cost nothing."""
+"""How many nodes are kept, and which leave when there are too many: IMC has no authentication, and ids are free."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ MAX_UNHEARD_OF_HOST = 32
 MAX_UNANNOUNCED = 32
 MAX_UNANNOUNCED_OF_HOST = 8
 UNANNOUNCED_SILENT_S = 10.0
-"""Of those who announce nothing, one that is silent for this long leaves for another."""
+"""A system without an announce that is silent for this long leaves for another."""
 UNANNOUNCED_KEPT_WALL_S = 60.0
 UNHEARD_KEPT_WALL_S = 300.0
 """Silent ones are shown for this long, if their places are not needed."""
@@ -29,7 +29,7 @@ class Standing(IntEnum):
     UNHEARD = 1
     """It was announced, and nothing came from where it says that it is."""
     HEARD = 2
-    """It speaks from where it announced itself."""
+    """It sends from its announced address."""
 
 
 _MOST = {
@@ -59,7 +59,7 @@ class Capacity:
     wanted : set[str]
         Names of vehicles of missions and settings: they get a place, and keep it.
     in_use : Callable[[Node], bool]
-        Whether somebody works with a node, which keeps its place as well.
+        Whether a node is in use, which keeps its place as well.
     """
 
     def __init__(self, nodes: Mapping[int, Node]) -> None:
@@ -85,14 +85,14 @@ class Capacity:
         return not self.keeps(node)
 
     def room(self, standing: Standing, host: str, name: str, now: float) -> tuple[bool, Node | None]:
-        """Whether there is a place for one more node, and who leaves it.
+        """Whether there is a place for one more node, and which node leaves it.
 
         Parameters
         ----------
         standing
             What the node will be.
         host
-            Where it speaks or announces itself from.
+            The host that it sends or announces itself from.
         name
             As announced.
         now

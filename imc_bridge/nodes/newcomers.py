@@ -10,7 +10,7 @@ from imc_bridge.network.transport import Address
 
 MAX_NEWCOMERS = 16_384
 MAX_NEWCOMERS_OF_HOST = 8192
-"""What strangers at one host may announce in some 6 s, which is how long a vehicle takes to speak to us."""
+"""Most announces of unknown systems at one host in some 6 s, the time that a vehicle takes to answer us."""
 
 
 class Newcomers:

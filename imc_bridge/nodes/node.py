@@ -180,7 +180,7 @@ class Node:
 
     @property
     def is_vehicle(self) -> bool:
-        """Whether it announced itself as a vehicle, or has not said what it is."""
+        """Whether it announced itself as a vehicle, or without a type."""
         return self.announcement is None or self.announcement.is_vehicle
 
     # Discovery

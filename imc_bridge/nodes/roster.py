@@ -1,4 +1,4 @@
-"""Who is on the network: nodes by id, by name and by address, and what their announces change."""
+"""The systems on the network: nodes by id, by name and by address, and what their announces change."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Roster:
     Attributes
     ----------
     capacity : Capacity
-        Says for whom there is a place.
+        Decides which systems get a place.
     newcomers : Newcomers
         Those who announced themselves while there was none.
     left : list[Callable[[Node], None]]
@@ -71,7 +71,7 @@ class Roster:
         return next((node for node in self._nodes.values() if node.name == name), None)
 
     def stranger(self, imc_id: int, host: str, now: float) -> Node | None:
-        """The node of this id, whose packets come from anywhere; None when there are too many who announced nothing."""
+        """The node of this id, whose packets come from anywhere; None when too many without an announce are known."""
         node = self._nodes.get(imc_id)
         if node is None and self._make_room(Standing.UNANNOUNCED, host, "", now):
             node = self._add(imc_id, f"0x{imc_id:04X}", host, now)
@@ -96,7 +96,7 @@ class Roster:
         return True
 
     def first_heard(self, node: Node) -> None:
-        """Give a node that begins to speak the name that it announced, unless another one speaks under it."""
+        """Give a node with its first packet the name that it announced, unless another one uses it."""
         if node.announcement is None or node.name == node.announcement.name:
             return
         holder = self.named(node.announcement.name)
@@ -184,7 +184,7 @@ class Roster:
         return Arrival(node, first, rebooted, stale)
 
     def pass_time(self, now: float) -> None:
-        """Forget conflicts that have not shown for a while, and strangers who fell silent."""
+        """Forget conflicts that have not shown for a while, and unknown systems that fell silent."""
         self.capacity.look_again()
         for node in list(self._nodes.values()):
             if self.capacity.expired(node, now, self._settings.time_scale):
@@ -195,7 +195,7 @@ class Roster:
                 self._nodes[imc_id].conflict = None
 
     def _contested(self, node: Node, new: Announcement, now: float) -> bool:
-        """Note who claims the id; whether a second node does, whose announce must not count.
+        """Note which node claims the id; return whether a second one does, whose announce must not count.
 
         A node that restarts comes back under its name with a new uid, once. Two nodes come in turns.
         """

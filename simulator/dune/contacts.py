@@ -44,7 +44,7 @@ class Contacts:
     def __init__(self) -> None:
         self._known: dict[int, Contact] = {}
         self.destinations: list[tuple[int, Address]] = []
-        """To whom telemetry goes now: ids and addresses."""
+        """Present receivers of telemetry: ids and addresses."""
 
     def announced(self, imc_id: int, name: str, services: str) -> None:
         """Learn a system from its Announce; only the first counts."""

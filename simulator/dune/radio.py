@@ -14,7 +14,7 @@ _EARTH_M = 6_371_000.0
 
 
 class Radio:
-    """Who is within range of one vehicle.
+    """The systems within range of one vehicle.
 
     Parameters
     ----------

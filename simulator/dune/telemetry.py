@@ -47,7 +47,7 @@ class Telemetry:
         self._announce.services = services
 
     def announce(self) -> imcpy.Announce:
-        """Who and where it is, and how to reach it."""
+        """Its name, position and addresses."""
         here = self._vehicle.position
         lat, lon = self._frame.to_geodetic(here.east_m, here.north_m)
         message = self._announce

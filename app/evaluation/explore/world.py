@@ -107,7 +107,7 @@ class ExploreScenario:
     line_of_sight : bool
         Whether the true sea floor hides what lies behind it.
     capacity : int or None
-        Most landmark entries in a message between a vehicle and the station; None: everybody knows everything.
+        Most landmark entries in a message between a vehicle and the station; None: all knowledge is shared.
     message_loss : float
         Probability that a message is lost; only with a capacity.
     """

@@ -93,7 +93,7 @@ class TrackScenario:
     plain_ekf : bool
         Whether landmarks are estimated by one first-order filter each, as in MED13's figure 1.
     fixed_noise : float or None
-        Standard deviation that this filter, and who plans by it, takes every range to have; None: it knows the noise.
+        Standard deviation that this filter, and its planner, takes every range to have; None: it knows the noise.
     """
 
     terrain: Terrain | None = None
@@ -274,7 +274,7 @@ class TrackWorld:
             self.tracks[k] = self.target_estimator.update(self.tracks[k], places, ranges, blur)
 
     def _localize(self, rng: np.random.Generator) -> None:
-        """Count who came to the surface; there is GPS, and ranges between vehicles everywhere."""
+        """Count surfacings; there is GPS, and ranges between vehicles everywhere."""
         fading, up = self.scenario.fading, self.positions[:, 2] <= CEILING + SURFACED
         if fading is None:
             return

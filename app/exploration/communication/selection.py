@@ -7,7 +7,7 @@ from app.arrays import BoolArray, FloatArray, IntArray
 
 
 def reachable(positions: FloatArray, visible_by: BoolArray, xy_m: FloatArray, travel_m: float) -> BoolArray:
-    """Return who is in whose reachable exploration area: element (j, k) says that vehicle k is in that of j.
+    """Return the reachable exploration areas: element (j, k) says that vehicle k is in that of j.
 
     That is so when, of the landmarks visible to j, the one closest to k in the plane lies within the distance that k
     can travel in one step. No vehicle is in its own.

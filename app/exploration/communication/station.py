@@ -143,7 +143,7 @@ class StationNode:
         return tuple(sorted(self._members))
 
     def position(self, number: int) -> FloatArray:
-        """Return where a vehicle is, (3,): where it said it was, one step of silence later where it was sent."""
+        """Return where a vehicle is, (3,): its last report, or after one step of silence its waypoint."""
         return self._members[number].position
 
     def heard_within(self, steps: int) -> tuple[int, ...]:
@@ -212,7 +212,7 @@ class StationNode:
             member.presumed[member.clock - member.looked_at > PRESUMED_FOR] = 0.0
 
     def order(self, number: int, waypoint: FloatArray) -> bytes:
-        """Return the message to a vehicle: where to go next, who is near, what others have found out."""
+        """Return the message to a vehicle: its next waypoint, vehicles nearby, and news from the others."""
         member = self._members[number]
         row = self.members.index(number)
         by_distance = sorted(

@@ -91,7 +91,7 @@ class Errands:
             taken = [what for what in self._on.values() if what != RISE]
             if part[target] <= LEAVES_AT or int(target) in taken or len(taken) >= most_away(len(vehicles)):
                 continue
-            # Who is coming back from another target is on the way already.
+            # A vehicle coming back from another target is on the way already.
             free = [i for i, name in enumerate(vehicles) if name not in self._on]
             free = [i for i in free if vehicles[i] in chasing] or free
             if free:

@@ -14,7 +14,7 @@ from app.arrays import FloatArray
 from app.exploration.core.problem import Belief
 
 TRACE = 1e-6
-"""Of what is enough: the least that is said to be lacking of a landmark that is not accurate."""
+"""Least need of a landmark that is not accurate, as a fraction of what is enough."""
 
 DOWN = np.array([0.0, 0.0, 1.0])
 FLAT = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])

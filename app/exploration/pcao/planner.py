@@ -136,7 +136,7 @@ class PcaoPlanner(PlannerBase):
         return at_depth(team.constraints, bottom, team.positions, wish[..., :2], wish[..., 2])
 
     def _leader(self, names: tuple[str, ...], distance: FloatArray) -> int:
-        """Return who leads where links hold the team together: who has work closest by; seldom another one."""
+        """Return the leader where links hold the team together: the vehicle closest to its work; it seldom changes."""
         nearest = int(np.argmin(distance))
         if self._lead in names and distance[names.index(self._lead)] <= STAYS_LEADER * distance[nearest] + 0.1:
             nearest = names.index(self._lead)

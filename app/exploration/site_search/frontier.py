@@ -72,7 +72,7 @@ class FrontierSearch(SearchPlanner):
                 self._spent.append(self._views[name])
 
     def _views_to_weigh(self, ground: Ground, ways: list[NDArray[np.int32]]) -> IntArray:
-        """Return cells (n, 2) of a lattice that somebody can get to, and those that vehicles are under way to."""
+        """Return cells (n, 2) of a lattice that a vehicle can get to, and those that vehicles are under way to."""
         reached = np.minimum.reduce(ways) < UNREACHED
         lattice = np.zeros_like(reached)
         lattice[::LATTICE, ::LATTICE] = True
