@@ -168,7 +168,7 @@ class Bridge:
 
     @property
     def double(self) -> str:
-        """Who else announces our own id, empty when nobody does."""
+        """Names of other systems that announce our own id; usually empty."""
         return self._hearing.double
 
     def on_packet(self, packet: bytes, address: Address) -> None:
@@ -182,7 +182,7 @@ class Bridge:
     # What the user asks
 
     def nodes(self) -> tuple[NodeView, ...]:
-        """Every node heard of, by id."""
+        """Every known node, by id."""
         now = self._now()
         return tuple(
             view_of(
@@ -197,7 +197,7 @@ class Bridge:
         )
 
     def want(self, vehicle: str) -> None:
-        """Keep a place for a vehicle of this name, whoever else announces himself."""
+        """Reserve a place for a vehicle of this name, however many other systems announce themselves."""
         self._roster.capacity.wanted.add(vehicle)
 
     def position_rad(self) -> tuple[float, float]:
@@ -245,7 +245,7 @@ class Bridge:
         return self._crew.of(node).intervention if node is not None and self._commanding else ""
 
     def goto(self, vehicle: str, waypoint: Waypoint) -> None:
-        """Replace the vehicle's waypoint; what becomes of it is told by events.
+        """Replace the vehicle's waypoint; its progress is reported by events.
 
         Raises
         ------
@@ -277,7 +277,7 @@ class Bridge:
             return StopResult(vehicle, False, "this bridge only listens")
         control = self._crew.of(node)
         if node.status(self._now()).state in (NodeState.LOST, NodeState.EXPECTED_OFFLINE):
-            # It does not hear us now, and is stopped when it is heard again.
+            # It is out of reach, and is stopped when its packets arrive again.
             timeout_s = min(timeout_s, SILENT_STOP_WALL_S)
         control.begin_stop(self._now())
         begun = self._clock()
@@ -327,7 +327,7 @@ class Bridge:
             await asyncio.sleep(self._tick_wall_s)
 
     def _excuse(self, seconds: float) -> None:
-        """Blame nobody for a silence that is ours: this process, or its machine, was busy with something else."""
+        """Count no silence that this process or its machine caused by being busy."""
         now = self._now()
         if seconds > WORTH_TELLING_WALL_S * self.settings.time_scale:
             log.warning("The IMC bridge was held up for %.1f s", seconds / self.settings.time_scale)

@@ -1,4 +1,4 @@
-"""What the bridge tells its user, as plain values: WGS84 degrees, metres, depth positive down."""
+"""Events that the bridge reports to its user, as plain values: WGS84 degrees, metres, depth positive down."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ class NodeState(StrEnum):
     HEARD = "heard"
     """Packets arrive, but it never announced where it can be reached."""
     ANNOUNCED = "announced"
-    """It said where it can be reached; no telemetry yet."""
+    """Its address is known; no telemetry yet."""
     ACTIVE = "active"
     """Telemetry arrives, but it cannot take a plan now."""
     READY = "ready"
@@ -29,9 +29,9 @@ class Guidance(StrEnum):
     """How a vehicle is led."""
 
     FOLLOW = "follow"
-    """By references, one a second: it can be led anew at any moment, and ends its plan when they cease."""
+    """By references, one a second: it can be redirected at any moment, and ends its plan when they cease."""
     LEGS = "legs"
-    """By a plan for each whole leg: needs no contact under way, and cannot be led anew or guarded meanwhile."""
+    """By a plan for each whole leg: needs no contact under way, and cannot be redirected or guarded meanwhile."""
     ACOUSTIC = "acoustic"
     """By legs; while radio is silent plans, stops and reports go by sound through a gateway."""
 
@@ -177,9 +177,9 @@ class LinkChange:
 
 @dataclass(frozen=True, slots=True)
 class Restarted:
-    """DUNE on board a vehicle has begun anew: whatever it was doing is forgotten.
+    """DUNE on board a vehicle restarted: its plan is gone.
 
-    ``submerged``: the vehicle was under water when it was last heard before.
+    ``submerged``: the vehicle was under water at the last contact before.
     """
 
     vehicle: str
@@ -247,12 +247,12 @@ class NodeView:
     """Address that packets under its id came from last without being announced."""
     conflict: str | None = None
     clock_rate: float | None = None
-    """Seconds of its clock per second of ours; None while it was not heard for long enough."""
+    """Seconds of its clock per second of ours; None until contact has lasted long enough."""
     history: tuple[LinkChange, ...] = ()
     """The last changes of its link, oldest first."""
     rate_limiters: str = ""
     restarts: int = 0
-    """How often DUNE on board has begun anew while we listened."""
+    """How often DUNE on board restarted while we listened."""
     radio_gaps: int = 0
     """How often radio ended under water while it was led by references, which ends their plan each time."""
 

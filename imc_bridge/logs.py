@@ -182,7 +182,7 @@ class VehicleLog:
         return {fault.value: count for fault, count in self._decoder.faults.items() if fault is not PacketFault.UNKNOWN}
 
     def _identify(self) -> tuple[int, str, dict[int, str]]:
-        """Whose log it is, by which name, and its entities by id: read up to the vehicle's own announce."""
+        """The log's vehicle, its name, and its entities by id: read up to the vehicle's own announce."""
         decoder = Decoder(IDENTIFYING)
         states: Counter[int] = Counter()
         names: dict[int, str] = {}
@@ -211,7 +211,7 @@ class VehicleLog:
     def events(self) -> Iterator[LogEvent]:
         """Yield states, soundings and refused Distances; the same file gives the same events every time."""
         node = Node(self.imc_id, self.vehicle, self._settings, 0.0)
-        # A log tells no arrival times, and nobody else speaks in it: a leap of the clock counts once it repeats.
+        # A log has no arrival times and only one sender: a leap of the clock counts once it repeats.
         node.clock = VehicleClock(quiet_s=0.0)
         node.entities = dict(self._entities) or None
         self.refused.clear()

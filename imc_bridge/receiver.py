@@ -1,4 +1,4 @@
-"""Everything that arrives: whose word a packet is, and who has to know of it."""
+"""Everything that arrives: the sender of a packet, and what it changes."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class Hearing:
     ----------
     settings
     roster, crew, links
-        Who is known, who is under control, and how their links are; all of them are told.
+        Known nodes, controlled vehicles and their links; each is updated.
     tell
         Receives events for the bridge's user.
     failed
@@ -80,7 +80,7 @@ class Hearing:
         self.decoder = Decoder(WANTED)
         self.announces = Decoder(("Announce",))
         self.double = ""
-        """Who else announces our own id, empty when nobody does."""
+        """Names of other systems that announce our own id; usually empty."""
         self._settings = settings
         self._roster = roster
         self._crew = crew
@@ -214,7 +214,7 @@ class Hearing:
             self._take_message(sender, message, now, address)
 
     def _newcomer(self, imc_id: int, address: Address, now: float) -> Node | None:
-        """The system that had no place when it announced itself and now speaks, if it gets one."""
+        """The system that had no place when it announced itself and now sends, if it gets one."""
         announcement = self._roster.newcomers.answered(imc_id, address)
         if announcement is None:
             return None

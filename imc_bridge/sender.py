@@ -62,7 +62,7 @@ class Speaker:
     def begin(self, now: float) -> None:
         """Announce from now on, or as soon as it is known where we are."""
         if self.settings.position_deg is None:
-            # The first vehicle heard tells where we are and is answered at once; see own_announce.
+            # The first vehicle's position serves as ours, and it is answered at once; see own_announce.
             self._announce_due = now + self.settings.announce_period_s
 
     def tick(self, now: float) -> None:
@@ -73,7 +73,7 @@ class Speaker:
             self._heartbeat_due = now + self.settings.heartbeat_period_s
             self._greeted.clear()
             for node in self._roster:
-                # Who was announced and never heard may not exist: whoever has its address is not bothered for long.
+                # A system that never answered may not exist: its address is not addressed for long.
                 if self.talks_to(node) and (node.packets or not node.given_up(now)):
                     self._beat(node)
         for node in self._roster:
@@ -148,11 +148,11 @@ class Speaker:
         )
 
     def talks_to(self, node: Node) -> bool:
-        """Whether a node is one that we speak to."""
+        """Whether we send to a node."""
         wanted = self.settings.vehicles
         if node.address is None or node.announcement is None:
             return False
-        # A console announces, too, but has nothing to tell us.
+        # A console announces, too, but has no telemetry for us.
         return node.name in wanted if wanted else node.announcement.system_type != int(imcpy.SystemType.CCU)
 
     def send(self, node: Node, message: Message) -> None:

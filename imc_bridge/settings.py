@@ -42,7 +42,7 @@ class BridgeSettings:
     announce_ports: tuple[int, ...] = STANDARD_ANNOUNCE_PORTS
     multicast_group: str = STANDARD_MULTICAST_GROUP
     position_deg: tuple[float, float] | None = None
-    """Where this console is, latitude and longitude; without it the place of the first vehicle heard is announced."""
+    """Where this console is, latitude and longitude; without it the first vehicle's position is announced."""
     vehicles: tuple[str, ...] = ()
     """Names of the vehicles to talk to; empty means every vehicle that announces itself."""
     allowed_ids: tuple[int, ...] = ()
@@ -82,7 +82,7 @@ class BridgeSettings:
     rate_limiters: str = DEFAULT_RATE_LIMITERS
     """Asked of every engaged vehicle, the former value is restored afterwards; empty leaves rates alone."""
     state_events_per_s: float = 10.0
-    """At most so many state reports per vehicle and second of the wall clock are passed on."""
+    """Most state reports per vehicle and second of the wall clock that are passed on."""
 
     altimeter: AltimeterGeometry = "vertical"
     """``vertical``: the range is the height above the bottom (DUNE's simulation); ``body``: fixed to the hull."""

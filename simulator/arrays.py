@@ -1,4 +1,4 @@
-"""Types of arrays, by what is in them; their shapes are said where they are used."""
+"""Types of arrays by their content; shapes are stated where they are used."""
 
 import numpy as np
 from numpy.typing import NDArray

@@ -1,7 +1,7 @@
 """Car parks of 150 x 150 m in three degrees of difficulty (ACCESS13, section V), and a harbour basin.
 
 ACCESS13 shows its car parks in figures only. These are drawn by their descriptions: barrels are known beforehand,
-parked cars are not; the third one holds a wall of vehicles that traps whoever goes straight for the goal.
+parked cars are not; the third one holds a wall of vehicles that traps a robot heading straight for the goal.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ CAR = (5, 2)
 STALL = 3
 AISLE = 8
 CLEAR = 6.0
-"""Radius about entry and goal in which nobody parks."""
+"""Radius about entry and goal without parked cars."""
 
 SCENARIOS = (1, 2, 3)
 

@@ -1,4 +1,4 @@
-"""Worlds of obstacles on square cells: where a vehicle may not be, and what its scanner hears of them."""
+"""Worlds of obstacles on square cells: where a vehicle may not be, and what its scanner measures."""
 
 from __future__ import annotations
 

@@ -40,7 +40,7 @@ class Measurement:
     Attributes
     ----------
     vehicle, time_s, source, beam
-        Whose, when (the vehicle's clock, seconds), by which device ("Altimeter", "DVL", "Multibeam"), beam.
+        Vehicle, time (the vehicle's clock, seconds), device ("Altimeter", "DVL", "Multibeam"), beam.
     range_m
         Along the beam; NaN when there was no return.
     position
@@ -282,7 +282,7 @@ class SimulatedVehicle:
         return out
 
     def step(self) -> bool:
-        """One step of 0.1 s; tells whether a ping is due."""
+        """One step of 0.1 s; returns whether a ping is due."""
         vehicle = self.vehicle
         m = vehicle.motion
         hit = vehicle.step(self.navigation.error_m, self.bottom_m)

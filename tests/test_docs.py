@@ -274,9 +274,9 @@ def test_the_planner_of_the_guide_keeps_the_contract(tmp_path: Path) -> None:
 def test_the_guides_name_every_problem_limit_and_field() -> None:
     rest = (ROOT / "docs" / "rest.md").read_text()
     assert set(re.findall(r"`([a-z-]+)`", rest.partition("Last part of `type`")[2].partition("\n\n")[0])) == set(TITLES)
-    guide = (ROOT / "docs" / "operators-guide.md").read_text()
-    told = set(re.findall(r"`(\w+)`", guide))
-    assert set(Limits.model_fields) <= told
+    guide = (ROOT / "docs" / "operating.md").read_text()
+    named = set(re.findall(r"`(\w+)`", guide))
+    assert set(Limits.model_fields) <= named
     assert set(re.findall(r"^\| `(\w+)` \|", guide.partition("## Describing")[2].partition("## Limits")[0], re.M)) <= (
         set(MissionSpec.model_fields)
     )

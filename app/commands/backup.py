@@ -36,7 +36,7 @@ def backup(
         path, contents = back_up(settings.database_url, file or Path("backups"))
     except BackupError as error:
         raise CommandError(str(error), error.remedy) from None
-    # In the database, not in the copy: who has taken everything away with him is worth knowing.
+    # In the database, not in the copy: a copy of everything is worth an audit entry.
     asyncio.run(noted(settings, "backup", str(path)))
     _tell(path, contents, "is written and checked")
 

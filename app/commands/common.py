@@ -30,7 +30,7 @@ class CommandError(Exception):
 
 
 def command_settings(**overrides: Any) -> "Settings":
-    """Read the settings, with what was said on the command line; only warnings are logged."""
+    """Read the settings, with the command line's options; only warnings are logged."""
     from app.api import logs
     from app.settings import load_settings
 
@@ -40,7 +40,7 @@ def command_settings(**overrides: Any) -> "Settings":
 
 
 def this_user() -> str:
-    """Return who gives a command on this machine."""
+    """Return the user who gives a command on this machine."""
     import getpass
     import os
 

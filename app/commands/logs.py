@@ -55,7 +55,7 @@ def import_logs(
         with Progress(*columns, console=console, disable=not console.is_terminal) as bar:
             with_missions(settings, run, changing="import-log", mission=mission)
     finally:
-        # What one log brought is told also when the next one cannot be read.
+        # The result of one log is shown even when the next one cannot be read.
         if as_json:
             typer.echo(json.dumps([view.model_dump() for view in views], indent=2))
         else:

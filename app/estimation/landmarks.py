@@ -40,7 +40,7 @@ class Landmarks:
 
     @classmethod
     def unknown(cls, xy_m: FloatArray) -> "Landmarks":
-        """Return landmarks at ``xy_m`` (n, 2) that nobody has seen."""
+        """Return landmarks at ``xy_m`` (n, 2) that are still unseen."""
         n = len(xy_m)
         return cls(
             np.ascontiguousarray(xy_m, dtype=np.float64),

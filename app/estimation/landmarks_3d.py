@@ -1,7 +1,7 @@
 """Landmarks whose whole position is unknown: an extended Kalman filter per landmark, from ranges (MED13, NGCUV12).
 
 A range says nothing of the direction. The first look therefore starts a bundle of filters, spread evenly over the half
-sphere below the vehicle; every further look updates all of them and weighs each by how well it foretold the range, as
+sphere below the vehicle; every further look updates all of them and weighs each by how well it predicted the range, as
 in a Gaussian-sum filter. Once the bundle as a whole is narrow enough to be linearised about, it becomes a single filter
 with the bundle's mean and covariance. The predicted range's mean and variance are of second order, which keeps the
 covariance honest while a point is still uncertain across the beam.
@@ -56,7 +56,7 @@ class Landmarks3D:
 
     @classmethod
     def unknown(cls, n: int) -> "Landmarks3D":
-        """Return ``n`` landmarks that nobody has seen."""
+        """Return ``n`` landmarks that are still unseen."""
         covariance = np.zeros((n, 3, 3))
         covariance[:, range(3), range(3)] = np.inf
         return cls(

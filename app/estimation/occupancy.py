@@ -66,7 +66,7 @@ class OccupancyGrid:
     blueprint : (rows, cols)
         Obstacles known beforehand; row 0 is south, column 0 west.
     evidence : (rows, cols)
-        Logarithmic odds of being occupied from all scans; NaN where nobody looked.
+        Logarithmic odds of being occupied from all scans; NaN where not scanned.
     """
 
     west_m: float

@@ -2,7 +2,7 @@
 
 A range says nothing of the direction, and ranges from vehicles in a row leave mirror images. A target's first range
 therefore starts a mixture of filters spread evenly over the water that it may be in; every range updates all of them
-and weighs each by how well it foretold that range. Once the mixture is narrow enough to be linearised about, it becomes
+and weighs each by how well it predicted that range. Once the mixture is narrow enough to linearise about, it becomes
 a single filter. Only while its standard deviations are small does a target belong to the set ``A`` (MED13): unlike a
 landmark it leaves that set again.
 """
@@ -52,7 +52,7 @@ class TargetTrack:
     covariances : (k, 6, 6)
         Their covariances.
     weights : (k,)
-        Their probabilities; empty as long as nothing was heard.
+        Their probabilities; empty before the first range.
     surprise : float
         Mean squared normalised innovation of the last step's ranges; NaN where there were none, and while it is a
         mixture.
@@ -68,12 +68,12 @@ class TargetTrack:
 
     @classmethod
     def unknown(cls) -> "TargetTrack":
-        """Return a target that nobody has heard."""
+        """Return a target without any range."""
         return cls(np.zeros((0, 6)), np.zeros((0, 6, 6)), np.zeros(0))
 
     @property
     def known(self) -> bool:
-        """Whether it was ever heard."""
+        """Whether it was ever ranged."""
         return len(self.weights) > 0
 
     @property
@@ -103,18 +103,18 @@ class TargetTrack:
 
 @dataclass(frozen=True)
 class TargetEstimator:
-    """The filter; see the module's text. Time advances by 1 per step, or by as much as :meth:`predict` is told.
+    """The filter; see the module's text. Time advances by 1 per step, or by what :meth:`predict` is given.
 
     Attributes
     ----------
     sensor : RangeSensor
-        Gives the noise, and how far a target is heard (infinitely far by default).
+        Gives the noise, and how far a target can be ranged (infinitely far by default).
     acceleration_sd : float
         Standard deviation of the change of each velocity component within a unit of time ("zero-acceleration" model).
     accuracy_sd_m : float
         A target belongs to ``A`` while its three standard deviations are below this.
     low_m, high_m : (3,)
-        Box in which a target may be when it is first heard.
+        Box in which a target may be at its first range.
     speed_sd : float
         Standard deviation of each component of its velocity then.
     vertical : float
@@ -174,7 +174,7 @@ class TargetEstimator:
         positions : (n_vehicles, 3)
             Where they measured.
         ranges : (n_vehicles,)
-            What they measured; NaN where the target was not heard.
+            What they measured; NaN where the target was not ranged.
         blur_m2 : (n_vehicles, 3) or None
             Variances of their own positions.
         """
@@ -272,7 +272,7 @@ def foretold_sd(
 ) -> FloatArray:
     """Return, for each team configuration (c, n_vehicles, 3), the greatest standard deviation it would leave, (c,).
 
-    ``mean`` (6,) and ``covariance`` (6, 6) are the target's as foretold for that time; every vehicle closer than
+    ``mean`` (6,) and ``covariance`` (6, 6) are the target's as predicted for that time; every vehicle closer than
     ``hearing`` is taken to range to it once, and to find it where it is expected. ``sd`` is the part of the
     noise that is the same at any distance.
     """

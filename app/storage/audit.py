@@ -15,7 +15,7 @@ LEAST_DAYS = 30
 
 @dataclass(frozen=True)
 class Command:
-    """Who did what from where, and what came of it; see :class:`AuditRow`."""
+    """Who did what from where, with the result; see :class:`AuditRow`."""
 
     actor: str
     role: str

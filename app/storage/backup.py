@@ -16,7 +16,7 @@ from app.storage import private
 SQLITE_MAGIC = b"SQLite format 3\0"
 ARCHIVE_MAGIC = b"PGDMP"
 _WITHOUT_PROCESSES = ("--exclude-table-data=mission_owners", "--exclude-table-data=processes")
-"""Which processes live is true of no other moment, and their secrets are nobody's business."""
+"""The list of live processes is of no use later, and their secrets are private."""
 
 
 class BackupError(Exception):

@@ -20,7 +20,7 @@ BUSY_TIMEOUT_MS = 30_000
 TROUBLED_TIMEOUT_MS = 1_000
 """How long one waits once another one has waited in vain."""
 RECENT_S = 60.0
-"""A trouble that did not show for so long is taken to be over."""
+"""A trouble that did not show for this long is taken to be over."""
 
 
 def make_engine(url: str) -> AsyncEngine:

@@ -1,4 +1,4 @@
-"""Troubles of the database that pass: its disk is full, somebody holds it locked, its server is away."""
+"""Troubles of the database that pass: its disk is full, another program holds it locked, its server is away."""
 
 import sqlite3
 

@@ -16,7 +16,7 @@ class Grouped(Generic[T, R]):
     """Does what came while the last orders were done, in the order it came, all of it at once.
 
     ``work`` returns a result or an exception for each order. When it fails with several, each is done alone: one that
-    cannot be done is not the others' trouble. ``alone`` tells which orders are never done with others.
+    cannot be done is not the others' trouble. ``alone`` says which orders are never done with others.
     """
 
     def __init__(
@@ -28,7 +28,7 @@ class Grouped(Generic[T, R]):
         self._worker: asyncio.Task[None] | None = None
 
     async def __call__(self, order: T) -> R:
-        """Return the order's result, or raise what it came to. Whoever stops waiting does not end it."""
+        """Return the order's result, or raise what it came to. A caller that stops waiting does not end it."""
         done: asyncio.Future[R] = asyncio.get_running_loop().create_future()
         self._waiting.append((order, done))
         if self._worker is None:
@@ -66,7 +66,7 @@ class Grouped(Generic[T, R]):
             raise
         for (_, done), result in zip(group, found, strict=True):
             if done.done():
-                continue  # nobody waits any more
+                continue  # no caller waits any more
             if isinstance(result, Exception):
                 done.set_exception(result)
             else:

@@ -1,4 +1,4 @@
-"""Which of the processes that share a database are alive, told by locks that end with their holders.
+"""Which of the processes that share a database are alive, shown by locks that end with their holders.
 
 No clock is compared and no heartbeat written: the operating system (SQLite) or the database server (PostgreSQL) gives
 a lock up when its process is killed, and the server also when the network to it is cut.
@@ -20,12 +20,12 @@ from app.storage.process_lock import LockHeldError, ProcessLock, is_held
 LOCKS = 0x62617468
 """The first half of our advisory locks' names in PostgreSQL; the second is the process's number."""
 CHANNEL = "bathyfleet"
-"""PostgreSQL's channel on which processes tell each other to look again."""
+"""PostgreSQL's channel on which processes ask each other to look again."""
 SILENCE_S = 4
-"""PostgreSQL asks a connection that was silent for so long whether it is still there, ``PROBES`` times each second."""
+"""PostgreSQL asks a connection that was silent this long whether it is still there, ``PROBES`` times each second."""
 PROBES = 3
 ANSWER_S = 2.0
-"""A server that does not answer for so long is taken for cut off: before the server takes us for dead."""
+"""A server that does not answer for this long is taken for cut off: before the server takes us for dead."""
 
 
 class MembershipLostError(Exception):

@@ -130,7 +130,7 @@ def positions_after(mission_id: str, after_id: int) -> Select[*tuple[Any, ...]]:
 
 
 async def last_positions(session: AsyncSession, mission_id: str) -> dict[str, PositionRow]:
-    """Return each vehicle's position that was heard last; its own clock may have begun anew, and logs come later."""
+    """Return each vehicle's last received position; its own clock may have been reset, and logs come later."""
     newest = (
         select(func.max(PositionRow.id))
         .where(PositionRow.mission_id == mission_id, PositionRow.imported.is_(False))
@@ -141,7 +141,7 @@ async def last_positions(session: AsyncSession, mission_id: str) -> dict[str, Po
 
 
 async def track_points(session: AsyncSession, mission_id: str) -> dict[str, list[tuple[float, float, float, float]]]:
-    """Return each vehicle's places as (longitude, latitude, depth, time), in the order they were heard."""
+    """Return each vehicle's places as (longitude, latitude, depth, time), in the order of arrival."""
     query = (
         select(PositionRow.vehicle, PositionRow.lon_deg, PositionRow.lat_deg, PositionRow.depth_m, PositionRow.time_s)
         .where(PositionRow.mission_id == mission_id)

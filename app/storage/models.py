@@ -173,7 +173,7 @@ class SoundingRow(Base):
     verdict: Mapped[str] = mapped_column(String(16))
     reason: Mapped[str] = mapped_column(Text, default="")
     ruling: Mapped[str | None] = mapped_column(String(16))
-    """What an operator said of it, whatever gate and map think: restored or rejected."""
+    """An operator's decision, which overrules gate and map: restored or rejected."""
 
 
 class TargetRangeRow(Base):
@@ -311,18 +311,18 @@ class PositionRow(Base):
     mission_id: Mapped[str] = mapped_column(ForeignKey("missions.id", ondelete="CASCADE"))
     vehicle: Mapped[str] = mapped_column(String(64))
     time_s: Mapped[float]
-    """By the vehicle's clock, which may begin anew."""
+    """By the vehicle's clock, which may be reset."""
     lat_deg: Mapped[float]
     lon_deg: Mapped[float]
     depth_m: Mapped[float]
     imported: Mapped[bool] = mapped_column(default=False, server_default=false())
-    """Whether a log brought it later; else ids are in the order in which positions were heard."""
+    """Whether a log brought it later; else ids are in the order in which positions arrived."""
 
 
 class TelemetryRow(Base):
-    """What a vehicle told of itself at a moment, thinned; all vehicles of a mission have the same moments.
+    """A vehicle's telemetry at a moment, thinned; all vehicles of a mission have the same moments.
 
-    ``at_s`` are Unix seconds by the service's clock, ``age_s`` the seconds since it was heard.
+    ``at_s`` are Unix seconds by the service's clock, ``age_s`` the seconds since its last report.
     """
 
     __tablename__ = "telemetry"
@@ -366,7 +366,7 @@ class EventRow(Base):
 
 
 class ProcessRow(Base):
-    """A service process that shares this database. Whether it still lives, its membership tells (``membership.py``)."""
+    """A service process that shares this database. Its membership shows whether it still lives (``membership.py``)."""
 
     __tablename__ = "processes"
 
@@ -376,7 +376,7 @@ class ProcessRow(Base):
     secret: Mapped[str] = mapped_column(String(64))
     """What they show to it; it ends with the process."""
     certificate: Mapped[str | None] = mapped_column(Text)
-    """PEM of the certificate that it serves TLS with; None: plain HTTP, or one that everybody can check."""
+    """PEM of the certificate that it serves TLS with; None: plain HTTP, or one signed by a public authority."""
     began_at: Mapped[datetime]
 
 

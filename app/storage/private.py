@@ -1,4 +1,4 @@
-"""Files and folders for their owner only, whatever the user's umask: what the service stores is nobody else's."""
+"""Files and folders for their owner only, whatever the user's umask: what the service stores is private."""
 
 import contextlib
 import os
@@ -48,7 +48,7 @@ def open_new(path: Path, mode: Literal["w", "wb"] = "w") -> TextIO | BinaryIO:
 
 
 def write(path: Path, content: bytes | str) -> None:
-    """Write a file. One that was there is replaced when all is written, so nobody reads a half."""
+    """Write a file. One that was there is replaced when all is written, so that no reader gets a half."""
     data = content.encode() if isinstance(content, str) else content
     if path.exists() and not path.is_file():
         path.write_bytes(data)  # a terminal or a pipe that the user named
@@ -72,7 +72,7 @@ def create(path: Path) -> None:
 
 
 def mend(paths: Iterable[Path]) -> dict[Path, str]:
-    """Take from everybody else what they may do with files of ours; returns those that were open, with their mode."""
+    """Remove other users' rights on our files; returns those that were open, with their mode."""
     mended = {}
     for path in paths:
         try:

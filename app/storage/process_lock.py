@@ -67,7 +67,7 @@ class ProcessLock:
     def __init__(self, path: Path, number: int, owner: int | None = None) -> None:
         if is_held(path, owner):
             raise LockHeldError(f"{path} is locked by another process")
-        # Made under another name, so that nobody finds it before it is locked and says whose it is.
+        # Made under another name, so that it is not found before it is locked and names its owner.
         part = path.with_name(f"{path.name}.{secrets.token_hex(4)}")
         self._descriptor = os.open(part, os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, FILE_MODE)
         try:
@@ -122,7 +122,7 @@ def is_held(path: Path, owner: int | None = None) -> bool:
             path.unlink()
         return False
     except FileNotFoundError:
-        return False  # removed by somebody else meanwhile
+        return False  # removed by another process meanwhile
     finally:
         os.close(descriptor)
 
@@ -155,7 +155,7 @@ def _this_process(number: int) -> Holder:
 
 
 def _began(pid: int) -> str | None:
-    """Return when a process began, empty when there is none; None where this system does not tell."""
+    """Return when a process began, empty when there is none; None where the system does not show it."""
     try:
         os.kill(pid, 0)
     except ProcessLookupError:

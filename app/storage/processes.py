@@ -17,7 +17,7 @@ async def all_processes(session: AsyncSession) -> Sequence[ProcessRow]:
 
 
 async def bury(session: AsyncSession, numbers: Iterable[int]) -> None:
-    """Forget processes; what they had belongs to nobody now."""
+    """Forget processes; their missions have no owner now."""
     await session.execute(delete(ProcessRow).where(ProcessRow.id.in_(list(numbers))))
 
 
@@ -29,7 +29,7 @@ async def owner(session: AsyncSession, mission_id: str, *, hold: bool = False) -
 
 
 async def take(session: AsyncSession, mission_id: str, process: int, at: datetime) -> None:
-    """Give a mission that nobody has to a process; nothing happens when somebody has it."""
+    """Give a mission without owner to a process; nothing happens when it has one."""
     insert = sqlite.insert if session.get_bind().dialect.name == "sqlite" else postgresql.insert
     values = {"mission_id": mission_id, "process_id": process, "since": at}
     await session.execute(insert(MissionOwnerRow).values(values).on_conflict_do_nothing())

@@ -37,7 +37,7 @@ async def ended_before(database: Database, days: float) -> list[Ended]:
 
 
 async def remove(database: Database, mission_id: str, days: float) -> bool:
-    """Remove a mission with all that belongs to it; False when it is not one that ended so long ago any more."""
+    """Remove a mission with all that belongs to it; False when it did not end long enough ago, after all."""
     condition = (MissionRow.id == mission_id, MissionRow.state.in_(ENDED), MissionRow.updated_at < _moment(days))
     async with database.writing() as session:
         return (

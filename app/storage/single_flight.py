@@ -10,7 +10,7 @@ T = TypeVar("T")
 class Shared(Generic[T]):
     """Work whose result is the same for everyone who asks at the same time.
 
-    Nobody gets an answer that was begun before he asked: what was written before is in it. So this is no cache.
+    No caller gets an answer that was begun before the request: earlier writes are in it. So this is no cache.
     """
 
     def __init__(self, work: Callable[[], Awaitable[T]]) -> None:
@@ -22,7 +22,7 @@ class Shared(Generic[T]):
         """Return the result, or raise what the work raised."""
         if self._next is None:
             self._next = asyncio.create_task(self._run(self._running))
-        # Whoever stops waiting does not end it for the others.
+        # A caller that stops waiting does not end it for the others.
         return await asyncio.shield(self._next)
 
     async def _run(self, before: asyncio.Task[T] | None) -> T:

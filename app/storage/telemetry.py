@@ -1,4 +1,4 @@
-"""Queries on what vehicles told of themselves."""
+"""Queries on vehicles' telemetry."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -38,7 +38,7 @@ async def samples(session: AsyncSession, mission_id: str, most: int) -> Sequence
 
 
 async def last_heard(session: AsyncSession, mission_id: str) -> dict[str, float]:
-    """Return when each vehicle was last heard, Unix seconds by the service's clock."""
+    """Return the time of each vehicle's last report, Unix seconds by the service's clock."""
     heard = func.max(TelemetryRow.at_s - TelemetryRow.age_s)
     query = select(TelemetryRow.vehicle, heard).where(TelemetryRow.mission_id == mission_id)
     found = await session.execute(query.group_by(TelemetryRow.vehicle))

@@ -1,4 +1,4 @@
-"""Work that is done to its end even when whoever waits for it is cancelled."""
+"""Work that is done to its end even when its waiting caller is cancelled."""
 
 import asyncio
 from collections.abc import Coroutine

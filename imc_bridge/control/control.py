@@ -1,6 +1,6 @@
 """One vehicle under our control, however it is led: from engaging it to the end of its plan, wanted or not.
 
-A :class:`Control` neither waits nor sleeps. It is told of messages and of the passing of time, sends through a
+A :class:`Control` neither waits nor sleeps. It receives messages and the passing of time, sends through a
 callback, and reports through another; the bridge owns sockets and tasks. Times are seconds of the bridge's
 clock. :mod:`imc_bridge.control.follow` and :mod:`imc_bridge.control.legs` say how a vehicle is led.
 """
@@ -107,7 +107,7 @@ class Control(ABC):
         self._request_ids = request_ids
         self._order: Order | None = None
         self.intervention = ""
-        """Why it was released though heard, until we stop it: someone, or the vehicle itself, wanted that."""
+        """Why it was released although in contact, until we stop it: another console or the vehicle decided so."""
         self._since = 0.0
         self._plan_since_s = -math.inf
         """Since when the vehicle has had our plan, by its own clock and word."""
@@ -120,7 +120,7 @@ class Control(ABC):
         self._abandoned = False
         self._abort = False
         self._gap = False
-        """Whether radio ended under water, which ends plans that need it and is nobody's fault."""
+        """Whether radio ended under water, which ends plans that need it and is no fault."""
         self._again = False
 
     @property
@@ -247,7 +247,7 @@ class Control(ABC):
                 self._stopped("its plan has ended", now)
 
     def _outdated(self) -> bool:
-        """Whether the last PlanControlState waited in some queue while our plan was loaded, and tells of before."""
+        """Whether the last PlanControlState was queued while our plan was loaded and describes the time before."""
         return self.node.plan_state_time_s < self._plan_since_s
 
     def vehicle_state_changed(self, now: float) -> None:
@@ -274,7 +274,7 @@ class Control(ABC):
     def foreign_plan_control(self, source: int, operation: int) -> None:
         """Another console's request to plan control, relayed by the vehicle.
 
-        Whether it had an effect is told by the plan's state.
+        Whether it had an effect shows in the plan's state.
         """
         if self.phase in (Phase.FOLLOWING, Phase.ENDED) and operation in (OPERATION_START, OPERATION_STOP):
             self._evidence.stopped_by = source
@@ -363,7 +363,7 @@ class Control(ABC):
                 self._send(imcpy.Abort())
 
     def excuse(self, seconds: float, now: float) -> None:
-        """Take out of every wait the time in which we were held up ourselves and could hear nothing."""
+        """Subtract from every wait the time in which this process was held up and received nothing."""
         self._since = min(self._since + seconds, now)
         self._following_since = min(self._following_since + seconds, now)
 

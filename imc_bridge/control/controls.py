@@ -1,4 +1,4 @@
-"""The vehicles under control: who is led how, by which way, and at which rates it reports."""
+"""The vehicles under control: how each is led, over which link, and at which rates it reports."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ class Crew:
         return control is not None and control.engaged
 
     def works_with(self, node: Node) -> bool:
-        """Whether a node is led, was told to stop, or has rates to get back."""
+        """Whether a node is led, is being stopped, or has rates to be restored."""
         control, rates = self.get(node), self.asked_rates(node)
         busy = control is not None and (control.engaged or control.phase is Phase.STOPPING)
         return busy or (rates is not None and rates.restoring)
@@ -110,7 +110,7 @@ class Crew:
             self._controls.pop(node.imc_id, None)
 
     def attach_sound(self, node: Node, gateway: str, roster: Roster, now: Callable[[], float]) -> None:
-        """Speak to a vehicle through a gateway when radio is silent. Raises RefusedError when nobody knows that."""
+        """Reach a vehicle through a gateway when radio is silent. Raises RefusedError for an unknown gateway."""
         control = self.of(node)
         via = roster.named(gateway)
         if via is None or via.address is None:
@@ -135,7 +135,7 @@ class Crew:
             )
 
     def by_sound_through(self, gateway: Node) -> Iterator[LegFollower]:
-        """The vehicles that are spoken to through a gateway."""
+        """The vehicles reached through a gateway."""
         for control in self._controls.values():
             if isinstance(control, LegFollower) and control.sound and control.sound.gateway == gateway.name:
                 yield control

@@ -20,14 +20,14 @@ from imc_bridge.nodes.node import PlanState
 
 START_RETRY_S = 2.0
 BLOCKED_S = 1.0
-"""A plan that is blocked for longer, while its maneuver goes on, is started anew."""
+"""A plan that is blocked for longer, while its maneuver goes on, is started again."""
 STARVED_S = 4.0
 """A plan that ended this long after the last echo ended for want of references."""
 GUARD_STEP_M = 0.2
 """A guarded depth that changes by less than this is not worth a new reference of its own."""
 MIN_UNANSWERED = 5
 ALIVE_S = 3.0
-"""A vehicle heard this lately hears us, too, unless something is wrong."""
+"""A vehicle whose packets are this recent receives ours, too, unless something is wrong."""
 STATE_TIMEOUT = 6
 HOLD_SPEED_MPS = 1.0
 
@@ -45,7 +45,7 @@ class Follower(Control):
     _unanswered = 0
     _gap_boots = 0
     _gap_open = False
-    """Whether it has been silent under water, and has not been heard since."""
+    """Whether it fell silent under water and still is."""
     _blocked_since: float | None = None
     """Since when plan control has called itself blocked while the maneuver goes on."""
 
@@ -215,7 +215,7 @@ class Follower(Control):
             self._restarts = 0
 
     def _note_gap(self, *, long: bool) -> None:
-        """The radio ended under water, so its plan ends for want of references, which is nobody's fault."""
+        """The radio ended under water, so its plan ends for want of references, which is no fault."""
         if long and not self._gap_open:
             self._gap_open, self._gap_boots = True, self.node.boots
         self._gap = True
@@ -223,7 +223,7 @@ class Follower(Control):
             self._order.unseen = True
 
     def excuse(self, seconds: float, now: float) -> None:
-        """Take out of every wait the time in which we were held up ourselves and could hear nothing."""
+        """Subtract from every wait the time in which this process was held up and received nothing."""
         super().excuse(seconds, now)
         self._answered_at = min(self._answered_at + seconds, now)
 
@@ -278,5 +278,5 @@ class Follower(Control):
         self._unanswered = 0
 
     def _starved(self) -> bool:
-        """Whether no echo had come for so long before the plan ended that references cannot have reached it."""
+        """Whether echoes were missing long enough before the plan ended to prove that no references reached it."""
         return self._since - self._answered_at > STARVED_S

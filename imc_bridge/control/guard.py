@@ -1,4 +1,4 @@
-"""Keeps references off the sea floor: DUNE follows a reference into the ground when it is told to.
+"""Keeps references off the sea floor: DUNE follows a reference into the ground.
 
 A reference goes on being flown to when the link breaks, so its depth must be safe on the whole way to it and not only
 where the vehicle is.

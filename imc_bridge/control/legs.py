@@ -2,7 +2,7 @@
 
 Each waypoint becomes a plan: down where the way is too short for the depth, there, then up to the surface. Nothing is
 started while the vehicle is silent or under water. Once it has acknowledged a plan, silence is expected until the leg
-should be over; what became of it shows when the vehicle is heard again. Between legs it has no plan and floats.
+should be over; its outcome shows when the vehicle is in contact again. Between legs it has no plan and floats.
 Everything else, engaging, stopping and what ended a plan, is the :class:`Control`'s.
 """
 
@@ -43,11 +43,11 @@ START_TIMEOUT_WALLS = 3.0
 """In units of the silence on the wall clock that is never a loss, however fast the vehicles live."""
 START_RETRY_S = 2.0
 REPORT_KEEPS_S = 90.0
-"""A vehicle that was heard by sound is expected for at least this much longer."""
+"""A vehicle that reported by sound is expected for at least this much longer."""
 HEARD_LATELY_S = 2.0
 """Nothing is started while the last packet is older; the bridge counts at least half of ``lost_after_wall_s``."""
 HEARD_UNDER_WATER_S = 10.0
-"""A vehicle that is heard for so long under water is reached there: DUNE's simulation looks only every few seconds."""
+"""Contact under water for this long means that radio reaches it: DUNE's simulation checks only every few seconds."""
 DEPTH_TOLERANCE_M = 0.5
 
 
@@ -65,9 +65,9 @@ class Leg:
     acknowledged: bool = False
     ended: bool = False
     sent_at: float = 0.0
-    """Since when an answer has been waited for while the vehicle was heard."""
+    """Since when an answer has been awaited while in contact."""
     deepest_m: float = 0.0
-    """As far as it was heard."""
+    """As far as its reports were received."""
 
 
 class LegFollower(Control):
@@ -79,7 +79,7 @@ class LegFollower(Control):
     """The way to it when radio is silent, where it has one."""
     _leg: Leg | None = None
     _wet_since: float | None = None
-    """Since when it has been heard under water without a pause."""
+    """Since when its packets have arrived from under water without a pause."""
 
     def attach(self, sound: SoundPath, by_radio: Callable[[Message], None], now: Callable[[], float]) -> None:
         """Speak by sound while radio is silent."""
@@ -97,12 +97,12 @@ class LegFollower(Control):
         return self.sound is not None and self._silence(now) > RADIO_SILENT_S
 
     def left_by_sound(self, what: str, now: float) -> None:
-        """Note that the gateway has sent a message: nothing more is heard of a plan that was received."""
+        """Note that the gateway has sent a message: the reception of a plan is not reported any further."""
         if what == "PlanControl" and self.phase is Phase.FOLLOWING:
             self._acknowledged(now)
 
     def reported_by_sound(self, report: SoundReport, now: float) -> None:
-        """Take a place that was reported by sound: it tells of arrival where radio does not."""
+        """Take a position reported by sound: it shows arrival where radio cannot."""
         leg, order = self._leg, self._order
         if self.phase is not Phase.FOLLOWING or leg is None or not leg.acknowledged or order is None:
             return
@@ -121,7 +121,7 @@ class LegFollower(Control):
         return engaged
 
     def _make_order(self, waypoint: Waypoint) -> Order:
-        """Begin anew: a plan for another waypoint replaces the one under way, once the vehicle can be reached."""
+        """Start over: a plan for another waypoint replaces the present one once the vehicle can be reached."""
         self._leg = None
         return super()._make_order(waypoint)
 
@@ -185,7 +185,7 @@ class LegFollower(Control):
         """Nothing follows references here."""
 
     def moved(self, report: StateReport, now: float) -> None:
-        """EstimatedState has been taken in: where the vehicle is after its leg tells whether it arrived."""
+        """EstimatedState has been taken in: its position after the leg shows whether it arrived."""
         leg, order = self._leg, self._order
         if leg is None or leg.ended or not leg.acknowledged:
             self._expect_up(now)
@@ -242,10 +242,10 @@ class LegFollower(Control):
             self._watch_idle(now)
 
     def _ask_again(self, order: Order, leg: Leg, now: float) -> None:
-        """Say a leg again that was not acknowledged, while the vehicle is heard."""
+        """Send a leg again that was not acknowledged, while in contact."""
         if not self._heard_lately(now) and not self._by_sound(now):
             if self.node.expected_back is None:
-                # It may have heard us and dived.
+                # It may have received the plan and dived.
                 self.node.expected_back = now + leg.expected_s
             leg.sent_at = now
             self._watch_leg(leg, now)
@@ -274,18 +274,18 @@ class LegFollower(Control):
         return self._silence(now) <= max(HEARD_LATELY_S, 0.5 * settings.lost_after_wall_s * settings.time_scale)
 
     def _reachable(self, now: float) -> bool:
-        """Whether what is sent now arrives: it is heard at the surface, or all the time under water, or by sound."""
+        """Whether a message sent now arrives: contact at the surface, lasting contact under water, or sound."""
         if self._by_sound(now):
             return True
         wet = self._wet_since is not None and now - self._wet_since >= HEARD_UNDER_WATER_S
         return self._heard_lately(now) and (not self.node.submerged or wet)
 
     def _expect_up(self, now: float) -> None:
-        """Note that a vehicle without a plan, last heard under water, is silent until it has floated up."""
+        """Note that a vehicle without a plan, last in contact under water, is silent until it has floated up."""
         node = self.node
         node.expected_back = now + node.ascent_s if node.submerged else None
         if node.expected_back is not None and self._evidence.rebooted:
-            # It has to start up, and to hear of us again.
+            # It has to start up and to discover us again.
             node.expected_back += self._settings.engage_timeout_s + self._settings.announce_period_s
 
     def _watch_idle(self, now: float) -> None:
@@ -384,13 +384,13 @@ class LegFollower(Control):
         self._advance(order, WaypointStatus.ACKNOWLEDGED, order.limited)
 
     def _leg_over(self, now: float) -> None:
-        """Note that the plan is done; the next report of its place tells where that led."""
+        """Note that the plan is done; the next position report shows where it led."""
         if self._leg is not None:
             self._leg.ended = True
             self._expect_up(now)
 
     def excuse(self, seconds: float, now: float) -> None:
-        """Take out of every wait the time in which we were held up ourselves and could hear nothing."""
+        """Subtract from every wait the time in which this process was held up and received nothing."""
         super().excuse(seconds, now)
         if self._leg is not None:
             self._leg.sent_at = min(self._leg.sent_at + seconds, now)

@@ -53,7 +53,7 @@ def judge_ending(seen: Evidence, node: Node, plan_id: str, *, starved: bool) -> 
     plan_id
         Of our plan.
     starved
-        Whether no echo had come for so long that references cannot have reached it.
+        Whether echoes were missing long enough to prove that no references reached it.
     """
     words = seen.failure or seen.error or node.error_text or "no reason given"
     if node.plan_state == PlanState.EXECUTING and node.plan_id not in ("", plan_id):

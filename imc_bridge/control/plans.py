@@ -37,7 +37,7 @@ TURNING_S = 60.0
 CIRCLE_RADIUS_M = 10.0
 """The tightest circle that a LAUV flies in an Elevator maneuver, and what is asked for."""
 NEARNESS_S = 5.0
-"""Goto ends so long before its place, whatever the depth is then."""
+"""Goto ends this long before its waypoint, at any depth."""
 RUN_UP_M, RUN_PER_DEPTH = 8.0, 5.0
 """What a leg has to be long to reach a depth on the way: for getting under way, and for each metre down."""
 SHALLOW_M = 0.5
@@ -189,7 +189,7 @@ def descent_m(depth_m: float) -> float:
 
 
 def leg_time_s(length_m: float, depth_m: float, speed_mps: float) -> float:
-    """How long a leg may take until the vehicle is heard again."""
+    """How long a leg may take until contact returns."""
     return (
         length_m / (SLOWEST_SHARE * max(speed_mps, 0.1))
         + depth_m / DIVE_MPS

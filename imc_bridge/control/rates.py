@@ -19,7 +19,7 @@ DUNE_DEFAULTS = (
     "CpuUsage:0.2, Distance:0.2, EntityState:1, EstimatedState:2, FuelLevel:0.1, Rpm:1, SimulatedState:0.5, "
     "StorageUsage:0.05, Temperature:0.1, Voltage:0.1"
 )
-"""What a vehicle that never told its rates most likely had."""
+"""Likely rates of a vehicle that never reported them."""
 RESTORE_TRIES = 3
 RESTORE_RETRY_S = 1.0
 
@@ -59,7 +59,7 @@ class RateRequest:
 
     @property
     def restoring(self) -> bool:
-        """Whether the former rates are still to be said again."""
+        """Whether the former rates are still to be sent again."""
         return self._restores > 0
 
     @property
@@ -130,7 +130,7 @@ class RateRequest:
                     return
 
     def restore(self) -> None:
-        """Give the vehicle its former rates back; said again later, for a packet can be lost."""
+        """Give the vehicle its former rates back; sent again later, since a packet can be lost."""
         if self._active and self._set is not None:
             self._former = self._former or DUNE_DEFAULTS
             self._send(_set_message(self._former))
@@ -140,7 +140,7 @@ class RateRequest:
         self._set = None
 
     def restore_now(self) -> None:
-        """Give the former rates back as the last thing that is said."""
+        """Give the former rates back with the last message."""
         self.restore()
         while self._restores and self._former is not None:
             self._restores -= 1

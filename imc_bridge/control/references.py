@@ -1,4 +1,4 @@
-"""References: where a vehicle that follows is told to be."""
+"""References: the commanded position of a vehicle that follows."""
 
 from __future__ import annotations
 

@@ -50,7 +50,7 @@ class Cause(StrEnum):
     RADIO_GAPS = "radio_gaps"
     """Radio ends under water, and the vehicle is led by references, which need it."""
     RESTARTED = "restarted"
-    """DUNE on board has begun anew while we listened."""
+    """DUNE on board restarted while we listened."""
     PACKETS_DROPPED = "packets_dropped"
     """This machine threw packets away because our socket was full."""
     LOW_RATE = "low_rate"
@@ -62,10 +62,10 @@ class Cause(StrEnum):
     SEND_ERRORS = "send_errors"
     BAD_PACKETS = "bad_packets"
     REFUSED = "refused"
-    """Packets that nobody who is trusted sent, or not now."""
+    """Packets from untrusted senders, or from another time."""
     UNKNOWN_MESSAGES = "unknown_messages"
     CROWDED = "crowded"
-    """More systems claim to be there than places for them: somebody makes them up."""
+    """More systems announce themselves than there are places: some are forged."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,7 +128,7 @@ class Diagnosis:
 
 
 def radio_gap_words(gaps: int) -> tuple[str, str]:
-    """What is said of a vehicle that is led by references where radio does not reach, and what to do about it."""
+    """The finding for a vehicle that is led by references where radio does not reach, with its remedy."""
     times = "once" if gaps == 1 else f"{gaps} times"
     return (
         f"radio ended {times} while it was under water and led by references, which ends its plan on board each time",
@@ -138,7 +138,7 @@ def radio_gap_words(gaps: int) -> tuple[str, str]:
 
 
 def restart_words(restarts: int) -> tuple[str, str]:
-    """What is said of a vehicle whose DUNE has begun anew, and what to do about it."""
+    """The finding for a vehicle whose DUNE restarted, with its remedy."""
     times = "once" if restarts == 1 else f"{restarts} times"
     return (
         f"DUNE on board has restarted {times} since we listen; what it was doing is forgotten each time",
@@ -147,7 +147,7 @@ def restart_words(restarts: int) -> tuple[str, str]:
 
 
 def drop_words(count: int, buffer_bytes: int) -> tuple[str, str]:
-    """What is said of packets that this machine threw away, and what to do about it."""
+    """The finding for packets that this machine dropped, with its remedy."""
     return (
         f"this machine threw {count} packets away because it did not read its IMC socket in time "
         f"(room for {buffer_bytes / 1e6:.1f} MB); what is missing of vehicles may be among them",
@@ -162,7 +162,7 @@ def ok(text: str) -> Finding:
 
 
 def note(cause: Cause, text: str, remedy: str = "") -> Finding:
-    """Worth knowing, in nobody's way."""
+    """Worth knowing, but harmless."""
     return Finding(Severity.NOTE, text, remedy, cause)
 
 

@@ -39,7 +39,7 @@ SLOWEST_RATE, FASTEST_RATE = 0.5, 1.5
 MIN_STATE_RATE_HZ = 1.0
 SILENT_HEARTBEAT_S = 5.0
 CROWD_GONE_S = 60.0
-"""Wall clock: so long after the last one, made-up systems are history."""
+"""Wall clock: this long after the last one, made-up systems are not reported any more."""
 REFUSED_REMEDY = "Somebody may pretend to be a vehicle, or settings that begin with allowed_ leave one out"
 FLOOD_REMEDY = (
     "Where that address is a vehicle of yours it sends more than is allowed for: let it send less (imc.rate_limiters), "
@@ -48,9 +48,9 @@ FLOOD_REMEDY = (
 
 
 async def diagnose(settings: BridgeSettings, seconds: float = 15.0) -> Diagnosis:
-    """Listen with our own id and port, without commanding anything, and judge what was heard.
+    """Listen with our own id and port, without commanding anything, and judge what arrived.
 
-    Vehicles that announce themselves and send nothing are asked again in ways that tell why (some 8 s more).
+    Vehicles that announce themselves and send nothing are asked again in ways that show why (some 8 s more).
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Which program holds a port of this machine, as far as Linux tells."""
+"""Which program holds a port of this machine, as far as Linux shows."""
 
 from __future__ import annotations
 

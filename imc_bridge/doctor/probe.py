@@ -23,7 +23,7 @@ from imc_bridge.network.transport import LOOPBACK, Address
 CONSOLE_IDS = range(0x4100, 0x5F00)
 """Ids of consoles that hardly anybody sets by hand."""
 ANSWER_S = 8.0
-"""A vehicle begins to send within 5 s of being heard."""
+"""A vehicle begins to send within 5 s of its discovery."""
 REPEAT_S = 1.0
 POLL_WALL_S = 0.05
 
@@ -60,7 +60,7 @@ class _Ear(asyncio.DatagramProtocol):
 
 
 async def probe(bridge: Bridge) -> dict[int, Answer]:
-    """Ask every vehicle of which nothing but announces was heard.
+    """Ask every vehicle of which nothing but announces arrived.
 
     Parameters
     ----------

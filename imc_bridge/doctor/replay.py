@@ -66,7 +66,7 @@ def read_recording(path: str | Path) -> Iterator[Recorded]:
     number = 0
     try:
         with gzip.open(path, "rt") if path.suffix == ".gz" else path.open() as lines:
-            for number, line in enumerate(lines, 1):  # noqa: B007 - told when a line cannot be read
+            for number, line in enumerate(lines, 1):  # noqa: B007 - named when a line cannot be read
                 if line.strip():
                     item = json.loads(line)
                     packet = bytes.fromhex(item["hex"])
@@ -85,7 +85,7 @@ def replay(
 ) -> Session:
     """Feed a recording to a bridge at the recording's pace.
 
-    The recorded console is the one of our id, or else whom most packets went to; the bridge takes its id and port.
+    The recorded console is the one of our id, or else the receiver of most packets; the bridge takes its id and port.
     The clocks of simulated vehicles that ran faster than the recording's set the time scale.
     """
     records = list(read_recording(path))

@@ -78,7 +78,7 @@ class FtpEndpoint:
     passive_ports
         First and last port for data connections; None: any.
     public_address
-        Address that is told to clients for data connections, where a router stands between.
+        Address given to clients for data connections, where a router stands between.
     """
 
     def __init__(
@@ -188,7 +188,7 @@ class _Incoming(io.BytesIO):
 
 
 class _Transfer(DTPHandler):  # type: ignore[misc]
-    """Hands a file over before the client is told that it was stored, so that the reply says what became of it."""
+    """Hands a file over before the reply, so that the reply gives the result."""
 
     def close(self) -> None:
         file = self.file_obj
@@ -203,7 +203,7 @@ class _Transfer(DTPHandler):  # type: ignore[misc]
 
 
 class _Doorkeeper:
-    """Lets in whom the gateway lets in; nobody may do more than make a folder and store."""
+    """Admits the gateway's users; they may make a folder and store, no more."""
 
     def validate_authentication(self, username: str, password: str, handler: Any) -> None:
         try:
@@ -260,7 +260,7 @@ class _Handler(FTPHandler):  # type: ignore[misc]
     auth_failed_timeout = 1
 
     def __init__(self, connection: socket.socket, *arguments: Any, **options: Any) -> None:
-        # Before anything is waited for: of who has hung up nobody knows any more whose connection it was.
+        # Before any wait: the owner of a connection is unknown once it is closed.
         self.own_user = self.calls.is_own_user(connection)
         super().__init__(connection, *arguments, **options)
 

@@ -60,11 +60,11 @@ class SessionKeeper(Protocol):
     """Who knows what sessions are for; called from the event loop."""
 
     def is_own_user(self, connection: socket.socket) -> bool:
-        """Tell of a connection that was just accepted whether the user made it who runs this process; any thread."""
+        """Return whether a connection just accepted belongs to the user who runs this process; any thread."""
         ...
 
     async def log_in(self, user: str, password: str, host: str, *, own_user: bool) -> str | None:
-        """Return who that is; None: not let in. Raises SessionRefusedError to say why."""
+        """Return the user; None: not admitted. Raises SessionRefusedError with the reason."""
         ...
 
     async def begin(self, session: str, vehicles: int, user: str, host: str) -> None:
@@ -82,7 +82,7 @@ class SessionKeeper(Protocol):
     async def step(self, data: StepData, user: str, host: str, *, answered: bool) -> None:
         """Take a step; its answer is given with :meth:`NeptusGateway.answer`. Raises SessionRefusedError.
 
-        ``answered``: it came so late that the panel was told to stay meanwhile, and waits for nothing.
+        ``answered``: it came so late that the panel was sent a stay meanwhile, and waits for nothing.
         """
         ...
 
@@ -95,7 +95,7 @@ class SessionKeeper(Protocol):
         ...
 
     async def may_repeat(self, session: str, time_step: int) -> bool:
-        """Tell whether a panel that waits for the answer to a step that never came is to be told to stay."""
+        """Return whether a panel that waits for the answer to a step that never came needs the answer to stay."""
         ...
 
 
@@ -121,7 +121,7 @@ class _Session:
 class NeptusGateway:
     """An FTP and an HTTP endpoint that look to Neptus' ConvCAO panel like the service it was written for.
 
-    A session belongs to who made its folder; its answers are served only to hosts that logged in for it, because the
+    A session belongs to the user that made its folder; its answers are served only to hosts that logged in for it: the
     panel sends no password with HTTP.
 
     The panel uploads each step once, looks at no reply, and polls until an answer comes whose ``timeStep`` is not less
@@ -271,7 +271,7 @@ class NeptusGateway:
             known = self._sessions[session] = _Session(session, restored.user, set(restored.hosts))
             known.vehicles = restored.vehicles
             known.time_step = restored.time_step
-            # What its last step was answered, if it was, is said again by the mission when that goes on.
+            # The mission repeats the answer to its last step, if there was one, when it goes on.
             known.answered = max(restored.time_step - 1, 0)
             self._forget_some()
         return known
@@ -368,7 +368,7 @@ class NeptusGateway:
         if data.time_step < known.time_step:
             raise NeptusDataError("timeStep", f"{data.time_step} came after {known.time_step}: steps count up")
         if data.time_step == known.time_step:
-            # The panel did not hear that it was stored, and sends it again; the answer stays.
+            # The panel missed the confirmation and sends it again; the answer stays.
             return
         known.pairs = data.pairs
         await self._keeper.step(data, upload.user, upload.host, answered=data.time_step <= known.answered)
@@ -395,7 +395,7 @@ def _meant(upload: Upload) -> tuple[str, _Taking]:
 
 def _port_error(kind: str, host: str, port: int, error: OSError) -> PortInUseError:
     remedy = (
-        "ports below 1024 need a privilege: see the operator's guide, or set others and redirect these"
+        "ports below 1024 need a privilege: see docs/neptus.md, or set others and redirect these"
         if isinstance(error, PermissionError)
         else "stop what listens there, or set another address or port"
     )

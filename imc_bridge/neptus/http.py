@@ -55,7 +55,7 @@ class HttpEndpoint:
 class _Server(uvicorn.Server):
     @contextmanager
     def capture_signals(self) -> Iterator[None]:
-        """Leave the process's signals to whom they belong."""
+        """Leave the process's signals to their own handlers."""
         yield
 
 

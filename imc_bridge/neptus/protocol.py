@@ -50,7 +50,7 @@ def read_session(content: bytes, session: str) -> int:
 
 
 def count_vehicles(content: bytes, session: str) -> int:
-    """Number of vehicles that a step tells of.
+    """Number of vehicles in a step.
 
     Raises
     ------

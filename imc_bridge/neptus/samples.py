@@ -1,6 +1,6 @@
-"""Whose the panel's samples are, and which of them mean a depth.
+"""Which vehicle each of the panel's samples belongs to, and which of them are depths.
 
-The panel makes a sample of every range that any system tells of, also of an echo sounder that looks ahead, and takes
+The panel makes a sample of every range that any system reports, also of an echo sounder that looks ahead, and takes
 whatever it does not know for a beam 22.5 degrees ahead. It says neither which vehicle nor which sensor a sample is of.
 What the vehicles themselves say of the bottom under them (`Bathymeter`) is right, so samples are held against that.
 """

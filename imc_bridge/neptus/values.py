@@ -86,7 +86,7 @@ class Conventions:
     ``bathymeter``: ``twice``: the unmodified panel, which subtracts the vehicle's depth and the bottom's depth, which
     holds the vehicle's depth already, from ``max_depth_m``; ``once``: a panel that was corrected, ``max_depth_m`` minus
     the bottom's depth; ``off``: not used. ``samples``: ``checked`` against the `Bathymeter` where that is used, since
-    the panel makes a sample of every range that any sensor tells of; ``off``: not used.
+    the panel makes a sample of every range that any sensor reports; ``off``: not used.
     """
 
     area: Area
@@ -104,7 +104,7 @@ class CellSounding:
     bottom_depth_m: float
     source: str
     vehicle: int | None = None
-    """Index of the vehicle that measured; None where the panel does not tell."""
+    """Index of the vehicle that measured; None where the panel gives none."""
     depth_sd_m: float | None = None
 
 

@@ -1,6 +1,6 @@
 """IMC packets to messages and back: imcpy does the coding, this module decides what is worth decoding.
 
-A vehicle sends some 400 packets per second, most of which nobody here needs. Their header is read first, so that
+A vehicle sends some 400 packets per second, most of which are not needed here. Their header is read first, so that
 an unwanted packet costs no decoding. Nothing that arrives can raise out of :class:`Decoder`.
 """
 
@@ -136,7 +136,7 @@ def without_argument(packet: bytes) -> bytes:
     """Return a plan message's packet without what it carries inside (and the text after that), unless that is sound.
 
     What vehicles answer with stays where it can be read to its end (:data:`_CARRIED`). imcpy 1.1.2 loses
-    memory for good with every inner message that it cannot read: whoever sent many would bring the service down. All
+    memory for good with every inner message that it cannot read: a flood of them would bring the service down. All
     other packets are returned as they are.
     """
     order: Literal["little", "big"] = "little" if packet[:2] == _SYNC_LITTLE else "big"
@@ -180,7 +180,7 @@ class Decoder:
     faults : Counter[PacketFault]
     unknown_ids : Counter[int]
     foreign_versions : Counter[tuple[str, str]]
-        Packets of another IMC version (the synchronisation word tells it), by host and version.
+        Packets of another IMC version (by the synchronisation word), by host and version.
     """
 
     def __init__(self, wanted: Iterable[str]) -> None:

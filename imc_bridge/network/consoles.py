@@ -1,7 +1,7 @@
 """What other consoles are shown of a mission: its area's corners and where the vehicles are sent.
 
-Neptus draws any system that a RemoteSensorInfo tells of as an external system on its map, by its id. There is no IMC
-message by which it takes up an area or another console's plan unasked, so places are all that it is shown.
+Neptus draws any system named in a RemoteSensorInfo as an external system on its map, by its id. There is no IMC
+message that makes it show an area or another console's plan unasked, so positions are all that it gets.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Announces: who is there, where it can be reached, and how we say the same of ourselves."""
+"""Announces: systems on the network, their addresses, and our own announce."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Lets the system throw away what nobody needs before this process has to read it.
+"""Lets the system drop unneeded packets before this process has to read them.
 
 One LAUV sends 660 servo positions and attitudes a second, in simulations several times that. They fill a socket within
 some milliseconds in which this process does something else. So a second socket, which is never read, shares the port,

@@ -29,17 +29,17 @@ LOOPBACK = "127.0.0.1"
 _RECEIVE_BUFFER_BYTES = 16 << 20
 _SO_REUSEPORT = getattr(socket, "SO_REUSEPORT", 0)
 _SO_RCVBUFFORCE = 33
-"""Linux: a receive buffer beyond what the system allows everybody, for programs that may have it."""
+"""Linux: a receive buffer beyond the system's limit, for programs with that privilege."""
 _SO_MEMINFO = 55
 _MEMINFO = struct.Struct("=9I")
 """Linux: what a socket holds; the last figure counts packets that it had no room for."""
 _PACKETS_PER_TURN = 512
 _TURN_WALL_S = 0.01
-"""After so many packets, or so long, other tasks get their turn, however fast packets come: a stop must not wait."""
+"""After this many packets, or seconds, other tasks get their turn, however fast packets come: a stop must not wait."""
 _PACKETS_PER_LOOK = 16
 _MAX_UNREACHABLE = 64
 _IP_RECVERR = 11
-"""Linux: tell the ICMP errors that our packets cause; the socket module does not name it."""
+"""Linux: report the ICMP errors that our packets cause; the socket module does not name it."""
 _MSG_ERRQUEUE = getattr(socket, "MSG_ERRQUEUE", 0)
 _EXTENDED_ERROR = struct.Struct("=IBBBBII")
 
@@ -107,7 +107,7 @@ class Transport:
         self._traffic: socket.socket | None = None
         self._announces: socket.socket | None = None
         self._unread: socket.socket | None = None
-        """Gets what nobody needs, and half of the errors: the system returns those to either of two on a port."""
+        """Receives unneeded packets, and half of the errors: the system returns those to either of two on a port."""
         self._loop: asyncio.AbstractEventLoop | None = None
         self.interfaces: list[Interface] = []
         self.announce_port: int | None = None
@@ -132,7 +132,7 @@ class Transport:
         self.interfaces = choose_interfaces(settings)
         host = LOOPBACK if settings.loopback_only else "0.0.0.0"  # noqa: S104 - vehicles come from any interface
         try:
-            # Shared with nobody but our own second socket.
+            # Shared with our own second socket only.
             _bound_socket(host, settings.port).close()
             self._traffic = _bound_socket(host, settings.port, shared=True)
         except OSError as error:
@@ -193,7 +193,7 @@ class Transport:
         return True
 
     def dropped(self) -> int:
-        """How many packets the system threw away because our sockets were full; 0 where it does not tell."""
+        """How many packets the system threw away because our sockets were full; 0 where it does not count."""
         count = 0
         for sock in (self._traffic, self._announces):
             if sock is None:
@@ -264,7 +264,7 @@ class Transport:
             try:
                 self._traffic.sendto(packet, address)
             except OSError as error:
-                # The error may be an earlier packet's to another address, told late.
+                # The error may be an earlier packet's to another address, reported late.
                 self._take_errors(self._traffic)
                 if last:
                     reason = error.strerror or type(error).__name__
@@ -327,7 +327,7 @@ def _ask_for_errors(sock: socket.socket) -> None:
 
 
 def _unread_socket(traffic: socket.socket) -> socket.socket | None:
-    """A socket on the port of ``traffic`` that gets the messages that nobody needs; None where there can be none."""
+    """A socket on the port of ``traffic`` that receives the unneeded messages; None where there can be none."""
     if not _SO_REUSEPORT:
         return None
     host, port = traffic.getsockname()

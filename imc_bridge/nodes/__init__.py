@@ -1,1 +1,1 @@
-"""Who is out there: one ``Node`` per vehicle or console, the roster of all, and whose packets count."""
+"""Systems on the network: one ``Node`` per vehicle or console, the roster of all, and the admission of packets."""

@@ -1,4 +1,4 @@
-"""Whose packets are looked at: IMC knows no authentication, so addresses, ids and amounts are what is left."""
+"""Which packets are admitted: IMC has no authentication, so addresses, ids and rates decide."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from imc_bridge.settings import BridgeSettings
 
 WINDOW_S = 1.0
 STRANGERS_SHARE = 4
-"""All who announced nothing, at one host together, get this part of what a vehicle may send."""
+"""All systems at one host without an announce share this part of a vehicle's allowance."""
 MAX_SOURCES = 1024
 """Sources of one window that are counted one by one; the others share a count."""
 _TRAFFIC, _ANNOUNCES = 0, -1
@@ -29,7 +29,7 @@ class Admission:
     ----------
     settings
     roster
-        Whoever announced an address has an allowance of its own there, which nobody at another port can use up.
+        A system that announced an address has an allowance of its own there, which no other port can use up.
     clock
         Seconds of the wall clock that never step back.
 
@@ -76,7 +76,7 @@ class Admission:
         return True
 
     def admits_id(self, imc_id: int, address: Address) -> bool:
-        """Whether a node of this id is taken up."""
+        """Whether a node of this id is admitted."""
         return not self._ids or imc_id in self._ids or self.refuse(Refused.ID, address)
 
     def refuse(self, reason: Refused, address: Address) -> bool:

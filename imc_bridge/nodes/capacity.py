@@ -1,4 +1,4 @@
-"""How many nodes are kept, and who leaves when there are too many: IMC has no authentication, and ids cost nothing."""
+"""How many nodes are kept, and which leave when there are too many: IMC has no authentication, and ids are free."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ MAX_UNHEARD_OF_HOST = 32
 MAX_UNANNOUNCED = 32
 MAX_UNANNOUNCED_OF_HOST = 8
 UNANNOUNCED_SILENT_S = 10.0
-"""Of those who announce nothing, one that is silent for this long leaves for another."""
+"""A system without an announce that is silent for this long leaves for another."""
 UNANNOUNCED_KEPT_WALL_S = 60.0
 UNHEARD_KEPT_WALL_S = 300.0
-"""Silent ones are shown for so long, if nobody needs their places."""
+"""Silent ones are shown for this long, if their places are not needed."""
 
 
 class Standing(IntEnum):
@@ -29,7 +29,7 @@ class Standing(IntEnum):
     UNHEARD = 1
     """It was announced, and nothing came from where it says that it is."""
     HEARD = 2
-    """It speaks from where it announced itself."""
+    """It sends from its announced address."""
 
 
 _MOST = {
@@ -59,7 +59,7 @@ class Capacity:
     wanted : set[str]
         Names of vehicles of missions and settings: they get a place, and keep it.
     in_use : Callable[[Node], bool]
-        Whether somebody works with a node, which keeps its place as well.
+        Whether a node is in use, which keeps its place as well.
     """
 
     def __init__(self, nodes: Mapping[int, Node]) -> None:
@@ -77,7 +77,7 @@ class Capacity:
         return node.name in self.wanted or self.in_use(node)
 
     def expired(self, node: Node, now: float, time_scale: float) -> bool:
-        """Whether a node that was never heard is not even shown any longer."""
+        """Whether a node that never answered is no longer shown."""
         standing = standing_of(node)
         kept_s = UNANNOUNCED_KEPT_WALL_S if standing is Standing.UNANNOUNCED else UNHEARD_KEPT_WALL_S
         if standing is Standing.HEARD or now - _last_sign(node) <= kept_s * time_scale:
@@ -85,14 +85,14 @@ class Capacity:
         return not self.keeps(node)
 
     def room(self, standing: Standing, host: str, name: str, now: float) -> tuple[bool, Node | None]:
-        """Whether there is a place for one more node, and who leaves it.
+        """Whether there is a place for one more node, and which node leaves it.
 
         Parameters
         ----------
         standing
             What the node will be.
         host
-            Where it speaks or announces itself from.
+            The host that it sends or announces itself from.
         name
             As announced.
         now
@@ -111,7 +111,7 @@ class Capacity:
         return found, leaver
 
     def may_be_heard(self, node: Node, host: str) -> bool:
-        """Whether a node that was never heard may change its place for one of those that are."""
+        """Whether a node that never answered may give its place to one that does."""
         if self.keeps(node):
             return True
         if (Standing.HEARD, host) in self._full:
@@ -127,7 +127,7 @@ class Capacity:
         return standing_of(node) is Standing.HEARD and not self.keeps(node)
 
     def _is_wanted(self, name: str, now: float) -> bool:
-        """Whether a name's place is still free: nobody speaks under it yet."""
+        """Whether a name's place is still free: no system uses it yet."""
         holder = next((node for node in self._nodes.values() if node.name == name), None)
         return name in self.wanted and (holder is None or standing_of(holder) is not Standing.HEARD)
 

@@ -1,4 +1,4 @@
-"""Systems that announced themselves while there was no place for them: they get one as soon as they are heard."""
+"""Systems that announced themselves while there was no place for them: they get one as soon as they answer."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from imc_bridge.network.transport import Address
 
 MAX_NEWCOMERS = 16_384
 MAX_NEWCOMERS_OF_HOST = 8192
-"""What strangers at one host may announce in some 6 s, which is how long a vehicle takes to speak to us."""
+"""Most announces of unknown systems at one host in some 6 s, the time that a vehicle takes to answer us."""
 
 
 class Newcomers:
     """The last announces that found no place, by host and id.
 
-    Anybody can announce any number of systems from one address. To be heard from the announced one as well takes a
+    Anyone can announce any number of systems from one address. To answer from the announced one as well takes a
     system that is there, so that is what gives a right to a place. Where too many announce, the host with the most
     loses its oldest.
     """

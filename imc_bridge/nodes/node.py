@@ -1,4 +1,4 @@
-"""What is known of one node: who it is, how it is heard, what it does, where it is.
+"""What is known of one node: identity, contact, activity, position.
 
 A :class:`Node` is fed messages and the time they arrived and keeps no clock of its own. Arrival times are in
 seconds of the bridge's clock, which runs ``time_scale`` times faster than the wall clock; the vehicle's own
@@ -134,9 +134,9 @@ class Node:
         self.started_at: float | None = None
         """When it announced a restart."""
         self.ordered_depth_m = 0.0
-        """How deep it may be by our orders: it goes on down after it was last heard."""
+        """How deep it may be by our orders: it continues its descent after the last contact."""
         self._restart_seen = False
-        """Whether its last restart showed before it announced itself anew."""
+        """Whether its last restart showed before its next announce."""
 
         self.packets = 0
         self.heard_at: float | None = None
@@ -166,7 +166,7 @@ class Node:
         self.expected_back: float | None = None
         """Until when its silence is part of a plan of ours, seconds of the bridge's clock."""
         self.controller: int | None = None
-        """Whose references its FollowReference maneuver takes, by its own account."""
+        """Id of the console whose references its FollowReference maneuver reports to take."""
         self.medium: int | None = None
         self.battery_pct: float | None = None
         self.history = StateHistory()
@@ -180,7 +180,7 @@ class Node:
 
     @property
     def is_vehicle(self) -> bool:
-        """Whether it announced itself as a vehicle, or has not said what it is."""
+        """Whether it announced itself as a vehicle, or without a type."""
         return self.announcement is None or self.announcement.is_vehicle
 
     # Discovery
@@ -202,7 +202,7 @@ class Node:
             and previous.uid != announcement.uid
         )
         if rebooted and self._restart_seen:
-            # Its telemetry told of that already.
+            # Its telemetry has shown that already.
             self._restart_seen = False
             return False
         if rebooted:
@@ -212,7 +212,7 @@ class Node:
         return rebooted
 
     def restarted(self) -> None:
-        """Note that its telemetry shows a restart, of which its announce will tell later."""
+        """Note that its telemetry shows a restart, which its announce will show later."""
         self.boots += 1
         self._restart_seen = True
         self.entities = None
@@ -228,7 +228,7 @@ class Node:
         self._latest.clear()
 
     def given_up(self, now: float) -> bool:
-        """Whether it was silent for so long that another host may announce its id."""
+        """Whether it was silent long enough for another host to announce its id."""
         last = max((at for at in (self.heard_at, self.announced_at) if at is not None), default=-math.inf)
         patience = max(ANNOUNCES_MISSED * self._settings.announce_period_s, min(self.patience_s, LONGEST_BOND_S))
         return now - last > patience
@@ -242,7 +242,7 @@ class Node:
         self.address = address
 
     def excuse(self, seconds: float, now: float) -> None:
-        """Take out of its silence the time in which we were held up ourselves and could hear nothing."""
+        """Subtract from its silence the time in which this process was held up and received nothing."""
 
         def later(at: float | None) -> float | None:
             return None if at is None else min(at + seconds, now)
@@ -314,7 +314,7 @@ class Node:
             self._uncertainty = (message.timestamp, math.sqrt(variance))
 
     def position_sd_m(self) -> float | None:
-        """Standard deviation of the position per axis, None when the vehicle has not told it lately."""
+        """Standard deviation of the position per axis, None when the vehicle has not reported it lately."""
         if self._uncertainty is None or self.clock.time_s is None:
             return None
         at_s, sd = self._uncertainty
@@ -371,7 +371,7 @@ class Node:
 
     @property
     def submerged(self) -> bool:
-        """Whether it was under water when last heard."""
+        """Whether it was under water at the last contact."""
         return self.medium == MEDIUM_UNDERWATER or (self.report is not None and self.report.depth_m > SUBMERGED_DEPTH_M)
 
     @property
@@ -390,7 +390,7 @@ class Node:
 
     @property
     def ascent_s(self) -> float:
-        """How long it takes, at the most, to float up from where it was last heard and to be heard again."""
+        """Longest time to float up from its last reported depth and to be in contact again."""
         depth = self.report.depth_m if self.report is not None else 0.0
         return max(depth, self.ordered_depth_m, 0.0) / SLOWEST_ASCENT_MPS + CONTACT_AGAIN_S
 

@@ -13,12 +13,12 @@ ALLOWANCE_M = 20.0
 """A correction of the navigation, as by a GPS fix after a short dive, is believed at once up to this size."""
 CONFIRMATIONS = 4
 CONFIRM_S = 1.0
-"""A place far away is believed when so many states over at least this time agree, and none came from the old one."""
+"""A position far away is believed when enough states over at least this time agree, and none came from the old one."""
 EARTH_M = 6_371_000.0
 
 
 class Step(Enum):
-    """What a position tells."""
+    """The verdict on a position."""
 
     GOOD = "good"
     DOUBTFUL = "doubtful"

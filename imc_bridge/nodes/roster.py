@@ -1,4 +1,4 @@
-"""Who is on the network: nodes by id, by name and by address, and what their announces change."""
+"""The systems on the network: nodes by id, by name and by address, and what their announces change."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from imc_bridge.settings import BridgeSettings
 MAX_CLAIMS = 8
 
 Claim = tuple[str, str]
-"""Name and uid (or addresses) by which one node is told from another of the same id."""
+"""Name and uid (or addresses) that distinguish nodes of the same id."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +41,7 @@ class Roster:
     Attributes
     ----------
     capacity : Capacity
-        Says for whom there is a place.
+        Decides which systems get a place.
     newcomers : Newcomers
         Those who announced themselves while there was none.
     left : list[Callable[[Node], None]]
@@ -71,7 +71,7 @@ class Roster:
         return next((node for node in self._nodes.values() if node.name == name), None)
 
     def stranger(self, imc_id: int, host: str, now: float) -> Node | None:
-        """The node of this id, whose packets come from anywhere; None when there are too many who announced nothing."""
+        """The node of this id, whose packets come from anywhere; None when too many without an announce are known."""
         node = self._nodes.get(imc_id)
         if node is None and self._make_room(Standing.UNANNOUNCED, host, "", now):
             node = self._add(imc_id, f"0x{imc_id:04X}", host, now)
@@ -80,7 +80,7 @@ class Roster:
     def find_place(self, announcement: Announcement, host: str, now: float, *, heard: bool = False) -> bool:
         """Whether a system that announced itself has a place or gets one.
 
-        With ``heard`` it was heard from where it announced itself: one that was not gives the id up to it.
+        With ``heard`` packets came from its announced address: a node without any gives the id up to it.
         """
         node = self._nodes.get(announcement.imc_id)
         if heard and node is not None and standing_of(node) is Standing.UNHEARD and not self.capacity.in_use(node):
@@ -96,7 +96,7 @@ class Roster:
         return True
 
     def first_heard(self, node: Node) -> None:
-        """Give a node that begins to speak the name that it announced, unless another one speaks under it."""
+        """Give a node with its first packet the name that it announced, unless another one uses it."""
         if node.announcement is None or node.name == node.announcement.name:
             return
         holder = self.named(node.announcement.name)
@@ -133,24 +133,24 @@ class Roster:
         return node if node is not None and address in node.addresses else None
 
     def at(self, address: Address) -> Node | None:
-        """The node that announced this address, whoever's packets it passes on."""
+        """The node that announced this address, even when it relays packets of others."""
         return self._by_address.get(address)
 
     def comes_from_elsewhere(self, imc_id: int, source_host: str, now: float) -> bool:
         """Whether an announce of a node that is there came from a host that is not its own.
 
-        A node is bound to the hosts of its announces as long as it is not silent for long: nobody else takes its place.
+        A node is bound to the hosts of its announces unless it is silent for long: no other node takes its place.
         """
         node = self._nodes.get(imc_id)
         return node is not None and bool(node.hosts) and source_host not in node.hosts and not node.given_up(now)
 
     def may_be_another(self, imc_id: int) -> bool:
-        """Whether the node of this id was never heard: who announces the id from elsewhere may be the real one."""
+        """Whether the node of this id never answered: another system that announces the id may be the real one."""
         node = self._nodes.get(imc_id)
         return node is not None and standing_of(node) is Standing.UNHEARD
 
     def is_old(self, imc_id: int, timestamp: float, now: float) -> bool:
-        """Whether a node that is heard sent this long ago. While it restarts, maybe with another time, it is silent."""
+        """Whether a node in contact sent this long ago. While it restarts, maybe with another time, it is silent."""
         node = self._nodes.get(imc_id)
         heard = node is not None and node.heard_at is not None and now - node.heard_at <= self._settings.lost_after_s
         return node is not None and heard and node.clock.is_old(timestamp)
@@ -184,7 +184,7 @@ class Roster:
         return Arrival(node, first, rebooted, stale)
 
     def pass_time(self, now: float) -> None:
-        """Forget conflicts that have not shown for a while, and strangers who fell silent."""
+        """Forget conflicts that have not shown for a while, and unknown systems that fell silent."""
         self.capacity.look_again()
         for node in list(self._nodes.values()):
             if self.capacity.expired(node, now, self._settings.time_scale):
@@ -195,7 +195,7 @@ class Roster:
                 self._nodes[imc_id].conflict = None
 
     def _contested(self, node: Node, new: Announcement, now: float) -> bool:
-        """Note who claims the id; whether a second node does, whose announce must not count.
+        """Note which node claims the id; return whether a second one does, whose announce must not count.
 
         A node that restarts comes back under its name with a new uid, once. Two nodes come in turns.
         """
@@ -207,7 +207,7 @@ class Roster:
         mine = _claim(new)
         rivals = [claim for claim in claims if claim != mine]
         known = node.announcement
-        # One that is not heard any more, as after a single forged announce, bars nobody.
+        # A silent one, as after a single forged announce, blocks no other.
         returned = mine in claims and known is not None and _claim(known) in rivals
         renamed = any(name != new.name for name, _ in rivals)
         if len(claims) < MAX_CLAIMS or mine in claims:

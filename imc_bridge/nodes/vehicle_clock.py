@@ -1,4 +1,4 @@
-"""A vehicle's own clock, as its packets show it: it may run ahead of ours, run faster (a simulation) or be set anew."""
+"""A vehicle's own clock, as its packets show it: it may run ahead of ours, run faster (a simulation) or be reset."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ LATE_S = 5.0
 LEAP_S = 60.0
 """A timestamp further ahead than this, and than what passed meanwhile explains, is a clock set forward, if repeated."""
 FASTEST = 50.0
-"""No simulation runs this many times faster than the bridge was told."""
+"""No simulation runs this many times faster than the bridge's ``time_scale``."""
 CONFIRMATIONS = 3
 QUIET_S = 1.0
 """Nor is a clock believed to have been set while packets of the old one go on arriving: one of both is not its own."""
@@ -20,7 +20,7 @@ MIN_SPAN_S = 4.0
 
 
 class Tick(Enum):
-    """What a timestamp tells."""
+    """The verdict on a timestamp."""
 
     GOOD = "good"
     DOUBTFUL = "doubtful"
@@ -74,7 +74,7 @@ class VehicleClock:
         return Tick.GOOD
 
     def rate(self, time_scale: float) -> float | None:
-        """Seconds of the vehicle per second of the wall clock, None while it was not heard for long enough."""
+        """Seconds of the vehicle per second of the wall clock, None until contact has lasted long enough."""
         if len(self._samples) < 2:
             return None
         (first_now, first), (last_now, last) = self._samples[0], self._samples[-1]

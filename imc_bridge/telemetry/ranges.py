@@ -1,9 +1,9 @@
 """Ranges to other systems that vehicles measure by sound, placed where the vehicle was when it measured.
 
-DUNE tells of a range in one of five messages. By default its UDP transport passes on three of them: AcousticOperation
+DUNE reports a range in one of five messages. By default its UDP transport passes on three of them: AcousticOperation
 (the answer to a range request), LblRangeAcceptance (a transponder's range with what the navigation made of it) and
 UsblPositionExtended (of which only the distance is used here). UamRxRange and LblRange stay on board unless the
-vehicle's configuration adds them. Where two of them tell of the same measurement it is taken once.
+vehicle's configuration adds them. Where two of them report the same measurement it is taken once.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ LBL = "lbl-"
 """A transponder of a long base line has a number only; this and the number is the name it gets."""
 
 SAME_S, SAME_M = 0.5, 0.05
-"""Ranges to one system that are this close together are one measurement, told twice."""
+"""Ranges to one system that are this close together are one measurement, reported twice."""
 
 MAX_PENDING = 64
 REMEMBERED = 64
@@ -45,7 +45,7 @@ class Ping:
 
 
 def read_range(name: str, message: Message) -> tuple[str, float] | None:
-    """Return whom a message of :data:`MESSAGES` tells a range to, and the range; None where it tells none."""
+    """Return the target of a range in a message of :data:`MESSAGES`, and the range; None without one."""
     match name:
         case "AcousticOperation":
             if int(message.op) != int(imcpy.AcousticOperation.OperationEnum.RANGE_RECVED):

@@ -1,4 +1,4 @@
-"""Who a DUNE node knows and sends to: announced systems, of which those heard lately are active.
+"""Systems that a DUNE node knows and sends to: announced ones, of which those in recent contact are active.
 
 A system is known by its first Announce; one that comes back under the same id with another port stays ignored
 until the node restarts, as on a real vehicle.
@@ -44,7 +44,7 @@ class Contacts:
     def __init__(self) -> None:
         self._known: dict[int, Contact] = {}
         self.destinations: list[tuple[int, Address]] = []
-        """To whom telemetry goes now: ids and addresses."""
+        """Present receivers of telemetry: ids and addresses."""
 
     def announced(self, imc_id: int, name: str, services: str) -> None:
         """Learn a system from its Announce; only the first counts."""

@@ -9,7 +9,7 @@ from ipaddress import ip_address
 from simulator.network import PacketHandler, UdpEndpoint
 
 MULTICAST_GROUP = "224.0.75.69"
-_EVERY_ADDRESS = "0.0.0.0"  # noqa: S104 - only such sockets hear broadcasts and multicasts
+_EVERY_ADDRESS = "0.0.0.0"  # noqa: S104 - only such sockets receive broadcasts and multicasts
 
 
 async def listen_for_announces(host: str, ports: Iterable[int], handler: PacketHandler) -> UdpEndpoint:

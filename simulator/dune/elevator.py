@@ -17,7 +17,7 @@ LEAST_RADIUS_M = 10.0
 DEPTH_TOLERANCE_M = 0.3
 SLOWEST_MPS = 0.1
 PROGRESS_TIMEOUT_S = 20.0
-"""A vehicle that is slower than that for so long, up or down, fails."""
+"""A vehicle that stays slower for this long, up or down, fails."""
 
 
 class _Phase(Enum):

@@ -56,7 +56,7 @@ def default_specs(
     starts: Sequence[tuple[float, float, float]] = (),
     base_port: int = FIRST_PORT,
 ) -> list[VehicleSpec]:
-    """Vehicles ``lauv-sim-1`` … side by side at the southern border, as far as nothing else is said.
+    """Vehicles ``lauv-sim-1`` … side by side at the southern border, unless given otherwise.
 
     Raises
     ------

@@ -122,7 +122,7 @@ class FollowReference:
     def failure(self, now_s: float) -> tuple[str, bool] | None:
         """Why the maneuver fails now, None while it goes on.
 
-        The flag tells whether the vehicle goes through ERROR (a task failed) or straight into service.
+        The flag says whether the vehicle goes through ERROR (a task failed) or straight into service.
         """
         if self.timeout_s > 0.0 and now_s - self._last_s > self.timeout_s:
             self.state = State.TIMEOUT

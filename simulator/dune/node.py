@@ -61,7 +61,7 @@ _HEARTBEAT = imcpy.Heartbeat().msg_id
 _PLAN_CONTROL = imcpy.PlanControl().msg_id
 _ENTITY_LIST = imcpy.EntityList().msg_id
 _TRANSPORTED = frozenset({_HEARTBEAT, _PLAN_CONTROL, _ENTITY_LIST})
-"""What is heard and passed on to every active system, the sender included."""
+"""Received messages that are passed on to every active system, the sender included."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +71,7 @@ class DuneOptions:
     Attributes
     ----------
     bind_address
-        Where the imc+udp socket listens, and the address told in the announce.
+        Where the imc+udp socket listens, and the announced address.
     announce_addresses, announce_ports
         Every combination gets the announce.
     faults
@@ -83,7 +83,7 @@ class DuneOptions:
     static_destinations
         Addresses that get everything, known or not.
     imc_version
-        As told in the announce.
+        As announced.
     tcp
         Also serve consoles by TCP.
     radio_range_m
@@ -118,7 +118,7 @@ class DuneOptions:
 
 @dataclass(slots=True)
 class NodeCounts:
-    """What a node did with what it heard."""
+    """What a node did with its received packets."""
 
     accepted: int = 0
     malformed: int = 0
@@ -247,7 +247,7 @@ class FakeDune:
         self._begin()
 
     def _begin(self) -> None:
-        """Begin anew with everything that a start of DUNE begins with; every start has a uid of its own."""
+        """Start again as DUNE does; every start has a uid of its own."""
         host, port = self.address
         offered = self._offered
         services = (
@@ -264,7 +264,7 @@ class FakeDune:
     def crash(self, down_s: float = RESTART_S) -> None:
         """Let DUNE die, and start again ``down_s`` of vehicle time later: whatever it did or knew is forgotten.
 
-        The vehicle floats up meanwhile, and is nobody's.
+        The vehicle floats up meanwhile, without a controller.
         """
         self._down_until_s = self._now_s + down_s
         self.vehicle.stop()

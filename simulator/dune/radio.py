@@ -14,7 +14,7 @@ _EARTH_M = 6_371_000.0
 
 
 class Radio:
-    """Who is within range of one vehicle.
+    """The systems within range of one vehicle.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ class Radio:
         self._reached[imc_id] = self._in_reach((lat_rad, lon_rad))
 
     def forget(self) -> None:
-        """Know of nobody any more, as after a start."""
+        """Forget all systems, as after a start."""
         self._places.clear()
         self._reached.clear()
 

@@ -13,7 +13,7 @@ from simulator.world import SimulatedVehicle
 
 LEAST_RADIUS_M = 10.0
 AT_SURFACE_WITHIN = 2.5
-"""A vehicle that drifted no farther than so many radii comes back at the surface."""
+"""A vehicle that drifted no farther than this many radii comes back at the surface."""
 
 
 class StationKeepingManeuver:

@@ -1,4 +1,4 @@
-"""DUNE's TCP server: whoever connects gets everything that the node sends and may command it, without any announce."""
+"""DUNE's TCP server: every client gets all that the node sends and may command it, without any announce."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Messages in which a DUNE node tells about its vehicle."""
+"""Messages in which a DUNE node reports on its vehicle."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class Telemetry:
         self._announce.services = services
 
     def announce(self) -> imcpy.Announce:
-        """Who and where it is, and how to reach it."""
+        """Its name, position and addresses."""
         here = self._vehicle.position
         lat, lon = self._frame.to_geodetic(here.east_m, here.north_m)
         message = self._announce
@@ -114,7 +114,7 @@ class Telemetry:
     def distance(self, measurement: Measurement) -> imcpy.Distance:
         """One beam's range.
 
-        The device's rotation tells the beam's direction: theta from the bow (-90 degrees is down), then psi
+        The device's rotation is the beam's direction: theta from the bow (-90 degrees is down), then psi
         around the hull, clockwise from above.
         """
         key = (measurement.source, measurement.beam)

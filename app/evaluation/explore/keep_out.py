@@ -34,7 +34,7 @@ def draw_keep_out(
     Raises
     ------
     ValueError
-        When the fraction is out of range, or so many zones with passages between them do not fit into the area.
+        When the fraction is out of range, or the zones with passages between them do not fit into the area.
     """
     if fraction == 0.0:
         return ()

@@ -20,7 +20,7 @@ SPREAD = 0.5
 class Osarses(Trier):
     """Takes the best of ``tries`` random feasible moves and of staying; 0 tries are one random feasible move.
 
-    That the team may stay is what makes plain J a deadlock: where nobody can gain, no move is better than none.
+    That the team may stay is what makes plain J a deadlock: where no vehicle can gain, no move is better than none.
     """
 
     def __init__(self, world: World, tries: int, rng: np.random.Generator, terms: Terms = "full") -> None:

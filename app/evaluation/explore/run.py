@@ -19,7 +19,7 @@ OSARSES, TRIED_SPSA, TRIED_FDSA = ONLY_IN_SIMULATION
 EXPLORERS = (*sorted(PLANNERS), *ONLY_IN_SIMULATION)
 
 UNSEEN_DEPTH = (DEEPEST + SHALLOWEST) / 2
-"""What a landmark that nobody has seen is taken to be, where errors are summed."""
+"""Assumed depth of an unseen landmark, where errors are summed."""
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ SILENT_AFTER = 5
 
 
 class Team(Protocol):
-    """The vehicles of a :class:`World` with what they, and whoever plans for them, know."""
+    """The vehicles of a :class:`World` with their knowledge and the planner's."""
 
     @property
     def landmarks(self) -> Landmarks:
@@ -67,7 +67,7 @@ class UnlimitedTeam:
         return self._world.team, self._world.positions, self._world.belief
 
     def order(self, vehicles: IntArray, waypoints: FloatArray) -> FloatArray:
-        """Return the waypoints: everybody hears them."""
+        """Return the waypoints: every vehicle receives them."""
         return waypoints
 
 
@@ -75,7 +75,7 @@ class LimitedTeam:
     """Vehicles and a station that exchange messages, some of which may be lost.
 
     A landmark counts as accurate when a vehicle of the team or the station knows it that accurately; what only a lost
-    vehicle knew is lost with it. The planner is given nothing but what was transmitted. A vehicle that did not hear its
+    vehicle knew is lost with it. The planner has nothing but what was transmitted. A vehicle that did not receive its
     order stays where it is.
 
     Parameters
@@ -101,7 +101,7 @@ class LimitedTeam:
 
     @property
     def landmarks(self) -> Landmarks:
-        """For each landmark the knowledge of whoever knows best; accurate when it is to anyone."""
+        """For each landmark the best knowledge of any vehicle or the station; accurate when it is to one."""
         known = [self._node(int(number)).knowledge for number in self._world.team]
         station = replace(
             Landmarks.unknown(self._xy),

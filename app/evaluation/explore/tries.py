@@ -31,7 +31,7 @@ class Trier(ABC):
 
     def propose(self, situation: Situation, rng: np.random.Generator) -> Proposal:
         """Return the next configuration."""
-        if situation.vehicles != self._names:  # progress is told per vehicle
+        if situation.vehicles != self._names:  # progress is counted per vehicle
             self._progress, self._names = [], situation.vehicles
         now = self._judge(situation.positions, self._world.landmarks)
         self._progress = [*self._progress[-1:], now.progress]

@@ -107,7 +107,7 @@ class ExploreScenario:
     line_of_sight : bool
         Whether the true sea floor hides what lies behind it.
     capacity : int or None
-        Most landmark entries in a message between a vehicle and the station; None: everybody knows everything.
+        Most landmark entries in a message between a vehicle and the station; None: all knowledge is shared.
     message_loss : float
         Probability that a message is lost; only with a capacity.
     """
@@ -161,7 +161,7 @@ class ExploreScenario:
 
 
 class World:
-    """The truth: where the bottom is, what the sensors hear. ``landmarks`` is what the team knows.
+    """The truth: where the bottom is, what the sensors measure. ``landmarks`` is what the team knows.
 
     ``team`` (n_vehicles,) are the numbers of the vehicles that are there, counted from 0 in the order of their joining,
     which never change their meaning; ``positions`` (n_vehicles, 3) is where these are.

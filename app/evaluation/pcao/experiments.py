@@ -160,7 +160,7 @@ class TeamJob:
 
 @dataclass(frozen=True, eq=False)
 class CurveJob:
-    """A training of figure 2: so many controllers of a method, scored one after the other on one core."""
+    """A training of figure 2: a number of controllers of a method, scored one after the other on one core."""
 
     terrains: tuple[Terrain, ...]
     method: str
@@ -208,7 +208,7 @@ class CurveJob:
 
 
 def digest(parameters: FloatArray | None) -> str:
-    """Return what tells controllers apart."""
+    """Return what distinguishes controllers."""
     return "" if parameters is None else sha256(np.round(parameters, 9).tobytes()).hexdigest()[:12]
 
 

@@ -37,7 +37,7 @@ class Physics(NamedTuple):
 
 
 class Known(NamedTuple):
-    """What is known of the landmarks: estimated depth, its variance, looks, whether in A, who brought it there."""
+    """What is known of the landmarks: estimated depth, its variance, looks, whether in A, and by which vehicle."""
 
     depth: FloatArray
     variance: FloatArray
@@ -97,7 +97,7 @@ def sense(
     visible: BoolArray,
     rng: np.random.Generator,
 ) -> None:
-    """Ping with every vehicle: ``known`` takes in the ranges, ``visible`` (n, m) is set to who saw what."""
+    """Ping with every vehicle: ``known`` takes in the ranges, ``visible`` (n, m) is set to the landmarks seen."""
     for v in range(len(positions)):
         x, y, z = positions[v]
         sin_h, cos_h = np.sin(headings[v]), np.cos(headings[v])
@@ -153,7 +153,7 @@ def error_squared(p: Physics, known: Known) -> float:
 
 @njit(cache=True, nogil=True)
 def unknown(m: int) -> Known:
-    """Return m landmarks that nobody has seen."""
+    """Return m landmarks that are still unseen."""
     return Known(
         np.full(m, np.nan),
         np.full(m, np.inf),

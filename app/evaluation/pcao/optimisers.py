@@ -1,7 +1,7 @@
 """What looks for the best P: algorithm 1 of PCAO18, random search (its yardstick), CMA-ES.
 
-An optimiser is asked for the next controllers and told their scores. What it asks follows from its seed and from what
-it was told, and from nothing else: whoever tells it the same scores again has it where it was.
+An optimiser proposes the next controllers and receives their scores. Its proposals follow from its seed and from
+these scores, and from nothing else: given the same scores again it is in the same state.
 """
 
 from abc import ABC, abstractmethod
@@ -27,7 +27,7 @@ class Optimiser(ABC):
 
     @abstractmethod
     def ask(self) -> list[FloatArray]:
-        """Return the controllers to be scored next, all at once; ask again only after telling."""
+        """Return the controllers to be scored next, all at once; ask again only after giving the scores."""
 
     def tell(self, asked: list[FloatArray], scores: list[float]) -> None:
         """Take in the scores of what was asked for."""

@@ -12,7 +12,7 @@ Cases = tuple[tuple[int, int], ...]
 
 
 class Scorer(Protocol):
-    """Scores controllers (SIZE,); the same scores whoever computes them."""
+    """Scores controllers (SIZE,); the same scores on any machine."""
 
     def score(self, controllers: Sequence[FloatArray]) -> list[float]:
         """Return E(P) of each."""

@@ -16,7 +16,7 @@ DECISIONS = 400
 
 
 def speed_lines(rng: np.random.Generator, model: PcaoModel) -> list[str]:
-    """Return what is to be said of the speed."""
+    """Return the report's section on speed."""
     job = FlightJob(sea_floor("harbour:1"), "pcao", 100, model.parameters)
     job.run(lambda step: None)
     seconds = sum(job.run(lambda step: None)["cpu_s"] for _ in range(RUNS))

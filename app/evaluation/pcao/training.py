@@ -1,6 +1,6 @@
 """Training: an optimiser looks for the best P while every generation's scores are written down as they come.
 
-What an optimiser asks follows from its seed and the scores it was told, so the scores are the checkpoint: killed at any
+What an optimiser proposes follows from its seed and the scores so far, so the scores are the checkpoint: killed at any
 moment, training goes on where it was, and ends with the same controller as if it had never stopped.
 """
 
@@ -75,9 +75,9 @@ def train(
     progress: Callable[[Curve], None] = lambda curve: None,
     better: Callable[[Optimiser, Curve], None] = lambda optimiser, curve: None,
 ) -> Curve:
-    """Train until so many controllers were scored, those of the checkpoint included; return the learning curve.
+    """Train until all controllers were scored, those of the checkpoint included; return the learning curve.
 
-    ``progress`` is told after every generation, ``better`` whenever there is a new best controller.
+    ``progress`` is called after every generation, ``better`` whenever there is a new best controller.
     """
     curve, known = Curve(), list(checkpoint.generations)
     for number, generation in enumerate(known):
@@ -127,7 +127,7 @@ def write_atomically(path: Path, content: bytes) -> None:
 
 
 def _digest(controllers: list[FloatArray]) -> str:
-    """Return what tells generations apart; rounded, as other processors round the last digit otherwise."""
+    """Return what distinguishes generations; rounded, as other processors round the last digit otherwise."""
     return " ".join(f"{float(np.abs(p).sum()):.6g}" for p in controllers)
 
 

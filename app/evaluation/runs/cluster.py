@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 T = TypeVar("T")
 
 ATTEMPTS = 5
-"""How often a piece of work is begun anew after its worker died."""
+"""How often a piece of work is started again after its worker died."""
 
 CONNECT_S = 15.0
 
@@ -41,7 +41,7 @@ class Cluster:
         return sum(self._client.nthreads().values())
 
     def share(self, what: Any) -> Any:
-        """Give something to the workers that many pieces of work need; made anew where a worker took it with it."""
+        """Give something to the workers that many pieces of work need; made again where a worker died with it."""
         return self._client.submit(pickle.loads, pickle.dumps(what), pure=True)
 
     def map(self, work: Callable[[Any, Any], T], shared: Any, pieces: Sequence[Any]) -> list[T]:

@@ -31,7 +31,7 @@ class Job(Protocol):
         ...
 
     def run(self, progress: Progress) -> dict[str, Any]:
-        """Run it, telling every step, and return the object of the command's JSON."""
+        """Run it, reporting every step, and return the object of the command's JSON."""
         ...
 
 
@@ -43,7 +43,7 @@ def run_jobs(
 ) -> Iterator[dict[str, Any]]:
     """Yield the result of every job, in the order of ``jobs``.
 
-    With one process ``progress`` is told every step of the job that runs; with several, each job once it is done.
+    With one process ``progress`` is called for every step of the job that runs; with several, each job once it is done.
     Processes are spawned, so nothing depends on what this one has loaded. With the address of a Dask ``scheduler`` the
     cluster's workers do the jobs; raises ClusterError when there is none.
     """

@@ -53,7 +53,7 @@ class RescueRun:
 
 @dataclass(frozen=True)
 class RescueJob:
-    """One run of ``rescue``; ``key`` tells it from others in a report."""
+    """One run of ``rescue``; ``key`` distinguishes it in a report."""
 
     scenario: RescueScenario
     planner: str

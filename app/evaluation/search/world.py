@@ -124,7 +124,7 @@ def run_search(
     options: PlannerOptions,
     progress: Callable[[int], None] = lambda step: None,
 ) -> RescueTrack:
-    """Run the closed loop until everybody is home for good or the time is up."""
+    """Run the closed loop until all robots are home for good or the time is up."""
     world, scanner = scenario.world, scenario.scanner
     chooser = create_planner(planner, options, scanner)
     rng = np.random.default_rng([scenario.seed, 11])
@@ -183,7 +183,7 @@ def run_search(
 def fully_explored(scenario: RescueScenario) -> NDArray[np.bool_]:
     """Return the free cells (rows, cols) that can be seen from anywhere a robot can get to.
 
-    The paper compares with "the fully explored map". A gap between parked cars may be out of everybody's sight.
+    The paper compares with "the fully explored map". A gap between parked cars may be out of sight of every robot.
     """
     world = scenario.world
     rows, cols = world.solid.shape

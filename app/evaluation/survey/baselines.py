@@ -76,7 +76,7 @@ def lawnmower_baselines(
     distance_m : float
         What each vehicle travelled, on average.
     soundings : int
-        What the whole team sounded; the second lawnmower travels as far as so many soundings at 5 Hz and 1.3 m/s take.
+        What the whole team sounded; the second lawnmower travels as far as they take at 5 Hz and 1.3 m/s.
     """
     spacing = SPEED_MPS / SOUNDING_RATE_HZ
     by_distance, by_soundings = (

@@ -59,7 +59,7 @@ def fly_lawnmower(
 def _fly(
     vehicle: SimulatedVehicle, route: FloatArray, depth_m: float, distance_m: float
 ) -> tuple[bool, list[Measurement]]:
-    """Follow a route (k, 2) for at most a distance; tell whether its end was reached, and what was measured."""
+    """Follow a route (k, 2) for at most a distance; return whether its end was reached, and the soundings."""
     heard: list[Measurement] = []
     for east, north in route:
         vehicle.go_to(float(east), float(north), depth_m, SPEED_MPS, arrival_radius_m=ARRIVAL_RADIUS_M)

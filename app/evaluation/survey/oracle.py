@@ -1,4 +1,4 @@
-"""An oracle that knows the truth and travels nowhere: what so many soundings could do at best, or nearly."""
+"""An oracle that knows the truth and travels nowhere: what the same number of soundings could do at best, or nearly."""
 
 import numpy as np
 from scipy.ndimage import gaussian_filter

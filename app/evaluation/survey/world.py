@@ -31,7 +31,7 @@ BELIEF_NODES_PER_SIDE = 50
 MAPS = 20
 """How often the belief is brought up to date in a mission."""
 LEARN_AT = (0.05, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8)
-"""Parts of the mission after which the map's hyperparameters are learned anew; between them they are kept."""
+"""Parts of the mission after which the map's hyperparameters are learned again; between them they are kept."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ class SurveyScenario:
     symmetry: int = 0
 
     def log(self, stream: int) -> "Log":
-        """Return an empty log; ``stream`` tells apart the random numbers of surveys under one seed."""
+        """Return an empty log; ``stream`` separates the random numbers of surveys under one seed."""
         beams = None
         if self.sounder == "dvl":
             beams = Multibeam(self.relative_noise, count=3, swath_rad=2 * SIDE_BEAM_RAD)
@@ -133,10 +133,10 @@ class Log:
     sd_m: list[FloatArray] = field(default_factory=list)
 
     def sound(self, points: FloatArray, headings_rad: FloatArray | None = None) -> None:
-        """Sound from vehicle positions (n, 3); nothing is heard where the terrain is unknown.
+        """Sound from vehicle positions (n, 3); there is no echo where the terrain is unknown.
 
         ``headings_rad`` (n,), clockwise from north, say where beams to the sides point; without them, or where they are
-        NaN, only the beam down is heard.
+        NaN, only the beam down has an echo.
         """
         bottom = self.terrain.depth_at(points[:, 0], points[:, 1])
         aside = np.zeros(len(points), dtype=np.bool_)
@@ -171,7 +171,7 @@ class Log:
 def along(start: FloatArray, end: FloatArray, sampling: Sampling, since_m: float = 0.0) -> tuple[FloatArray, float]:
     """Return the positions (n, 3) at which a vehicle sounds on the leg, its start left out, and the way since the last.
 
-    ``since_m`` is that way at the start: a sounder does not begin anew with each leg.
+    ``since_m`` is that way at the start: a sounder does not restart with each leg.
     """
     if sampling == "step":
         return end[None], 0.0
@@ -222,7 +222,7 @@ def fly_planner(
 ) -> Track:
     """Run the closed loop: belief from the default map, planner, legs, soundings.
 
-    ``progress`` is told every step. An oracle is given ``known`` instead of what it has sounded.
+    ``progress`` is called every step. An oracle is given ``known`` instead of what it has sounded.
     """
     sensor = SingleBeam(scenario.relative_noise)
     chooser = create_planner(planner, options, sensor)

@@ -1,4 +1,4 @@
-"""Where landmarks that nobody has seen may be: spread evenly over what nobody has looked at yet.
+"""Where unseen landmarks may be: spread evenly over ground that was not yet looked at.
 
 MED13's cost needs the number of all landmarks (its footnote 3) but no place of an unseen one. A planner that thinks
 ahead has to presume places; these are all that it may presume, because everything within sight of a vehicle is seen.

@@ -1,4 +1,4 @@
-"""Greedy on the trace of the EKF covariance: the usual way of active exploration, which MED13 figure 1 speaks against.
+"""Greedy on the trace of the EKF covariance: the usual way of active exploration, which MED13 figure 1 argues against.
 
 Each step all vehicles go to the neighbouring positions, out of 27 each, after which the filters of all landmarks and
 targets expect the least sum of variances. As long as there are few landmarks every combination is weighed ("infinite

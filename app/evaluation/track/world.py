@@ -93,7 +93,7 @@ class TrackScenario:
     plain_ekf : bool
         Whether landmarks are estimated by one first-order filter each, as in MED13's figure 1.
     fixed_noise : float or None
-        Standard deviation that this filter, and who plans by it, takes every range to have; None: it knows the noise.
+        Standard deviation that this filter, and its planner, takes every range to have; None: it knows the noise.
     """
 
     terrain: Terrain | None = None
@@ -274,7 +274,7 @@ class TrackWorld:
             self.tracks[k] = self.target_estimator.update(self.tracks[k], places, ranges, blur)
 
     def _localize(self, rng: np.random.Generator) -> None:
-        """Count who came to the surface; there is GPS, and ranges between vehicles everywhere."""
+        """Count surfacings; there is GPS, and ranges between vehicles everywhere."""
         fading, up = self.scenario.fading, self.positions[:, 2] <= CEILING + SURFACED
         if fading is None:
             return
@@ -318,7 +318,7 @@ class TrackWorld:
 
     @property
     def belief(self) -> Belief:
-        """What a planner is told of the landmarks: estimates of those seen, presumed places of the others."""
+        """The landmarks as a planner gets them: estimates of those seen, presumed places of the others."""
         k, flat = self.known, self._cube is not None
         n, seen = len(k.looks), k.looks > 0
         point = np.where(seen[:, None], k.position_m, 0.0)
@@ -368,7 +368,7 @@ class TrackWorld:
         )
 
     def told_of_targets(self) -> Targets | None:
-        """Return what is known of the targets, foretold for the end of the next step."""
+        """Return what is known of the targets, predicted for the end of the next step."""
         if not self.tracks:
             return None
         ahead = [self.target_estimator.predict(track) for track in self.tracks]

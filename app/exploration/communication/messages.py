@@ -18,7 +18,7 @@ byte   bits content
 Every entry takes 5 bytes: index of the landmark (16 bits), flag "accurately estimated" (1), code of the standard
 deviation (7), depth (16). Every neighbour takes 10: number (8), east, north, depth (3x24). Positions and depths are
 multiples of a 2^24-1-th (2^16-1-th) part of their range and saturate at its ends. The standard deviation is
-``accuracy * 2^((code - 32) / 16)``, rounded up so that nobody ever claims to know more than he does: steps of
+``accuracy * 2^((code - 32) / 16)``, rounded up so that no sender claims too much: steps of
 4.4 % from a quarter of the accuracy threshold to 58 times it; code 127 stands for anything larger (infinite).
 
 Beyond the paper, an entry about a landmark that is not accurate carries the sender's *estimate from all its own looks*

@@ -7,7 +7,7 @@ from app.arrays import BoolArray, FloatArray, IntArray
 
 
 def reachable(positions: FloatArray, visible_by: BoolArray, xy_m: FloatArray, travel_m: float) -> BoolArray:
-    """Return who is in whose reachable exploration area: element (j, k) says that vehicle k is in that of j.
+    """Return the reachable exploration areas: element (j, k) says that vehicle k is in that of j.
 
     That is so when, of the landmarks visible to j, the one closest to k in the plane lies within the distance that k
     can travel in one step. No vehicle is in its own.
@@ -56,7 +56,7 @@ def fill(order: IntArray, xy_m: FloatArray, capacity: int, apart_m: float) -> In
     """Return what goes into a message: the first ``capacity`` landmarks of ``order`` that are no near-duplicates.
 
     A landmark within ``apart_m`` of one already taken waits; beyond the paper, which drops it, it takes a place that
-    would stay free, because nothing else ever tells the receiver that this landmark is done.
+    would stay free, because nothing else informs the receiver that this landmark is done.
 
     Parameters
     ----------

@@ -34,7 +34,7 @@ class Contribution:
 
 
 def fuse(contributions: list[Contribution], n: int) -> tuple[FloatArray, FloatArray]:
-    """Return fused depths (n,), NaN where nobody knows anything, and their information (n,)."""
+    """Return fused depths (n,), NaN where unknown, and their information (n,)."""
     total, weighted = np.zeros(n), np.zeros(n)
     for part in contributions:
         total += part.information

@@ -65,14 +65,14 @@ class StationNode:
     Each step: :meth:`begin`, :meth:`receive` every report that arrives, :meth:`conclude`, plan with :attr:`depth_m`,
     :attr:`sd_m` and :attr:`accurate`, then send each vehicle its :meth:`order`. A vehicle is known from its first
     report on, so that one can join at any time; one that falls silent is presumed to have followed its last order and
-    holds up nobody.
+    delays no other.
 
     Beyond the paper:
 
     - Estimates of several vehicles are put together (they stem from different looks), so that the station may know a
       landmark accurately that no vehicle does.
     - The station knows the sensors and where the vehicles were: a landmark that they must have measured is presumed to
-      be known that well until a report tells, or until ``PRESUMED_FOR`` steps with room to tell have passed.
+      be known that well until a report says so, or until ``PRESUMED_FOR`` steps with room for it have passed.
 
     Parameters
     ----------
@@ -139,19 +139,19 @@ class StationNode:
 
     @property
     def members(self) -> tuple[int, ...]:
-        """Numbers of the vehicles ever heard of, ascending."""
+        """Numbers of the vehicles known so far, ascending."""
         return tuple(sorted(self._members))
 
     def position(self, number: int) -> FloatArray:
-        """Return where a vehicle is, (3,): where it said it was, one step of silence later where it was sent."""
+        """Return where a vehicle is, (3,): its last report, or after one step of silence its waypoint."""
         return self._members[number].position
 
     def heard_within(self, steps: int) -> tuple[int, ...]:
-        """Return the numbers of the vehicles that were heard in one of the last ``steps`` steps, ascending."""
+        """Return the numbers of the vehicles that reported in one of the last ``steps`` steps, ascending."""
         return tuple(k for k in self.members if self._count - self._members[k].heard_at < steps)
 
     def begin(self) -> None:
-        """Begin a step: nobody was heard yet."""
+        """Begin a step: no report has arrived yet."""
         self._count += 1
         for member in self._members.values():
             member.told = NOTHING
@@ -191,7 +191,7 @@ class StationNode:
         return report
 
     def conclude(self) -> None:
-        """Put together what was heard in this step, and presume what was looked at without being told."""
+        """Merge this step's reports, and presume what was looked at without a report."""
         members = [self._members[number] for number in self.members]
         self._depth, self._information = fuse([member.reported for member in members], len(self._xy))
         self._known |= self._information > self._needed
@@ -212,7 +212,7 @@ class StationNode:
             member.presumed[member.clock - member.looked_at > PRESUMED_FOR] = 0.0
 
     def order(self, number: int, waypoint: FloatArray) -> bytes:
-        """Return the message to a vehicle: where to go next, who is near, what others have found out."""
+        """Return the message to a vehicle: its next waypoint, vehicles nearby, and news from the others."""
         member = self._members[number]
         row = self.members.index(number)
         by_distance = sorted(

@@ -1,4 +1,4 @@
-"""A vehicle under limited communication: what it has measured, what it was told, what it has yet to tell."""
+"""A vehicle under limited communication: what it has measured, received, and has yet to report."""
 
 from dataclasses import replace
 
@@ -70,7 +70,7 @@ class VehicleNode:
 
     @property
     def accurate(self) -> BoolArray:
-        """``A`` as this vehicle knows it, (n,): from its own looks, with what it was told, or told so outright."""
+        """``A`` as this vehicle knows it, (n,): from its own looks with received estimates, or received as done."""
         return self._done
 
     @property

@@ -1,4 +1,4 @@
-"""Where altimeters lifted vehicles off the bottom: ranges do not tell up from down, so walls are estimated wrongly."""
+"""Where altimeters lifted vehicles off the bottom: ranges cannot separate up from down, so walls are wrong."""
 
 from typing import Any
 

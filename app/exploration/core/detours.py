@@ -42,7 +42,7 @@ class Errand:
 
 
 class Errands:
-    """Keeps who is on which errand."""
+    """Remembers which vehicle is on which detour."""
 
     def __init__(self) -> None:
         self._on: dict[str, int] = {}
@@ -54,7 +54,7 @@ class Errands:
         targets: Targets | None,
         localization: Localization | None,
     ) -> list[Errand]:
-        """Return the errands of this step, for vehicles at ``positions`` (n_vehicles, 3)."""
+        """Return the detours of this step, for vehicles at ``positions`` (n_vehicles, 3)."""
         self._on = {name: what for name, what in self._on.items() if name in vehicles}
         self._rise(vehicles, positions, localization)
         self._chase(vehicles, positions, targets)
@@ -66,7 +66,7 @@ class Errands:
             needed: set[str] = set()
         else:
             due = due_to_rise(localization)
-            # Whoever has begun to rise goes on until a fix has made its position good.
+            # A vehicle that has begun to rise goes on until a fix has made its position good.
             needed = {name for name, late in zip(vehicles, due, strict=True) if late}
             if localization.shared:
                 still = rising if needed else set()
@@ -91,7 +91,7 @@ class Errands:
             taken = [what for what in self._on.values() if what != RISE]
             if part[target] <= LEAVES_AT or int(target) in taken or len(taken) >= most_away(len(vehicles)):
                 continue
-            # Who is coming back from another target is on the way already.
+            # A vehicle coming back from another target is on the way already.
             free = [i for i, name in enumerate(vehicles) if name not in self._on]
             free = [i for i in free if vehicles[i] in chasing] or free
             if free:
@@ -131,7 +131,7 @@ def errand_move(
     localization: Localization | None,
     at_depth: Callable[[FloatArray], FloatArray] | None = None,
 ) -> FloatArray:
-    """Return where the vehicle in a row goes on its errand, (3,); where it is, when nothing else is feasible.
+    """Return where the vehicle in a row goes on its detour, (3,); where it is, when nothing else is feasible.
 
     Parameters
     ----------

@@ -32,11 +32,11 @@ class Targets:
     relative_noise : float
         Of ranges to them.
     hearing_m : float
-        How far they are heard; inf: everywhere.
+        How far they can be ranged; inf: everywhere.
     range_sd_m : float
         Part of the ranges' deviation that is the same at any distance.
     standoff_m : float
-        Vehicles on an errand come no closer to any target.
+        Vehicles on a detour come no closer to any target.
     """
 
     state: FloatArray

@@ -1,6 +1,6 @@
 """What is still lacking of each landmark, as directions along which it is not known well enough.
 
-Where only depths are estimated that is one figure per landmark. Where whole positions are, a range tells something
+Where only depths are estimated that is one figure per landmark. Where whole positions are, a range informs
 along its own direction only: looking again from the same side helps no more. Each axis of a landmark's error ellipsoid
 that is too long is therefore kept as a task of its own, with its direction.
 """
@@ -14,7 +14,7 @@ from app.arrays import FloatArray
 from app.exploration.core.problem import Belief
 
 TRACE = 1e-6
-"""Of what is enough: the least that is said to be lacking of a landmark that is not accurate."""
+"""Least need of a landmark that is not accurate, as a fraction of what is enough."""
 
 DOWN = np.array([0.0, 0.0, 1.0])
 FLAT = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])

@@ -100,7 +100,7 @@ class Situation:
 class Proposal:
     """A planner's answer: the next team configuration, (n_vehicles, 3), and figures for the operator.
 
-    ``errands`` names vehicles that left the plan, with the number of the target they go for; negative: the surface.
+    ``errands`` (detours) names vehicles that left the plan, with the number of their target; negative: the surface.
     """
 
     positions: FloatArray

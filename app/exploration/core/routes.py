@@ -167,7 +167,7 @@ class FreeSpace:
     def way(self, start: FloatArray, goal: FloatArray) -> FloatArray:
         """Return the vertices (k, 2) of a shortest way, ``goal`` last and ``start`` left out.
 
-        Where no way exists the straight line is returned: whoever flies it is stopped by the constraints.
+        Where no way exists the straight line is returned: the constraints stop a vehicle on it.
         """
         if self._sees(start, np.asarray(goal)[None])[0]:
             return np.asarray(goal, dtype=np.float64)[None]

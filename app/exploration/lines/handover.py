@@ -1,4 +1,4 @@
-"""Routes when the team changes: nobody's rest is lost, a newcomer gets a share."""
+"""Routes when the team changes: no remaining part is lost, a newcomer gets a share."""
 
 import numpy as np
 

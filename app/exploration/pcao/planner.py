@@ -37,7 +37,7 @@ LINK_SHARE = 0.92
 """Part of the communication range that the team's wishes are drawn together to."""
 
 TRAIL = 8
-"""Last places that are remembered: whoever came no farther than STUCK_STEPS in so many steps is stuck."""
+"""Number of remembered positions: a vehicle that came no farther than STUCK_STEPS over them is stuck."""
 STUCK_STEPS = 2.0
 STUCK_LEFT = 0.1
 """Share of what is left round a vehicle above which it is not stuck but busy."""
@@ -136,7 +136,7 @@ class PcaoPlanner(PlannerBase):
         return at_depth(team.constraints, bottom, team.positions, wish[..., :2], wish[..., 2])
 
     def _leader(self, names: tuple[str, ...], distance: FloatArray) -> int:
-        """Return who leads where links hold the team together: who has work closest by; seldom another one."""
+        """Return the leader where links hold the team together: the vehicle closest to its work; it seldom changes."""
         nearest = int(np.argmin(distance))
         if self._lead in names and distance[names.index(self._lead)] <= STAYS_LEADER * distance[nearest] + 0.1:
             nearest = names.index(self._lead)
@@ -157,7 +157,7 @@ class PcaoPlanner(PlannerBase):
         """Return how much is left to learn of every landmark, 0 to 1; in a survey, of every cell that it passed far."""
         belief = team.belief
         open_ = np.where(belief.accurate, 0.0, 1.0)
-        if self._surveys:  # nobody gets to the others
+        if self._surveys:  # no vehicle gets to the others
             open_ *= inside_area(team.constraints, belief.xy_m)
         else:
             with np.errstate(divide="ignore"):
@@ -200,7 +200,7 @@ class PcaoPlanner(PlannerBase):
             tries[:, i, :2] = place[:2] + turned
             tries[:, i, 2] = wish[i, 2]
             tries[:, i] = self._clear(team, bottom, tries)[:, i]
-            # Others have decided or still stand; whoever is too far from all of them counts as linked for now.
+            # Others have decided or still stand; a vehicle too far from all of them counts as linked for now.
             ok = team.constraints.feasible(team.positions, tries, bottom)
             if ok.any():
                 result[i] = tries[int(np.argmax(ok)), i]

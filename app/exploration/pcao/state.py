@@ -3,7 +3,7 @@
 The paper's state holds all landmarks' errors Omega. Here every vehicle sees them through 7 horizontal vectors, each the
 displacement from where something draws it (so that V = z'Pz is least where it should go), 4 vertical figures, and 2
 figures about how much is left, from which the mixing signals follow. What a vehicle sees depends on the others only
-through symmetric functions (who is nearest to a landmark, the sum of repulsions), so permuting the vehicles permutes
+through symmetric functions (the nearest one of a landmark, the sum of repulsions), so permuting the vehicles permutes
 the states, and turning or mirroring the plane turns or mirrors the vectors. Lengths are in units of ``unit``, half
 of what a vehicle maps to its sides.
 """

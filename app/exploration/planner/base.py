@@ -59,7 +59,7 @@ class PlannerBase(ABC):
         return replace(proposal, positions=proposal.positions[inverse])
 
     def _with_errands(self, team: Situation, bottom: Bottom, seed: int) -> Proposal:
-        """Decide for the vehicles that are on no errand, then send the others on theirs."""
+        """Decide for the vehicles that follow the plan, then for those on detours."""
         self._whole = team
         # Bathymeter missions rise along their legs instead; see app.missions.flight.decision.
         localization = None if self._surveys else team.localization
@@ -70,7 +70,7 @@ class PlannerBase(ABC):
             return self._decide(team, bottom, seed)
         rows = {errand.vehicle: team.vehicles.index(errand.vehicle) for errand in errands}
         positions, objective, terms = team.positions.copy(), 0.0, {}
-        if np.isfinite(team.constraints.com_range_m):  # nobody may go alone
+        if np.isfinite(team.constraints.com_range_m):  # no vehicle may go alone
             first = errands[0]
             move = self._go(team, bottom, positions, rows[first.vehicle], first) - positions[rows[first.vehicle]]
             positions, _ = settle(team, bottom, (team.positions + move)[None])

@@ -26,7 +26,7 @@ class MeasuredObjective:
     Every switch of eq. (9) stays open (infinite eps, which the paper leaves free): an estimator fits what changes with
     the positions, and a term that comes and goes with the progress two steps ago would hide that.
 
-    Who brought a landmark into ``A`` is not part of the belief: it is credited to the vehicle closest to it.
+    A belief does not hold which vehicle brought a landmark into ``A``: the closest one is credited with it.
     """
 
     def __init__(self, sensor: RangeSensor | None, options: PlannerOptions) -> None:
@@ -115,7 +115,7 @@ class MeasuredObjective:
 
 
 def belief_sets(belief: Belief, visible_by: NDArray[np.bool_]) -> LandmarkSets:
-    """Return the sets of AURO15 as far as a belief knows them: nobody is credited with a landmark."""
+    """Return the sets of AURO15 as far as a belief knows them: no vehicle is credited with a landmark."""
     hidden = ~visible_by.any(axis=0) & ~belief.accurate
     seen = hidden & np.isfinite(belief.depth_m)
     nobody = np.zeros(len(visible_by), dtype=np.int64)

@@ -1,4 +1,4 @@
-"""Flies a team plan over the estimated floor, step by step under the constraints, and foretells when all is done.
+"""Flies a team plan over the estimated floor, step by step under the constraints, and predicts when all is done.
 
 A plan is a list of *team waypoints*: the horizontal positions of all vehicles, shape (n_vehicles, 2), and a height
 above the smoothed floor. Between two of them every vehicle goes straight, all arriving at the same time: links that
@@ -202,7 +202,7 @@ def _look_along(
     gain: float,
     lacks: FloatArray,
 ) -> int:
-    """Take from ``lacks`` what ranges tell along the tasks' directions (3, m); return how many that completes."""
+    """Subtract from ``lacks`` what ranges inform along the tasks' directions (3, m); return how many that completes."""
     us, vs, ws = direction[0], direction[1], direction[2]
     done = 0
     for m in range(len(lacks)):

@@ -90,7 +90,7 @@ def estimate_floor(
     unknown_m : float
         Depth to presume while nothing was seen.
     held_m : float
-        Height above the floor below which vehicles never are, whatever they are told.
+        Height above the floor below which vehicles never are, whatever the command.
     """
     low, high = area.min(axis=0), area.max(axis=0)
     cell = max(visibility_m / CELLS_PER_VISIBILITY, float((high - low).max()) / MAX_CELLS_PER_SIDE)
@@ -141,7 +141,7 @@ def _from_neighbours(
 def let_stay(floor: Floor, positions: FloatArray, height_m: float, reach_m: float) -> None:
     """Lower the estimate in place where vehicles at ``positions`` (n, 3) are closer to it than their altimeters allow.
 
-    Whoever holds its height above the sea floor need not climb because an estimate says that it is too low.
+    A vehicle that holds its height above the sea floor need not climb because an estimate says that it is too low.
     """
     rows, cols = floor.depth_m.shape
     for k in range(len(positions)):

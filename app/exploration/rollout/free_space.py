@@ -61,7 +61,7 @@ def free_space(constraints: Constraints) -> Free:
         allowed = eroded if eroded.any() else allowed
     if not allowed.any():
         allowed = np.ones_like(allowed)
-    # Who is moved is moved well clear of corners, so that the ways there and back are allowed too.
+    # A vehicle that is moved is moved well clear of corners, so that the ways there and back are allowed too.
     clear = binary_erosion(allowed, np.ones((3, 3), dtype=bool), iterations=PUSH_CELLS, border_value=1)
     goal = clear if not everywhere and clear.any() else allowed
     index = distance_transform_edt(~goal, return_distances=False, return_indices=True)

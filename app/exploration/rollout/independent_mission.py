@@ -122,7 +122,7 @@ class ApartMission:
         return self.refine(min(chosen, key=lambda best: best.score), FIRST_SEARCH)
 
     def refine(self, best: Best, changes: int, worth: float = 0.0) -> Best:
-        """Try so many changes; the routes are improved in place."""
+        """Try a number of changes; the routes are improved in place."""
         trial = RoutesFlown(
             no_routes(len(self._start), ROOM, self._height),
             no_paths(len(self._start), self._horizon),
@@ -197,7 +197,7 @@ def _left_of(step_m: float, ahead_m: float) -> float:
 
 
 def _sample(xy: FloatArray) -> NDArray[np.int64]:
-    """Return evenly many of the landmarks at ``xy`` (m, 2): flights over all of them would tell no more."""
+    """Return evenly many of the landmarks at ``xy`` (m, 2): flights over all of them would add nothing."""
     n = len(xy)
     if n <= SAMPLE:
         return np.arange(n)

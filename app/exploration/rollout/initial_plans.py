@@ -101,7 +101,7 @@ def _chains(here_m: FloatArray, com_range_m: float) -> list[NDArray[np.int64]]:
 
 
 def with_team(plan: Backbone, before: tuple[str, ...], now: tuple[str, ...]) -> Backbone | None:
-    """Return a plan for a team that has changed: who is left closes up, newcomers lengthen the row; None for nobody.
+    """Return a plan for a team that has changed: those left close up, newcomers lengthen the row; None without any.
 
     Parameters
     ----------

@@ -73,7 +73,7 @@ SWATH_EXCESS = 1.2
 """How far a team may exceed, on average, the landmarks in the swath that it sees."""
 
 BACK_SOON = -1
-"""In place of the number of steps planned so far: a vehicle left on an errand, or came back."""
+"""In place of the number of steps planned so far: a vehicle left on a detour, or came back."""
 
 FIRST_SEARCH = 1500
 LAST_SHARE = 4
@@ -83,7 +83,7 @@ FRESH_STARTS = 4
 FRESH_SEARCH = 60
 
 AWAY_STEPS = 40.0
-"""Steps over which it is averaged what part of its time a vehicle is on errands."""
+"""Steps over which the share of a vehicle's time on detours is averaged."""
 
 LEAST_FREE = 0.1
 
@@ -151,7 +151,7 @@ class RolloutPlanner(PlannerBase):
         if self._names != team.vehicles:
             if self._kept is not None:
                 self._kept = with_team(self._kept, self._names, team.vehicles)
-            # On an errand a vehicle is away for a while only: new sweeps may compete, with the usual effort.
+            # On a detour a vehicle is away for a while only: new sweeps may compete, with the usual effort.
             away = team.targets is not None or team.localization is not None
             self._names, self._planned = team.vehicles, BACK_SOON if away and self._planned else 0
         if self._free is None or not _same(self._free[0], team.constraints):
@@ -163,7 +163,7 @@ class RolloutPlanner(PlannerBase):
         best = None
         if self._kept is not None and len(self._kept.at_m):
             best = mission.plan(self._kept, self._heights)
-        # Sweeps over what nobody has seen yet look better than they are: the plan that stands is not given up for one
+        # Sweeps over unseen ground look better than they are: the plan that stands is not given up for one
         # (measured: changing for a new sweep every 8 steps costs 8 steps, only for one better by 10 still costs them).
         if best is None or self._planned in (0, BACK_SOON):
             rivals = [mission.refine(start, FRESH_SEARCH) for start in mission.fresh_starts(FRESH_STARTS)]
@@ -189,7 +189,7 @@ class RolloutPlanner(PlannerBase):
         return Proposal(positions, -best.score, terms)
 
     def _decide_apart(self, team: Situation, bottom: Bottom, seed: int) -> Proposal:
-        """Decide where no links are needed: a route for each vehicle, those on errands included."""
+        """Decide where no links are needed: a route for each vehicle, those on detours included."""
         whole = team if self._whole is None else self._whole
         self._felt.feel(team)
         constraints = team.constraints
@@ -247,7 +247,7 @@ class RolloutPlanner(PlannerBase):
 def _sample(left: Lacking, belief: Belief) -> NDArray[np.int64]:
     """Return the tasks that plans are judged by: all, or evenly many where a landmark has several.
 
-    Where whole positions are estimated each takes many looks, and flights are long; a sample tells as much.
+    Where whole positions are estimated each takes many looks, and flights are long; a sample is enough.
     """
     n = len(left.row)
     if belief.covariance_m2 is None or n <= SAMPLE:
@@ -401,7 +401,7 @@ class _Mission:
         return np.vstack([middle, space.way(middle, space.nearest(self._work.xyz[:2, nearest]))])
 
     def refine(self, best: _Best, changes: int) -> _Best:
-        """Try so many changes; the plan is improved in place."""
+        """Try a number of changes; the plan is improved in place."""
         n = len(self._start)
         like = best.flown.plan
         trial = Flown(

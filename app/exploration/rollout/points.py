@@ -1,8 +1,8 @@
 """Landmarks whose whole position is unknown, as flights look at them: each with the information held about it.
 
-A range tells something along its own direction only, so that what a flight teaches of a landmark is a matrix. A
+A range informs along its own direction only, so that the information of a flight on a landmark is a matrix. A
 straight line, however long, leaves the direction across it and across the line of sight unknown; a second line at the
-side, or across, settles it. Flights that foretell the matrices know that; single figures do not.
+side, or across, settles it. Flights that predict the matrices know that; single figures do not.
 """
 
 from typing import NamedTuple

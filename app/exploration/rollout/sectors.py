@@ -16,7 +16,7 @@ INSETS = (0.1, 0.3)
 """How far from the end of what is left lines turn, in visibilities."""
 
 MOST_VEHICLES = 3
-"""Up to so many vehicles every way of giving them the strips is tried; otherwise as they stand across the lines."""
+"""Up to this many vehicles every way of giving them the strips is tried; otherwise as they stand across the lines."""
 
 
 def sectors(left_m: FloatArray, here_m: FloatArray, area: FloatArray, sight_m: float) -> Iterator[list[FloatArray]]:

@@ -70,9 +70,9 @@ def _with_spare(team: Situation, task: SearchTask, way_m: FloatArray) -> FloatAr
 
 
 class SearchPlanner(PlannerBase):
-    """Brings everybody back in time, keeps off what is not known to be free, and lets vehicles give way.
+    """Brings all vehicles back in time, keeps off what is not known to be free, and lets vehicles give way.
 
-    Positions only change where the whole leg lies over explored ground; who cannot be sure to be back later goes now.
+    Positions only change where the whole leg lies over explored ground; a vehicle that may be late otherwise goes now.
     """
 
     runs_errands: ClassVar[bool] = False

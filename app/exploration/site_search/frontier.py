@@ -16,7 +16,7 @@ ELSEWHERE = 0.15
 LATTICE = 2
 """Cells between the views that are weighed."""
 NEAR = 0.5
-"""Added to every distance, as a part of the scanner's reach, so that very small gains next door attract nobody."""
+"""Added to every distance, as a part of the scanner's reach, so that very small gains next door attract no vehicle."""
 FARTHEST = 2.0
 """How far the goal area counts as being, in diagonals of the site, where no way is hoped for."""
 KEEP = 2.0
@@ -34,7 +34,7 @@ class FrontierSearch(SearchPlanner):
         super().__init__(*args, **kwargs)
         self._views: dict[str, tuple[int, int]] = {}
         self._spent: list[tuple[int, int]] = []
-        self._gains = Gains()  # no memory of the search: what it says could be found out anew
+        self._gains = Gains()  # no memory of the search: it can be computed again
 
     @property
     def _homewards(self) -> bool:
@@ -72,7 +72,7 @@ class FrontierSearch(SearchPlanner):
                 self._spent.append(self._views[name])
 
     def _views_to_weigh(self, ground: Ground, ways: list[NDArray[np.int32]]) -> IntArray:
-        """Return cells (n, 2) of a lattice that somebody can get to, and those that vehicles are under way to."""
+        """Return cells (n, 2) of a lattice that a vehicle can get to, and those that vehicles are under way to."""
         reached = np.minimum.reduce(ways) < UNREACHED
         lattice = np.zeros_like(reached)
         lattice[::LATTICE, ::LATTICE] = True

@@ -28,7 +28,7 @@ class Ground:
     task : SearchTask
         What it was made from.
     hazard : (rows, cols)
-        Cells that are not known to be free: obstacles, and what nobody has looked at.
+        Cells that are not known to be free: obstacles, and unexplored ones.
     passable : (rows, cols)
         Cells whose centre keeps the safety distance from every hazard.
     """

@@ -2,7 +2,7 @@
 
 The team holds two plans for all remaining steps: the coverage backbone, and a freer plan that is improved again and
 again (:mod:`.survey.local_search`) towards where the map is rough and little sounded. It follows the backbone
-until the freer plan promises a clearly better final map. The plan is made anew ``REPLANS`` times in a mission, and when
+until the freer plan promises a clearly better final map. The plan is renewed ``REPLANS`` times in a mission, and when
 the team changes. Then the candidates are the next legs of both plans, turns that a vehicle can fly, legs to places of
 high gain, and random ones; each is judged by the final map when the plan goes on from its end. In between the plan
 is followed.
@@ -35,7 +35,7 @@ AtCruise = Callable[[Situation, Bottom, FloatArray], FloatArray]
 
 MAX_NODES = 2500
 REPLANS = 20
-"""How often the plan is made anew in a mission."""
+"""How often the plan is renewed in a mission."""
 HEAT = 0.01
 """Part by which changes to a plan may worsen it while the search begins."""
 POWER = 2.0
@@ -127,7 +127,7 @@ class SurveyRegressors:
         return np.array([final, float(np.clip(theta[1], 0.0, 0.1 * final))])
 
     def candidates(self, alpha: float) -> FloatArray:
-        """The next legs of the plan; when it was made anew also, per vehicle, others as described above."""
+        """The next legs of the plan; when it was just renewed also, per vehicle, others as described above."""
         team, n = self._team, len(self._en)
         along = self._first_legs(self._followed)
         targets = [along]
