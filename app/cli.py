@@ -412,7 +412,7 @@ def _search_demo(
 def evaluate(context: typer.Context) -> None:
     """Compare planners in closed loop, without a network. See bathyfleet evaluate --help."""
     # Mounted by hand: its options are made from the planners, which take a second to load.
-    from app.evaluation.commands import evaluate_app
+    from app.evaluation.cli import evaluate_app
 
     evaluate_app(args=context.args, prog_name="bathyfleet evaluate")
 

@@ -25,7 +25,7 @@ from app.api.problems import TITLES
 from app.api.schemas import API, MeasurementBatch, ScanBatch
 from app.cli import app as command_line
 from app.estimation import SingleBeam
-from app.evaluation.commands import evaluate_app
+from app.evaluation.cli import evaluate_app
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.constraints import Constraints
 from app.exploration.core.problem import Belief, Situation

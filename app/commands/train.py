@@ -33,7 +33,6 @@ def train(
 ) -> None:
     """Train a PCAO controller that missions fly with. Killed, the same command goes on where it was."""
     from app import __version__
-    from app.evaluation.cli import progress_bar
     from app.evaluation.pcao.curves import draw_curve
     from app.evaluation.pcao.optimisers import METHODS, Optimiser
     from app.evaluation.pcao.scoring import DaskScorer, LocalScorer, Scorer
@@ -43,6 +42,7 @@ def train(
     from app.evaluation.pcao.training import train as run_training
     from app.evaluation.pcao.world import SeaFloor
     from app.evaluation.runs.cluster import Cluster, ClusterError
+    from app.evaluation.runs.command import progress_bar
     from app.exploration.pcao.model import Training
     from simulator.terrain import TerrainError
 

@@ -3,7 +3,7 @@ import json
 import pytest
 from typer.testing import CliRunner
 
-from app.evaluation.commands import evaluate_app
+from app.evaluation.cli import evaluate_app
 from simulator.seafloors import generate
 from simulator.terrain_files import save_npz
 

@@ -4,7 +4,7 @@ import orjson
 import pytest
 from typer.testing import CliRunner
 
-from app.evaluation.commands import evaluate_app
+from app.evaluation.cli import evaluate_app
 
 RUNNER = CliRunner()
 

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
-from app.evaluation.cli import Scheduler, evaluate_app, model_of, progress_bar, seed_list
+from app.evaluation.runs.command import Scheduler, evaluate_app, model_of, progress_bar, seed_list
 
 
 @evaluate_app.command()

@@ -6,7 +6,17 @@ from typing import Annotated, Any
 import typer
 from rich.progress import Progress as ProgressBar
 
-from app.evaluation.cli import Jobs, Json, Scheduler, Seed, Seeds, compare, evaluate_app, planners_named, seed_list
+from app.evaluation.runs.command import (
+    Jobs,
+    Json,
+    Scheduler,
+    Seed,
+    Seeds,
+    compare,
+    evaluate_app,
+    planners_named,
+    seed_list,
+)
 from app.evaluation.search.report import VARIANTS, report_jobs, rescue_report
 from app.evaluation.search.run import RescueJob
 from app.evaluation.search.world import RescueScenario

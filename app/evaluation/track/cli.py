@@ -8,7 +8,7 @@ import numpy as np
 import typer
 
 from app.estimation import Fading
-from app.evaluation.cli import (
+from app.evaluation.runs.command import (
     Jobs,
     Json,
     Scheduler,
