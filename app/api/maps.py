@@ -1,25 +1,29 @@
 """A mission's map: as JSON, as a picture to lay over a web map, and as the files hydrographers use."""
 
 import asyncio
+from collections.abc import Callable, Collection
+from dataclasses import dataclass, replace
 from email.utils import quote
 from enum import StrEnum
-from typing import Annotated, Any
+from typing import Annotated, Any, cast
 
 import numpy as np
 from fastapi import APIRouter, Depends, Header, Path, Query, Response
+from pydantic import GetCoreSchemaHandler
+from pydantic_core import CoreSchema
 
 from app.api.auth import Reader
 from app.api.problems import ProblemError, problems
 from app.api.schemas import API, MissionId
 from app.api.state import EdgeState, Service, State
-from app.mapping.layers import Layer
+from app.mapping.layers import LAYERS, Layer, LayerKind
 from app.mapping.products.overlay import overlay_png
 from app.mapping.s44 import Order
-from app.missions.maps.products import MAP, PRODUCTS, SOUNDINGS, TRACKS, ProductOptions, layers_of
+from app.missions.maps.products import MAP, PRODUCTS, SOUNDINGS, TRACKS, ProductOptions
 from app.missions.maps.quality import quality_of
 from app.missions.maps.snapshot import MapSnapshot
 from app.missions.spec.base import Name
-from app.missions.views.map import MapView, ProductView, QualityView
+from app.missions.views.map import LayerView, MapView, ProductView, QualityView
 
 router = APIRouter(
     prefix=f"{API}/missions/{{mission_id}}",
@@ -62,34 +66,49 @@ async def _file_options(
     return ProductOptions(order, interval_m, None if min is None or max is None else (min, max), vehicle)
 
 
-class LayerName(StrEnum):
-    """A layer of the map beside those that its JSON always has."""
-
-    UNCERTAINTY = "uncertainty"
-    COUNT = "count"
-    SOUNDED = "sounded"
-    SLOPE = "slope"
-    TVU_FRACTION = "tvu_fraction"
-    DIFFERENCE = "difference"
-    LIVE = "live"
+def _layer_enum(title: str, description: str, among: Callable[[LayerKind], bool]) -> type[StrEnum]:
+    names = {kind.name.upper(): kind.name for kind in LAYERS.values() if among(kind)}
+    made = cast("type[StrEnum]", StrEnum(title, names))
+    made.__doc__ = description
+    return made
 
 
-class OverlayLayer(StrEnum):
-    """A layer that can be seen as a picture."""
+@dataclass(frozen=True)
+class _OneOf:
+    """Lets a string be one of an enumeration that is made of a table; the document has it like one that is written."""
 
-    DEPTH = "depth"
-    UNCERTAINTY = "uncertainty"
-    COUNT = "count"
-    SLOPE = "slope"
-    TVU_FRACTION = "tvu_fraction"
-    DIFFERENCE = "difference"
-    LIVE = "live"
+    names: type[StrEnum]
 
+    def __get_pydantic_core_schema__(self, source: type, handler: GetCoreSchemaHandler) -> CoreSchema:
+        return handler(self.names)
+
+
+JSON_LAYERS = _layer_enum(
+    "LayerName", "A layer of the map beside those that its JSON always has.", lambda kind: kind.in_json
+)
+PICTURES = _layer_enum("OverlayLayer", "A layer that can be seen as a picture.", lambda kind: kind.in_pictures)
+FURTHER_TILES = _layer_enum(
+    "FurtherLayer",
+    "A layer that the tiles hold on request.",
+    lambda kind: kind.scale is not None and not kind.in_every_tile,
+)
 
 _NOT_MODIFIED: dict[int | str, dict[str, Any]] = {
     304: {"description": "The map is still the one that `If-None-Match` names"}
 }
 _IfNoneMatch = Annotated[str | None, Header(description="ETag of the map that the client has")]
+
+
+layers_router = APIRouter(prefix=API, tags=["maps"], responses=problems("unauthenticated", "forbidden"))
+
+
+@layers_router.get("/layers", operation_id="listLayers", summary="List the layers of maps")
+async def list_layers(reader: Reader) -> list[LayerView]:
+    """Return every layer that a map may have: what its values say, in which colours, and where it can be had."""
+    return [
+        LayerView.model_validate(replace(kind, meaning=kind.meaning_at(Order.ORDER_1A)), from_attributes=True)
+        for kind in LAYERS.values()
+    ]
 
 
 @router.get(
@@ -105,8 +124,8 @@ async def get_map(
     state: State,
     reader: Reader,
     layer: Annotated[
-        list[LayerName] | None,
-        Query(max_length=len(LayerName), description="Further layers, in `layers`; repeat it for several"),
+        list[Annotated[str, _OneOf(JSON_LAYERS)]] | None,
+        Query(max_length=len(JSON_LAYERS), description="Further layers, in `layers`; repeat it for several"),
     ] = None,
     order: _Order = Order.ORDER_1A,
     if_none_match: _IfNoneMatch = None,
@@ -114,7 +133,7 @@ async def get_map(
     """Return depth, standard deviation and count of every cell, with an ETag that changes with every new map."""
     snapshot = await service.map(mission_id)
     names = sorted(set(layer or ()))
-    tag = _tag(state, snapshot, *names, *([order] if names else []))
+    tag = _tag(state, snapshot, names, *([order] if names else []))
     if _matches(tag, if_none_match):
         return _not_modified(tag)
 
@@ -144,7 +163,7 @@ async def get_overlay(
     service: Service,
     state: State,
     reader: Reader,
-    layer: Annotated[OverlayLayer, Query(description="What is shown")] = OverlayLayer.DEPTH,
+    layer: Annotated[str, _OneOf(PICTURES), Query(description="What is shown")] = "depth",
     order: _Order = Order.ORDER_1A,
     min: Annotated[  # noqa: A002 - the query parameter's name
         float | None,
@@ -173,7 +192,7 @@ async def get_overlay(
     if min is not None and max is not None and max <= min:
         raise ProblemError("invalid-request", f"max is {max:g} but min is {min:g}", remedy="Give a max above min")
     snapshot = await service.map(mission_id)
-    tag = _tag(state, snapshot, layer, order, min, max)
+    tag = _tag(state, snapshot, [layer], order, min, max)
     if _matches(tag, if_none_match):
         return _not_modified(tag)
 
@@ -183,17 +202,9 @@ async def get_overlay(
         high = float(np.nanmax(values)) if max is None else max
         # A flat map, or one beyond the only end that was given, is all one colour.
         range_m = (low, high) if low < high else (low, low + 1.0) if max is None else (high - 1.0, high)
-        return overlay_png(values, snapshot.built.map.sounded, range_m, layer=layer)
+        return overlay_png(values, snapshot.built.map.sounded, range_m, LAYERS[layer].fit)
 
     return Response(await asyncio.to_thread(picture), media_type="image/png", headers=_caching(tag))
-
-
-class FurtherLayer(StrEnum):
-    """A layer that the tiles hold on request."""
-
-    SLOPE = "slope"
-    TVU_FRACTION = "tvu_fraction"
-    DIFFERENCE = "difference"
 
 
 @router.get(
@@ -217,7 +228,8 @@ async def get_tiles(
         str, Query(max_length=80, pattern=r"^[A-Za-z0-9.@]*$", description="`tag` of the map that the client has")
     ] = "",
     layer: Annotated[
-        list[FurtherLayer] | None, Query(max_length=len(FurtherLayer), description="Layers beside the usual ones")
+        list[Annotated[str, _OneOf(FURTHER_TILES)]] | None,
+        Query(max_length=len(FURTHER_TILES), description="Layers beside the usual ones"),
     ] = None,
     step: Annotated[
         int | None, Query(ge=0, lt=2**31, description="The map as it was at the end of this step; default: the newest")
@@ -315,32 +327,16 @@ _add_files(TRACKS, "getTracksFile", "Download the tracks", "Return where the veh
 
 def _layer(snapshot: MapSnapshot, name: str, order: Order) -> Layer:
     """Return a layer. Raises ProblemError where the mission has none of that name."""
-    if name == LayerName.LIVE:
-        return _live_layer(snapshot)
-    found = next((layer for layer in layers_of(snapshot, order) if layer.name == name), None)
+    kind = LAYERS[name]
+    found = kind.of(snapshot.source(order))
     if found is None:
-        raise ProblemError(
-            "invalid-request",
-            "the mission has no reference grid to differ from",
-            remedy="Send one: PUT /api/v1/missions/{id}/reference",
-        )
+        raise ProblemError("invalid-request", kind.absence, remedy=kind.remedy)
     return found
 
 
-def _live_layer(snapshot: MapSnapshot) -> Layer:
-    live = None if snapshot.interpolation is None else snapshot.interpolation.map()
-    if live is None:
-        raise ProblemError(
-            "invalid-request",
-            "nothing was sounded since the service has this mission in memory",
-            remedy="Ask for the depth of the map itself, which holds every sounding",
-        )
-    return Layer("live", "depth by the papers' Gaussian interpolation of every sounding", "metre", live.depth_m)
-
-
-def _tag(state: EdgeState, snapshot: MapSnapshot, *variant: object) -> str:
-    shown = "".join(f"-{part}" for part in variant)
-    if LayerName.LIVE in variant and snapshot.interpolation is not None:
+def _tag(state: EdgeState, snapshot: MapSnapshot, layers: Collection[str], *variant: object) -> str:
+    shown = "".join(f"-{part}" for part in (*layers, *variant))
+    if snapshot.interpolation is not None and any(LAYERS[name].live for name in layers):
         shown += f"{snapshot.interpolation.version}"
     return f'"{snapshot.facts.mission_id}-{state.run_id}-{snapshot.version}.{snapshot.revision}{shown}"'
 

@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 from app.mapping.gaussian import GaussianInterpolator
+from app.mapping.layers import ACCURATE, SOUNDED
 from app.mapping.types import Soundings
 from app.missions.maps.builder import MapBuilder, make_grid
 from app.missions.maps.live_grid import SHOWN_CELLS, LiveGrid
-from app.missions.maps.tiles import ACCURATE, SOUNDED, TileCache
+from app.missions.maps.tiles import TileCache
 from tests.missions.builders import make_spec
 from tests.missions.test_map_builder import AREA, soundings
 from tests.missions.test_map_tiles import put_together, read, snapshot

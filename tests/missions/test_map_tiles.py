@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from app.mapping.layers import ACCURATE, SOUNDED, VISIBLE
 from app.missions.maps.builder import BuiltMap, MapBuilder
 from app.missions.maps.snapshot import MapSnapshot, MissionFacts
-from app.missions.maps.tiles import ACCURATE, SOUNDED, TILE, VISIBLE, TileCache
+from app.missions.maps.tiles import TILE, TileCache
 from tests.missions.builders import make_spec
 
 SPEC = make_spec(side_m=70.0, cell_m=1.0)

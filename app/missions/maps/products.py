@@ -12,7 +12,7 @@ from shapely.geometry import Polygon, mapping
 
 from app import __version__
 from app.csv_cells import text_cell
-from app.mapping.layers import Layer, make_layers
+from app.mapping.layers import file_layers
 from app.mapping.products.bag import bag
 from app.mapping.products.contours import Contour, contours_geojson, find_contours
 from app.mapping.products.crowdsourced import Provider, RawSounding, crowdsourced_geojson
@@ -149,13 +149,6 @@ def make_product(name: str, material: Material, options: ProductOptions) -> Prod
     return Product(f"{_slug(material.facts.spec.name)}{part}.{kind.extension}", kind.media_type, content)
 
 
-def layers_of(snapshot: MapSnapshot, order: Order) -> list[Layer]:
-    """Return every layer of a mission's map."""
-    return make_layers(
-        snapshot.built.map, order=order, common_sd_m=snapshot.facts.common_sd_m, reference_m=snapshot.reference_m
-    )
-
-
 def _map_file(kind: ProductKind, material: Material, options: ProductOptions) -> bytes:
     snapshot = material.map
     if snapshot is None:
@@ -164,9 +157,9 @@ def _map_file(kind: ProductKind, material: Material, options: ProductOptions) ->
     frame, datum, title = facts.frame, facts.vertical_datum, facts.title
     match kind.extension:
         case "tif":
-            return geotiff(bathymetry, layers_of(snapshot, options.order), frame, vertical_datum=datum)
+            return geotiff(bathymetry, file_layers(snapshot.source(options.order)), frame, vertical_datum=datum)
         case "nc":
-            layers = layers_of(snapshot, options.order)
+            layers = file_layers(snapshot.source(options.order))
             return netcdf(bathymetry, layers, frame, vertical_datum=datum, title=title, created=material.created)
         case "bag":
             return bag(bathymetry, frame, vertical_datum=datum, title=title)

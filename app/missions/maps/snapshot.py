@@ -7,8 +7,9 @@ import numpy as np
 
 from app.arrays import FloatArray
 from app.mapping.georeference import LocalFrame
-from app.mapping.layers import Layer
+from app.mapping.layers import Layer, LayerSource
 from app.mapping.products.overlay import overlay_corners
+from app.mapping.s44 import Order
 from app.mapping.vertical import VerticalDatum
 from app.missions.maps.builder import BuiltMap
 from app.missions.maps.live_grid import LiveCells, LiveGrid
@@ -73,6 +74,17 @@ class MapSnapshot:
     def tag(self) -> str:
         """Changes with everything that the map shows."""
         return f"{self.version}.{self.revision}" + ("" if self.live is None else f"@{self.live.version}")
+
+    def source(self, order: Order = Order.ORDER_1A) -> LayerSource:
+        """Return what the map's layers are computed from."""
+        return LayerSource(
+            self.built.map,
+            order,
+            self.facts.common_sd_m,
+            self.facts.spec.accuracy_m,
+            self.reference_m,
+            lambda: None if self.interpolation is None else self.interpolation.map(),
+        )
 
     def view(self, layers: Collection[Layer] = ()) -> MapView:
         """Return the map as JSON shows it, with the values of further layers."""
