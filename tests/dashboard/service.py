@@ -12,7 +12,6 @@ from typing import Any
 import httpx
 
 ROOT = Path(__file__).parents[2]
-BATHYFLEET = [sys.executable, "-c", "from app.cli import main; main()"]
 START_LIMIT_S = 180
 
 # About 59 m by 56 m.
@@ -23,14 +22,18 @@ AREA = {
 
 
 class Service:
-    """``bathyfleet serve`` with simulated vehicles, on one port and one database for all its lives."""
+    """``bathyfleet serve`` with simulated vehicles, on one port and one database for all its lives.
 
-    def __init__(self, folder: Path, **settings: str) -> None:
+    ``before`` is Python that its processes run first.
+    """
+
+    def __init__(self, folder: Path, before: str = "", **settings: str) -> None:
         with socket.socket() as probe:
             probe.bind(("127.0.0.1", 0))
             self.port: int = probe.getsockname()[1]
         self.url = f"http://127.0.0.1:{self.port}"
         self._folder = folder
+        self._command = [sys.executable, "-c", f"{before}\nfrom app.cli import main; main()"]
         self._settings = {f"BATHYFLEET_{name.upper()}": value for name, value in settings.items()}
         self._log = folder / "service.log"
         self._process: subprocess.Popen[bytes] | None = None
@@ -50,7 +53,7 @@ class Service:
     def make_token(self, name: str, role: str) -> str:
         """Make an access token on the command line; from then on the service asks for one."""
         made = subprocess.run(
-            [*BATHYFLEET, "token", "create", name, "--role", role],
+            [*self._command, "token", "create", name, "--role", role],
             cwd=self._folder,
             env=self._environment,
             capture_output=True,
@@ -63,7 +66,7 @@ class Service:
         """Start and wait until requests are answered."""
         with self._log.open("ab") as log:
             self._process = subprocess.Popen(
-                [*BATHYFLEET, "serve", "--port", str(self.port)],
+                [*self._command, "serve", "--port", str(self.port)],
                 cwd=self._folder,
                 env=self._environment,
                 stderr=log,
