@@ -19,7 +19,7 @@ from app.api.state import EdgeState, Service, State
 from app.mapping.layers import LAYERS, Layer, LayerKind
 from app.mapping.products.overlay import overlay_png
 from app.mapping.s44 import Order
-from app.missions.maps.products import MAP, PRODUCTS, SOUNDINGS, TRACKS, ProductOptions
+from app.missions.maps.products import MAP, PRODUCTS, SEARCH, SOUNDINGS, TRACKS, Product, ProductOptions
 from app.missions.maps.quality import quality_of
 from app.missions.maps.snapshot import MapSnapshot
 from app.missions.spec.base import Name
@@ -264,7 +264,20 @@ async def list_products(mission_id: MissionId, service: Service, reader: Reader)
             needs_map=MAP in kind.needs,
         )
         for name, kind in PRODUCTS.items()
+        if SEARCH not in kind.needs or mission.spec.search is not None
     ]
+
+
+def file_answer(product: Product) -> Response:
+    """Return what lets a client save a file under its name."""
+    return Response(
+        product.content,
+        media_type=product.media_type,
+        headers={
+            "Content-Disposition": f'attachment; filename="{quote(product.filename)}"',
+            "Cache-Control": "no-cache",
+        },
+    )
 
 
 _FileOptions = Annotated[ProductOptions, Depends(_file_options)]
@@ -288,14 +301,7 @@ def _add_files(resource: str, operation_id: str, summary: str, description: str)
                 remedy="Use one of " + ", ".join(f".{name}" for name in kinds),
             )
         product = await service.export(mission_id, kinds[format], options)
-        return Response(
-            product.content,
-            media_type=product.media_type,
-            headers={
-                "Content-Disposition": f'attachment; filename="{quote(product.filename)}"',
-                "Cache-Control": "no-cache",
-            },
-        )
+        return file_answer(product)
 
     get_file.__doc__ = description
     media = {PRODUCTS[name].media_type.partition(";")[0] for name in kinds.values()}

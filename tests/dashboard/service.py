@@ -50,17 +50,16 @@ class Service:
             "PYTHONPATH": os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")]),
         }
 
+    def command(self, *arguments: str) -> str:
+        """Run another of the program's commands and return what it says."""
+        command = [*self._command, *arguments]
+        return subprocess.run(
+            command, cwd=self._folder, env=self._environment, capture_output=True, text=True, check=True
+        ).stdout
+
     def make_token(self, name: str, role: str) -> str:
         """Make an access token on the command line; from then on the service asks for one."""
-        made = subprocess.run(
-            [*self._command, "token", "create", name, "--role", role],
-            cwd=self._folder,
-            env=self._environment,
-            capture_output=True,
-            text=True,
-            check=True,
-        )
-        return made.stdout.split()[-1]
+        return self.command("token", "create", name, "--role", role).split()[-1]
 
     def start(self) -> None:
         """Start and wait until requests are answered."""

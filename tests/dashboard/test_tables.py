@@ -1,4 +1,4 @@
-"""What is added to the table of layers is offered everywhere, in Chromium against the real service."""
+"""What is added to the tables of layers and files is offered everywhere, in Chromium against the real service."""
 
 from collections.abc import Iterator
 
@@ -11,6 +11,7 @@ from .steps import by_id, show
 
 ADDED = """
 from app.mapping.layers import LAYERS, LayerKind, Palette
+from app.missions.maps.products import PRODUCTS, TRACKS, ProductKind
 
 LAYERS["roughness"] = LayerKind(
     "roughness",
@@ -20,6 +21,9 @@ LAYERS["roughness"] = LayerKind(
     lambda source: source.map.roughness,
     Palette.MATTER,
     scale=100,
+)
+PRODUCTS["tracks.txt"] = ProductKind(
+    TRACKS, "txt", "text/plain", "names of the vehicles", lambda *_: b"these", {TRACKS}
 )
 """
 
@@ -59,4 +63,20 @@ def test_an_added_layer_can_be_chosen_on_the_page(extended: Service, measured: s
     by_id(page, "layer").select_option(label="Roughness")
     expect(by_id(page, "layer")).to_have_attribute("title", "Variability of the sea floor, mean about 1")
     expect(page.get_by_role("img", name="Roughness from 0")).to_be_visible()
+    page.close()
+
+
+def test_an_added_kind_of_file_is_made_on_the_command_line(extended: Service, measured: str) -> None:
+    assert "names of the vehicles" in extended.command("export", "--formats")
+    assert extended.command("export", measured, "--format", "tracks.txt", "--out", "-") == "these"
+
+
+def test_an_added_kind_of_file_is_downloaded_from_the_list(extended: Service, measured: str, browser: Browser) -> None:
+    page = browser.new_page(base_url=extended.url)
+    show(page, measured)
+    by_id(page, "toggle-files").click()
+    with page.expect_download() as waited:
+        by_id(page, "file-tracks.txt").click()
+    assert waited.value.suggested_filename == "harbour-basin-tracks.txt"
+    assert waited.value.path().read_bytes() == b"these"
     page.close()
