@@ -9,7 +9,7 @@ from typing import Annotated, Any, cast
 
 import numpy as np
 from fastapi import APIRouter, Depends, Header, Path, Query, Response
-from pydantic import GetCoreSchemaHandler
+from pydantic import Field, GetCoreSchemaHandler
 from pydantic_core import CoreSchema
 
 from app.api.auth import Reader
@@ -34,6 +34,8 @@ router = APIRouter(
 MAX_VALUE_M = 20_000.0
 """No sea is deeper."""
 
+_End = Annotated[float | None, Field(ge=-MAX_VALUE_M, le=MAX_VALUE_M, allow_inf_nan=False)]
+"""Of a range of colours; ``min`` and ``max`` are the query parameters' names."""
 _Order = Annotated[Order, Query(description="Order of IHO S-44 that the TVU is compared with")]
 
 
@@ -51,12 +53,8 @@ async def _file_options(
     interval_m: Annotated[
         float | None, Query(gt=0, le=1000, allow_inf_nan=False, description="Between contours; default: about ten")
     ] = None,
-    min: Annotated[  # noqa: A002 - the query parameter's name
-        float | None, Query(ge=-MAX_VALUE_M, le=MAX_VALUE_M, allow_inf_nan=False, description="A picture's least depth")
-    ] = None,
-    max: Annotated[  # noqa: A002 - the query parameter's name
-        float | None, Query(ge=-MAX_VALUE_M, le=MAX_VALUE_M, allow_inf_nan=False, description="Its largest depth")
-    ] = None,
+    min: Annotated[_End, Query(description="A picture's least depth")] = None,  # noqa: A002
+    max: Annotated[_End, Query(description="Its largest depth")] = None,  # noqa: A002
     vehicle: Annotated[
         Name | None, Query(description="Whose soundings, in crowdsourced bathymetry; default: the only vehicle's")
     ] = None,
@@ -165,24 +163,8 @@ async def get_overlay(
     reader: Reader,
     layer: Annotated[str, _OneOf(PICTURES), Query(description="What is shown")] = "depth",
     order: _Order = Order.ORDER_1A,
-    min: Annotated[  # noqa: A002 - the query parameter's name
-        float | None,
-        Query(
-            ge=-MAX_VALUE_M,
-            le=MAX_VALUE_M,
-            allow_inf_nan=False,
-            description="Value at the palette's begin, m; default: the map's least",
-        ),
-    ] = None,
-    max: Annotated[  # noqa: A002 - the query parameter's name
-        float | None,
-        Query(
-            ge=-MAX_VALUE_M,
-            le=MAX_VALUE_M,
-            allow_inf_nan=False,
-            description="Value at the palette's end, m; default: the map's largest",
-        ),
-    ] = None,
+    min: Annotated[_End, Query(description="Value at the palette's begin, m; default: the map's least")] = None,  # noqa: A002
+    max: Annotated[_End, Query(description="Value at the palette's end, m; default: the map's largest")] = None,  # noqa: A002
     if_none_match: _IfNoneMatch = None,
 ) -> Response:
     """Return a picture to lay between the `corners` of the map's JSON; cells without a value are transparent.

@@ -199,8 +199,7 @@ def _overlay(material: Material, options: ProductOptions) -> bytes:
 def _soundings_xyz(material: Material, _: ProductOptions) -> bytes:
     rows = [row for row in material.soundings if row.verdict == Verdict.ACCEPTED]
     table = np.array([(row.east_m, row.north_m, row.depth_m, row.sd_m) for row in rows]).reshape(-1, 4)
-    corrected = Soundings(*table.T.copy())
-    return soundings_xyz(corrected, material.facts.frame, vertical_datum=material.datum, geographic=True)
+    return soundings_xyz(Soundings.of_rows(table), material.facts.frame, vertical_datum=material.datum, geographic=True)
 
 
 def _obstacles(material: Material, _: ProductOptions) -> bytes:

@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.mapping.layers import LAYERS, SOUNDED, VISIBLE
-from app.mapping.products.overlay import overlay_corners
 from app.missions.maps.live_grid import LiveCells
 from app.missions.maps.snapshot import NOT_MADE, MapSnapshot
 
@@ -139,8 +138,7 @@ def _whole(name: str, values: NDArray[np.float64]) -> NDArray[np.int32]:
 
 
 def _encode(snapshot: MapSnapshot, now: _Picture, before: _Picture | None, names: tuple[str, ...]) -> bytes:
-    bathymetry = snapshot.built.map
-    grid = bathymetry.grid
+    grid = snapshot.built.map.grid
     if before is not None and not set(names) <= before.layers.keys():
         before = None
     across, down = -(-grid.cols // TILE), -(-grid.rows // TILE)
@@ -154,23 +152,11 @@ def _encode(snapshot: MapSnapshot, now: _Picture, before: _Picture | None, names
         for number, place in enumerate(places)
         if before is None or any(not np.array_equal(now.layers[n][place], before.layers[n][place]) for n in names)
     ]
-    depths = bathymetry.depth_m[np.isfinite(bathymetry.depth_m)]
     header = json.dumps(
         {
             "tag": now.tag,
             "base": before.tag if before is not None else None,
-            "version": snapshot.version,
-            "step": snapshot.step,
-            "rows": grid.rows,
-            "cols": grid.cols,
-            "cell_m": grid.cell_m,
-            "west_m": grid.west_m,
-            "south_m": grid.south_m,
-            "corners": overlay_corners(grid, snapshot.facts.frame),
-            "vertical_datum": snapshot.facts.vertical_datum.statement,
-            "min_depth_m": float(depths.min()) if depths.size else None,
-            "max_depth_m": float(depths.max()) if depths.size else None,
-            "model": bathymetry.model,
+            **snapshot.header(),
             "accuracy_m": snapshot.facts.spec.accuracy_m,
             "tile": TILE,
             "tiles": tiles,
