@@ -1,3 +1,4 @@
+import "./SpaceView.css";
 import { effect, useSignal } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
 import { DEPTH_PALETTES } from "../map/palette";
