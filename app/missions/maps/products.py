@@ -293,17 +293,13 @@ def _soundings_csv(material: Material, _: ProductOptions) -> bytes:
 
 
 EVERY_SOUNDING = "every sounding, raw and corrected, with its verdict"
+TIMED_TRACKS = "the vehicles' tracks with times and depths"
 
 PRODUCTS = {
     kind.name: kind
     for kind in (
         ProductKind(
-            MAP,
-            "tif",
-            "image/tiff; application=geotiff",
-            "Cloud-Optimized GeoTIFF with every layer",
-            _geotiff,
-            {MAP},
+            MAP, "tif", "image/tiff; application=geotiff", "Cloud-Optimized GeoTIFF with every layer", _geotiff, {MAP}
         ),
         ProductKind(MAP, "nc", "application/x-netcdf", "CF-NetCDF with every layer", _netcdf, {MAP}),
         ProductKind(
@@ -333,37 +329,20 @@ PRODUCTS = {
             {SOUNDINGS},
             of_vehicle=True,
         ),
+        ProductKind(TRACKS, "geojson", GEOJSON, TIMED_TRACKS, lambda m, _: tracks_geojson(m.tracks), {TRACKS}),
         ProductKind(
-            TRACKS,
-            "geojson",
-            GEOJSON,
-            "the vehicles' tracks with times and depths",
-            lambda material, _: tracks_geojson(material.tracks),
-            {TRACKS},
-        ),
-        ProductKind(
-            TRACKS,
-            "kml",
-            KML,
-            "the vehicles' tracks",
-            lambda material, _: tracks_kml(material.tracks, title=material.facts.title),
-            {TRACKS},
+            TRACKS, "kml", KML, "the vehicles' tracks", lambda m, _: tracks_kml(m.tracks, title=m.facts.title), {TRACKS}
         ),
         ProductKind(
             TRACKS,
             "gpx",
             "application/gpx+xml",
-            "the vehicles' tracks with times and depths",
-            lambda material, _: tracks_gpx(material.tracks, title=material.facts.title),
+            TIMED_TRACKS,
+            lambda m, _: tracks_gpx(m.tracks, title=m.facts.title),
             {TRACKS},
         ),
         ProductKind(
-            f"{SEARCH}/obstacles",
-            "geojson",
-            GEOJSON,
-            "obstacles of the search, known and found",
-            _obstacles,
-            {SEARCH},
+            f"{SEARCH}/obstacles", "geojson", GEOJSON, "obstacles of the search, known and found", _obstacles, {SEARCH}
         ),
     )
 }
