@@ -159,6 +159,7 @@ def create_app(settings: Settings | None = None, *, port: int | None = None) -> 
         corrections.router,
         imports.router,
         maps.router,
+        maps.layers_router,
         soundings.router,
         targets.router,
         searches.router,

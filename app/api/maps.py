@@ -1,25 +1,29 @@
 """A mission's map: as JSON, as a picture to lay over a web map, and as the files hydrographers use."""
 
 import asyncio
+from collections.abc import Callable, Collection
+from dataclasses import dataclass, replace
 from email.utils import quote
 from enum import StrEnum
-from typing import Annotated, Any
+from typing import Annotated, Any, cast
 
 import numpy as np
 from fastapi import APIRouter, Depends, Header, Path, Query, Response
+from pydantic import Field, GetCoreSchemaHandler
+from pydantic_core import CoreSchema
 
 from app.api.auth import Reader
 from app.api.problems import ProblemError, problems
 from app.api.schemas import API, MissionId
 from app.api.state import EdgeState, Service, State
-from app.mapping.layers import Layer
+from app.mapping.layers import LAYERS, Layer, LayerKind
 from app.mapping.products.overlay import overlay_png
 from app.mapping.s44 import Order
-from app.missions.maps.products import MAP, PRODUCTS, SOUNDINGS, TRACKS, ProductOptions, layers_of
+from app.missions.maps.products import MAP, PRODUCTS, SEARCH, SOUNDINGS, TRACKS, Product, ProductOptions
 from app.missions.maps.quality import quality_of
 from app.missions.maps.snapshot import MapSnapshot
 from app.missions.spec.base import Name
-from app.missions.views.map import MapView, ProductView, QualityView
+from app.missions.views.map import LayerView, MapView, ProductView, QualityView
 
 router = APIRouter(
     prefix=f"{API}/missions/{{mission_id}}",
@@ -30,6 +34,8 @@ router = APIRouter(
 MAX_VALUE_M = 20_000.0
 """No sea is deeper."""
 
+_End = Annotated[float | None, Field(ge=-MAX_VALUE_M, le=MAX_VALUE_M, allow_inf_nan=False)]
+"""Of a range of colours; ``min`` and ``max`` are the query parameters' names."""
 _Order = Annotated[Order, Query(description="Order of IHO S-44 that the TVU is compared with")]
 
 
@@ -47,12 +53,8 @@ async def _file_options(
     interval_m: Annotated[
         float | None, Query(gt=0, le=1000, allow_inf_nan=False, description="Between contours; default: about ten")
     ] = None,
-    min: Annotated[  # noqa: A002 - the query parameter's name
-        float | None, Query(ge=-MAX_VALUE_M, le=MAX_VALUE_M, allow_inf_nan=False, description="A picture's least depth")
-    ] = None,
-    max: Annotated[  # noqa: A002 - the query parameter's name
-        float | None, Query(ge=-MAX_VALUE_M, le=MAX_VALUE_M, allow_inf_nan=False, description="Its largest depth")
-    ] = None,
+    min: Annotated[_End, Query(description="A picture's least depth")] = None,  # noqa: A002
+    max: Annotated[_End, Query(description="Its largest depth")] = None,  # noqa: A002
     vehicle: Annotated[
         Name | None, Query(description="Whose soundings, in crowdsourced bathymetry; default: the only vehicle's")
     ] = None,
@@ -62,34 +64,49 @@ async def _file_options(
     return ProductOptions(order, interval_m, None if min is None or max is None else (min, max), vehicle)
 
 
-class LayerName(StrEnum):
-    """A layer of the map beside those that its JSON always has."""
-
-    UNCERTAINTY = "uncertainty"
-    COUNT = "count"
-    SOUNDED = "sounded"
-    SLOPE = "slope"
-    TVU_FRACTION = "tvu_fraction"
-    DIFFERENCE = "difference"
-    LIVE = "live"
+def _layer_enum(title: str, description: str, among: Callable[[LayerKind], bool]) -> type[StrEnum]:
+    names = {kind.name.upper(): kind.name for kind in LAYERS.values() if among(kind)}
+    made = cast("type[StrEnum]", StrEnum(title, names))
+    made.__doc__ = description
+    return made
 
 
-class OverlayLayer(StrEnum):
-    """A layer that can be seen as a picture."""
+@dataclass(frozen=True)
+class _OneOf:
+    """Lets a string be one of an enumeration that is made of a table; the document has it like one that is written."""
 
-    DEPTH = "depth"
-    UNCERTAINTY = "uncertainty"
-    COUNT = "count"
-    SLOPE = "slope"
-    TVU_FRACTION = "tvu_fraction"
-    DIFFERENCE = "difference"
-    LIVE = "live"
+    names: type[StrEnum]
 
+    def __get_pydantic_core_schema__(self, source: type, handler: GetCoreSchemaHandler) -> CoreSchema:
+        return handler(self.names)
+
+
+JSON_LAYERS = _layer_enum(
+    "LayerName", "A layer of the map beside those that its JSON always has.", lambda kind: kind.in_json
+)
+PICTURES = _layer_enum("OverlayLayer", "A layer that can be seen as a picture.", lambda kind: kind.in_pictures)
+FURTHER_TILES = _layer_enum(
+    "FurtherLayer",
+    "A layer that the tiles hold on request.",
+    lambda kind: kind.scale is not None and not kind.in_every_tile,
+)
 
 _NOT_MODIFIED: dict[int | str, dict[str, Any]] = {
     304: {"description": "The map is still the one that `If-None-Match` names"}
 }
 _IfNoneMatch = Annotated[str | None, Header(description="ETag of the map that the client has")]
+
+
+layers_router = APIRouter(prefix=API, tags=["maps"], responses=problems("unauthenticated", "forbidden"))
+
+
+@layers_router.get("/layers", operation_id="listLayers", summary="List the layers of maps")
+async def list_layers(reader: Reader) -> list[LayerView]:
+    """Return every layer that a map may have: what its values say, in which colours, and where it can be had."""
+    return [
+        LayerView.model_validate(replace(kind, meaning=kind.meaning_at(Order.ORDER_1A)), from_attributes=True)
+        for kind in LAYERS.values()
+    ]
 
 
 @router.get(
@@ -105,8 +122,8 @@ async def get_map(
     state: State,
     reader: Reader,
     layer: Annotated[
-        list[LayerName] | None,
-        Query(max_length=len(LayerName), description="Further layers, in `layers`; repeat it for several"),
+        list[Annotated[str, _OneOf(JSON_LAYERS)]] | None,
+        Query(max_length=len(JSON_LAYERS), description="Further layers, in `layers`; repeat it for several"),
     ] = None,
     order: _Order = Order.ORDER_1A,
     if_none_match: _IfNoneMatch = None,
@@ -114,7 +131,7 @@ async def get_map(
     """Return depth, standard deviation and count of every cell, with an ETag that changes with every new map."""
     snapshot = await service.map(mission_id)
     names = sorted(set(layer or ()))
-    tag = _tag(state, snapshot, *names, *([order] if names else []))
+    tag = _tag(state, snapshot, names, *([order] if names else []))
     if _matches(tag, if_none_match):
         return _not_modified(tag)
 
@@ -144,26 +161,10 @@ async def get_overlay(
     service: Service,
     state: State,
     reader: Reader,
-    layer: Annotated[OverlayLayer, Query(description="What is shown")] = OverlayLayer.DEPTH,
+    layer: Annotated[str, _OneOf(PICTURES), Query(description="What is shown")] = "depth",
     order: _Order = Order.ORDER_1A,
-    min: Annotated[  # noqa: A002 - the query parameter's name
-        float | None,
-        Query(
-            ge=-MAX_VALUE_M,
-            le=MAX_VALUE_M,
-            allow_inf_nan=False,
-            description="Value at the palette's begin, m; default: the map's least",
-        ),
-    ] = None,
-    max: Annotated[  # noqa: A002 - the query parameter's name
-        float | None,
-        Query(
-            ge=-MAX_VALUE_M,
-            le=MAX_VALUE_M,
-            allow_inf_nan=False,
-            description="Value at the palette's end, m; default: the map's largest",
-        ),
-    ] = None,
+    min: Annotated[_End, Query(description="Value at the palette's begin, m; default: the map's least")] = None,  # noqa: A002
+    max: Annotated[_End, Query(description="Value at the palette's end, m; default: the map's largest")] = None,  # noqa: A002
     if_none_match: _IfNoneMatch = None,
 ) -> Response:
     """Return a picture to lay between the `corners` of the map's JSON; cells without a value are transparent.
@@ -173,7 +174,7 @@ async def get_overlay(
     if min is not None and max is not None and max <= min:
         raise ProblemError("invalid-request", f"max is {max:g} but min is {min:g}", remedy="Give a max above min")
     snapshot = await service.map(mission_id)
-    tag = _tag(state, snapshot, layer, order, min, max)
+    tag = _tag(state, snapshot, [layer], order, min, max)
     if _matches(tag, if_none_match):
         return _not_modified(tag)
 
@@ -183,17 +184,9 @@ async def get_overlay(
         high = float(np.nanmax(values)) if max is None else max
         # A flat map, or one beyond the only end that was given, is all one colour.
         range_m = (low, high) if low < high else (low, low + 1.0) if max is None else (high - 1.0, high)
-        return overlay_png(values, snapshot.built.map.sounded, range_m, layer=layer)
+        return overlay_png(values, snapshot.built.map.sounded, range_m, LAYERS[layer].fit)
 
     return Response(await asyncio.to_thread(picture), media_type="image/png", headers=_caching(tag))
-
-
-class FurtherLayer(StrEnum):
-    """A layer that the tiles hold on request."""
-
-    SLOPE = "slope"
-    TVU_FRACTION = "tvu_fraction"
-    DIFFERENCE = "difference"
 
 
 @router.get(
@@ -217,7 +210,8 @@ async def get_tiles(
         str, Query(max_length=80, pattern=r"^[A-Za-z0-9.@]*$", description="`tag` of the map that the client has")
     ] = "",
     layer: Annotated[
-        list[FurtherLayer] | None, Query(max_length=len(FurtherLayer), description="Layers beside the usual ones")
+        list[Annotated[str, _OneOf(FURTHER_TILES)]] | None,
+        Query(max_length=len(FURTHER_TILES), description="Layers beside the usual ones"),
     ] = None,
     step: Annotated[
         int | None, Query(ge=0, lt=2**31, description="The map as it was at the end of this step; default: the newest")
@@ -252,7 +246,20 @@ async def list_products(mission_id: MissionId, service: Service, reader: Reader)
             needs_map=MAP in kind.needs,
         )
         for name, kind in PRODUCTS.items()
+        if SEARCH not in kind.needs or mission.spec.search is not None
     ]
+
+
+def file_answer(product: Product) -> Response:
+    """Return what lets a client save a file under its name."""
+    return Response(
+        product.content,
+        media_type=product.media_type,
+        headers={
+            "Content-Disposition": f'attachment; filename="{quote(product.filename)}"',
+            "Cache-Control": "no-cache",
+        },
+    )
 
 
 _FileOptions = Annotated[ProductOptions, Depends(_file_options)]
@@ -276,14 +283,7 @@ def _add_files(resource: str, operation_id: str, summary: str, description: str)
                 remedy="Use one of " + ", ".join(f".{name}" for name in kinds),
             )
         product = await service.export(mission_id, kinds[format], options)
-        return Response(
-            product.content,
-            media_type=product.media_type,
-            headers={
-                "Content-Disposition": f'attachment; filename="{quote(product.filename)}"',
-                "Cache-Control": "no-cache",
-            },
-        )
+        return file_answer(product)
 
     get_file.__doc__ = description
     media = {PRODUCTS[name].media_type.partition(";")[0] for name in kinds.values()}
@@ -315,32 +315,16 @@ _add_files(TRACKS, "getTracksFile", "Download the tracks", "Return where the veh
 
 def _layer(snapshot: MapSnapshot, name: str, order: Order) -> Layer:
     """Return a layer. Raises ProblemError where the mission has none of that name."""
-    if name == LayerName.LIVE:
-        return _live_layer(snapshot)
-    found = next((layer for layer in layers_of(snapshot, order) if layer.name == name), None)
+    kind = LAYERS[name]
+    found = kind.of(snapshot.source(order))
     if found is None:
-        raise ProblemError(
-            "invalid-request",
-            "the mission has no reference grid to differ from",
-            remedy="Send one: PUT /api/v1/missions/{id}/reference",
-        )
+        raise ProblemError("invalid-request", kind.absence, remedy=kind.remedy)
     return found
 
 
-def _live_layer(snapshot: MapSnapshot) -> Layer:
-    live = None if snapshot.interpolation is None else snapshot.interpolation.map()
-    if live is None:
-        raise ProblemError(
-            "invalid-request",
-            "nothing was sounded since the service has this mission in memory",
-            remedy="Ask for the depth of the map itself, which holds every sounding",
-        )
-    return Layer("live", "depth by the papers' Gaussian interpolation of every sounding", "metre", live.depth_m)
-
-
-def _tag(state: EdgeState, snapshot: MapSnapshot, *variant: object) -> str:
-    shown = "".join(f"-{part}" for part in variant)
-    if LayerName.LIVE in variant and snapshot.interpolation is not None:
+def _tag(state: EdgeState, snapshot: MapSnapshot, layers: Collection[str], *variant: object) -> str:
+    shown = "".join(f"-{part}" for part in (*layers, *variant))
+    if snapshot.interpolation is not None and any(LAYERS[name].live for name in layers):
         shown += f"{snapshot.interpolation.version}"
     return f'"{snapshot.facts.mission_id}-{state.run_id}-{snapshot.version}.{snapshot.revision}{shown}"'
 

@@ -6,6 +6,7 @@ from fastapi import APIRouter, Body, Query, Response
 
 from app.api.auth import Reader, VehicleOrOperator, check_vehicle
 from app.api.json_route import JsonRoute
+from app.api.maps import file_answer
 from app.api.problems import problems
 from app.api.schemas import API, MissionId, ScanBatch
 from app.api.state import Service
@@ -77,4 +78,4 @@ async def get_search(
 )
 async def get_search_obstacles(mission_id: MissionId, service: Service, reader: Reader) -> Response:
     """Return the outlines of all cells that obstacles fill: known beforehand, and found."""
-    return Response(await service.search_obstacles(mission_id), media_type="application/geo+json")
+    return file_answer(await service.export(mission_id, "obstacles.geojson"))

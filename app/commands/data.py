@@ -22,17 +22,23 @@ if TYPE_CHECKING:
     from app.missions.service import MissionService
 
 
+def _list_formats(wanted: bool) -> None:
+    if wanted:
+        from app.missions.maps.products import PRODUCTS
+
+        for name, kind in PRODUCTS.items():
+            typer.echo(f"{name:20} {kind.title}")
+        raise typer.Exit
+
+
 def export(
     mission: Annotated[str, typer.Argument(metavar="MISSION", help="Its id, or the begin of it.")],
     format: Annotated[  # noqa: A002 - the option's name
-        str,
-        typer.Option(
-            "--format",
-            "-f",
-            help="Of the map tif, nc, bag, xyz, csv (soundings), geojson, kml (contours) or png; soundings.csv, "
-            "soundings.xyz, soundings.geojson (IHO B-12); tracks.geojson, tracks.kml, tracks.gpx.",
-        ),
+        str, typer.Option("--format", "-f", help="Kind of file; --formats lists them.")
     ] = "tif",
+    formats: Annotated[
+        bool, typer.Option("--formats", help="List the kinds of files.", callback=_list_formats, is_eager=True)
+    ] = False,
     out: Annotated[
         Path | None, typer.Option("--out", "-o", help="File to write; '-' is stdout [default: in output_dir]")
     ] = None,

@@ -1,15 +1,65 @@
-"""The layers of a map as products and the API show them, each declared once."""
+"""The layers of a map, each declared once: files, tiles, REST and the dashboard show what stands in ``LAYERS``."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from enum import StrEnum
 
 import numpy as np
+from scipy.ndimage import distance_transform_edt
 
-from app.arrays import FloatArray
+from app.arrays import BoolArray, FloatArray, IntArray
 from app.mapping.s44 import Order, tvu_fraction
 from app.mapping.types import BathymetricMap
 
 INTERPOLATED, SOUNDED, PRIOR = 0, 1, 2
-"""Values of the layer ``sounded``."""
+"""Values of the layer ``sounded``; the latter two are bits of the layer ``flags``, too."""
+
+ACCURATE, VISIBLE = 4, 8
+"""Further bits of ``flags``: known to the asked accuracy and supported by soundings; near a sounding."""
+
+
+class Palette(StrEnum):
+    """Colours of the dashboard's map."""
+
+    DEEP = "deep"
+    VIOLET = "violet"
+    MATTER = "matter"
+    BALANCE = "balance"
+    LANDMARKS = "landmarks"
+
+
+class Fit(StrEnum):
+    """How a range of colours follows the values: from the least, from zero, or as far below zero as above."""
+
+    DATA = "data"
+    FROM_ZERO = "from_zero"
+    ABOUT_ZERO = "about_zero"
+
+
+@dataclass(frozen=True)
+class LayerSource:
+    """What layers are computed from.
+
+    Attributes
+    ----------
+    order
+        The S-44 order whose largest TVU the layer ``tvu_fraction`` is relative to.
+    common_sd_m
+        Standard deviation of what all soundings share.
+    accuracy_m
+        To which cells are to be known.
+    reference_m
+        A reference grid's depths at the map's cells.
+    live
+        Returns the papers' interpolation of every sounding so far; None where there is none.
+    """
+
+    map: BathymetricMap
+    order: Order = Order.ORDER_1A
+    common_sd_m: float = 0.0
+    accuracy_m: float = 0.0
+    reference_m: FloatArray | None = None
+    live: Callable[[], BathymetricMap | None] = lambda: None
 
 
 @dataclass(frozen=True)
@@ -20,6 +70,55 @@ class Layer:
     meaning: str
     unit: str
     values: FloatArray
+
+
+@dataclass(frozen=True)
+class LayerKind:
+    """A layer and where it is shown.
+
+    Attributes
+    ----------
+    meaning
+        What its values say; ``{order}`` stands for the S-44 order.
+    unit
+        By its name in UDUNITS.
+    compute
+        Returns its values; None where the mission has none, which ``absence`` and ``remedy`` explain.
+    range
+        Values of the first and the last colour, where they do not follow the data.
+    scale
+        Tiles hold whole numbers, the value times this; None: no tile has it. Those not ``in_every_tile`` are asked for.
+    in_json, in_pictures, in_files
+        Whether it can be asked for beside what the map's JSON always has, as a picture, and stands in every file.
+    live
+        Whether it changes with every sounding, not only with the map.
+    """
+
+    name: str
+    title: str
+    meaning: str
+    unit: str
+    compute: Callable[[LayerSource], FloatArray | None]
+    palette: Palette
+    fit: Fit = Fit.FROM_ZERO
+    range: tuple[float, float] | None = None
+    scale: int | None = None
+    in_every_tile: bool = False
+    in_json: bool = True
+    in_pictures: bool = True
+    in_files: bool = True
+    live: bool = False
+    absence: str = ""
+    remedy: str = ""
+
+    def of(self, source: LayerSource) -> Layer | None:
+        """Return the layer of a map; None where the mission has none."""
+        values = self.compute(source)
+        return None if values is None else Layer(self.name, self.meaning_at(source.order), self.unit, values)
+
+    def meaning_at(self, order: Order) -> str:
+        """Return what the values say where they are compared with an order of S-44."""
+        return self.meaning.format(order=order.spoken)
 
 
 def slope_deg(depth_m: FloatArray, cell_m: float) -> FloatArray:
@@ -40,40 +139,152 @@ def _along(depth_m: FloatArray, cell_m: float) -> FloatArray:
     return both / cell_m
 
 
-def sounded_flag(bathymetry: BathymetricMap) -> FloatArray:
-    """Return SOUNDED, PRIOR or INTERPOLATED per cell, NaN outside the area."""
-    flag = np.where(bathymetry.sounded, float(SOUNDED), float(INTERPOLATED))
-    if bathymetry.prior is not None:
-        flag[bathymetry.prior & ~bathymetry.sounded] = PRIOR
-    flag[~np.isfinite(bathymetry.depth_m)] = np.nan
-    return flag
+def _inside(bathymetry: BathymetricMap, values: FloatArray | IntArray) -> FloatArray:
+    return np.where(np.isfinite(bathymetry.depth_m), values, np.nan)
 
 
-def make_layers(
-    bathymetry: BathymetricMap, *, order: Order, common_sd_m: float = 0.0, reference_m: FloatArray | None = None
-) -> list[Layer]:
-    """Return every layer of a map; ``difference`` only where there is a reference grid of the same shape.
+def _sounded(source: LayerSource) -> FloatArray:
+    bathymetry = source.map
+    imported = False if bathymetry.prior is None else bathymetry.prior
+    return _inside(bathymetry, np.where(bathymetry.sounded, SOUNDED, np.where(imported, PRIOR, INTERPOLATED)))
 
-    Parameters
-    ----------
-    order
-        The S-44 order whose largest TVU the layer ``tvu_fraction`` is relative to.
-    common_sd_m
-        Standard deviation of what all soundings share.
-    """
-    depth, sd = bathymetry.depth_m, bathymetry.sd_m
-    known = np.isfinite(depth)
-    tvu = tvu_fraction(depth, sd, order, common_sd_m=common_sd_m)
-    layers = [
-        Layer("depth", "depth below the vertical datum, positive down", "metre", depth),
-        Layer("uncertainty", "standard deviation of the depth", "metre", sd),
-        Layer("count", "soundings in the cell", "1", np.where(known, bathymetry.count, np.nan)),
-        Layer(
-            "sounded", "1 sounded, 0 interpolated, 2 only imported soundings in the cell", "1", sounded_flag(bathymetry)
+
+def _flags(source: LayerSource) -> FloatArray:
+    bathymetry = source.map
+    imported = np.zeros_like(bathymetry.sounded) if bathymetry.prior is None else bathymetry.prior
+    near = _near(bathymetry.sounded | imported, bathymetry.correlation_length_m / bathymetry.grid.cell_m)
+    known = bathymetry.known(source.accuracy_m)
+    bits = SOUNDED * bathymetry.sounded | PRIOR * imported | ACCURATE * known | VISIBLE * near
+    return _inside(bathymetry, bits)
+
+
+def _near(measured: BoolArray, cells: float) -> BoolArray:
+    """Return which cells lie within so many cells of a measured one."""
+    if not measured.any():
+        return np.zeros_like(measured)
+    near: BoolArray = distance_transform_edt(~measured) <= cells
+    return near
+
+
+def _difference(source: LayerSource) -> FloatArray | None:
+    return None if source.reference_m is None else source.map.depth_m - source.reference_m
+
+
+def _live(source: LayerSource) -> FloatArray | None:
+    live = source.live()
+    return None if live is None else live.depth_m
+
+
+LAYERS = {
+    kind.name: kind
+    for kind in (
+        LayerKind(
+            "depth",
+            "Depth",
+            "depth below the vertical datum, positive down",
+            "metre",
+            lambda source: source.map.depth_m,
+            Palette.DEEP,
+            fit=Fit.DATA,
+            scale=100,
+            in_every_tile=True,
+            in_json=False,
         ),
-        Layer("slope", "inclination of the sea floor", "degree", slope_deg(depth, bathymetry.grid.cell_m)),
-        Layer("tvu_fraction", f"TVU estimate (95 %) over the largest TVU of S-44 {order.spoken}", "1", tvu),
-    ]
-    if reference_m is not None:
-        layers.append(Layer("difference", "depth minus the reference grid's depth", "metre", depth - reference_m))
-    return layers
+        LayerKind(
+            "uncertainty",
+            "Uncertainty",
+            "standard deviation of the depth",
+            "metre",
+            lambda source: source.map.sd_m,
+            Palette.VIOLET,
+            scale=1000,
+            in_every_tile=True,
+        ),
+        LayerKind(
+            "count",
+            "Soundings",
+            "soundings in the cell",
+            "1",
+            lambda source: _inside(source.map, source.map.count),
+            Palette.MATTER,
+            scale=1,
+            in_every_tile=True,
+        ),
+        LayerKind(
+            "flags",
+            "Landmarks",
+            "never seen, seen but not known well enough, known to the asked accuracy",
+            "1",
+            _flags,
+            Palette.LANDMARKS,
+            range=(0, 2),
+            scale=1,
+            in_every_tile=True,
+            in_json=False,
+            in_pictures=False,
+            in_files=False,
+        ),
+        LayerKind(
+            "sounded",
+            "Sounded",
+            "1 sounded, 0 interpolated, 2 only imported soundings in the cell",
+            "1",
+            _sounded,
+            Palette.MATTER,
+            in_pictures=False,
+        ),
+        LayerKind(
+            "slope",
+            "Slope",
+            "inclination of the sea floor",
+            "degree",
+            lambda source: slope_deg(source.map.depth_m, source.map.grid.cell_m),
+            Palette.MATTER,
+            scale=10,
+        ),
+        LayerKind(
+            "tvu_fraction",
+            "TVU / 1a",
+            "TVU estimate (95 %) over the largest TVU of S-44 {order}",
+            "1",
+            lambda source: tvu_fraction(
+                source.map.depth_m, source.map.sd_m, source.order, common_sd_m=source.common_sd_m
+            ),
+            Palette.BALANCE,
+            range=(0, 2),
+            scale=100,
+        ),
+        LayerKind(
+            "difference",
+            "Difference",
+            "depth minus the reference grid's depth",
+            "metre",
+            _difference,
+            Palette.BALANCE,
+            fit=Fit.ABOUT_ZERO,
+            scale=100,
+            absence="the mission has no reference grid to differ from",
+            remedy="Send one: PUT /api/v1/missions/{id}/reference",
+        ),
+        LayerKind(
+            "live",
+            "Live depth",
+            "depth by the papers' Gaussian interpolation of every sounding",
+            "metre",
+            _live,
+            Palette.DEEP,
+            fit=Fit.DATA,
+            in_files=False,
+            live=True,
+            absence="nothing was sounded since the service has this mission in memory",
+            remedy="Ask for the depth of the map itself, which holds every sounding",
+        ),
+    )
+}
+"""Every layer by its name, in the order of files."""
+
+
+def file_layers(source: LayerSource) -> list[Layer]:
+    """Return the layers that a file with every layer has; those that the mission has none of are left out."""
+    made = (kind.of(source) for kind in LAYERS.values() if kind.in_files)
+    return [layer for layer in made if layer is not None]

@@ -6,6 +6,9 @@ import numpy as np
 
 from app.arrays import BoolArray, FloatArray, IntArray
 
+SoundingRows = FloatArray
+"""Soundings as rows, shape (n, 4): east, north, depth, standard deviation in metres."""
+
 
 @dataclass(frozen=True)
 class Grid:
@@ -45,6 +48,11 @@ class Soundings:
     north_m: FloatArray
     depth_m: FloatArray
     sd_m: FloatArray
+
+    @classmethod
+    def of_rows(cls, rows: SoundingRows) -> "Soundings":
+        """Return what stands in rows."""
+        return cls(*rows.T.copy())
 
     def __len__(self) -> int:
         return len(self.depth_m)

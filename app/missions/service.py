@@ -37,6 +37,7 @@ from app.missions.live.mission import LiveMission
 from app.missions.live.trails import Trail
 from app.missions.maps.products import (
     MAP,
+    SEARCH,
     SOUNDINGS,
     TRACKS,
     Material,
@@ -74,7 +75,6 @@ from app.missions.running.ownership import Ownership
 from app.missions.running.registry import MissionRegistry
 from app.missions.running.supervisor import MissionSupervisor
 from app.missions.running.team_changes import TeamChanges, refuse_ended, vehicle_row
-from app.missions.search.obstacles import obstacles_geojson
 from app.missions.search.progress import grid_view
 from app.missions.search.scan_schema import Scan
 from app.missions.settings import ServiceSettings
@@ -464,11 +464,6 @@ class MissionService:
         search = search_of(live)
         return None if after is not None and search.version <= after else grid_view(search, live.id, live.frame)
 
-    async def search_obstacles(self, mission_id: str) -> bytes:
-        """Return the obstacles of a search's site as GeoJSON. Raises ConflictError."""
-        live = await self._get(mission_id)
-        return await live.in_thread(obstacles_geojson, search_of(live), live.frame)
-
     # Corrections
 
     async def corrections(self, mission_id: str) -> CorrectionsView:
@@ -594,8 +589,9 @@ class MissionService:
 
         Raises
         ------
-        InvalidRequestError, MapNotReadyError
-            For an unknown kind or options that cannot be; where the map is needed and there is none yet.
+        InvalidRequestError, MapNotReadyError, ConflictError
+            For an unknown kind or options that cannot be; where the map is needed and there is none yet; where the
+            mission would have to be a search.
         """
         needs = product_kind(name).needs
         material = Material(
@@ -605,6 +601,7 @@ class MissionService:
             map=await self.map(mission_id) if MAP in needs else None,
             soundings=await self.soundings(mission_id) if SOUNDINGS in needs else (),
             tracks=await self._track_lines(mission_id) if TRACKS in needs else (),
+            search=search_of(await self._get(mission_id)) if SEARCH in needs else None,
         )
         loop = asyncio.get_running_loop()
         return await loop.run_in_executor(self._executor, make_product, name, material, options or ProductOptions())

@@ -80,6 +80,7 @@ CONTRACT = {
     "DELETE /missions/{mission_id}": "deleteMission",
     "POST /missions/{mission_id}/vehicles/{name}/rejoin": "rejoinVehicle",
     "GET /planners": "listPlanners",
+    "GET /layers": "listLayers",
     "GET /health": "getHealth",
     "GET /health/live": "getLiveness",
     "GET /health/ready": "getReadiness",

@@ -39,6 +39,8 @@ async def test_scans_go_in_and_the_site_comes_out(client: httpx.AsyncClient) -> 
     assert progress["explored_pct"] > 20
     obstacles = await client.get(f"{path}/search/obstacles.geojson")
     assert obstacles.headers["content-type"] == "application/geo+json"
+    listed = {product["name"]: product["href"] for product in (await client.get(f"{path}/products")).json()}
+    assert listed["obstacles.geojson"] == f"/api/v1{path}/search/obstacles.geojson"
     found = [f["properties"]["found"] for f in obstacles.json()["features"]]
     assert found.count(False) == 1
     assert found.count(True) >= 1

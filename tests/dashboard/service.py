@@ -12,7 +12,6 @@ from typing import Any
 import httpx
 
 ROOT = Path(__file__).parents[2]
-BATHYFLEET = [sys.executable, "-c", "from app.cli import main; main()"]
 START_LIMIT_S = 180
 
 # About 59 m by 56 m.
@@ -23,14 +22,18 @@ AREA = {
 
 
 class Service:
-    """``bathyfleet serve`` with simulated vehicles, on one port and one database for all its lives."""
+    """``bathyfleet serve`` with simulated vehicles, on one port and one database for all its lives.
 
-    def __init__(self, folder: Path, **settings: str) -> None:
+    ``before`` is Python that its processes run first.
+    """
+
+    def __init__(self, folder: Path, before: str = "", **settings: str) -> None:
         with socket.socket() as probe:
             probe.bind(("127.0.0.1", 0))
             self.port: int = probe.getsockname()[1]
         self.url = f"http://127.0.0.1:{self.port}"
         self._folder = folder
+        self._command = [sys.executable, "-c", f"{before}\nfrom app.cli import main; main()"]
         self._settings = {f"BATHYFLEET_{name.upper()}": value for name, value in settings.items()}
         self._log = folder / "service.log"
         self._process: subprocess.Popen[bytes] | None = None
@@ -47,23 +50,22 @@ class Service:
             "PYTHONPATH": os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")]),
         }
 
+    def command(self, *arguments: str) -> str:
+        """Run another of the program's commands and return what it says."""
+        command = [*self._command, *arguments]
+        return subprocess.run(
+            command, cwd=self._folder, env=self._environment, capture_output=True, text=True, check=True
+        ).stdout
+
     def make_token(self, name: str, role: str) -> str:
         """Make an access token on the command line; from then on the service asks for one."""
-        made = subprocess.run(
-            [*BATHYFLEET, "token", "create", name, "--role", role],
-            cwd=self._folder,
-            env=self._environment,
-            capture_output=True,
-            text=True,
-            check=True,
-        )
-        return made.stdout.split()[-1]
+        return self.command("token", "create", name, "--role", role).split()[-1]
 
     def start(self) -> None:
         """Start and wait until requests are answered."""
         with self._log.open("ab") as log:
             self._process = subprocess.Popen(
-                [*BATHYFLEET, "serve", "--port", str(self.port)],
+                [*self._command, "serve", "--port", str(self.port)],
                 cwd=self._folder,
                 env=self._environment,
                 stderr=log,

@@ -60,10 +60,10 @@ def test_charts_layers_space_and_comparison_of_a_finished_mission(
     for name in ("uncertainty", "count", "slope", "tvu_fraction"):
         by_id(page, "layer").select_option(name)
         expect(by_id(page, "range-low")).to_be_visible()
-    by_id(page, "layer").select_option("landmarks")
+    by_id(page, "layer").select_option("flags")
     expect(by_id(page, "landmarks")).to_contain_text(re.compile(r"accurate \d+ %"))
     by_id(page, "layer").select_option("difference")
-    expect(page.get_by_text("There is no reference grid to differ from")).to_be_visible()
+    expect(page.get_by_text("The mission has no reference grid to differ from")).to_be_visible()
     by_id(page, "layer").select_option("depth")
     expect(by_id(page, "range-low")).to_be_visible()
     by_id(page, "measure").click()

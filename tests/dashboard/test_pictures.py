@@ -67,7 +67,7 @@ def test_the_main_views_look_as_they_did(page: Page, service: Service, surveyed:
     by_id(page, "range-fix").click()
     page.wait_for_timeout(1500)
     compare(page, service, surveyed, "wide-light")
-    by_id(page, "layer").select_option("landmarks")
+    by_id(page, "layer").select_option("flags")
     expect(by_id(page, "landmarks")).to_be_visible()
     page.emulate_media(color_scheme="dark", reduced_motion="reduce")
     page.wait_for_timeout(1500)

@@ -19,14 +19,13 @@ import rasterio
 from compliance_checker.runner import CheckSuite, ComplianceChecker
 
 from app.mapping.georeference import LocalFrame
-from app.mapping.layers import make_layers
+from app.mapping.layers import LayerSource, file_layers
 from app.mapping.products.bag import NODATA, bag
 from app.mapping.products.contours import find_contours
 from app.mapping.products.crowdsourced import Provider, RawSounding, crowdsourced_geojson
 from app.mapping.products.kml import contours_kml, tracks_kml
 from app.mapping.products.netcdf import netcdf
 from app.mapping.products.tracks import Track, TrackPoint, tracks_geojson, tracks_gpx
-from app.mapping.s44 import Order
 from app.mapping.types import BathymetricMap, Grid
 from app.mapping.vertical import INSTANTANEOUS_WATER_LEVEL, VerticalDatum
 
@@ -56,7 +55,7 @@ def bathymetry() -> BathymetricMap:
 
 
 def nc_bytes(bathymetry: BathymetricMap, datum: VerticalDatum) -> bytes:
-    layers = make_layers(bathymetry, order=Order.ORDER_1A, reference_m=bathymetry.depth_m + 0.25)
+    layers = file_layers(LayerSource(bathymetry, reference_m=bathymetry.depth_m + 0.25))
     return netcdf(bathymetry, layers, FRAME, vertical_datum=datum, title=TITLE, created=CREATED)
 
 

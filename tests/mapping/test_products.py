@@ -15,7 +15,7 @@ from rasterio.io import MemoryFile
 from rasterio.warp import transform
 
 from app.mapping.georeference import LocalFrame
-from app.mapping.layers import make_layers
+from app.mapping.layers import Fit, LayerSource, file_layers
 from app.mapping.products.colours import depth_range, palette
 from app.mapping.products.contours import contours_geojson, find_contours
 from app.mapping.products.geotiff import NODATA, geotiff
@@ -58,7 +58,7 @@ def soundings() -> Soundings:
 
 
 def cog(bathymetry: BathymetricMap, reference_m: np.ndarray | None = None) -> bytes:
-    layers = make_layers(bathymetry, order=Order.SPECIAL, reference_m=reference_m)
+    layers = file_layers(LayerSource(bathymetry, Order.SPECIAL, reference_m=reference_m))
     return geotiff(bathymetry, layers, FRAME, vertical_datum=LAT)
 
 
@@ -123,12 +123,12 @@ def test_overlay_pixels_are_the_cells_north_up(bathymetry: BathymetricMap) -> No
     assert np.all(image[:5, :5, 3] == 0)
     assert np.all(image[5:, 10, 3] == 255)
     assert 0 < image[29, 11, 3] < 255
-    colour = palette("depth")((bathymetry.depth_m[0, 20] - 4.0) / 10.0, bytes=True)
+    colour = palette(Fit.DATA)((bathymetry.depth_m[0, 20] - 4.0) / 10.0, bytes=True)
     np.testing.assert_allclose(image[29, 20, :3].astype(int), colour[:3], atol=1)
 
 
 def test_overlay_opens_as_a_raster_too(bathymetry: BathymetricMap) -> None:
-    png = overlay_png(bathymetry.sd_m, bathymetry.sounded, (0.0, 1.0), layer="uncertainty")
+    png = overlay_png(bathymetry.sd_m, bathymetry.sounded, (0.0, 1.0), Fit.FROM_ZERO)
     with MemoryFile(png) as memory, pytest.warns(NotGeoreferencedWarning), memory.open() as file:
         assert (file.count, file.width, file.height) == (4, 40, 30)
 

@@ -15,7 +15,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from app.mapping.georeference import LocalFrame
-from app.mapping.layers import make_layers
+from app.mapping.layers import LayerSource, file_layers
 from app.mapping.products.bag import bag
 from app.mapping.products.geotiff import geotiff
 from app.mapping.products.netcdf import netcdf
@@ -59,7 +59,7 @@ def make_map() -> BathymetricMap:
 
 def own_product(kind: str) -> bytes:
     bathymetry, datum = make_map(), VerticalDatum(5861, "LAT")
-    layers = make_layers(bathymetry, order=Order.ORDER_2)
+    layers = file_layers(LayerSource(bathymetry, Order.ORDER_2))
     if kind == "tif":
         return geotiff(bathymetry, layers, FRAME, vertical_datum=datum)
     if kind == "nc":

@@ -7,19 +7,16 @@ import numpy as np
 import pytest
 
 from app.mapping.gaussian import GaussianInterpolator
+from app.mapping.layers import ACCURATE, SOUNDED
 from app.mapping.types import Soundings
 from app.missions.maps.builder import MapBuilder, make_grid
 from app.missions.maps.live_grid import SHOWN_CELLS, LiveGrid
-from app.missions.maps.tiles import ACCURATE, SOUNDED, TileCache
+from app.missions.maps.tiles import TileCache
 from tests.missions.builders import make_spec
 from tests.missions.test_map_builder import AREA, soundings
 from tests.missions.test_map_tiles import put_together, read, snapshot
 
 DEEPER = np.array([0.0, 0.0, 0.5, 0.0])
-
-
-def as_soundings(rows: np.ndarray) -> Soundings:
-    return Soundings(*rows.T.copy())
 
 
 def builder_with_live_grid() -> MapBuilder:
@@ -77,7 +74,7 @@ def test_it_is_the_interpolation_of_all_soundings_whenever_they_came() -> None:
     found = live_of(builder).map()
     assert found is not None
     expected = GaussianInterpolator(builder.grid, found.correlation_length_m)
-    expected.add(as_soundings(np.concatenate([rows, DEEPER + rows[:20]])))
+    expected.add(Soundings.of_rows(np.concatenate([rows, DEEPER + rows[:20]])))
     np.testing.assert_allclose(found.depth_m, expected.to_map(builder.mask).depth_m, rtol=1e-9)
     np.testing.assert_array_equal(found.count, expected.to_map(builder.mask).count)
 
@@ -94,7 +91,7 @@ def test_soundings_that_took_the_place_of_others_are_the_ones_that_count() -> No
     found = live_of(builder).map()
     assert found is not None
     expected = GaussianInterpolator(builder.grid, found.correlation_length_m)
-    expected.add(as_soundings(np.concatenate([corrected, late])))
+    expected.add(Soundings.of_rows(np.concatenate([corrected, late])))
     np.testing.assert_allclose(found.depth_m, expected.to_map(builder.mask).depth_m, rtol=1e-9)
 
 

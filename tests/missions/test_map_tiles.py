@@ -7,10 +7,12 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import pytest
 
+from app.mapping.layers import ACCURATE, LAYERS, SOUNDED, VISIBLE, LayerKind, Palette
 from app.missions.maps.builder import BuiltMap, MapBuilder
 from app.missions.maps.snapshot import MapSnapshot, MissionFacts
-from app.missions.maps.tiles import ACCURATE, SOUNDED, TILE, VISIBLE, TileCache
+from app.missions.maps.tiles import TILE, TileCache
 from tests.missions.builders import make_spec
 
 SPEC = make_spec(side_m=70.0, cell_m=1.0)
@@ -91,3 +93,13 @@ def test_a_difference_without_a_reference_grid_is_unknown_everywhere() -> None:
     header, tiles = read(TileCache().changes(snapshot(1, (5, 5, 8), (30, 30, 9)), "a.1", "", ("difference", "slope")))
     assert header["layers"][-2:] == ["difference", "slope"]
     assert {int(v) for layers in tiles.values() for v in np.unique(layers["difference"])} == {-(2**31)}
+
+
+def test_a_layer_that_is_added_to_the_table_is_in_the_tiles(monkeypatch: pytest.MonkeyPatch) -> None:
+    kind = LayerKind("rough", "Rough", "roughness", "1", lambda s: s.map.roughness, Palette.MATTER, scale=1000)
+    monkeypatch.setitem(LAYERS, "rough", kind)
+    shown = snapshot(1, (5, 5, 8), (30, 30, 9))
+    header, tiles = read(TileCache().changes(shown, "a.1", "", ("rough",)))
+    assert dict(zip(header["layers"], header["scales"], strict=True))["rough"] == 1000
+    roughness = shown.built.map.roughness[:TILE, :TILE]
+    np.testing.assert_allclose(tiles[0]["rough"] / 1000, roughness, atol=0.00051)

@@ -93,7 +93,7 @@ async def test_a_boat_goes_round_what_nobody_knew_of_sees_the_goal_and_is_back_i
     assert before is not None
     assert before.version >= found.version
     figures = (await service.mission(mission.id)).progress.search
-    geo = json.loads(await service.search_obstacles(mission.id))
+    geo = json.loads((await service.export(mission.id, "obstacles.geojson")).content)
     seen = [f for f in geo["features"] if f["properties"]["found"]]
     assert all(shape(f["geometry"]).intersects(pontoon.buffer(2e-5)) for f in seen)
     assert figures is not None

@@ -5,18 +5,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from app.arrays import FloatArray
+from app.mapping.layers import Fit
 from app.mapping.types import BathymetricMap
 
 if TYPE_CHECKING:
     from matplotlib.colors import Colormap
 
 
-def palette(layer: str) -> "Colormap":
-    """Return the colours of a layer: depths, differences of either sign, or amounts of something."""
+def palette(fit: Fit) -> "Colormap":
+    """Return the colours of a layer by how its range follows its values."""
     # They bring all of Matplotlib: a quarter of the service's start, before anyone has asked for a picture.
     import cmocean
 
-    colours: Colormap = {"depth": cmocean.cm.deep, "difference": cmocean.cm.balance}.get(layer, cmocean.cm.amp)
+    colours: Colormap = {Fit.DATA: cmocean.cm.deep, Fit.ABOUT_ZERO: cmocean.cm.balance}.get(fit, cmocean.cm.amp)
     return colours
 
 

@@ -7,6 +7,7 @@ from PIL import Image
 
 from app.arrays import BoolArray, FloatArray
 from app.mapping.georeference import LocalFrame
+from app.mapping.layers import Fit
 from app.mapping.products.colours import palette, scaled
 from app.mapping.types import Grid
 
@@ -14,7 +15,7 @@ INTERPOLATED_ALPHA = 0.72
 """Opacity of cells that were not sounded, so that sounded tracks show."""
 
 
-def overlay_png(values: FloatArray, sounded: BoolArray, range_m: tuple[float, float], *, layer: str = "depth") -> bytes:
+def overlay_png(values: FloatArray, sounded: BoolArray, range_m: tuple[float, float], fit: Fit = Fit.DATA) -> bytes:
     """Return an RGBA PNG, one pixel per cell, north up, no axes; cells without a value are transparent.
 
     Parameters
@@ -24,12 +25,12 @@ def overlay_png(values: FloatArray, sounded: BoolArray, range_m: tuple[float, fl
     range_m
         Values of the first and the last colour. Fixed by the caller: a range that follows the data would make
         successive pictures of a mission incomparable.
-    layer
-        Its name, which chooses the palette.
+    fit
+        How the layer's range follows its values, which chooses the palette.
     """
     alpha = np.where(sounded, 1.0, INTERPOLATED_ALPHA)
     fractions = scaled(values, range_m)
-    pixels = palette(layer)(np.nan_to_num(fractions), bytes=True)
+    pixels = palette(fit)(np.nan_to_num(fractions), bytes=True)
     pixels[..., 3] = np.where(np.isfinite(fractions), np.round(255 * alpha), 0)
     stream = io.BytesIO()
     Image.fromarray(np.ascontiguousarray(pixels[::-1])).save(stream, "PNG", compress_level=6)

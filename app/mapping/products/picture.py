@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from app.arrays import FloatArray
+from app.mapping.layers import Fit
 from app.mapping.products.colours import depth_range, palette
 from app.mapping.types import BathymetricMap
 
@@ -51,7 +52,7 @@ def picture_png(
         np.ma.masked_invalid(bathymetry.depth_m),
         origin="lower",
         extent=extent,
-        cmap=palette("depth"),
+        cmap=palette(Fit.DATA),
         vmin=low,
         vmax=high,
         interpolation="nearest",

@@ -70,7 +70,7 @@ def floors_of(spec: MissionSpec, prior: FloatArray, deepest_m: float, depth_m: f
     guess = max(LEAST_GUESS_M, deepest_m + spec.limits.min_altitude_m + ROOM_M)
     known, doubt, share = np.full(mask.shape, np.nan), np.full(mask.shape, np.nan), 0.0
     if len(prior):
-        imported = prior_map(Soundings(*prior.T.copy()), grid, mask)
+        imported = prior_map(Soundings.of_rows(prior), grid, mask)
         known, doubt = imported.depth_m, imported.sd_m
         share = float(np.mean(imported.prior[mask])) if imported.prior is not None else 0.0
     has = np.isfinite(known)

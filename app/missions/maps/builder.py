@@ -8,7 +8,6 @@ from functools import cached_property
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 from shapely.geometry import Polygon
 
 from app.arrays import BoolArray, FloatArray
@@ -16,7 +15,7 @@ from app.exploration.core.problem import Belief
 from app.mapping.fusion import fuse, prior_map
 from app.mapping.gp import GaussianProcessMap
 from app.mapping.outliers import flag_outliers
-from app.mapping.types import BathymetricMap, Grid, Soundings
+from app.mapping.types import BathymetricMap, Grid, SoundingRows, Soundings
 from app.missions.maps.live_grid import LiveGrid
 from app.missions.maps.queue import MapQueue, Replacement
 
@@ -28,6 +27,9 @@ CLAIM_MARGIN, UNSEEN_MARGIN = 1.25, 1.0
 so. What is learned of the sea floor changes a little with every map: cells at the limit do not come and go with it.
 Ground that no sounding supports may be rougher than the rest, and a model that learns of it will be less sure of all:
 the second is added times its share of the area."""
+
+Doubted = list[tuple[FloatArray, str]]
+"""Soundings, rows of shape (4,), that a map leaves out, each with the reason."""
 
 RELEARN_GROWTH = 1.15
 """Hyperparameters are learned again when the soundings grew by this factor."""
@@ -41,7 +43,7 @@ class _Learned:
     """
 
     model: GaussianProcessMap
-    soundings: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 4)))
+    soundings: SoundingRows = field(default_factory=lambda: np.zeros((0, 4)))
     reasons: tuple[str, ...] = ()
 
     @cached_property
@@ -49,7 +51,7 @@ class _Learned:
         return np.array([bool(reason) for reason in self.reasons], dtype=bool)
 
     @cached_property
-    def doubted(self) -> list[tuple[NDArray[np.float64], str]]:
+    def doubted(self) -> Doubted:
         return [(row, reason) for row, reason in zip(self.soundings, self.reasons, strict=True) if reason]
 
 
@@ -122,7 +124,7 @@ class MapBuilder:
         self._building = threading.Lock()
         self._learning = threading.Lock()
         self._newest: BuiltMap | None = None
-        self._doubted: list[tuple[NDArray[np.float64], str]] = []
+        self._doubted: Doubted = []
         # What ``arrivals.replaced`` was when the newest map's soundings were taken in.
         self._replaced_mapped = 0
         self._version = 0
@@ -130,7 +132,7 @@ class MapBuilder:
         # Counts how often all soundings were replaced: what is learned meanwhile of the old ones is void.
         self._generation = 0
 
-    def add(self, soundings: NDArray[np.float64]) -> None:
+    def add(self, soundings: SoundingRows) -> None:
         """Take in soundings, shape (n, 4): east, north, depth, standard deviation in metres."""
         if len(soundings):
             if self.live is not None:
@@ -138,7 +140,7 @@ class MapBuilder:
                 self.live.note(soundings)
             self.arrivals.add(soundings)
 
-    def show(self, built: BuiltMap, doubted: list[tuple[NDArray[np.float64], str]]) -> None:
+    def show(self, built: BuiltMap, doubted: Doubted) -> None:
         """Begin with a map that was stored, and with what it left out; its soundings stay where they are stored."""
         self._version = built.version
         self._newest, self._doubted = built, doubted
@@ -200,12 +202,14 @@ class MapBuilder:
                     self.live.settle(upto)
             return self._newest
 
-    def _take_in(self, came: list[NDArray[np.float64] | Replacement]) -> None:
+    def _take_in(self, came: list[SoundingRows | Replacement]) -> None:
         """Add what came."""
-        arrived: list[NDArray[np.float64]] = []
+        arrived: list[SoundingRows] = []
         for item in came:
             if isinstance(item, Replacement):
-                self._prior = prior_map(_as_soundings(item.prior), self.grid, self.mask) if len(item.prior) else None
+                self._prior = (
+                    prior_map(Soundings.of_rows(item.prior), self.grid, self.mask) if len(item.prior) else None
+                )
                 if item.soundings is not None:
                     self._generation += 1
                     arrived, self._soundings, self._trusted = [], item.soundings, item.trusted
@@ -242,7 +246,7 @@ class MapBuilder:
         used = np.ones(len(self._soundings), dtype=bool)
         used[: len(learned.reasons)] = ~learned.rejected
         model = copy.copy(learned.model)
-        bathymetry = model.fit(_as_soundings(self._soundings[used]), learn=False).predict(self.grid, self.mask)
+        bathymetry = model.fit(Soundings.of_rows(self._soundings[used]), learn=False).predict(self.grid, self.mask)
         if not learned.reasons:
             # The first fit had to learn; keep what it found.
             self._learned = _Learned(model)
@@ -261,7 +265,7 @@ class MapBuilder:
             known, trusted = self._soundings, self._trusted
             if not len(known) or (len(known) < RELEARN_GROWTH * len(before) and not always):
                 return
-            soundings = _as_soundings(known)
+            soundings = Soundings.of_rows(known)
             verdict = flag_outliers(soundings, hyperparameters=getattr(model, "stationary_hyperparameters_", None))
             # Both were taken while soundings may have been added: the shorter one says for how many.
             restored = np.flatnonzero(trusted[: len(known)])
@@ -275,7 +279,7 @@ class MapBuilder:
         finally:
             self._learning.release()
 
-    def doubted(self) -> list[tuple[NDArray[np.float64], str]]:
+    def doubted(self) -> Doubted:
         """Return the soundings, rows of shape (4,), that the map leaves out as outliers, each with the reason.
 
         Does not wait for a map that is being made.
@@ -283,11 +287,11 @@ class MapBuilder:
         return self._learned.doubted if self._learned.reasons else self._doubted
 
     @property
-    def soundings(self) -> NDArray[np.float64]:
+    def soundings(self) -> SoundingRows:
         """All that the newest map was made of, (n, 4), those left out as outliers included."""
         return self._soundings
 
-    def as_of(self, soundings: NDArray[np.float64]) -> BathymetricMap:
+    def as_of(self, soundings: SoundingRows) -> BathymetricMap:
         """Return the map that the first soundings (n, 4) alone make, under the model learned of all of them."""
         with self._building:
             learned, prior = self._learned, self._prior
@@ -298,7 +302,7 @@ class MapBuilder:
                 raise ValueError("there is no sounding to make a map of")
             return prior
         model = copy.copy(learned.model)
-        measured = model.fit(_as_soundings(soundings[used]), learn=False).predict(self.grid, self.mask)
+        measured = model.fit(Soundings.of_rows(soundings[used]), learn=False).predict(self.grid, self.mask)
         return measured if prior is None else fuse(measured, prior)
 
     def coverage_pct(self) -> float:
@@ -357,8 +361,3 @@ class MapBuilder:
 
 def _new_model() -> GaussianProcessMap:
     return GaussianProcessMap(reject_outliers=False)  # outliers are judged by ``learn``
-
-
-def _as_soundings(rows: NDArray[np.float64]) -> Soundings:
-    east, north, depth, sd = rows.T.copy()
-    return Soundings(east, north, depth, sd)

@@ -5,13 +5,9 @@ import json
 import zlib
 
 import numpy as np
-from numpy.typing import NDArray
 
 from app.mapping.types import BathymetricMap, Grid
-from app.missions.maps.builder import BuiltMap, digest_of
-
-Doubted = list[tuple[NDArray[np.float64], str]]
-"""Soundings, rows of shape (4,), that a map leaves out, each with the reason."""
+from app.missions.maps.builder import BuiltMap, Doubted, digest_of
 
 LAYERS = ("depth_m", "sd_m", "count", "sounded", "roughness")
 OPTIONAL = ("prior", "process_sd_m", "bound_sd_m")

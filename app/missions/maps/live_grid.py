@@ -10,15 +10,11 @@ from collections import deque
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from app.arrays import BoolArray, FloatArray, IntArray
 from app.mapping.counting import cell_numbers
 from app.mapping.gaussian import MODEL, GaussianInterpolator, choose_width
-from app.mapping.types import BathymetricMap, Grid, Soundings
-
-Rows = NDArray[np.float64]
-"""Soundings, shape (n, 4): east, north, depth, standard deviation in metres."""
+from app.mapping.types import BathymetricMap, Grid, SoundingRows, Soundings
 
 SHOWN_CELLS = 1.5
 """How far about a sounding the interpolation is shown, in cells: its own cell and those that touch it."""
@@ -60,8 +56,8 @@ class LiveGrid:
 
     def __init__(self, grid: Grid, mask: BoolArray) -> None:
         self._grid, self._mask = grid, mask
-        self._noted: deque[Rows] = deque()
-        self._recent: deque[tuple[int, Rows]] = deque()
+        self._noted: deque[SoundingRows] = deque()
+        self._recent: deque[tuple[int, SoundingRows]] = deque()
         self._taken = 0
         self._chosen_of = 0
         self._lock = threading.Lock()
@@ -69,7 +65,7 @@ class LiveGrid:
         self._fresh: LiveCells | None = None
         self.version = 0
 
-    def note(self, soundings: Rows) -> None:
+    def note(self, soundings: SoundingRows) -> None:
         """Note soundings that came."""
         self._noted.append(soundings)
         self.version += len(soundings)
@@ -82,18 +78,18 @@ class LiveGrid:
                 self._recent.popleft()
             self._fresh = None
 
-    def begin_anew(self, soundings: Rows, upto: int) -> None:
+    def begin_anew(self, soundings: SoundingRows, upto: int) -> None:
         """Interpolate these, which were the mission's ``upto`` here, and what came since."""
         with self._lock:
             self._take()
             width_m = FIRST_WIDTH_CELLS * self._grid.cell_m
             if len(soundings):
-                width_m = choose_width(_as_soundings(soundings), self._grid)
+                width_m = choose_width(Soundings.of_rows(soundings), self._grid)
             self._interpolator = GaussianInterpolator(self._grid, width_m)
-            self._interpolator.add(_as_soundings(soundings))
+            self._interpolator.add(Soundings.of_rows(soundings))
             for until, rows in self._recent:
                 if until > upto:
-                    self._interpolator.add(_as_soundings(rows))
+                    self._interpolator.add(Soundings.of_rows(rows))
             self._chosen_of = len(soundings)
             self._fresh = None
 
@@ -135,13 +131,13 @@ class LiveGrid:
             self._recent.append((self._taken, rows))
             if self._interpolator is None:
                 self._interpolator = GaussianInterpolator(self._grid, FIRST_WIDTH_CELLS * self._grid.cell_m)
-            self._interpolator.add(_as_soundings(rows))
+            self._interpolator.add(Soundings.of_rows(rows))
             self._fresh = None
 
 
-def _about(grid: Grid, rows: Rows) -> BoolArray:
+def _about(grid: Grid, rows: SoundingRows) -> BoolArray:
     """Return which cells hold one of the soundings or touch a cell that does, (rows, cols)."""
-    cells = np.unique(cell_numbers(grid, _as_soundings(rows)))
+    cells = np.unique(cell_numbers(grid, Soundings.of_rows(rows)))
     row, col = np.divmod(cells[cells >= 0], grid.cols)
     reach = int(SHOWN_CELLS)
     found = np.zeros((grid.rows, grid.cols), dtype=np.bool_)
@@ -170,8 +166,3 @@ def map_of(grid: Grid, live: LiveCells) -> BathymetricMap:
         model=MODEL,
         bound_sd_m=np.full(shape, np.inf),
     )
-
-
-def _as_soundings(rows: Rows) -> Soundings:
-    east, north, depth, sd = rows.T.copy()
-    return Soundings(east, north, depth, sd)

@@ -2,8 +2,8 @@
 
 import csv
 import io
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass
 from datetime import datetime
 
 import numpy as np
@@ -12,7 +12,7 @@ from shapely.geometry import Polygon, mapping
 
 from app import __version__
 from app.csv_cells import text_cell
-from app.mapping.layers import Layer, make_layers
+from app.mapping.layers import file_layers
 from app.mapping.products.bag import bag
 from app.mapping.products.contours import Contour, contours_geojson, find_contours
 from app.mapping.products.crowdsourced import Provider, RawSounding, crowdsourced_geojson
@@ -27,36 +27,16 @@ from app.mapping.s44 import Order
 from app.mapping.types import Soundings
 from app.missions.errors import InvalidRequestError, MapNotReadyError
 from app.missions.maps.snapshot import MapSnapshot, MissionFacts
+from app.missions.search.obstacles import obstacles_geojson
+from app.missions.search.state import Search
 from app.missions.views.soundings import Verdict
 from app.storage.models import SoundingRow
 
 CONTOURS_PER_MAP = 10
 CONTOUR_INTERVALS_M = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0)
 
-MAP, SOUNDINGS, TRACKS = "map", "soundings", "tracks"
-
-
-@dataclass(frozen=True)
-class ProductKind:
-    """A kind of file.
-
-    Attributes
-    ----------
-    resource
-        What it shows and where the REST interface has it: ``/missions/{id}/{resource}.{extension}``.
-    needs
-        What has to be loaded to make it.
-    """
-
-    resource: str
-    extension: str
-    media_type: str
-    title: str
-    needs: frozenset[str]
-
-
-def _kind(resource: str, extension: str, media_type: str, title: str, *also: str) -> ProductKind:
-    return ProductKind(resource, extension, media_type, title, frozenset({resource, *also}))
+MAP, SOUNDINGS, TRACKS, SEARCH = "map", "soundings", "tracks", "search"
+"""What files are made of."""
 
 
 GEOJSON, KML, TEXT, CSV = (
@@ -65,27 +45,6 @@ GEOJSON, KML, TEXT, CSV = (
     "text/plain; charset=utf-8",
     "text/csv; charset=utf-8",
 )
-
-PRODUCTS = {
-    "tif": _kind(MAP, "tif", "image/tiff; application=geotiff", "Cloud-Optimized GeoTIFF with every layer"),
-    "nc": _kind(MAP, "nc", "application/x-netcdf", "CF-NetCDF with every layer"),
-    "bag": _kind(MAP, "bag", "application/x-bag", "Bathymetric Attributed Grid: elevation and uncertainty"),
-    "xyz": _kind(MAP, "xyz", TEXT, "longitude, latitude and depth of every cell"),
-    "csv": ProductKind(MAP, "csv", CSV, "every sounding, raw and corrected, with its verdict", frozenset({SOUNDINGS})),
-    "geojson": _kind(MAP, "geojson", GEOJSON, "depth contours, area and tracks", TRACKS),
-    "kml": _kind(MAP, "kml", KML, "depth contours"),
-    "png": _kind(MAP, "png", "image/png", "a picture with axes, colour bar and scale", TRACKS),
-    "overlay.png": _kind(MAP, "overlay.png", "image/png", "a bare picture to lay over a web map"),
-    "soundings.csv": _kind(SOUNDINGS, "csv", CSV, "every sounding, raw and corrected, with its verdict"),
-    "soundings.xyz": _kind(SOUNDINGS, "xyz", TEXT, "longitude, latitude and corrected depth of accepted soundings"),
-    "soundings.geojson": _kind(
-        SOUNDINGS, "geojson", GEOJSON, "raw soundings of one vehicle as crowdsourced bathymetry (IHO B-12)"
-    ),
-    "tracks.geojson": _kind(TRACKS, "geojson", GEOJSON, "the vehicles' tracks with times and depths"),
-    "tracks.kml": _kind(TRACKS, "kml", KML, "the vehicles' tracks"),
-    "tracks.gpx": _kind(TRACKS, "gpx", "application/gpx+xml", "the vehicles' tracks with times and depths"),
-}
-"""Every file by its name on the command line; without a resource before the point it is one of the map's."""
 
 
 @dataclass(frozen=True)
@@ -119,7 +78,20 @@ class Material:
     provider: Provider | None = None
     map: MapSnapshot | None = None
     soundings: Sequence[SoundingRow] = ()
-    tracks: Sequence[Track] = field(default=())
+    tracks: Sequence[Track] = ()
+    search: Search | None = None
+
+    @property
+    def snapshot(self) -> MapSnapshot:
+        """Return the map. Raises MapNotReadyError without one."""
+        if self.map is None:
+            raise MapNotReadyError("there is no map yet", "start the mission or post measurements")
+        return self.map
+
+    @property
+    def datum(self) -> str:
+        """Return what depths are counted from."""
+        return self.facts.vertical_datum.statement
 
 
 @dataclass(frozen=True)
@@ -131,86 +103,109 @@ class Product:
     content: bytes
 
 
-def product_kind(name: str) -> ProductKind:
-    """Return a kind of file by its name. Raises InvalidRequestError when there is none."""
-    if name not in PRODUCTS:
-        raise InvalidRequestError("format", f"there is no format {name!r}", f"use one of {', '.join(PRODUCTS)}")
-    return PRODUCTS[name]
+@dataclass(frozen=True)
+class ProductKind:
+    """A kind of file.
+
+    Attributes
+    ----------
+    resource
+        What it shows and where the REST interface has it: ``/missions/{id}/{resource}.{extension}``.
+    make
+        Returns the file. Raises InvalidRequestError for options that cannot be.
+    needs
+        What has to be loaded to make it.
+    of_vehicle
+        Whether it holds what one vehicle measured.
+    """
+
+    resource: str
+    extension: str
+    media_type: str
+    title: str
+    make: Callable[[Material, ProductOptions], bytes]
+    needs: Collection[str]
+    of_vehicle: bool = False
+
+    @property
+    def name(self) -> str:
+        """Return its name on the command line; without a part before the point it is one of the map's."""
+        return f"{self.part}.{self.extension}".removeprefix(f"{MAP}.")
+
+    @property
+    def part(self) -> str:
+        """Return which part of what is known it shows."""
+        return self.resource.rpartition("/")[2]
 
 
-def make_product(name: str, material: Material, options: ProductOptions) -> Product:
-    """Return one file. Raises InvalidRequestError for an unknown format or options that cannot be."""
-    kind = product_kind(name)
-    makers = {MAP: _map_file, SOUNDINGS: _soundings_file, TRACKS: _tracks_file}
-    content = makers[SOUNDINGS if kind.needs == {SOUNDINGS} else kind.resource](kind, material, options)
-    part = "" if kind.resource == MAP else f"-{kind.resource}"
-    if name == "soundings.geojson":
-        part = f"-{_only_vehicle(material.soundings, options.vehicle)}"
-    return Product(f"{_slug(material.facts.spec.name)}{part}.{kind.extension}", kind.media_type, content)
+def _geotiff(material: Material, options: ProductOptions) -> bytes:
+    snapshot, facts = material.snapshot, material.facts
+    layers = file_layers(snapshot.source(options.order))
+    return geotiff(snapshot.built.map, layers, facts.frame, vertical_datum=facts.vertical_datum)
 
 
-def layers_of(snapshot: MapSnapshot, order: Order) -> list[Layer]:
-    """Return every layer of a mission's map."""
-    return make_layers(
-        snapshot.built.map, order=order, common_sd_m=snapshot.facts.common_sd_m, reference_m=snapshot.reference_m
+def _netcdf(material: Material, options: ProductOptions) -> bytes:
+    snapshot, facts = material.snapshot, material.facts
+    return netcdf(
+        snapshot.built.map,
+        file_layers(snapshot.source(options.order)),
+        facts.frame,
+        vertical_datum=facts.vertical_datum,
+        title=facts.title,
+        created=material.created,
     )
 
 
-def _map_file(kind: ProductKind, material: Material, options: ProductOptions) -> bytes:
-    snapshot = material.map
-    if snapshot is None:
-        raise MapNotReadyError("there is no map yet", "start the mission or post measurements")
-    facts, bathymetry = material.facts, snapshot.built.map
-    frame, datum, title = facts.frame, facts.vertical_datum, facts.title
-    match kind.extension:
-        case "tif":
-            return geotiff(bathymetry, layers_of(snapshot, options.order), frame, vertical_datum=datum)
-        case "nc":
-            layers = layers_of(snapshot, options.order)
-            return netcdf(bathymetry, layers, frame, vertical_datum=datum, title=title, created=material.created)
-        case "bag":
-            return bag(bathymetry, frame, vertical_datum=datum, title=title)
-        case "xyz":
-            return map_xyz(bathymetry, frame, vertical_datum=datum.statement, geographic=True)
-        case "geojson":
-            return _contours_with_tracks(_contours(snapshot, options.interval_m), material)
-        case "kml":
-            contours = _contours(snapshot, options.interval_m)
-            return contours_kml(contours, title=title, vertical_datum=datum.statement)
-        case "png":
-            local = {track.vehicle: _local_track(facts, track) for track in material.tracks if track.points}
-            return picture_png(
-                bathymetry, vertical_datum=datum.statement, title=title, range_m=options.range_m, tracks=local
-            )
-        case _:
-            depths = bathymetry.depth_m[np.isfinite(bathymetry.depth_m)]
-            range_m = options.range_m or (float(depths.min()), float(depths.max()) + 1e-3)
-            return overlay_png(bathymetry.depth_m, bathymetry.sounded, range_m)
-
-
-def _soundings_file(kind: ProductKind, material: Material, options: ProductOptions) -> bytes:
+def _bag(material: Material, _: ProductOptions) -> bytes:
     facts = material.facts
-    match kind.extension:
-        case "csv":
-            return _soundings_csv(material.soundings, facts.vertical_datum.statement)
-        case "xyz":
-            rows = [row for row in material.soundings if row.verdict == Verdict.ACCEPTED]
-            table = np.array([(row.east_m, row.north_m, row.depth_m, row.sd_m) for row in rows]).reshape(-1, 4)
-            corrected = Soundings(*table.T.copy())
-            return soundings_xyz(corrected, facts.frame, vertical_datum=facts.vertical_datum.statement, geographic=True)
-        case _:
-            return _crowdsourced(material, options.vehicle)
+    return bag(material.snapshot.built.map, facts.frame, vertical_datum=facts.vertical_datum, title=facts.title)
 
 
-def _tracks_file(kind: ProductKind, material: Material, options: ProductOptions) -> bytes:
-    title = material.facts.title
-    match kind.extension:
-        case "geojson":
-            return tracks_geojson(material.tracks)
-        case "kml":
-            return tracks_kml(material.tracks, title=title)
-        case _:
-            return tracks_gpx(material.tracks, title=title)
+def _map_xyz(material: Material, _: ProductOptions) -> bytes:
+    return map_xyz(material.snapshot.built.map, material.facts.frame, vertical_datum=material.datum, geographic=True)
+
+
+def _map_geojson(material: Material, options: ProductOptions) -> bytes:
+    """Return contours, the area and the tracks as one feature collection."""
+    collection = orjson.loads(contours_geojson(_contours(material, options), vertical_datum=material.datum))
+    ring = Polygon(material.facts.spec.area.ring)
+    area = {"type": "Feature", "properties": {"kind": "area"}, "geometry": mapping(ring)}
+    collection["features"] += [area, *orjson.loads(tracks_geojson(material.tracks))["features"]]
+    return orjson.dumps(collection)
+
+
+def _map_kml(material: Material, options: ProductOptions) -> bytes:
+    return contours_kml(_contours(material, options), title=material.facts.title, vertical_datum=material.datum)
+
+
+def _picture(material: Material, options: ProductOptions) -> bytes:
+    facts = material.facts
+    return picture_png(
+        material.snapshot.built.map,
+        vertical_datum=material.datum,
+        title=facts.title,
+        range_m=options.range_m,
+        tracks={track.vehicle: _local_track(facts, track) for track in material.tracks if track.points},
+    )
+
+
+def _overlay(material: Material, options: ProductOptions) -> bytes:
+    bathymetry = material.snapshot.built.map
+    depths = bathymetry.depth_m[np.isfinite(bathymetry.depth_m)]
+    range_m = options.range_m or (float(depths.min()), float(depths.max()) + 1e-3)
+    return overlay_png(bathymetry.depth_m, bathymetry.sounded, range_m)
+
+
+def _soundings_xyz(material: Material, _: ProductOptions) -> bytes:
+    rows = [row for row in material.soundings if row.verdict == Verdict.ACCEPTED]
+    table = np.array([(row.east_m, row.north_m, row.depth_m, row.sd_m) for row in rows]).reshape(-1, 4)
+    return soundings_xyz(Soundings.of_rows(table), material.facts.frame, vertical_datum=material.datum, geographic=True)
+
+
+def _obstacles(material: Material, _: ProductOptions) -> bytes:
+    if material.search is None:
+        raise InvalidRequestError("format", "the mission is no search", "ask for another file")
+    return obstacles_geojson(material.search, material.facts.frame)
 
 
 def _local_track(facts: MissionFacts, track: Track) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
@@ -218,7 +213,8 @@ def _local_track(facts: MissionFacts, track: Track) -> np.ndarray[tuple[int, int
     return np.column_stack(facts.frame.to_local(lat, lon))
 
 
-def _contours(snapshot: MapSnapshot, interval_m: float | None) -> list[Contour]:
+def _contours(material: Material, options: ProductOptions) -> list[Contour]:
+    snapshot, interval_m = material.snapshot, options.interval_m
     if interval_m is None:
         depths = snapshot.built.map.depth_m
         span = float(np.nanmax(depths) - np.nanmin(depths))
@@ -229,23 +225,14 @@ def _contours(snapshot: MapSnapshot, interval_m: float | None) -> list[Contour]:
         raise InvalidRequestError("interval_m", str(error), "choose a larger one") from error
 
 
-def _contours_with_tracks(contours: Sequence[Contour], material: Material) -> bytes:
-    """Return contours, the area and the tracks as one feature collection."""
-    facts = material.facts
-    collection = orjson.loads(contours_geojson(contours, vertical_datum=facts.vertical_datum.statement))
-    area = {"type": "Feature", "properties": {"kind": "area"}, "geometry": mapping(Polygon(facts.spec.area.ring))}
-    collection["features"] += [area, *orjson.loads(tracks_geojson(material.tracks))["features"]]
-    return orjson.dumps(collection)
-
-
-def _crowdsourced(material: Material, vehicle: str | None) -> bytes:
+def _crowdsourced(material: Material, options: ProductOptions) -> bytes:
     if material.provider is None:
         raise InvalidRequestError(
             "provider",
             "IHO B-12 asks who hands soundings in, and the settings do not say",
             "set provider.organization and provider.email in bathyfleet.toml",
         )
-    name = _only_vehicle(material.soundings, vehicle)
+    name = _only_vehicle(material.soundings, options.vehicle)
     raw = [
         RawSounding(row.lon_deg, row.lat_deg, row.raw_depth_m, row.sd_m, row.time_s, row.position_sd_m)
         for row in material.soundings
@@ -295,14 +282,86 @@ COLUMNS = (
 )
 
 
-def _soundings_csv(soundings: Sequence[SoundingRow], vertical_datum: str) -> bytes:
+def _soundings_csv(material: Material, _: ProductOptions) -> bytes:
     """Return every sounding, rejected ones with their reason; raw and corrected depth side by side."""
     text = io.StringIO()
-    text.write(f"# depth_m: positive down, from {vertical_datum}\n")
+    text.write(f"# depth_m: positive down, from {material.datum}\n")
     writer = csv.writer(text)
     writer.writerow(COLUMNS)
-    writer.writerows([text_cell(getattr(row, column)) for column in COLUMNS] for row in soundings)
+    writer.writerows([text_cell(getattr(row, column)) for column in COLUMNS] for row in material.soundings)
     return text.getvalue().encode()
+
+
+EVERY_SOUNDING = "every sounding, raw and corrected, with its verdict"
+TIMED_TRACKS = "the vehicles' tracks with times and depths"
+
+PRODUCTS = {
+    kind.name: kind
+    for kind in (
+        ProductKind(
+            MAP, "tif", "image/tiff; application=geotiff", "Cloud-Optimized GeoTIFF with every layer", _geotiff, {MAP}
+        ),
+        ProductKind(MAP, "nc", "application/x-netcdf", "CF-NetCDF with every layer", _netcdf, {MAP}),
+        ProductKind(
+            MAP, "bag", "application/x-bag", "Bathymetric Attributed Grid: elevation and uncertainty", _bag, {MAP}
+        ),
+        ProductKind(MAP, "xyz", TEXT, "longitude, latitude and depth of every cell", _map_xyz, {MAP}),
+        ProductKind(MAP, "csv", CSV, EVERY_SOUNDING, _soundings_csv, {SOUNDINGS}),
+        ProductKind(MAP, "geojson", GEOJSON, "depth contours, area and tracks", _map_geojson, {MAP, TRACKS}),
+        ProductKind(MAP, "kml", KML, "depth contours", _map_kml, {MAP}),
+        ProductKind(MAP, "png", "image/png", "a picture with axes, colour bar and scale", _picture, {MAP, TRACKS}),
+        ProductKind(MAP, "overlay.png", "image/png", "a bare picture to lay over a web map", _overlay, {MAP}),
+        ProductKind(SOUNDINGS, "csv", CSV, EVERY_SOUNDING, _soundings_csv, {SOUNDINGS}),
+        ProductKind(
+            SOUNDINGS,
+            "xyz",
+            TEXT,
+            "longitude, latitude and corrected depth of accepted soundings",
+            _soundings_xyz,
+            {SOUNDINGS},
+        ),
+        ProductKind(
+            SOUNDINGS,
+            "geojson",
+            GEOJSON,
+            "raw soundings of one vehicle as crowdsourced bathymetry (IHO B-12)",
+            _crowdsourced,
+            {SOUNDINGS},
+            of_vehicle=True,
+        ),
+        ProductKind(TRACKS, "geojson", GEOJSON, TIMED_TRACKS, lambda m, _: tracks_geojson(m.tracks), {TRACKS}),
+        ProductKind(
+            TRACKS, "kml", KML, "the vehicles' tracks", lambda m, _: tracks_kml(m.tracks, title=m.facts.title), {TRACKS}
+        ),
+        ProductKind(
+            TRACKS,
+            "gpx",
+            "application/gpx+xml",
+            TIMED_TRACKS,
+            lambda m, _: tracks_gpx(m.tracks, title=m.facts.title),
+            {TRACKS},
+        ),
+        ProductKind(
+            f"{SEARCH}/obstacles", "geojson", GEOJSON, "obstacles of the search, known and found", _obstacles, {SEARCH}
+        ),
+    )
+}
+"""Every file by its name."""
+
+
+def product_kind(name: str) -> ProductKind:
+    """Return a kind of file by its name. Raises InvalidRequestError when there is none."""
+    if name not in PRODUCTS:
+        raise InvalidRequestError("format", f"there is no format {name!r}", f"use one of {', '.join(PRODUCTS)}")
+    return PRODUCTS[name]
+
+
+def make_product(name: str, material: Material, options: ProductOptions) -> Product:
+    """Return one file. Raises InvalidRequestError for an unknown format or options that cannot be."""
+    kind = product_kind(name)
+    content = kind.make(material, options)
+    part = _only_vehicle(material.soundings, options.vehicle) if kind.of_vehicle else kind.part.removeprefix(MAP)
+    return Product(f"{_slug(material.facts.spec.name)}{part and f'-{part}'}.{kind.extension}", kind.media_type, content)
 
 
 def _slug(name: str) -> str:

@@ -5,12 +5,9 @@ from collections import deque
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from app.arrays import BoolArray
-
-Rows = NDArray[np.float64]
-"""Soundings, shape (n, 4): east, north, depth, standard deviation in metres."""
+from app.mapping.types import SoundingRows
 
 
 @dataclass(frozen=True)
@@ -20,8 +17,8 @@ class Replacement:
     ``soundings`` None: the mission's own stay. ``trusted`` (n,) is True for those that are never taken for outliers.
     """
 
-    soundings: Rows | None
-    prior: Rows
+    soundings: SoundingRows | None
+    prior: SoundingRows
     trusted: BoolArray
 
 
@@ -43,7 +40,7 @@ class MapQueue:
     """
 
     def __init__(self) -> None:
-        self._queue: deque[Rows | Replacement | Pending] = deque()
+        self._queue: deque[SoundingRows | Replacement | Pending] = deque()
         self._lock = threading.Lock()
         self.at_rest = False
         self.replaced = 0
@@ -53,14 +50,14 @@ class MapQueue:
         """Tell whether anything came."""
         return bool(self._queue)
 
-    def add(self, soundings: Rows) -> None:
+    def add(self, soundings: SoundingRows) -> None:
         """Note soundings."""
         if len(soundings):
             with self._lock:
                 self._queue.append(soundings)
                 self.came += len(soundings)
 
-    def replace(self, soundings: Rows, prior: Rows, trusted: BoolArray | None = None) -> None:
+    def replace(self, soundings: SoundingRows, prior: SoundingRows, trusted: BoolArray | None = None) -> None:
         """Take these in place of all soundings so far; ``prior`` are those that were imported."""
         known = np.zeros(len(soundings), dtype=bool) if trusted is None else trusted
         with self._lock:
@@ -69,7 +66,7 @@ class MapQueue:
             self.at_rest = False
             self.replaced += 1
 
-    def replace_prior(self, prior: Rows) -> None:
+    def replace_prior(self, prior: SoundingRows) -> None:
         """Take these in place of all imported soundings so far."""
         with self._lock:
             self._queue.append(Replacement(None, prior, np.zeros(0, dtype=bool)))
@@ -98,7 +95,7 @@ class MapQueue:
             self.at_rest = self.at_rest or not self._queue
             return self.at_rest
 
-    def take(self) -> tuple[list[Rows | Replacement], int] | None:
+    def take(self) -> tuple[list[SoundingRows | Replacement], int] | None:
         """Return what came, and ``replaced`` as of that; None while the soundings are not in memory."""
         with self._lock:
             if self.at_rest:
@@ -108,6 +105,6 @@ class MapQueue:
             self.taken = self.came
             return taken, self.replaced
 
-    def noted(self) -> list[Rows]:
+    def noted(self) -> list[SoundingRows]:
         """Return the soundings that came one by one."""
         return [item for item in self._queue.copy() if isinstance(item, np.ndarray)]

@@ -2,13 +2,15 @@
 
 from collections.abc import Collection
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from app.arrays import FloatArray
 from app.mapping.georeference import LocalFrame
-from app.mapping.layers import Layer
+from app.mapping.layers import Layer, LayerSource
 from app.mapping.products.overlay import overlay_corners
+from app.mapping.s44 import Order
 from app.mapping.vertical import VerticalDatum
 from app.missions.maps.builder import BuiltMap
 from app.missions.maps.live_grid import LiveCells, LiveGrid
@@ -74,25 +76,43 @@ class MapSnapshot:
         """Changes with everything that the map shows."""
         return f"{self.version}.{self.revision}" + ("" if self.live is None else f"@{self.live.version}")
 
-    def view(self, layers: Collection[Layer] = ()) -> MapView:
-        """Return the map as JSON shows it, with the values of further layers."""
+    def source(self, order: Order = Order.ORDER_1A) -> LayerSource:
+        """Return what the map's layers are computed from."""
+        return LayerSource(
+            self.built.map,
+            order,
+            self.facts.common_sd_m,
+            self.facts.spec.accuracy_m,
+            self.reference_m,
+            lambda: None if self.interpolation is None else self.interpolation.map(),
+        )
+
+    def header(self) -> dict[str, Any]:
+        """Return which map it is, where it lies, and what its depths mean and are between."""
         bathymetry = self.built.map
         grid = bathymetry.grid
         depths = bathymetry.depth_m[np.isfinite(bathymetry.depth_m)]
+        return {
+            "version": self.version,
+            "step": self.step,
+            "west_m": grid.west_m,
+            "south_m": grid.south_m,
+            "cell_m": grid.cell_m,
+            "rows": grid.rows,
+            "cols": grid.cols,
+            "corners": overlay_corners(grid, self.facts.frame),
+            "vertical_datum": self.facts.vertical_datum.statement,
+            "min_depth_m": round(float(depths.min()), 3) if depths.size else None,
+            "max_depth_m": round(float(depths.max()), 3) if depths.size else None,
+            "model": bathymetry.model,
+        }
+
+    def view(self, layers: Collection[Layer] = ()) -> MapView:
+        """Return the map as JSON shows it, with the values of further layers."""
+        bathymetry = self.built.map
         return MapView.model_construct(
             mission_id=self.facts.mission_id,
-            version=self.version,
-            step=self.step,
-            west_m=grid.west_m,
-            south_m=grid.south_m,
-            cell_m=grid.cell_m,
-            rows=grid.rows,
-            cols=grid.cols,
-            corners=overlay_corners(grid, self.facts.frame),
-            vertical_datum=self.facts.vertical_datum.statement,
-            min_depth_m=round(float(depths.min()), 3) if depths.size else None,
-            max_depth_m=round(float(depths.max()), 3) if depths.size else None,
-            model=bathymetry.model,
+            **self.header(),
             depth_m=_nullable(bathymetry.depth_m),
             sd_m=_nullable(bathymetry.sd_m),
             count=bathymetry.count.tolist(),

@@ -10,13 +10,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import distance_transform_edt
 
-from app.arrays import BoolArray
-from app.mapping.layers import make_layers
-from app.mapping.products.overlay import overlay_corners
-from app.mapping.s44 import Order
-from app.mapping.types import BathymetricMap
+from app.mapping.layers import LAYERS, SOUNDED, VISIBLE
 from app.missions.maps.live_grid import LiveCells
 from app.missions.maps.snapshot import NOT_MADE, MapSnapshot
 
@@ -24,22 +19,6 @@ MAGIC = b"BFM1"
 TILE = 32
 UNKNOWN = np.int32(-(2**31))
 """Stands for a cell without a value."""
-
-SCALES = {
-    "depth": 100,
-    "uncertainty": 1000,
-    "count": 1,
-    "flags": 1,
-    "slope": 10,
-    "tvu_fraction": 100,
-    "difference": 100,
-}
-"""Whole numbers are sent: a layer's value times this."""
-
-BASE = ("depth", "uncertainty", "count", "flags")
-SOUNDED, PRIOR, ACCURATE, VISIBLE = 1, 2, 4, 8
-"""Bits of the layer ``flags``: sounded; imported soundings in it; known to the asked accuracy and supported by
-soundings; near a sounding."""
 
 KEPT_VERSIONS = 12
 KEPT_ANSWERS = 24
@@ -88,7 +67,7 @@ class TileCache:
             known = self._answers.get(key)
             if known is None:
                 picture = self._picture(snapshot, tag, further)
-                known = _encode(snapshot, picture, self._pictures.get(since), (*BASE, *further))
+                known = _encode(snapshot, picture, self._pictures.get(since), (*_base(), *further))
                 self._answers[key] = known
                 _shorten(self._answers, KEPT_ANSWERS)
             return known
@@ -113,20 +92,25 @@ def _shorten(kept: OrderedDict, most: int) -> None:  # type: ignore[type-arg]
 
 
 def _layers(snapshot: MapSnapshot, further: tuple[str, ...]) -> dict[str, NDArray[np.int32]]:
-    bathymetry, accuracy_m = snapshot.built.map, snapshot.facts.spec.accuracy_m
-    made = make_layers(
-        bathymetry,
-        order=Order.ORDER_1A,
-        common_sd_m=snapshot.facts.common_sd_m,
-        reference_m=snapshot.reference_m,
-    )
-    wanted = {*BASE, *further}
-    found = {layer.name: _whole(layer.values * SCALES[layer.name]) for layer in made if layer.name in wanted}
-    for name in wanted - found.keys() - {"flags"}:
-        # There is nothing to differ from: no cell has a value.
-        found[name] = np.full(bathymetry.depth_m.shape, UNKNOWN, dtype=np.int32)
-    found["flags"] = _flags(bathymetry, accuracy_m)
+    source = snapshot.source()
+    unknown = np.full(source.map.depth_m.shape, np.nan)
+    found = {}
+    for name in (*_base(), *further):
+        # Where there is nothing to differ from, no cell has a value.
+        values = LAYERS[name].compute(source)
+        found[name] = _whole(name, unknown if values is None else values)
     return found
+
+
+def _base() -> list[str]:
+    return [kind.name for kind in LAYERS.values() if kind.in_every_tile]
+
+
+def _scale(name: str) -> int:
+    scale = LAYERS[name].scale
+    if scale is None:
+        raise ValueError(f"tiles do not hold the layer {name!r}")
+    return scale
 
 
 def considered_tag(tag: str) -> str:
@@ -139,7 +123,7 @@ def _with_live_cells(layers: dict[str, NDArray[np.int32]], live: LiveCells) -> d
     found = dict(layers)
     for name, values in (("depth", live.depth_m), ("uncertainty", live.sd_m)):
         found[name] = layers[name].copy()
-        found[name][live.cells] = _whole(values * SCALES[name])
+        found[name][live.cells] = _whole(name, values)
     found["count"], found["flags"] = layers["count"].copy(), layers["flags"].copy()
     found["count"][live.cells] = np.maximum(found["count"][live.cells], live.count)
     flags = np.where(found["flags"][live.cells] == UNKNOWN, 0, found["flags"][live.cells])
@@ -147,34 +131,14 @@ def _with_live_cells(layers: dict[str, NDArray[np.int32]], live: LiveCells) -> d
     return found
 
 
-def _whole(values: NDArray[np.float64]) -> NDArray[np.int32]:
+def _whole(name: str, values: NDArray[np.float64]) -> NDArray[np.int32]:
     known = np.isfinite(values)
-    limits = np.clip(np.round(np.where(known, values, 0.0)), -(2**31) + 1, 2**31 - 1)
+    limits = np.clip(np.round(np.where(known, values * _scale(name), 0.0)), -(2**31) + 1, 2**31 - 1)
     return np.where(known, limits, float(UNKNOWN)).astype(np.int32)
 
 
-def _flags(bathymetry: BathymetricMap, accuracy_m: float) -> NDArray[np.int32]:
-    inside = np.isfinite(bathymetry.depth_m)
-    measured = bathymetry.sounded if bathymetry.prior is None else bathymetry.sounded | bathymetry.prior
-    flags = np.where(bathymetry.sounded, SOUNDED, 0)
-    if bathymetry.prior is not None:
-        flags |= np.where(bathymetry.prior, PRIOR, 0)
-    flags |= np.where(bathymetry.known(accuracy_m), ACCURATE, 0)
-    flags |= np.where(_near(measured, bathymetry.correlation_length_m / bathymetry.grid.cell_m), VISIBLE, 0)
-    return np.where(inside, flags, UNKNOWN).astype(np.int32)
-
-
-def _near(measured: BoolArray, cells: float) -> BoolArray:
-    """Return which cells lie within so many cells of a measured one."""
-    if not measured.any():
-        return np.zeros_like(measured)
-    near: BoolArray = distance_transform_edt(~measured) <= cells
-    return near
-
-
 def _encode(snapshot: MapSnapshot, now: _Picture, before: _Picture | None, names: tuple[str, ...]) -> bytes:
-    bathymetry = snapshot.built.map
-    grid = bathymetry.grid
+    grid = snapshot.built.map.grid
     if before is not None and not set(names) <= before.layers.keys():
         before = None
     across, down = -(-grid.cols // TILE), -(-grid.rows // TILE)
@@ -188,28 +152,16 @@ def _encode(snapshot: MapSnapshot, now: _Picture, before: _Picture | None, names
         for number, place in enumerate(places)
         if before is None or any(not np.array_equal(now.layers[n][place], before.layers[n][place]) for n in names)
     ]
-    depths = bathymetry.depth_m[np.isfinite(bathymetry.depth_m)]
     header = json.dumps(
         {
             "tag": now.tag,
             "base": before.tag if before is not None else None,
-            "version": snapshot.version,
-            "step": snapshot.step,
-            "rows": grid.rows,
-            "cols": grid.cols,
-            "cell_m": grid.cell_m,
-            "west_m": grid.west_m,
-            "south_m": grid.south_m,
-            "corners": overlay_corners(grid, snapshot.facts.frame),
-            "vertical_datum": snapshot.facts.vertical_datum.statement,
-            "min_depth_m": float(depths.min()) if depths.size else None,
-            "max_depth_m": float(depths.max()) if depths.size else None,
-            "model": bathymetry.model,
+            **snapshot.header(),
             "accuracy_m": snapshot.facts.spec.accuracy_m,
             "tile": TILE,
             "tiles": tiles,
             "layers": names,
-            "scales": [SCALES[name] for name in names],
+            "scales": [_scale(name) for name in names],
         }
     ).encode()
     parts = [MAGIC, struct.pack("<I", len(header)), header, b" " * (-(len(header)) % 4)]

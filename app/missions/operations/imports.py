@@ -261,7 +261,7 @@ def _kept(live: LiveMission, table: NDArray[np.float64]) -> tuple[NDArray[np.flo
     near = table[shapely.contains_xy(zone, table[:, 0], table[:, 1])]
     if len(near) <= MAX_PRIOR:
         return near, 0
-    merged, group = merge_soundings(Soundings(*near.T.copy()), live.spec.cell_m)
+    merged, group = merge_soundings(Soundings.of_rows(near), live.spec.cell_m)
     # Errors of one survey belong together: a mean of many is not better known than one of them.
     deviation = np.sqrt(np.bincount(group, near[:, 3] ** 2) / np.bincount(group))
     return np.column_stack([merged.east_m, merged.north_m, merged.depth_m, deviation]), len(near)

@@ -2,6 +2,7 @@
 
 from pydantic import Field
 
+from app.mapping.layers import Fit, Palette
 from app.mapping.s44 import Order
 from app.missions.spec.base import Latitude, Longitude
 from app.missions.views.base import View
@@ -32,6 +33,27 @@ class MapView(View):
     layers: dict[str, list[list[float | None]]] = Field(
         default_factory=dict, description="Further layers that were asked for, by name"
     )
+
+
+class LayerView(View):
+    """A layer of the map: what its values say and how it is shown."""
+
+    name: str
+    title: str
+    meaning: str = Field(description="What its values say, compared with Order 1a where with one of IHO S-44")
+    unit: str = Field(description="By its name in UDUNITS; 1: a number")
+    palette: Palette
+    fit: Fit
+    range: tuple[float, float] | None = Field(
+        description="Values of the first and the last colour; null: they follow the data as `fit` says"
+    )
+    scale: int | None = Field(description="Tiles hold whole numbers, the value times this; null: no tile has it")
+    in_every_tile: bool = Field(description="Tiles have it without being asked for it by `layer`")
+    in_json: bool = Field(description="The map's JSON has it when asked for it by `layer`")
+    in_pictures: bool = Field(description="It can be seen as `map.overlay.png`")
+    in_files: bool = Field(description="Files with every layer have it")
+    absence: str = Field(description="Why a mission may have no such layer; empty: each has it")
+    remedy: str
 
 
 class ConformityView(View):

@@ -1,4 +1,5 @@
-import "./style.css";
+import "./base.css";
+import "./ui/common.css";
 import { effect } from "@preact/signals";
 import { render } from "preact";
 import { startSession } from "./state/session";

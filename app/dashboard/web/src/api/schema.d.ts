@@ -704,6 +704,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/layers": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * List the layers of maps
+         * @description Return every layer that a map may have: what its values say, in which colours, and where it can be had.
+         */
+        get: operations["listLayers"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/missions/{mission_id}/soundings": {
         parameters: {
             query?: never;
@@ -1456,6 +1476,12 @@ export interface components {
             remedy: string;
         };
         /**
+         * Fit
+         * @description How a range of colours follows the values: from the least, from zero, or as far below zero as above.
+         * @enum {string}
+         */
+        Fit: "data" | "from_zero" | "about_zero";
+        /**
          * ForecastRange
          * @description From where to where a figure went, over floors of different roughness: 10 % were below, 10 % above.
          */
@@ -1603,6 +1629,68 @@ export interface components {
          * @enum {string}
          */
         LayerName: "uncertainty" | "count" | "sounded" | "slope" | "tvu_fraction" | "difference" | "live";
+        /**
+         * LayerView
+         * @description A layer of the map: what its values say and how it is shown.
+         */
+        LayerView: {
+            /** Name */
+            name: string;
+            /** Title */
+            title: string;
+            /**
+             * Meaning
+             * @description What its values say, compared with Order 1a where with one of IHO S-44
+             */
+            meaning: string;
+            /**
+             * Unit
+             * @description By its name in UDUNITS; 1: a number
+             */
+            unit: string;
+            palette: components["schemas"]["Palette"];
+            fit: components["schemas"]["Fit"];
+            /**
+             * Range
+             * @description Values of the first and the last colour; null: they follow the data as `fit` says
+             */
+            range: [
+                number,
+                number
+            ] | null;
+            /**
+             * Scale
+             * @description Tiles hold whole numbers, the value times this; null: no tile has it
+             */
+            scale: number | null;
+            /**
+             * In Every Tile
+             * @description Tiles have it without being asked for it by `layer`
+             */
+            in_every_tile: boolean;
+            /**
+             * In Json
+             * @description The map's JSON has it when asked for it by `layer`
+             */
+            in_json: boolean;
+            /**
+             * In Pictures
+             * @description It can be seen as `map.overlay.png`
+             */
+            in_pictures: boolean;
+            /**
+             * In Files
+             * @description Files with every layer have it
+             */
+            in_files: boolean;
+            /**
+             * Absence
+             * @description Why a mission may have no such layer; empty: each has it
+             */
+            absence: string;
+            /** Remedy */
+            remedy: string;
+        };
         /**
          * Level
          * @description How much an event matters.
@@ -2194,6 +2282,12 @@ export interface components {
          * @enum {string}
          */
         OverlayLayer: "depth" | "uncertainty" | "count" | "slope" | "tvu_fraction" | "difference" | "live";
+        /**
+         * Palette
+         * @description Colours of the dashboard's map.
+         * @enum {string}
+         */
+        Palette: "deep" | "violet" | "matter" | "balance" | "landmarks";
         /**
          * PcaoModel
          * @description A controller that ``bathyfleet train`` wrote.
@@ -7537,6 +7631,53 @@ export interface operations {
             };
             /** @description Some values cannot be taken */
             422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too many requests */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    listLayers: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["LayerView"][];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
                 headers: {
                     [name: string]: unknown;
                 };

@@ -38,6 +38,7 @@ export type CheckStatus = Schemas["CheckStatus"];
 export type SoundingView = Complete<Schemas["SoundingView"]>;
 export type SoundingPage = Complete<Schemas["SoundingPage"]>;
 export type SoundingState = Schemas["SoundingState"];
+export type LayerView = Complete<Schemas["LayerView"]>;
 export type ProductView = Complete<Schemas["ProductView"]>;
 export type QualityView = Complete<Schemas["QualityView"]>;
 export type PlannerView = Complete<Schemas["PlannerView"]>;

@@ -1,7 +1,6 @@
 /** Turns a layer into a picture, with stripes where cells were filled in between soundings. Pure; runs in a worker. */
 
-import { landmarkState } from "./layers";
-import { LANDMARK_COLOURS } from "./palette";
+import { LANDMARK_COLOURS, landmarkState } from "./landmarks";
 import { UNKNOWN } from "./seafloor";
 
 export interface Painting {

@@ -1,5 +1,7 @@
 /** Colour scales for grids. */
 
+import type { LayerView } from "../api/types";
+
 export type Rgb = readonly [number, number, number];
 
 export interface Palette {
@@ -24,7 +26,7 @@ export const DEEP = palette(
 );
 
 /** One hue for uncertainty: the paler, the better known. */
-export const VIOLET = palette("fbf7fd f1e6f7 e3cef0 d1b1e6 bc90da a56fcb 8c50b8 72369f 582183 3f1064");
+const VIOLET = palette("fbf7fd f1e6f7 e3cef0 d1b1e6 bc90da a56fcb 8c50b8 72369f 582183 3f1064");
 
 const HALINE = palette(
   "fdef9a e3e67e c4dd65 9ed65c 7acb67 61bf74 50b07e 44a284 3c9387 338588 297789 1c6a8c 0f5b90 0f4a98 2034a2 2e1d93 2a186c",
@@ -51,21 +53,22 @@ export const DEPTH_PALETTES = {
 export type DepthPalette = keyof typeof DEPTH_PALETTES;
 
 /** cmocean "matter", for counts and slopes. */
-export const MATTER = palette(
+const MATTER = palette(
   "feedb0 fbd79b f9c187 f6ab76 f29567 ed7f5b e66a54 dc5553 ce4356 be355c ab2960 972163 821c63 6d195e 571756 42144b 2f0f3e",
 );
 
 /** cmocean "balance", for differences: zero is pale, shallower than the reference blue, deeper red. */
-export const BALANCE = palette(
+const BALANCE = palette(
   "181c43 263276 2548b0 0f6abd 3888ba 65a2bc 98bac5 c7d2d7 f1eceb e2c7be d7a290 cc7d63 bf573a ae2e24 8d1029 630e23 3c0912",
 );
 
-/** Landmarks as in the papers' figure: never seen, visible, accurate. */
-export const LANDMARK_COLOURS: readonly Rgb[] = [
-  [176, 58, 46],
-  [244, 196, 80],
-  [46, 125, 110],
-];
+/** The palettes that layers name beside that of depths; null: the layer is drawn by classes. */
+export const PALETTES: Readonly<Record<Exclude<LayerView["palette"], "deep">, Palette | null>> = {
+  violet: VIOLET,
+  matter: MATTER,
+  balance: BALANCE,
+  landmarks: null,
+};
 
 /** The colour of a value between `low` and `high`; values outside take the end's colour. */
 export function colourAt({ stops }: Palette, value: number, low: number, high: number): Rgb {

@@ -1,7 +1,8 @@
 import { describe, expect, it } from "vitest";
-import type { LngLat } from "../api/types";
+import type { LayerView, LngLat } from "../api/types";
 import { contours } from "./contours";
-import { fittingRange, landmarkShares, shareOutside } from "./layers";
+import { landmarkShares } from "./landmarks";
+import { fittingRange, shareOutside } from "./layers";
 import { magnification, paint } from "./paint";
 import { colourAt, DEEP, lookupTable, roundRange } from "./palette";
 import { differenceOf, placeIn, readCell, type SeaFloor, UNKNOWN, valueAt, withTiles } from "./seafloor";
@@ -123,15 +124,35 @@ it("compares two maps where both know the bottom", () => {
   ).toBeNull();
 });
 
+const layer = (name: string, changes: Partial<LayerView> = {}): LayerView => ({
+  name,
+  title: name,
+  meaning: "",
+  unit: "metre",
+  palette: "deep",
+  fit: "data",
+  range: null,
+  scale: 100,
+  in_every_tile: true,
+  in_json: true,
+  in_pictures: true,
+  in_files: true,
+  absence: "",
+  remedy: "",
+  ...changes,
+});
+
 describe("ranges", () => {
-  it("hold all values with pleasant ends; deviations begin at zero", () => {
-    expect(fittingRange(whole(), "depth")).toEqual({ low: 1, high: 6 });
-    expect(fittingRange(whole(), "uncertainty")?.low).toBe(0);
-    expect(fittingRange(whole(), "difference")).toBeNull();
+  it("hold all values with pleasant ends, from where the layer says, unless they are fixed", () => {
+    expect(fittingRange(whole(), layer("depth"))).toEqual({ low: 1, high: 6 });
+    expect(fittingRange(whole(), layer("uncertainty", { fit: "from_zero" }))?.low).toBe(0);
+    expect(fittingRange(whole(), layer("depth", { fit: "about_zero" }))).toEqual({ low: -6, high: 6 });
+    expect(fittingRange(whole(), layer("flags", { range: [0, 2] }))).toEqual({ low: 0, high: 2 });
+    expect(fittingRange(whole(), layer("difference"))).toBeNull();
   });
 
   it("tell how much of the map lies outside", () => {
-    expect(shareOutside(whole(), "depth", { low: 1.5, high: 5 })).toBeCloseTo(2 / 6);
+    expect(shareOutside(whole(), layer("depth"), { low: 1.5, high: 5 })).toBeCloseTo(2 / 6);
   });
 
   it("are one, two or five times a power of ten apart", () => {

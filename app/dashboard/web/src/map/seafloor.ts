@@ -2,8 +2,6 @@
 
 import type { LngLat, Place } from "../api/types";
 
-export type LayerName = "depth" | "uncertainty" | "count" | "flags" | "slope" | "tvu_fraction" | "difference";
-
 export const SOUNDED = 1;
 export const PRIOR = 2;
 export const ACCURATE = 4;
@@ -28,14 +26,14 @@ interface Header {
   accuracy_m: number;
   tile: number;
   tiles: number[];
-  layers: LayerName[];
+  layers: string[];
   scales: number[];
 }
 
 /** Row 0 is south, column 0 is west; a value is a layer's number divided by its scale. */
 export interface SeaFloor extends Omit<Header, "tiles" | "base" | "layers" | "scales"> {
-  layers: Readonly<Partial<Record<LayerName, Int32Array<ArrayBuffer>>>>;
-  scales: Readonly<Partial<Record<LayerName, number>>>;
+  layers: Readonly<Partial<Record<string, Int32Array<ArrayBuffer>>>>;
+  scales: Readonly<Partial<Record<string, number>>>;
 }
 
 /** Puts an answer of the service over what was known; null when it builds on something else than that. */
@@ -48,7 +46,7 @@ export function withTiles(known: SeaFloor | null, answer: ArrayBuffer): SeaFloor
   const { tiles, base, layers: names, scales, ...rest } = header;
   if (base !== null && base !== known?.tag) return null;
   const size = header.rows * header.cols;
-  const layers: Partial<Record<LayerName, Int32Array<ArrayBuffer>>> = {};
+  const layers: Partial<Record<string, Int32Array<ArrayBuffer>>> = {};
   for (const name of names) {
     const before = base === null ? undefined : known?.layers[name];
     if (base !== null && !before) return null;
@@ -74,7 +72,7 @@ export function withTiles(known: SeaFloor | null, answer: ArrayBuffer): SeaFloor
 }
 
 /** A layer's value in a cell; null where there is none. */
-export function valueAt(map: SeaFloor, layer: LayerName, row: number, col: number): number | null {
+export function valueAt(map: SeaFloor, layer: string, row: number, col: number): number | null {
   if (row < 0 || col < 0 || row >= map.rows || col >= map.cols) return null;
   const value = map.layers[layer]?.[row * map.cols + col];
   return value === undefined || value === UNKNOWN ? null : value / (map.scales[layer] ?? 1);

@@ -11,6 +11,7 @@ import { EMPTY_VIEW, reduce, withEvents, withMission } from "./live";
 import {
   fleet,
   furtherLayers,
+  layers,
   missions,
   now,
   replayStep,
@@ -67,7 +68,13 @@ async function refreshForever(): Promise<never> {
 export async function refresh(): Promise<void> {
   try {
     if (!me.peek()) await identify();
-    const [list, vehicles] = await Promise.all([api.missions(), api.vehicles()]);
+    const known = layers.peek();
+    const [list, vehicles, declared] = await Promise.all([
+      api.missions(),
+      api.vehicles(),
+      known.length > 0 ? known : api.layers(),
+    ]);
+    layers.value = declared;
     missions.value = list;
     fleet.value = vehicles;
     serviceFault.value = null;

@@ -4,6 +4,7 @@ import { computed, effect, signal } from "@preact/signals";
 import type { ServiceError } from "../api/client";
 import type { SocketStatus } from "../api/socket";
 import type {
+  LayerView,
   LngLat,
   MissionSummary,
   MissionView,
@@ -15,7 +16,7 @@ import type {
   WaypointView,
 } from "../api/types";
 import { kept } from "../kept";
-import { fittingRange, KINDS, type Range, type Shown } from "../map/layers";
+import { fittingRange, type Range } from "../map/layers";
 import { type DepthPalette, vehicleColour } from "../map/palette";
 import type { SeaFloor } from "../map/seafloor";
 import type { SearchMark, Site } from "../map/site";
@@ -118,8 +119,16 @@ matchMedia("(prefers-color-scheme: dark)").addEventListener("change", (e) => {
 });
 export const isDark = computed(() => (theme.value === "system" ? systemDark.value : theme.value === "dark"));
 
-/** What the map shows. */
-export const layer = signal<Shown>("depth");
+/** What maps can show, as the service says; empty until its first answer. */
+export const layers = signal<readonly LayerView[]>([]);
+/** Name of what the map shows. */
+export const layer = signal("depth");
+export const shownLayer = computed(() => layerNamed(layer.value));
+
+export function layerNamed(name: string): LayerView | undefined {
+  return layers.value.find((one) => one.name === name);
+}
+
 export const depthPalette = kept<DepthPalette>("palette", "deep");
 export const showHatching = kept("hatching", true);
 export const showContours = kept("contours", true);
@@ -128,15 +137,17 @@ export const showRanges = kept("com-range", false);
 export const showSite = kept("site", true);
 export const showTargets = kept("targets", true);
 /** Ranges that the operator fixed, for each layer; a layer without one takes a fitting range. */
-export const fixedRanges = kept<Partial<Record<Shown, Range>>>("ranges", {});
-export const shownRange = computed<Range | null>(() => {
-  const fixed = fixedRanges.value[layer.value];
-  if (fixed) return fixed;
-  return seaFloor.value ? fittingRange(seaFloor.value, layer.value) : null;
-});
+export const fixedRanges = kept<Partial<Record<string, Range>>>("ranges", {});
+export const shownRange = computed(() => rangeOf(layer.value));
+
+export function rangeOf(name: string): Range | null {
+  const kind = layerNamed(name);
+  return fixedRanges.value[name] ?? (seaFloor.value && kind ? fittingRange(seaFloor.value, kind) : null);
+}
+
 /** Layers that the service has to be asked for beside the usual ones. */
 export const furtherLayers = computed<readonly string[]>(() =>
-  KINDS[layer.value].further ? [KINDS[layer.value].source] : [],
+  shownLayer.value && !shownLayer.value.in_every_tile ? [layer.value] : [],
 );
 
 export const coordinateFormat = kept<CoordinateFormat>("coordinates", "decimal");

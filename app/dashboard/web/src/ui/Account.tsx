@@ -1,3 +1,4 @@
+import "./Account.css";
 import { useSignal } from "@preact/signals";
 import { ServiceError } from "../api/client";
 import { me, signedOut, signIn, signOut, whyNotCommand } from "../state/access";

@@ -1,3 +1,4 @@
+import "./App.css";
 import { useEffect, useRef } from "preact/hooks";
 import { signedOut } from "../state/access";
 import { dialogOpen, in3d, mission, panelOpen, stripHeight } from "../state/store";

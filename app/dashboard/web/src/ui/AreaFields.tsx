@@ -1,3 +1,4 @@
+import "./AreaFields.css";
 import { useSignal } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
 import type { LngLat } from "../api/types";

@@ -1,3 +1,4 @@
+import "./BottomStrip.css";
 import type { ComponentChildren } from "preact";
 import { useEffect, useRef } from "preact/hooks";
 import { count, distance, metres, percent } from "../state/format";

@@ -1,3 +1,4 @@
+import "./ChartPane.css";
 import { useSignal } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
 import type { Chart, GridFrame } from "../map/chart";

@@ -1,3 +1,4 @@
+import "./Charts.css";
 import { useComputed, useSignal, useSignalEffect } from "@preact/signals";
 import { figuresOf } from "../state/history";
 import { fetchSteps, fetchTelemetry, noteFault } from "../state/session";

@@ -1,3 +1,4 @@
+import "./Compare.css";
 import { useSignal, useSignalEffect } from "@preact/signals";
 import { api } from "../api/client";
 import type { MissionView, StepView } from "../api/types";

@@ -3,6 +3,7 @@
  * whatever is open.
  */
 
+import "./Dialog.css";
 import type { ComponentChildren } from "preact";
 import { useEffect, useRef } from "preact/hooks";
 

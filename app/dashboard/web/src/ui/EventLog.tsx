@@ -1,3 +1,4 @@
+import "./EventLog.css";
 import { useComputed, useSignal } from "@preact/signals";
 import { api } from "../api/client";
 import type { Level } from "../api/types";

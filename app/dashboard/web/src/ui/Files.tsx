@@ -1,8 +1,9 @@
+import "./Files.css";
 import { useComputed, useSignal, useSignalEffect } from "@preact/signals";
 import { api, ServiceError } from "../api/client";
 import type { ProductView, QualityView } from "../api/types";
 import { duration, megabytes } from "../state/format";
-import { mission, now, selectedId, view } from "../state/store";
+import { now, selectedId, view } from "../state/store";
 
 /** A file that is on its way. */
 interface Making {
@@ -45,11 +46,6 @@ export function Files() {
     );
   });
 
-  const offered = useComputed(() => {
-    const id = selectedId.value;
-    return id && mission.value?.spec.search ? [...products.value, obstaclesOf(id)] : products.value;
-  });
-
   const download = async (product: ProductView) => {
     const note = (received: number) => {
       const since = making.peek()[product.name]?.since ?? Date.now();
@@ -82,7 +78,7 @@ export function Files() {
       ) : null}
       <Quality found={quality.value} />
       <ul>
-        {offered.value.map((product) => (
+        {products.value.map((product) => (
           <li key={product.name}>
             <button
               type="button"
@@ -111,17 +107,6 @@ function Progress({ making: { since, received } }: { making: Making }) {
       {received === 0 ? `being made, ${duration(seconds)}` : `${megabytes(received)} received`}
     </small>
   );
-}
-
-/** What a search alone has to offer. */
-function obstaclesOf(id: string): ProductView {
-  return {
-    name: "obstacles.geojson",
-    title: "Obstacles of the search, known and found",
-    media_type: "application/geo+json",
-    href: `/api/v1/missions/${encodeURIComponent(id)}/search/obstacles.geojson`,
-    needs_map: false,
-  };
 }
 
 function Quality({ found }: { found: QualityView | null }) {

@@ -1,3 +1,4 @@
+import "./FinishDialog.css";
 import { useSignal } from "@preact/signals";
 import { useEffect } from "preact/hooks";
 import type { StopView } from "../api/types";

@@ -1,3 +1,4 @@
+import "./FleetDialog.css";
 import type { VehicleView } from "../api/types";
 import { age, metres, percent, place } from "../state/format";
 import { coordinateFormat, fleet, fleetOpen, missions } from "../state/store";

@@ -1,3 +1,4 @@
+import "./Forecast.css";
 import { useSignal } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
 import type { ForecastView } from "../api/types";

@@ -1,27 +1,23 @@
+import "./Legend.css";
 import { type Signal, useSignal } from "@preact/signals";
 import type { ComponentChildren } from "preact";
 import { useEffect, useRef } from "preact/hooks";
-import {
-  KINDS,
-  LANDMARK_COLOURS,
-  LANDMARK_WORDS,
-  landmarkShares,
-  paletteOf,
-  type Range,
-  rangeFault,
-  type Shown,
-  shareOutside,
-} from "../map/layers";
-import { DEPTH_PALETTES, type DepthPalette } from "../map/palette";
+import type { LayerView } from "../api/types";
+import { LANDMARK_COLOURS, LANDMARK_WORDS, landmarkShares } from "../map/landmarks";
+import { paletteOf, type Range, rangeFault, shareOutside, symbolOf } from "../map/layers";
+import { DEPTH_PALETTES, type DepthPalette, type Palette } from "../map/palette";
+import type { SeaFloor } from "../map/seafloor";
 import { SITE_COLOURS, SITE_WORDS } from "../map/site";
 import {
   depthPalette,
   fixedRanges,
   layer,
+  layers,
   mission,
   seaFloor,
   showContours,
   showHatching,
+  shownLayer,
   shownRange,
   showSite,
   site,
@@ -31,7 +27,9 @@ import {
 export function Legend() {
   const map = seaFloor.value;
   const range = shownRange.value;
-  if (!mission.value) return null;
+  const shown = shownLayer.value;
+  if (!mission.value || !shown) return null;
+  const palette = paletteOf(shown, depthPalette.value);
   return (
     <section class="legend" aria-label="Map layer and legend">
       <label class="layer-choice">
@@ -39,57 +37,59 @@ export function Legend() {
         <select
           value={layer.value}
           data-testid="layer"
-          title={KINDS[layer.value].meaning}
+          title={sentence(shown.meaning)}
           onChange={(event) => {
-            layer.value = event.currentTarget.value as Shown;
+            layer.value = event.currentTarget.value;
           }}
         >
-          {Object.entries(KINDS).map(([name, { title }]) => (
-            <option key={name} value={name}>
-              {title}
-            </option>
-          ))}
+          {layers.value
+            .filter(({ scale }) => scale !== null)
+            .map(({ name, title }) => (
+              <option key={name} value={name}>
+                {title}
+              </option>
+            ))}
         </select>
       </label>
       {map && range ? (
-        layer.value === "landmarks" ? (
-          <Landmarks />
+        palette ? (
+          <Scale shown={shown} palette={palette} range={range} />
         ) : (
-          <Scale range={range} />
+          <Landmarks />
         )
       ) : (
-        <p class="empty">{map ? missing(layer.value) : "The sea floor appears with the first soundings"}</p>
+        <p class="empty">{map ? missing(map, shown) : "The sea floor appears with the first soundings"}</p>
       )}
-      {map ? <Options /> : null}
+      {map ? <Options shown={shown} /> : null}
       {site.value && showSite.value ? <SiteStates /> : null}
     </section>
   );
 }
 
-function missing(shown: Shown): string {
-  return shown === "difference"
-    ? "There is no reference grid to differ from: send one (PUT …/reference)"
-    : "This layer is on its way";
+function missing(map: SeaFloor, { name, absence, remedy }: LayerView): string {
+  return absence && map.layers[name] ? `${sentence(absence)}. ${remedy}` : "This layer is on its way";
 }
 
-function Scale({ range }: { range: Range }) {
-  const { title, unit } = KINDS[layer.value];
+const sentence = (words: string) => words.charAt(0).toUpperCase() + words.slice(1);
+
+function Scale({ shown, palette, range }: { shown: LayerView; palette: Palette; range: Range }) {
+  const unit = symbolOf(shown);
   const map = seaFloor.value;
-  const fixed = fixedRanges.value[layer.value] !== undefined;
+  const fixed = fixedRanges.value[shown.name] !== undefined;
   const setRange = (next: Range | undefined) => {
-    const { [layer.value]: _, ...others } = fixedRanges.value;
-    fixedRanges.value = next ? { ...others, [layer.value]: next } : others;
+    const { [shown.name]: _, ...others } = fixedRanges.value;
+    fixedRanges.value = next ? { ...others, [shown.name]: next } : others;
   };
   return (
     <>
       <div class="range-row">
-        <RangeInputs range={range} onChange={setRange} key={layer.value}>
+        <RangeInputs range={range} onChange={setRange} key={shown.name}>
           <div
             class="scale"
             role="img"
-            aria-label={`${title} from ${range.low} to ${range.high} ${unit}`}
+            aria-label={`${shown.title} from ${range.low} to ${range.high} ${unit}`}
             style={{
-              background: `linear-gradient(to right, ${paletteOf(layer.value, depthPalette.value).css})`,
+              background: `linear-gradient(to right, ${palette.css})`,
             }}
           />
         </RangeInputs>
@@ -116,7 +116,7 @@ function Scale({ range }: { range: Range }) {
             Keep range
           </button>
         )}
-        {fixed && map ? <Outside share={shareOutside(map, layer.value, range)} /> : null}
+        {fixed && map ? <Outside share={shareOutside(map, shown, range)} /> : null}
       </span>
     </>
   );
@@ -151,10 +151,10 @@ function SiteStates() {
   );
 }
 
-function Options() {
+function Options({ shown }: { shown: LayerView }) {
   return (
     <>
-      {layer.value === "depth" ? (
+      {shown.palette === "deep" ? (
         <label>
           <span class="visually-hidden">Colours of depths</span>
           <select

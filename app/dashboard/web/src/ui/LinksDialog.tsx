@@ -1,3 +1,4 @@
+import "./LinksDialog.css";
 import { useSignal } from "@preact/signals";
 import { useEffect } from "preact/hooks";
 import { api, ServiceError } from "../api/client";

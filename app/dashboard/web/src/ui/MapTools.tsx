@@ -1,3 +1,4 @@
+import "./MapTools.css";
 import type { ComponentChildren } from "preact";
 import { wayBetween } from "../map/geo";
 import { distance } from "../state/format";

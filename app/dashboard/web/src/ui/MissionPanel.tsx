@@ -1,3 +1,4 @@
+import "./MissionPanel.css";
 import { useSignal } from "@preact/signals";
 import type { MissionSummary } from "../api/types";
 import { whyNotCommand } from "../state/access";

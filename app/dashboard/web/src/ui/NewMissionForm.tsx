@@ -1,3 +1,4 @@
+import "./NewMissionForm.css";
 import { useSignal, useSignalEffect } from "@preact/signals";
 import { useEffect } from "preact/hooks";
 import { api, ServiceError } from "../api/client";

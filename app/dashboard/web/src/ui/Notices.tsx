@@ -1,3 +1,4 @@
+import "./Notices.css";
 import { useSignal } from "@preact/signals";
 import { signedOut, whyNotCommand } from "../state/access";
 import { emptyDraft, toMission } from "../state/draft";

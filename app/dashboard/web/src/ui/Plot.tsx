@@ -1,3 +1,4 @@
+import "./Plot.css";
 import "uplot/dist/uPlot.min.css";
 import { useEffect, useRef } from "preact/hooks";
 import uPlot from "uplot";

@@ -1,3 +1,4 @@
+import "./PreflightDialog.css";
 import { useSignal } from "@preact/signals";
 import { useEffect } from "preact/hooks";
 import { api } from "../api/client";

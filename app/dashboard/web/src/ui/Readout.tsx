@@ -1,3 +1,4 @@
+import "./Readout.css";
 import { readCell } from "../map/seafloor";
 import { metres, place } from "../state/format";
 import { coordinateFormat, cursor, seaFloor } from "../state/store";

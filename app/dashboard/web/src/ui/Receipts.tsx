@@ -1,3 +1,4 @@
+import "./Receipts.css";
 import type { StopView } from "../api/types";
 
 /** What every vehicle answered to a stop, and what to do about one that did not. */

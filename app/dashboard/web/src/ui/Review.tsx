@@ -1,3 +1,4 @@
+import "./Review.css";
 import { useComputed, useSignal, useSignalEffect } from "@preact/signals";
 import { useEffect } from "preact/hooks";
 import { api } from "../api/client";

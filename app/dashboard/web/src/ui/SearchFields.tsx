@@ -1,3 +1,4 @@
+import "./SearchFields.css";
 import { useSignal } from "@preact/signals";
 import { useEffect } from "preact/hooks";
 import { areasIn } from "../map/area";

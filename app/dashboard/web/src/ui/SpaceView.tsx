@@ -1,10 +1,10 @@
+import "./SpaceView.css";
 import { effect, useSignal } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
-import { fittingRange } from "../map/layers";
 import { DEPTH_PALETTES } from "../map/palette";
 import type { SceneVehicle } from "../map/scene";
 import { replayed } from "../state/replay";
-import { depthPalette, fixedRanges, in3d, isDark, seaFloor, theme, vehicles, view } from "../state/store";
+import { depthPalette, in3d, isDark, rangeOf, seaFloor, theme, vehicles, view } from "../state/store";
 
 /** The sea floor in space over the whole map. */
 export function SpaceView() {
@@ -33,7 +33,7 @@ export function SpaceView() {
           effect(() => scene.setExaggeration(exaggeration.value)),
           effect(() => {
             const map = seaFloor.value;
-            const range = map && (fixedRanges.value.depth ?? fittingRange(map, "depth"));
+            const range = rangeOf("depth");
             if (map && range) {
               scene.setSeaFloor(map, DEPTH_PALETTES[depthPalette.value].palette, range.low, range.high);
             }

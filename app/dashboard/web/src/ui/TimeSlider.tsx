@@ -1,3 +1,4 @@
+import "./TimeSlider.css";
 import { whyNotCommand } from "../state/access";
 import { clock } from "../state/format";
 import { pace, playing, replay, showPresent } from "../state/replay";

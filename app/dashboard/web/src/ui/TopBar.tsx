@@ -1,3 +1,4 @@
+import "./TopBar.css";
 import type { MissionAction } from "../api/types";
 import { whyNotCommand } from "../state/access";
 import { age, clock, duration } from "../state/format";

@@ -1,3 +1,4 @@
+import "./VehicleCards.css";
 import { whyNotCommand } from "../state/access";
 import { age, clock, metres, percent } from "../state/format";
 import { localizationWords } from "../state/localization";

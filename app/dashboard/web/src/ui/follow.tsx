@@ -5,7 +5,7 @@ import { render } from "preact";
 import type { LngLat, Place, WaypointView } from "../api/types";
 import type { Chart, Padding, Pin } from "../map/chart";
 import { contourInterval } from "../map/contours";
-import { KINDS, paletteOf } from "../map/layers";
+import { paletteOf } from "../map/layers";
 import type { Route, Track } from "../map/marks";
 import { Painter } from "../map/painter";
 import { lookupTable } from "../map/palette";
@@ -24,7 +24,6 @@ import {
   editing,
   editingReady,
   isDark,
-  layer,
   measured,
   mission,
   replayStep,
@@ -32,6 +31,7 @@ import {
   seaFloor,
   showContours,
   showHatching,
+  shownLayer,
   shownRange,
   showRanges,
   showSite,
@@ -193,12 +193,11 @@ function followSeaFloor(chart: Chart): () => void {
   const stop = effect(() => {
     map = seaFloor.value;
     const range = shownRange.value;
-    const { source } = KINDS[layer.value];
-    const values = map?.layers[source];
+    const shown = shownLayer.value;
+    const values = shown && map?.layers[shown.name];
     const { flags, depth } = map?.layers ?? {};
     const hatched = showHatching.value;
-    const table =
-      layer.value === "landmarks" ? null : lookupTable(paletteOf(layer.value, depthPalette.value));
+    const palette = shown && paletteOf(shown, depthPalette.value);
     const wanted = showContours.value;
     if (!map || !range || !values || !flags || !depth) {
       painter.forget();
@@ -207,7 +206,7 @@ function followSeaFloor(chart: Chart): () => void {
     }
     scale = map.scales.depth ?? 1;
     interval = Math.round(contourInterval(map.min_depth_m ?? 0, map.max_depth_m ?? 1) * scale) || 1;
-    const layerScale = map.scales[source] ?? 1;
+    const layerScale = map.scales[shown.name] ?? 1;
     painter.paint({
       painting: {
         rows: map.rows,
@@ -216,7 +215,7 @@ function followSeaFloor(chart: Chart): () => void {
         flags,
         low: range.low * layerScale,
         high: range.high * layerScale,
-        table,
+        table: palette ? lookupTable(palette) : null,
         hatched,
       },
       contours: wanted ? { depths: depth, interval } : null,

@@ -1,5 +1,6 @@
 /** Vehicles and waypoints as shapes on the map. */
 
+import "./marks.css";
 import type { LngLat, WaypointStatus, WaypointView } from "../api/types";
 import { wayBetween } from "../map/geo";
 import { age } from "../state/format";
