@@ -36,7 +36,7 @@ export function AbortDialog() {
   };
   const what = only ? `abort of ${only}` : "abort";
   const refused = refusal.value?.what === what ? refusal.value.error : null;
-  const again = only !== null && mission.value !== null && hasEnded(mission.value.state);
+  const again = only !== null && mission.value !== null && hasEnded(mission.value);
   const name = only ?? mission.value?.name ?? "the mission";
   const asked = !open
     ? []

@@ -22,7 +22,7 @@ export function Charts() {
   // The view changes several times a second; steps and samples seldom.
   const step = useComputed(() => mission.value?.progress.step);
   const samples = useComputed(() => view.value.samples);
-  const ended = useComputed(() => mission.value !== null && hasEnded(mission.value.state));
+  const ended = useComputed(() => mission.value !== null && hasEnded(mission.value));
   useSignalEffect(() => {
     step.value;
     fetchSteps().catch(noteFault);

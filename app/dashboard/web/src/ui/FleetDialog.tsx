@@ -1,7 +1,7 @@
 import type { VehicleView } from "../api/types";
-import { age, metres, percent, place } from "../state/format";
+import { age, metres, place } from "../state/format";
 import { coordinateFormat, fleet, fleetOpen, missions } from "../state/store";
-import { vehicleState } from "../state/words";
+import { batteryWords, vehicleState } from "../state/words";
 import { Dialog } from "./Dialog";
 
 /** Every vehicle that the service knows of, in a mission or not, one a line. */
@@ -74,7 +74,7 @@ function Line({ vehicle: v }: { vehicle: VehicleView }) {
         {v.mission_id === null ? "free" : <a href={`#/missions/${v.mission_id}`}>{name ?? "shown below"}</a>}
       </td>
       <td>{age(v.age_s)}</td>
-      <td>{percent(v.battery_pct)}</td>
+      <td>{batteryWords(v)}</td>
       <td>{metres(v.depth_m)}</td>
       <td>{metres(v.altitude_m)}</td>
       <td>{v.speed_mps === null ? "–" : `${v.speed_mps.toFixed(1)} m/s`}</td>

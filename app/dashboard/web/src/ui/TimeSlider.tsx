@@ -11,7 +11,7 @@ export function TimeSlider() {
   const { step: last, steps: planned } = present.progress;
   const shown = replayStep.value;
   const past = steps.value.find((s) => s.number === shown);
-  const over = hasEnded(present.state);
+  const over = hasEnded(present);
   return (
     <div class={`timeline${shown === null ? "" : " past"}`}>
       <span class="steps">
@@ -52,7 +52,7 @@ export function TimeSlider() {
       {shown === null ? (
         <>
           <span class="when">{over ? "as it ended" : "live"}</span>
-          {isAllowed("finish", present.state) ? (
+          {isAllowed("finish", present) ? (
             <button
               type="button"
               class="command finish"

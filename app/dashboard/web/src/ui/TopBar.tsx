@@ -81,13 +81,13 @@ export function TopBar() {
         type="button"
         class="abort"
         data-testid="abort"
-        disabled={!present || !isAllowed("abort", present.state) || whyNotCommand.value !== ""}
+        disabled={!present || !isAllowed("abort", present) || whyNotCommand.value !== ""}
         title={
           !present
             ? "No mission is chosen"
             : whyNotCommand.value
               ? whyNotCommand.value
-              : isAllowed("abort", present.state)
+              : isAllowed("abort", present)
                 ? "Stop every vehicle of this mission"
                 : `This mission is over: ${MISSION_WORDS[present.state].toLowerCase()}`
         }
@@ -196,8 +196,7 @@ function LinkSummary() {
 
 /** Shown only when the state allows it, so that there is never more than one way forward. */
 function Command({ action, label }: { action: MissionAction; label: string }) {
-  const state = mission.value?.state;
-  if (!state || !isAllowed(action, state)) return null;
+  if (!mission.value || !isAllowed(action, mission.value)) return null;
   return (
     <button
       type="button"

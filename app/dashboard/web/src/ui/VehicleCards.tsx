@@ -1,5 +1,5 @@
 import { whyNotCommand } from "../state/access";
-import { age, clock, metres, percent } from "../state/format";
+import { age, clock, metres } from "../state/format";
 import { localizationWords } from "../state/localization";
 import { replayed } from "../state/replay";
 import { rejoin } from "../state/session";
@@ -13,7 +13,7 @@ import {
   type Vehicle,
   vehicles,
 } from "../state/store";
-import { hasEnded, vehicleState, WAYPOINT_WORDS } from "../state/words";
+import { batteryWords, hasEnded, vehicleState, WAYPOINT_WORDS } from "../state/words";
 import { WaypointShape } from "./marks";
 import { SearchCard } from "./SearchCard";
 import { TargetCards } from "./TargetCards";
@@ -37,16 +37,13 @@ export function VehicleCards() {
   );
 }
 
-const LOW_BATTERY_PCT = 25;
-
 function Card({ vehicle }: { vehicle: Vehicle }) {
   const then = replayed.value?.find((one) => one.vehicle === vehicle.view.name);
   if (replayStep.value !== null) return <PastCard vehicle={vehicle} depth_m={then?.depth_m ?? null} />;
   const v = vehicle.view;
   const state = vehicleState(v, vehicle.waypoint);
   const away = v.kind === "sim" && v.link === "unknown";
-  const ended = mission.value !== null && hasEnded(mission.value.state);
-  const low = v.battery_pct !== null && v.battery_pct < LOW_BATTERY_PCT;
+  const ended = mission.value !== null && hasEnded(mission.value);
   return (
     <article
       class={`card ${state.tone}${v.active ? "" : " left"}${vehicle.stale && !away ? " stale" : ""}`}
@@ -71,12 +68,9 @@ function Card({ vehicle }: { vehicle: Vehicle }) {
           <dt>Altitude</dt>
           <dd>{metres(v.altitude_m)}</dd>
         </div>
-        <div class={low ? "low" : ""}>
+        <div class={v.battery ?? ""}>
           <dt>Battery</dt>
-          <dd>
-            {low ? "▲ " : ""}
-            {percent(v.battery_pct)}
-          </dd>
+          <dd>{batteryWords(v)}</dd>
         </div>
         <div class={vehicle.stale && !away ? "late" : ""}>
           <dt>Heard</dt>
