@@ -33,7 +33,7 @@ def test_the_defaults_are_safe() -> None:
     assert settings.loopback
     assert not settings.insecure
     assert settings.migrates_itself
-    assert settings.service().database_url == "sqlite+aiosqlite:///bathyfleet.db"
+    assert settings.database_url == "sqlite+aiosqlite:///bathyfleet.db"
 
 
 def test_the_command_line_beats_the_environment_beats_the_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

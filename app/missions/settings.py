@@ -139,15 +139,21 @@ class ServiceSettings(Section):
 
     database_url: str = Field(
         default="sqlite+aiosqlite:///bathyfleet.db",
-        description="SQLAlchemy URL: sqlite+aiosqlite:///FILE or postgresql+asyncpg://…",
+        description="SQLAlchemy URL: sqlite+aiosqlite:///FILE or postgresql+asyncpg://USER:PASSWORD@HOST/NAME",
     )
     time_scale: float = Field(
         default=1.0, gt=0, le=1000, description="How much faster than wall time simulated vehicles live"
     )
     unconfined_imports: bool = Field(
-        default=False, description="Read imported files even where nothing keeps them from reading others"
+        default=False,
+        description="Read imported files also where the kernel has neither Landlock nor seccomp, which keep them from "
+        "reading other files",
     )
-    imc: ImcSettings = ImcSettings()
-    neptus: NeptusSettings = NeptusSettings()
-    simulation: SimulationSettings = SimulationSettings()
-    provider: ProviderSettings = ProviderSettings()
+    imc: ImcSettings = Field(default=ImcSettings(), description="The link to IMC vehicles")
+    neptus: NeptusSettings = Field(default=NeptusSettings(), description="The gateway for Neptus' ConvCAO panel")
+    simulation: SimulationSettings = Field(
+        default=SimulationSettings(), description="The world of vehicles of kind sim"
+    )
+    provider: ProviderSettings = Field(
+        default=ProviderSettings(), description="Who hands soundings in as crowdsourced bathymetry"
+    )
