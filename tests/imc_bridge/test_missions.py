@@ -210,7 +210,7 @@ async def test_vehicle_in_another_consoles_plan_is_neither_engaged_nor_stopped()
     async with open_sea() as sea:
         (name,) = await sea.ready()
         await sea.bridge.close()
-        other = await sea.connect(imc_id=0x4001, name="ccu-other", port=free_ports(1)[0], plan_id="theirs")
+        other = await sea.connect(id=0x4001, name="ccu-other", port=free_ports(1)[0], plan_id="theirs")
         await until(lambda: sea.state(name) is NodeState.READY, "the other console hears it")
         await other.engage(name)
         ours = Bridge(sea.settings.changed(id=0x3F05, port=free_ports(1)[0], plan_id="ours"))

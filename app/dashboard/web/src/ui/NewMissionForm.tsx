@@ -18,12 +18,13 @@ import {
   placeOf,
   simulatedNames,
   toMission,
+  turnedInto,
 } from "../state/draft";
 import { distance, duration } from "../state/format";
 import { createMission, said } from "../state/session";
 import { copied, describing, draftShapes, drawing, fleet, mapCentre } from "../state/store";
 import { AreaFields } from "./AreaFields";
-import { Fault, Form, Text, useForm } from "./Fields";
+import { Fault, Form, Part, Text, useForm } from "./Fields";
 import { Forecast } from "./Forecast";
 import { SearchFields } from "./SearchFields";
 
@@ -135,38 +136,20 @@ export function NewMissionForm() {
         ) : (
           <>
             <Planner />
-            <Text field="steps" label="Steps" numeric hint="How many waypoints every vehicle gets" />
+            <Part of="course" />
             <Expected />
           </>
         )}
         <details>
           <summary>Limits and grid</summary>
           <div class="pair">
-            <Text field="max_step_m" label="Largest step, m" numeric />
-            <Text field="speed_mps" label="Speed, m/s" numeric />
-            <Text field="min_depth_m" label="Shallowest, m" numeric hint="Shallowest depth of travel" />
-            <Text field="max_depth_m" label="Deepest, m" numeric hint="Deepest depth of travel" />
-            <Text field="min_altitude_m" label="Altitude, m" numeric hint="Least height above the bottom" />
-            <Text
-              field="min_separation_m"
-              label="Apart, m"
-              numeric
-              hint="Between vehicles at similar depth"
-            />
-            <Text field="com_range_m" label="Com. range, m" placeholder="unlimited" numeric />
-            <Text field="cell_m" label="Cell, m" numeric hint="Side of the map's cells" />
-            <Text
-              field="accuracy_m"
-              label="Accuracy, m"
-              numeric
-              hint="Deviation below which a cell is known"
-            />
+            <Part of="limits" />
           </div>
         </details>
         <details>
           <summary>Tide</summary>
           <div class="pair">
-            <Text field="tide_m" label="Level, m" placeholder="none" numeric />
+            <Part of="tide" />
             <Text field="tide_source" label="From where" placeholder="gauge" />
           </div>
           <label class="command file">
@@ -208,7 +191,7 @@ function Kind() {
         name="kind"
         checked={draft.kind === kind}
         data-testid={`kind-${kind}`}
-        onChange={() => set({ kind })}
+        onChange={() => set(turnedInto(kind, draft))}
       />
       <span>
         <b>{title}</b> <small>{words}</small>

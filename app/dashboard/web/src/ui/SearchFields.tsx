@@ -3,7 +3,7 @@ import { useEffect } from "preact/hooks";
 import { areasIn } from "../map/area";
 import { typedPlace } from "../state/draft";
 import { picking } from "../state/store";
-import { Fault, Text, useForm } from "./Fields";
+import { Fault, Part, Text, useForm } from "./Fields";
 
 /** What a search looks for, where its vehicles enter, how long they have, and what is known to stand there. */
 export function SearchFields() {
@@ -36,10 +36,7 @@ export function SearchFields() {
       <Place field="goal" label="Goal" />
       <Place field="entry" label="Entry and exit" />
       <div class="pair">
-        <Text field="goal_radius_m" label="Radius of the goal, m" numeric />
-        <Text field="window_min" label="Back within, min" numeric hint="From the first step; pauses count" />
-        <Text field="safety_m" label="From obstacles, m" numeric hint="Also from what nobody has looked at" />
-        <Text field="reach_m" label="Scanner reaches, m" numeric />
+        <Part of="search" />
       </div>
       <label class="command file">
         Known obstacles from a file
