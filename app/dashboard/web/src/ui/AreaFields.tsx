@@ -5,6 +5,7 @@ import { areasIn, sizeOf } from "../map/area";
 import { centred, cornersOf } from "../state/draft";
 import { distance } from "../state/format";
 import { type Drawing, drawing, drawingReady, editing, editingReady, mapCentre } from "../state/store";
+import { FileButton } from "./Controls";
 import { Fault, Text, useForm } from "./Fields";
 
 /** Where to map: drawn on the map, typed as a rectangle, or read from a file; and where not to go. */
@@ -43,10 +44,9 @@ export function AreaFields() {
     others.value = [];
     set({ source: "drawn", ring });
   };
-  const read = async (file: File | undefined) => {
-    if (!file) return;
+  const read = (name: string, text: string) => {
     try {
-      const found = areasIn(file.name, await file.text());
+      const found = areasIn(name, text);
       set({ source: "drawn", ring: found.area, keepOut: [...draft.keepOut, ...found.keepOut] });
       note.value = found.note;
       others.value = found.others;
@@ -76,18 +76,9 @@ export function AreaFields() {
         >
           Draw rectangle
         </button>
-        <label class="command file">
+        <FileButton accept=".geojson,.json,.kml" id="area-file" onText={read}>
           From a file
-          <input
-            type="file"
-            accept=".geojson,.json,.kml"
-            data-testid="area-file"
-            onChange={(event) => {
-              void read(event.currentTarget.files?.[0]);
-              event.currentTarget.value = "";
-            }}
-          />
-        </label>
+        </FileButton>
       </div>
       {drawing.value ? (
         <p class="hint" role="status" data-testid="drawing" data-ready={drawingReady.value}>

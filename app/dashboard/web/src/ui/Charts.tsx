@@ -4,6 +4,7 @@ import { fetchSteps, fetchTelemetry, noteFault } from "../state/session";
 import { colourOf, isDark, mission, selectedId, steps, telemetry, view } from "../state/store";
 import { figuresOver, type Metric } from "../state/telemetry";
 import { hasEnded } from "../state/words";
+import { Choice, titles } from "./Controls";
 import { Plot } from "./Plot";
 
 const METRICS = {
@@ -82,19 +83,14 @@ export function Charts() {
       <div>
         <label class="metric">
           <span class="visually-hidden">Figure of the vehicles</span>
-          <select
+          <Choice
             value={metric.value}
-            data-testid="metric"
-            onChange={(event) => {
-              metric.value = event.currentTarget.value as Metric;
+            options={titles(METRICS)}
+            id="metric"
+            onChoose={(value) => {
+              metric.value = value;
             }}
-          >
-            {Object.entries(METRICS).map(([name, m]) => (
-              <option key={name} value={name}>
-                {m.title}
-              </option>
-            ))}
-          </select>
+          />
         </label>
         <Plot
           title={title}

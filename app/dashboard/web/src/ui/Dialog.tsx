@@ -5,13 +5,19 @@
 
 import type { ComponentChildren } from "preact";
 import { useEffect, useRef } from "preact/hooks";
+import { Trouble } from "./Controls";
 
 interface DialogProps {
   open: boolean;
   onClose: () => void;
-  /** Id of the element that names it. */
-  title: string;
-  id: string;
+  name: string;
+  heading: ComponentChildren;
+  /** What went wrong; empty when all is well. */
+  fault?: string;
+  /** Words of the button that closes it. */
+  closing?: string;
+  /** Further buttons. */
+  actions?: ComponentChildren;
   kind?: string;
   /** Over another dialog. */
   above?: boolean;
@@ -26,8 +32,11 @@ const stack: object[] = [];
 export function Dialog({
   open,
   onClose,
-  title,
-  id,
+  name,
+  heading,
+  fault = "",
+  closing = "Close",
+  actions,
   kind = "",
   above = false,
   data = {},
@@ -71,11 +80,19 @@ export function Dialog({
       <dialog
         ref={dialog}
         class={`dialog ${kind}${above ? " above" : ""}`}
-        aria-labelledby={title}
-        data-testid={id}
+        aria-labelledby={`${name}-title`}
+        data-testid={`${name}-dialog`}
         {...data}
       >
+        <h2 id={`${name}-title`}>{heading}</h2>
         {children}
+        <Trouble words={fault} />
+        <div class="dialog-actions">
+          <button type="button" class="command" onClick={onClose} data-testid={`${name}-close`}>
+            {closing}
+          </button>
+          {actions}
+        </div>
       </dialog>
     </>
   );

@@ -4,6 +4,7 @@ import { type ComponentChildren, createContext } from "preact";
 import { useContext } from "preact/hooks";
 import type { Draft, Faults } from "../state/draft";
 import { type Field, type FieldName, fieldsOf, schemaOf } from "../state/fields";
+import { Choice, same } from "./Controls";
 
 export interface FormState {
   draft: Draft;
@@ -79,15 +80,7 @@ function Plain({ name, field }: { name: FieldName; field: Field }) {
     return (
       <label class="field" title={description}>
         {label}
-        <select
-          value={draft[name]}
-          data-testid={`field-${name}`}
-          onChange={(event) => change(event.currentTarget.value)}
-        >
-          {choices.map((choice) => (
-            <option key={choice}>{choice}</option>
-          ))}
-        </select>
+        <Choice value={draft[name]} options={same(choices)} id={`field-${name}`} onChoose={change} />
       </label>
     );
   }

@@ -11,8 +11,7 @@ export function FleetDialog() {
     fleetOpen.value = false;
   };
   return (
-    <Dialog open={open} onClose={close} title="fleet-title" id="fleet-dialog" kind="fleet">
-      <h2 id="fleet-title">Fleet</h2>
+    <Dialog open={open} onClose={close} name="fleet" heading="Fleet" kind="fleet">
       {fleet.value.length === 0 ? (
         <p class="empty">
           No vehicle was heard yet. Switch one on within reach of this network; the link check says what is
@@ -50,11 +49,6 @@ export function FleetDialog() {
           </table>
         </div>
       )}
-      <div class="dialog-actions">
-        <button type="button" class="command" data-testid="fleet-close" onClick={close}>
-          Close
-        </button>
-      </div>
     </Dialog>
   );
 }

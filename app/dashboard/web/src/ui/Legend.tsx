@@ -12,7 +12,7 @@ import {
   type Shown,
   shareOutside,
 } from "../map/layers";
-import { DEPTH_PALETTES, type DepthPalette } from "../map/palette";
+import { DEPTH_PALETTES } from "../map/palette";
 import { SITE_COLOURS, SITE_WORDS } from "../map/site";
 import {
   depthPalette,
@@ -26,6 +26,7 @@ import {
   showSite,
   site,
 } from "../state/store";
+import { Choice, titles } from "./Controls";
 
 /** Layer switch, colour scale and its range, which stays what the operator set until changed. */
 export function Legend() {
@@ -36,20 +37,15 @@ export function Legend() {
     <section class="legend" aria-label="Map layer and legend">
       <label class="layer-choice">
         <span class="visually-hidden">Layer</span>
-        <select
+        <Choice
           value={layer.value}
-          data-testid="layer"
+          options={titles(KINDS)}
           title={KINDS[layer.value].meaning}
-          onChange={(event) => {
-            layer.value = event.currentTarget.value as Shown;
+          id="layer"
+          onChoose={(value) => {
+            layer.value = value;
           }}
-        >
-          {Object.entries(KINDS).map(([name, { title }]) => (
-            <option key={name} value={name}>
-              {title}
-            </option>
-          ))}
-        </select>
+        />
       </label>
       {map && range ? (
         layer.value === "landmarks" ? (
@@ -157,20 +153,15 @@ function Options() {
       {layer.value === "depth" ? (
         <label>
           <span class="visually-hidden">Colours of depths</span>
-          <select
+          <Choice
             value={depthPalette.value}
-            data-testid="palette"
+            options={titles(DEPTH_PALETTES)}
             title="Colours of depths"
-            onChange={(event) => {
-              depthPalette.value = event.currentTarget.value as DepthPalette;
+            id="palette"
+            onChoose={(value) => {
+              depthPalette.value = value;
             }}
-          >
-            {Object.entries(DEPTH_PALETTES).map(([name, { title }]) => (
-              <option key={name} value={name}>
-                {title}
-              </option>
-            ))}
-          </select>
+          />
         </label>
       ) : null}
       <Check signal={showContours} id="contours">

@@ -24,6 +24,7 @@ import { distance, duration } from "../state/format";
 import { createMission, said } from "../state/session";
 import { copied, describing, draftShapes, drawing, fleet, mapCentre } from "../state/store";
 import { AreaFields } from "./AreaFields";
+import { Choice, FileButton, same, useEscape } from "./Controls";
 import { Fault, Form, Part, Text, useForm } from "./Fields";
 import { Forecast } from "./Forecast";
 import { SearchFields } from "./SearchFields";
@@ -34,7 +35,6 @@ export function NewMissionForm() {
   const faults = useSignal<Faults>({});
   const refused = useSignal<ServiceError | null>(null);
   const sending = useSignal(false);
-  const tideFault = useSignal("");
 
   useSignalEffect(() => {
     draftShapes.value = {
@@ -43,17 +43,13 @@ export function NewMissionForm() {
       marks: draft.value.kind === "search" ? draftMarks(draft.value) : [],
     };
   });
-  useEffect(() => {
-    const stopDrawing = (event: KeyboardEvent) => {
-      if (event.key === "Escape") drawing.value = null;
-    };
-    window.addEventListener("keydown", stopDrawing);
-    return () => {
-      window.removeEventListener("keydown", stopDrawing);
+  useEscape(drawing);
+  useEffect(
+    () => () => {
       draftShapes.value = null;
-      drawing.value = null;
-    };
-  }, []);
+    },
+    [],
+  );
 
   const close = () => {
     describing.value = false;
@@ -96,11 +92,6 @@ export function NewMissionForm() {
       sending.value = false;
     }
   };
-  const readTide = async (file: File | undefined) => {
-    tideFault.value = "";
-    if (file) set({ tide_table: await file.text(), tide_source: file.name });
-  };
-
   return (
     <Form.Provider value={{ draft: draft.value, faults: faults.value, set }}>
       <form
@@ -152,15 +143,13 @@ export function NewMissionForm() {
             <Part of="tide" />
             <Text field="tide_source" label="From where" placeholder="gauge" />
           </div>
-          <label class="command file">
+          <FileButton
+            accept=".tid,.txt"
+            id="tide-file"
+            onText={(name, text) => set({ tide_table: text, tide_source: name })}
+          >
             {draft.value.tide_table ? `Table: ${draft.value.tide_source}` : "Table (.tid)"}
-            <input
-              type="file"
-              accept=".tid,.txt"
-              data-testid="tide-file"
-              onChange={(event) => void readTide(event.currentTarget.files?.[0])}
-            />
-          </label>
+          </FileButton>
           <p class="hint">Tides can be set and changed at any time; soundings keep their raw values.</p>
         </details>
         {refused.value ? (
@@ -279,17 +268,12 @@ function Planner() {
         <summary>More planners and their settings</summary>
         <label class="field">
           Planner
-          <select
+          <Choice
             value={draft.planner}
-            data-testid="field-planner"
-            onChange={(event) => set({ planner: event.currentTarget.value })}
-          >
-            {(planners.value.length > 0 ? planners.value.map((p) => p.name) : [draft.planner]).map((name) => (
-              <option key={name} value={name}>
-                {name}
-              </option>
-            ))}
-          </select>
+            options={same(planners.value.length > 0 ? planners.value.map((p) => p.name) : [draft.planner])}
+            id="field-planner"
+            onChoose={(planner) => set({ planner })}
+          />
           {other ? <small>{other.summary}</small> : null}
         </label>
         <Options schema={planners.value.find((p) => p.name === draft.planner)?.options} />

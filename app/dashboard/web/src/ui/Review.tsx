@@ -5,6 +5,7 @@ import type { SoundingState, SoundingView } from "../api/types";
 import { metres } from "../state/format";
 import { said } from "../state/session";
 import { chosenSounding, reviewed, selectedId, view } from "../state/store";
+import { Choice, Typed } from "./Controls";
 
 const WORDS: Record<SoundingState, string> = {
   used: "used",
@@ -69,31 +70,26 @@ export function Review() {
   return (
     <div class="log review" data-testid="review">
       <div class="filters">
-        <select
-          aria-label="Which soundings"
+        <Choice
+          label="Which soundings"
           value={filter.value}
-          data-testid="review-filter"
-          onChange={(event) => {
-            filter.value = event.currentTarget.value as typeof filter.value;
+          options={[
+            ["", "Everything that is not simply used"],
+            ...(["rejected", "doubted", "withdrawn", "restored", "used"] as const).map(
+              (state) => [state, WORDS[state]] as const,
+            ),
+          ]}
+          id="review-filter"
+          onChoose={(value) => {
+            filter.value = value;
           }}
-        >
-          <option value="">Everything that is not simply used</option>
-          {(["rejected", "doubted", "withdrawn", "restored", "used"] as const).map((state) => (
-            <option key={state} value={state}>
-              {WORDS[state]}
-            </option>
-          ))}
-        </select>
-        <input
-          type="text"
-          aria-label="Why: kept in the log"
+        />
+        <Typed
+          text={note}
+          label="Why: kept in the log"
           placeholder="Why (kept in the log)"
           maxLength={500}
-          value={note.value}
-          data-testid="review-note"
-          onInput={(event) => {
-            note.value = event.currentTarget.value;
-          }}
+          id="review-note"
         />
         <span>
           {total.value} sounding{total.value === 1 ? "" : "s"}

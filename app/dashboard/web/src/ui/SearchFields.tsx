@@ -1,31 +1,21 @@
 import { useSignal } from "@preact/signals";
-import { useEffect } from "preact/hooks";
 import { areasIn } from "../map/area";
 import { typedPlace } from "../state/draft";
 import { picking } from "../state/store";
+import { FileButton, useEscape } from "./Controls";
 import { Fault, Part, Text, useForm } from "./Fields";
 
 /** What a search looks for, where its vehicles enter, how long they have, and what is known to stand there. */
 export function SearchFields() {
   const { draft, set } = useForm();
   const note = useSignal("");
-  useEffect(() => {
-    const stop = (event: KeyboardEvent) => {
-      if (event.key === "Escape") picking.value = null;
-    };
-    window.addEventListener("keydown", stop);
-    return () => {
-      window.removeEventListener("keydown", stop);
-      picking.value = null;
-    };
-  }, []);
-  const read = async (file: File | undefined) => {
-    if (!file) return;
+  useEscape(picking);
+  const read = (name: string, text: string) => {
     try {
-      const { area, keepOut, others } = areasIn(file.name, await file.text());
+      const { area, keepOut, others } = areasIn(name, text);
       const obstacles = [area, ...keepOut, ...others];
       set({ obstacles: [...draft.obstacles, ...obstacles] });
-      note.value = `${file.name}: ${obstacles.length} obstacle${obstacles.length === 1 ? "" : "s"}`;
+      note.value = `${name}: ${obstacles.length} obstacle${obstacles.length === 1 ? "" : "s"}`;
     } catch (error) {
       note.value = error instanceof Error ? error.message : String(error);
     }
@@ -38,18 +28,9 @@ export function SearchFields() {
       <div class="pair">
         <Part of="search" />
       </div>
-      <label class="command file">
+      <FileButton accept=".geojson,.json,.kml" id="obstacles-file" onText={read}>
         Known obstacles from a file
-        <input
-          type="file"
-          accept=".geojson,.json,.kml"
-          data-testid="obstacles-file"
-          onChange={(event) => {
-            void read(event.currentTarget.files?.[0]);
-            event.currentTarget.value = "";
-          }}
-        />
-      </label>
+      </FileButton>
       {draft.obstacles.length > 0 ? (
         <span class="zone">
           {draft.obstacles.length} known
