@@ -1,6 +1,7 @@
 import { abortVehicle, act } from "../state/session";
 import { abortDialogOpen, abortOne, mission, type Vehicle, vehicles } from "../state/store";
 import { hasEnded } from "../state/words";
+import { Button } from "./Controls";
 import { StopDialog } from "./StopDialog";
 
 /** Of the whole team, or of one vehicle, which can be chosen here, too: the cards may be covered. */
@@ -57,16 +58,15 @@ function Asked({ vehicle, sending, choice }: { vehicle: Vehicle; sending: boolea
         {sending ? "waiting for its acknowledgement" : ""}
       </span>
       {choice && !sending ? (
-        <button
-          type="button"
-          class="abort-one"
-          data-testid={`abort-only-${name}`}
+        <Button
+          id={`abort-only-${name}`}
+          kind="abort-one"
           onClick={() => {
             abortOne.value = name;
           }}
         >
           Only {name}…
-        </button>
+        </Button>
       ) : null}
     </li>
   );

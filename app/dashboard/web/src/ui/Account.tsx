@@ -3,7 +3,7 @@ import { ServiceError } from "../api/client";
 import { me, signedOut, signIn, signOut, whyNotCommand } from "../state/access";
 import { said } from "../state/session";
 import { accountOpen } from "../state/store";
-import { Typed } from "./Controls";
+import { Button, sets, Typed } from "./Controls";
 import { Dialog } from "./Dialog";
 
 /** Who uses the page, always in sight. */
@@ -12,32 +12,26 @@ export function AccountButton() {
   if (!who) return null;
   const words = `${who.name}, role ${who.role}`;
   return (
-    <button
-      type="button"
-      class={`tool account${whyNotCommand.value ? " looks-only" : ""}`}
-      data-testid="account"
+    <Button
+      id="account"
+      kind={`tool account${whyNotCommand.value ? " looks-only" : ""}`}
       title={`Signed in: ${words}`}
-      onClick={() => {
-        accountOpen.value = true;
-      }}
+      onClick={sets(accountOpen, true)}
     >
       <span class="account-name">{who.name}</span>
       <small>{whyNotCommand.value ? `${who.role}: looks only` : who.role}</small>
-    </button>
+    </Button>
   );
 }
 
 export function AccountDialog() {
   const fault = useSignal("");
   const who = me.value;
-  const close = () => {
-    accountOpen.value = false;
-  };
+  const close = sets(accountOpen, false);
   const leaving = (
-    <button
-      type="button"
-      class="command primary"
-      data-testid="sign-out"
+    <Button
+      id="sign-out"
+      kind="command primary"
       onClick={() => {
         signOut().catch((error: unknown) => {
           fault.value = said(error);
@@ -45,7 +39,7 @@ export function AccountDialog() {
       }}
     >
       Sign out
-    </button>
+    </Button>
   );
   return (
     <Dialog

@@ -4,7 +4,7 @@ import { fetchSteps, fetchTelemetry, noteFault } from "../state/session";
 import { colourOf, isDark, mission, selectedId, steps, telemetry, view } from "../state/store";
 import { figuresOver, type Metric } from "../state/telemetry";
 import { hasEnded } from "../state/words";
-import { Choice, titles } from "./Controls";
+import { Choice, into, titles } from "./Controls";
 import { Plot } from "./Plot";
 
 const METRICS = {
@@ -83,14 +83,7 @@ export function Charts() {
       <div>
         <label class="metric">
           <span class="visually-hidden">Figure of the vehicles</span>
-          <Choice
-            value={metric.value}
-            options={titles(METRICS)}
-            id="metric"
-            onChoose={(value) => {
-              metric.value = value;
-            }}
-          />
+          <Choice value={metric.value} options={titles(METRICS)} id="metric" onChoose={into(metric)} />
         </label>
         <Plot
           title={title}

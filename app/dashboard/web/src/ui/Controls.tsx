@@ -1,8 +1,50 @@
 /** Controls that several parts of the page have. */
 
 import type { Signal } from "@preact/signals";
-import type { ComponentChildren } from "preact";
+import type { AriaAttributes, ComponentChildren } from "preact";
 import { useEffect } from "preact/hooks";
+import { whyNotCommand } from "../state/access";
+
+/** Handlers that give a signal this value, the opposite of what it has, or what they are called with. */
+export const sets =
+  <T,>(signal: Signal<T>, value: T) =>
+  () => {
+    signal.value = value;
+  };
+export const flips = (signal: Signal<boolean>) => () => {
+  signal.value = !signal.value;
+};
+export const into =
+  <T,>(signal: Signal<T>) =>
+  (value: T) => {
+    signal.value = value;
+  };
+
+interface ButtonProps extends AriaAttributes {
+  id?: string;
+  /** Its class. */
+  kind?: string;
+  /** Whether it commands: it says why where this user may not. */
+  commands?: boolean;
+  disabled?: boolean;
+  title?: string;
+  onClick: (event: MouseEvent) => void;
+  children: ComponentChildren;
+}
+
+export function Button({ id, kind = "command", commands = false, disabled, title, ...rest }: ButtonProps) {
+  const why = commands ? whyNotCommand.value : "";
+  return (
+    <button
+      type="button"
+      class={kind}
+      data-testid={id}
+      disabled={disabled || why !== ""}
+      title={why || title}
+      {...rest}
+    />
+  );
+}
 
 interface ChoiceProps<T extends string> {
   value: T;

@@ -5,12 +5,13 @@
 
 import type { ComponentChildren } from "preact";
 import { useEffect, useRef } from "preact/hooks";
-import { Trouble } from "./Controls";
+import { Button, Trouble } from "./Controls";
 
 interface DialogProps {
   open: boolean;
   onClose: () => void;
   name: string;
+  id?: string;
   heading: ComponentChildren;
   /** What went wrong; empty when all is well. */
   fault?: string;
@@ -33,6 +34,7 @@ export function Dialog({
   open,
   onClose,
   name,
+  id = `${name}-dialog`,
   heading,
   fault = "",
   closing = "Close",
@@ -81,16 +83,16 @@ export function Dialog({
         ref={dialog}
         class={`dialog ${kind}${above ? " above" : ""}`}
         aria-labelledby={`${name}-title`}
-        data-testid={`${name}-dialog`}
+        data-testid={id}
         {...data}
       >
         <h2 id={`${name}-title`}>{heading}</h2>
         {children}
         <Trouble words={fault} />
         <div class="dialog-actions">
-          <button type="button" class="command" onClick={onClose} data-testid={`${name}-close`}>
+          <Button id={`${name}-close`} onClick={onClose}>
             {closing}
-          </button>
+          </Button>
           {actions}
         </div>
       </dialog>

@@ -5,7 +5,7 @@ import { whyNotCommand } from "../state/access";
 import { clock } from "../state/format";
 import { said } from "../state/session";
 import { openAlarms, selectedId, takeAlarms, view } from "../state/store";
-import { Choice, same, Typed } from "./Controls";
+import { Button, Choice, into, same, Typed } from "./Controls";
 
 const SIGNS: Record<Level, string> = { info: "·", warning: "▲", alarm: "✕" };
 const MOST_SHOWN = 300;
@@ -37,17 +37,13 @@ export function EventLog() {
           value={least.value}
           options={LEAST}
           id="log-level"
-          onChoose={(value) => {
-            least.value = value;
-          }}
+          onChoose={into(least)}
         />
         <Choice
           label="Kind of line"
           value={kind.value}
           options={[["", "Every kind"], ...same(kinds.value)]}
-          onChoose={(value) => {
-            kind.value = value;
-          }}
+          onChoose={into(kind)}
         />
         <Typed text={words} type="search" label="Words in the line" placeholder="Words" id="log-words" />
       </div>
@@ -132,9 +128,9 @@ export function Alarms() {
         <b>✕ {clock(new Date(newest.time), "utc")} UTC</b> {newest.message}
         {alarms.length > 1 ? <small> and {alarms.length - 1} more in the log</small> : null}
       </p>
-      <button type="button" class="command" onClick={takeAlarms} data-testid="take-alarms">
+      <Button id="take-alarms" onClick={takeAlarms}>
         Taken
-      </button>
+      </Button>
     </section>
   );
 }

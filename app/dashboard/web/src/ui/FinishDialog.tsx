@@ -1,5 +1,6 @@
 import { act } from "../state/session";
 import { finishOpen, mission } from "../state/store";
+import { sets } from "./Controls";
 import { StopDialog } from "./StopDialog";
 
 /** Before a mission is ended early. */
@@ -8,9 +9,7 @@ export function FinishDialog() {
   return (
     <StopDialog
       open={finishOpen.value}
-      onClose={() => {
-        finishOpen.value = false;
-      }}
+      onClose={sets(finishOpen, false)}
       name="finish"
       kind="finishing"
       what="finish"

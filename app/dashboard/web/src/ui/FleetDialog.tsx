@@ -2,14 +2,13 @@ import type { VehicleView } from "../api/types";
 import { age, metres, place } from "../state/format";
 import { coordinateFormat, fleet, fleetOpen, missions } from "../state/store";
 import { batteryWords, vehicleState } from "../state/words";
+import { sets } from "./Controls";
 import { Dialog } from "./Dialog";
 
 /** Every vehicle that the service knows of, in a mission or not, one a line. */
 export function FleetDialog() {
   const open = fleetOpen.value;
-  const close = () => {
-    fleetOpen.value = false;
-  };
+  const close = sets(fleetOpen, false);
   return (
     <Dialog open={open} onClose={close} name="fleet" heading="Fleet" kind="fleet">
       {fleet.value.length === 0 ? (

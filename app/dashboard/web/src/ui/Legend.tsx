@@ -26,7 +26,7 @@ import {
   showSite,
   site,
 } from "../state/store";
-import { Choice, titles } from "./Controls";
+import { Button, Choice, into, titles } from "./Controls";
 
 /** Layer switch, colour scale and its range, which stays what the operator set until changed. */
 export function Legend() {
@@ -42,9 +42,7 @@ export function Legend() {
           options={titles(KINDS)}
           title={KINDS[layer.value].meaning}
           id="layer"
-          onChoose={(value) => {
-            layer.value = value;
-          }}
+          onChoose={into(layer)}
         />
       </label>
       {map && range ? (
@@ -93,24 +91,18 @@ function Scale({ range }: { range: Range }) {
       </div>
       <span class="range-kind">
         {fixed ? (
-          <button
-            type="button"
-            class="link-button"
-            data-testid="range-fit"
-            onClick={() => setRange(undefined)}
-          >
+          <Button id="range-fit" kind="link-button" onClick={() => setRange(undefined)}>
             Fit to data
-          </button>
+          </Button>
         ) : (
-          <button
-            type="button"
-            class="link-button"
-            data-testid="range-fix"
+          <Button
+            id="range-fix"
+            kind="link-button"
             title="The colours follow the data now. Keep them, so that a colour goes on meaning the same value"
             onClick={() => setRange(range)}
           >
             Keep range
-          </button>
+          </Button>
         )}
         {fixed && map ? <Outside share={shareOutside(map, layer.value, range)} /> : null}
       </span>
@@ -158,9 +150,7 @@ function Options() {
             options={titles(DEPTH_PALETTES)}
             title="Colours of depths"
             id="palette"
-            onChoose={(value) => {
-              depthPalette.value = value;
-            }}
+            onChoose={into(depthPalette)}
           />
         </label>
       ) : null}

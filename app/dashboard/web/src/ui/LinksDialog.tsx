@@ -6,6 +6,7 @@ import { clock } from "../state/format";
 import { said } from "../state/session";
 import { linksOpen } from "../state/store";
 import { FINDING_SIGNS, FINDING_TONES } from "../state/words";
+import { sets } from "./Controls";
 import { Dialog } from "./Dialog";
 
 const AGAIN_MS = 5000;
@@ -31,9 +32,7 @@ export function LinksDialog() {
     return () => clearInterval(again);
   }, [open]);
 
-  const close = () => {
-    linksOpen.value = false;
-  };
+  const close = sets(linksOpen, false);
   const view = found.value;
   return (
     <Dialog

@@ -13,6 +13,7 @@ import {
   showTargets,
   showTracks,
 } from "../state/store";
+import { Button, flips, sets } from "./Controls";
 
 /** Buttons on the map's edge: show the area, measure, what is drawn, look at it in space. */
 export function MapTools({ onFit }: { onFit: () => void }) {
@@ -66,9 +67,7 @@ export function MapTools({ onFit }: { onFit: () => void }) {
           label="Look at the sea floor in space"
           id="open-3d"
           disabled={!seaFloor.value}
-          onClick={() => {
-            in3d.value = true;
-          }}
+          onClick={sets(in3d, true)}
         >
           <path d="M2,13 L8,5 L12,10 L14,8 L18,13 M2,13 L10,18 L18,13" />
         </Tool>
@@ -98,15 +97,9 @@ function Measured() {
               )}
             </b>
           </span>
-          <button
-            type="button"
-            class="link-button"
-            onClick={() => {
-              measured.value = [];
-            }}
-          >
+          <Button kind="link-button" onClick={sets(measured, [])}>
             Anew
-          </button>
+          </Button>
         </>
       ) : (
         <span>Click on the map, corner after corner.</span>
@@ -134,9 +127,7 @@ function Shown({
     <Tool
       label={`${what}: ${signal.value ? "shown" : "hidden"}`}
       pressed={signal.value}
-      onClick={() => {
-        signal.value = !signal.value;
-      }}
+      onClick={flips(signal)}
       {...rest}
     />
   );

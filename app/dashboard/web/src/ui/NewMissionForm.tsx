@@ -24,7 +24,7 @@ import { distance, duration } from "../state/format";
 import { createMission, said } from "../state/session";
 import { copied, describing, draftShapes, drawing, fleet, mapCentre } from "../state/store";
 import { AreaFields } from "./AreaFields";
-import { Choice, FileButton, same, useEscape } from "./Controls";
+import { Button, Choice, FileButton, same, useEscape } from "./Controls";
 import { Fault, Form, Part, Text, useForm } from "./Fields";
 import { Forecast } from "./Forecast";
 import { SearchFields } from "./SearchFields";
@@ -102,9 +102,7 @@ export function NewMissionForm() {
       >
         <header class="panel-head">
           <h2>{original ? "Copy of a mission" : "New mission"}</h2>
-          <button type="button" class="command" onClick={close}>
-            Cancel
-          </button>
+          <Button onClick={close}>Cancel</Button>
         </header>
         <Text field="name" label="Name" placeholder="Leixões quay" />
         <Kind />
@@ -384,14 +382,9 @@ function Described({ spec }: { spec: VehicleSpec }) {
         onInput={(event) => change([{ ...spec, name: event.currentTarget.value.trim() }])}
       />
       <small>{spec.kind === "imc" ? "IMC" : spec.kind}</small>
-      <button
-        type="button"
-        class="tool small"
-        aria-label={`Leave ${spec.name} out`}
-        onClick={() => change([])}
-      >
+      <Button kind="tool small" aria-label={`Leave ${spec.name} out`} onClick={() => change([])}>
         ✕
-      </button>
+      </Button>
     </div>
   );
 }

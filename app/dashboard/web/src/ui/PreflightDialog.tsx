@@ -2,9 +2,9 @@ import { useSignal } from "@preact/signals";
 import { useEffect } from "preact/hooks";
 import { api } from "../api/client";
 import type { CheckStatus, PreflightView } from "../api/types";
-import { whyNotCommand } from "../state/access";
 import { act, busyWith, refusal, said } from "../state/session";
 import { mission, preflightOpen, selectedId } from "../state/store";
+import { Button, sets } from "./Controls";
 import { Dialog } from "./Dialog";
 import { Forecast } from "./Forecast";
 
@@ -43,9 +43,7 @@ export function PreflightDialog() {
     };
   }, [open]);
 
-  const close = () => {
-    preflightOpen.value = false;
-  };
+  const close = sets(preflightOpen, false);
   const start = async () => {
     if (await act("start")) close();
   };
@@ -53,12 +51,11 @@ export function PreflightDialog() {
   const problems = view?.checks.filter((c) => c.status === "problem").length ?? 0;
   const refused = refusal.value?.what === "start" ? refusal.value.error : null;
   const starting = (
-    <button
-      type="button"
-      class="command primary"
-      disabled={!view?.ready || busyWith.value !== null || whyNotCommand.value !== ""}
-      title={whyNotCommand.value}
-      data-testid="confirm-start"
+    <Button
+      id="confirm-start"
+      kind="command primary"
+      commands
+      disabled={!view?.ready || busyWith.value !== null}
       onClick={() => void start()}
     >
       {busyWith.value === "start"
@@ -66,13 +63,14 @@ export function PreflightDialog() {
         : problems > 0
           ? `${problems} problem${problems > 1 ? "s" : ""} to solve first`
           : "Start mission"}
-    </button>
+    </Button>
   );
   return (
     <Dialog
       open={open}
       onClose={close}
       name="preflight"
+      id="preflight"
       heading={`Start ${mission.value?.name ?? "the mission"}?`}
       fault={refused ? said(refused) : fault.value}
       closing="Not yet"

@@ -5,7 +5,7 @@ import type { SoundingState, SoundingView } from "../api/types";
 import { metres } from "../state/format";
 import { said } from "../state/session";
 import { chosenSounding, reviewed, selectedId, view } from "../state/store";
-import { Choice, Typed } from "./Controls";
+import { Button, Choice, into, Typed } from "./Controls";
 
 const WORDS: Record<SoundingState, string> = {
   used: "used",
@@ -80,9 +80,7 @@ export function Review() {
             ),
           ]}
           id="review-filter"
-          onChoose={(value) => {
-            filter.value = value;
-          }}
+          onChoose={into(filter)}
         />
         <Typed
           text={note}
@@ -106,11 +104,7 @@ export function Review() {
           <Row key={s.id} sounding={s} busy={busy.value === s.id} onRule={rule} />
         ))}
       </ol>
-      {next.value !== null ? (
-        <button type="button" class="command" onClick={() => load(next.value ?? 0)}>
-          More
-        </button>
-      ) : null}
+      {next.value !== null ? <Button onClick={() => load(next.value ?? 0)}>More</Button> : null}
     </div>
   );
 }
@@ -133,30 +127,23 @@ function Row({ sounding: s, busy, onRule }: RowProps) {
         if (chosen) element?.scrollIntoView({ block: "nearest" });
       }}
     >
-      <button
-        type="button"
-        class="link-button"
+      <Button
+        kind="link-button"
         title="Show it on the map"
         onClick={() => {
           chosenSounding.value = s.id;
         }}
       >
         {s.vehicle} #{s.id}
-      </button>
+      </Button>
       <b>{metres(s.depth_m ?? s.raw_depth_m, 2)}</b>
       <span class="message">
         {WORDS[s.state]}
         {s.reason ? <small>: {s.reason}</small> : null}
       </span>
-      <button
-        type="button"
-        class="command"
-        disabled={busy}
-        data-testid={`rule-${s.id}`}
-        onClick={() => onRule(s, counts ? "reject" : "restore")}
-      >
+      <Button id={`rule-${s.id}`} disabled={busy} onClick={() => onRule(s, counts ? "reject" : "restore")}>
         {busy ? "…" : counts ? "Reject" : "Restore"}
-      </button>
+      </Button>
     </li>
   );
 }

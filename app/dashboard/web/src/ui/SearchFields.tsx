@@ -2,7 +2,7 @@ import { useSignal } from "@preact/signals";
 import { areasIn } from "../map/area";
 import { typedPlace } from "../state/draft";
 import { picking } from "../state/store";
-import { FileButton, useEscape } from "./Controls";
+import { Button, FileButton, useEscape } from "./Controls";
 import { Fault, Part, Text, useForm } from "./Fields";
 
 /** What a search looks for, where its vehicles enter, how long they have, and what is known to stand there. */
@@ -34,14 +34,13 @@ export function SearchFields() {
       {draft.obstacles.length > 0 ? (
         <span class="zone">
           {draft.obstacles.length} known
-          <button
-            type="button"
-            class="tool small"
+          <Button
+            kind="tool small"
             aria-label="Forget the known obstacles"
             onClick={() => set({ obstacles: [] })}
           >
             ✕
-          </button>
+          </Button>
         </span>
       ) : null}
       {note.value ? (
@@ -60,11 +59,9 @@ function Place({ field, label }: { field: "goal" | "entry"; label: string }) {
   return (
     <div class="picked">
       <Text field={field} label={label} placeholder="latitude, longitude" />
-      <button
-        type="button"
-        class="command"
+      <Button
+        id={`pick-${field}`}
         aria-pressed={waiting}
-        data-testid={`pick-${field}`}
         onClick={() => {
           picking.value = waiting
             ? null
@@ -72,7 +69,7 @@ function Place({ field, label }: { field: "goal" | "entry"; label: string }) {
         }}
       >
         {waiting ? "Click on the map…" : "Pick"}
-      </button>
+      </Button>
     </div>
   );
 }

@@ -3,6 +3,7 @@ import type { ComponentChildren } from "preact";
 import { useEffect } from "preact/hooks";
 import type { ActionView, StopView } from "../api/types";
 import { refusal, said } from "../state/session";
+import { Button } from "./Controls";
 import { Dialog } from "./Dialog";
 
 interface StopDialogProps {
@@ -40,15 +41,14 @@ export function StopDialog({ open, what, question, done, send, children, ...rest
     }
   };
   const confirming = (
-    <button
-      type="button"
-      class={name === "abort" ? "abort" : "command primary"}
+    <Button
+      id={confirmId}
+      kind={name === "abort" ? "abort" : "command primary"}
       disabled={sending.value}
       onClick={() => void stop()}
-      data-testid={confirmId}
     >
       {confirm(sending.value)}
-    </button>
+    </Button>
   );
   return (
     <Dialog

@@ -1,4 +1,3 @@
-import { whyNotCommand } from "../state/access";
 import { age, clock, metres } from "../state/format";
 import { localizationWords } from "../state/localization";
 import { replayed } from "../state/replay";
@@ -14,6 +13,7 @@ import {
   vehicles,
 } from "../state/store";
 import { batteryWords, hasEnded, vehicleState, WAYPOINT_WORDS } from "../state/words";
+import { Button } from "./Controls";
 import { WaypointShape } from "./marks";
 import { SearchCard } from "./SearchCard";
 import { TargetCards } from "./TargetCards";
@@ -99,19 +99,17 @@ function Card({ vehicle }: { vehicle: Vehicle }) {
         </p>
       ) : null}
       {v.active && mission.value && (!ended || unstopped.value.has(v.name)) ? (
-        <button
-          type="button"
-          class="abort-one"
-          data-testid={`abort-${v.name}`}
-          disabled={whyNotCommand.value !== ""}
-          title={whyNotCommand.value}
+        <Button
+          id={`abort-${v.name}`}
+          kind="abort-one"
+          commands
           onClick={() => {
             abortOne.value = v.name;
             abortDialogOpen.value = true;
           }}
         >
           {ended ? `Stop ${v.name} again` : `Abort ${v.name}`}
-        </button>
+        </Button>
       ) : null}
       {v.active ? null : (
         <p class="small left-at" data-testid={`left-${v.name}`}>
@@ -120,16 +118,15 @@ function Card({ vehicle }: { vehicle: Vehicle }) {
         </p>
       )}
       {!v.active && !ended ? (
-        <button
-          type="button"
-          class="command again"
-          data-testid={`rejoin-${v.name}`}
-          disabled={whyNotCommand.value !== ""}
-          title={whyNotCommand.value || "Let it take part again, as it was described"}
+        <Button
+          id={`rejoin-${v.name}`}
+          kind="command again"
+          commands
+          title="Let it take part again, as it was described"
           onClick={() => void rejoin(v.name)}
         >
           Add again
-        </button>
+        </Button>
       ) : null}
       {v.reason ? <p class={`reason ${state.tone}`}>{v.reason}</p> : null}
       {vehicle.waypoint?.reason ? <p class={`reason ${state.tone}`}>{vehicle.waypoint.reason}</p> : null}
