@@ -267,10 +267,7 @@ def doctor(
     from imc_bridge.doctor.doctor import Diagnosis, diagnose, diagnose_recording
     from imc_bridge.doctor.replay import RecordingError
 
-    try:
-        bridge = bridge_settings(settings.imc, settings.time_scale)
-    except ValueError as error:
-        raise CommandError(str(error), "See docs/settings.md") from None
+    bridge = bridge_settings(settings.imc, settings.time_scale)
 
     async def run() -> Diagnosis:
         return await diagnose(bridge, seconds)

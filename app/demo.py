@@ -39,7 +39,6 @@ READY_TIMEOUT_S = 60.0
 POLL_S = 0.4
 MAP_PERIOD_S = 2.0
 NOISE = 0.01
-MAX_STEP_M = 10.0
 START_SPACING_M = 5.0
 START_M = (2.0, 2.0)
 SIDE_M = 100.0
@@ -218,11 +217,9 @@ class _Demo:
             "seed": options.seed,
             "sounding_noise": NOISE,
             "limits": {
-                "max_step_m": MAX_STEP_M,
                 # As an operator with a chart of the least depth would choose it.
                 "min_depth_m": round(float(np.clip(terrain.min_depth_m / 4, 0.5, 2.0)), 1),
                 "min_vertical_separation_m": 0.5,
-                "min_altitude_m": 1.0,
             },
         }
 
@@ -288,12 +285,13 @@ class _Demo:
         view = (await api.get(f"/missions/{mission_id}/map")).json()
         grid, depth = _grid_of(view)
         ours = difference(depth, self._truth(grid))
-        progress = (await get(api, f"/missions/{mission_id}"))["progress"]
+        mission = await get(api, f"/missions/{mission_id}")
+        progress = mission["progress"]
         with console.status("Flying the lawnmowers for comparison …"):
             baselines = await asyncio.to_thread(
                 lawnmower_baselines,
                 self._terrain,
-                Constraints(area=_rectangle(self._terrain), max_step_m=MAX_STEP_M),
+                Constraints(area=_rectangle(self._terrain), max_step_m=mission["spec"]["limits"]["max_step_m"]),
                 self._starts_m() + np.array([0.0, 0.0, 2.0]),
                 progress["distance_m"] / self._options.vehicles,
                 progress["soundings"],

@@ -117,7 +117,7 @@ def create_app(settings: Settings | None = None, *, port: int | None = None) -> 
                 return name
 
             service = MissionService(
-                settings.service(),
+                settings,
                 database,
                 log_in,
                 is_own_user=is_own_user,

@@ -17,7 +17,7 @@ from pydantic_settings import (
     TomlConfigSettingsSource,
 )
 
-from app.missions.settings import ImcSettings, NeptusSettings, ProviderSettings, ServiceSettings, SimulationSettings
+from app.missions.settings import ServiceSettings
 
 PREFIX = "BATHYFLEET_"
 CONFIG_VARIABLE = "BATHYFLEET_CONFIG"
@@ -44,7 +44,7 @@ class StartupError(Exception):
     """The service cannot start as it is set up; ``str()`` says why and what to do."""
 
 
-class Settings(BaseSettings):
+class Settings(BaseSettings, ServiceSettings):
     """Everything that can be set. Sources, strongest first: command line, environment, ``bathyfleet.toml``.
 
     The environment uses the prefix ``BATHYFLEET_`` and two underscores between levels:
@@ -67,10 +67,6 @@ class Settings(BaseSettings):
     allowed_origins: tuple[str, ...] = Field(
         default=(),
         description="Origins of other web pages that may use the API, for example https://console.example; never *",
-    )
-    database_url: str = Field(
-        default="sqlite+aiosqlite:///bathyfleet.db",
-        description="SQLAlchemy URL: sqlite+aiosqlite:///FILE or postgresql+asyncpg://USER:PASSWORD@HOST/NAME",
     )
     peer_url: str = Field(
         default="",
@@ -129,11 +125,6 @@ class Settings(BaseSettings):
     max_import_bytes: int = Field(
         default=64 * 2**20, ge=1024, le=2**30, description="Largest file of soundings or of a map that is taken"
     )
-    unconfined_imports: bool = Field(
-        default=False,
-        description="Read imported files also where the kernel has neither Landlock nor seccomp, which keep them from "
-        "reading other files",
-    )
     max_bytes_in_flight: int = Field(
         default=256 * 2**20,
         ge=1024,
@@ -146,17 +137,6 @@ class Settings(BaseSettings):
         ge=1,
         le=100_000,
         description="Most live views and event streams at the same time, shared out as max_connections is",
-    )
-    time_scale: float = Field(
-        default=1.0, gt=0, le=1000, description="How much faster than wall time simulated vehicles live"
-    )
-    imc: ImcSettings = Field(default=ImcSettings(), description="The link to IMC vehicles")
-    neptus: NeptusSettings = Field(default=NeptusSettings(), description="The gateway for Neptus' ConvCAO panel")
-    simulation: SimulationSettings = Field(
-        default=SimulationSettings(), description="The world of vehicles of kind sim"
-    )
-    provider: ProviderSettings = Field(
-        default=ProviderSettings(), description="Who hands soundings in as crowdsourced bathymetry"
     )
 
     @field_validator("log_level", "log_format", mode="before")
@@ -232,18 +212,6 @@ class Settings(BaseSettings):
         if self.auto_migrate is not None:
             return self.auto_migrate
         return self.database_url.startswith("sqlite")
-
-    def service(self) -> ServiceSettings:
-        """The part that the mission service needs."""
-        return ServiceSettings(
-            database_url=self.database_url,
-            time_scale=self.time_scale,
-            unconfined_imports=self.unconfined_imports,
-            imc=self.imc,
-            neptus=self.neptus,
-            simulation=self.simulation,
-            provider=self.provider,
-        )
 
 
 def _wrong_with_origin(origin: str) -> str:

@@ -112,7 +112,7 @@ class Hearing:
         if message is None:
             return
         announcement = read_announce(message)
-        if announcement.imc_id == self._settings.imc_id:
+        if announcement.imc_id == self._settings.id:
             self._look_for_double(announcement, address)
             return
         now = self._now()
@@ -234,7 +234,7 @@ class Hearing:
         if via is None:
             self._from_unknown_address(header.src, address, now)
             self.decoder.wants(header)
-        elif header.src == self._settings.imc_id:
+        elif header.src == self._settings.id:
             via.echoes += 1
         else:
             via.relayed += 1
@@ -242,7 +242,7 @@ class Hearing:
                 self._relayed(via, packet, now)
 
     def _from_unknown_address(self, imc_id: int, address: Address, now: float) -> None:
-        if imc_id in (self._settings.imc_id, 0, BROADCAST_ID) or not self.admission.admits_id(imc_id, address):
+        if imc_id in (self._settings.id, 0, BROADCAST_ID) or not self.admission.admits_id(imc_id, address):
             return
         node = self._roster.stranger(imc_id, address[0], now)
         if node is None:
@@ -307,7 +307,7 @@ class Hearing:
                     control.vehicle_state_changed(now)
             case "FollowRefState" if control is not None:
                 control.follow_state(message, now)
-            case "PlanControl" if control is not None and int(message.dst) == self._settings.imc_id:
+            case "PlanControl" if control is not None and int(message.dst) == self._settings.id:
                 control.plan_control_reply(message, now)
             case "VehicleMedium":
                 node.medium = int(message.medium)

@@ -61,7 +61,7 @@ class Speaker:
 
     def begin(self, now: float) -> None:
         """Announce from now on, or as soon as it is known where we are."""
-        if self.settings.position_deg is None:
+        if self.settings.position is None:
             # The first vehicle's position serves as ours, and it is answered at once; see own_announce.
             self._announce_due = now + self.settings.announce_period_s
 
@@ -117,7 +117,7 @@ class Speaker:
         self.transport.announce(
             lambda addresses: encode(
                 own_announce(self.settings, addresses, position),
-                src=self.settings.imc_id,
+                src=self.settings.id,
                 dst=0,
                 dst_ent=0,
                 time_s=self._wall_clock(),
@@ -125,12 +125,12 @@ class Speaker:
         )
 
     def _encoded(self, message: Message, dst: int) -> bytes:
-        return encode(message, src=self.settings.imc_id, dst=dst, time_s=self._wall_clock())
+        return encode(message, src=self.settings.id, dst=dst, time_s=self._wall_clock())
 
     def position_rad(self) -> tuple[float, float]:
         """The place that we announce as ours."""
-        if self.settings.position_deg is not None:
-            lat, lon = self.settings.position_deg
+        if self.settings.position is not None:
+            lat, lon = self.settings.position
             return math.radians(lat), math.radians(lon)
         for node in self._roster:
             if node.announcement is not None and node.announcement.is_vehicle:

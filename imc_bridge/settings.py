@@ -1,10 +1,9 @@
-"""Everything that can be set about the IMC side, in one frozen place."""
-
-from __future__ import annotations
+"""Everything that can be set about the IMC side, in one frozen place; what others offer of it derives from here."""
 
 import ipaddress
-from dataclasses import dataclass
-from typing import Literal
+from typing import Annotated, Literal, Self
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 STANDARD_ANNOUNCE_PORTS = (30100, 30101, 30102, 30103, 30104)
 STANDARD_MULTICAST_GROUP = "224.0.75.69"
@@ -17,158 +16,122 @@ DEFAULT_RATE_LIMITERS = (
 AltimeterGeometry = Literal["vertical", "body"]
 
 
-@dataclass(frozen=True, slots=True)
-class BridgeSettings:
+def _multicast(text: str) -> str:
+    if not ipaddress.IPv4Address(text).is_multicast:
+        raise ValueError(f"{text} is no multicast address such as {STANDARD_MULTICAST_GROUP}")
+    return text
+
+
+Address = Annotated[str, AfterValidator(lambda text: str(ipaddress.IPv4Address(text)))]
+Network = Annotated[str, AfterValidator(lambda text: ipaddress.IPv4Network(text) and text)]
+ImcId = Annotated[int, Field(ge=1, le=0xFFFE)]
+Port = Annotated[int, Field(ge=1, le=65535)]
+Latitude = Annotated[float, Field(ge=-90, le=90)]
+Longitude = Annotated[float, Field(ge=-180, le=180)]
+Positive = Annotated[float, Field(gt=0)]
+
+
+class ConsoleSettings(BaseModel):
+    """What an operator may want to set. Keep id and port fixed: vehicles remember them until they restart."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    name: str = Field(
+        default="bathyfleet", min_length=1, max_length=64, description="Name under which this service announces itself"
+    )
+    id: ImcId = Field(default=0x3F01, description="Our IMC id, in the range of consoles")
+    port: Port = Field(default=6101, description="UDP port on which we receive")
+    announce_ports: tuple[Port, ...] = Field(
+        default=STANDARD_ANNOUNCE_PORTS,
+        min_length=1,
+        description="UDP ports to which announces go; the first free one is listened on",
+    )
+    altimeter: AltimeterGeometry = Field(
+        default="vertical",
+        description="vertical: the altimeter measures straight down whatever the attitude, as DUNE's simulation does; "
+        "body: it is fixed to the hull and leans with it",
+    )
+    loopback_only: bool = Field(default=False, description="Speak only to vehicles on this machine")
+    interfaces: tuple[Address, ...] = Field(
+        default=(), description="IPv4 addresses of the interfaces to speak on; empty: all, also those that come later"
+    )
+    transport: Literal["udp", "tcp"] = Field(
+        default="udp", description="tcp: by TCP with vehicles that offer it, by UDP with the others"
+    )
+    position: tuple[Latitude, Longitude] | None = Field(
+        default=None,
+        description="Latitude and longitude that are announced as ours; without them the first vehicle's. "
+        "DUNE's simulated radio range counts from there",
+    )
+    vehicles: tuple[str, ...] = Field(default=(), description="Names of the vehicles to talk to; empty: all")
+    allowed_ids: tuple[ImcId, ...] = Field(
+        default=(), description="IMC ids of the vehicles and gateways to listen to; empty: all"
+    )
+    allowed_addresses: tuple[Network, ...] = Field(
+        default=(),
+        description="IPv4 addresses or networks (10.0.10.0/24) to take IMC packets from; empty: all. "
+        "127.0.0.0/8 has to be among them for vehicles on this machine",
+    )
+    max_packets_per_s: int = Field(
+        default=5000,
+        ge=100,
+        le=1_000_000,
+        description="Most IMC packets a second from one vehicle, multiplied by time_scale; all strangers at one "
+        "address get a quarter of that",
+    )
+    rate_limiters: str = Field(
+        default=DEFAULT_RATE_LIMITERS,
+        description="Rates in Hz asked of every engaged vehicle and taken back at the end; empty: as they are",
+    )
+    unknown_bottom_depth_m: float = Field(
+        default=2.0, ge=0, le=100, description="Deepest reference where no bottom is known"
+    )
+
+
+class BridgeSettings(ConsoleSettings):
     """How this console appears on the IMC network and how it drives vehicles.
 
     Every ``*_s`` value is in seconds of the vehicles' clock; with ``time_scale`` 20 a period of 1 s lasts 50 ms.
-
-    Raises
-    ------
-    ValueError
-        Naming the field, its value and what would be right.
     """
 
-    imc_id: int = 0x3F01
-    """Our IMC address. Vehicles remember an id with its port until they restart: keep both fixed."""
-    name: str = "bathyfleet"
-    port: int = 6101
-    loopback_only: bool = False
-    """Reach only vehicles on this machine; nothing goes out on any network."""
-    interfaces: tuple[str, ...] = ()
-    """IPv4 addresses of the interfaces to announce on; empty means all of them."""
-    transport: Literal["udp", "tcp"] = "udp"
-    """``tcp``: by TCP with every vehicle that offers it (DUNE's Transports.TCP.Server), by UDP with the others."""
-    announce_ports: tuple[int, ...] = STANDARD_ANNOUNCE_PORTS
-    multicast_group: str = STANDARD_MULTICAST_GROUP
-    position_deg: tuple[float, float] | None = None
-    """Where this console is, latitude and longitude; without it the first vehicle's position is announced."""
-    vehicles: tuple[str, ...] = ()
-    """Names of the vehicles to talk to; empty means every vehicle that announces itself."""
-    allowed_ids: tuple[int, ...] = ()
-    """IMC ids of the nodes to take up, vehicles and gateways; empty means every id."""
-    allowed_addresses: tuple[str, ...] = ()
-    """IPv4 addresses or networks to take packets from; empty means every address."""
-    max_packets_per_s: int = 5000
-    """Most packets a second of its own time from one vehicle's address; a LAUV sends 710 until asked for fewer."""
-    time_scale: float = 1.0
+    time_scale: float = Field(default=1.0, gt=0, le=1000)
     """How many times faster than the wall clock the vehicles live (simulations only)."""
+    multicast_group: Annotated[str, AfterValidator(_multicast)] = STANDARD_MULTICAST_GROUP
 
-    announce_period_s: float = 10.0
-    heartbeat_period_s: float = 1.0
-    reference_period_s: float = 1.0
+    announce_period_s: Positive = 10.0
+    heartbeat_period_s: Positive = 1.0
+    reference_period_s: float = Field(default=1.0, gt=0, lt=5)
     """A Reference has to reach a vehicle every 5 s or its plan fails."""
-    telemetry_timeout_s: float = 10.0
+    telemetry_timeout_s: Positive = 10.0
     """An announced vehicle that sends nothing for this long is reported with the likely causes."""
-    lost_after_s: float = 10.0
-    release_after_s: float = 30.0
+    lost_after_s: Positive = 10.0
+    release_after_s: Positive = 30.0
     """A vehicle silent for this long is no longer ours: its plan has ended by itself."""
     lost_after_wall_s: float = 1.0
     """Silence shorter than this on the wall clock is never a loss, whatever ``time_scale`` says."""
 
-    plan_id: str = "bathyfleet"
-    follow_timeout_s: float = 30.0
+    plan_id: str = Field(default="bathyfleet", min_length=1)
+    """A name that no other console uses."""
+    follow_timeout_s: Positive = 30.0
     loiter_radius_m: float = 7.5
     altitude_interval_m: float = 0.0
     """Part of the maneuver's specification, of which DUNE takes no notice."""
-    engage_timeout_s: float = 15.0
-    start_timeout_s: float = 10.0
-    answer_timeout_s: float = 10.0
+    engage_timeout_s: Positive = 15.0
+    start_timeout_s: Positive = 10.0
+    answer_timeout_s: Positive = 10.0
     """A live vehicle that leaves references unanswered for this long has its plan restarted."""
     max_restarts: int = 3
     restart_forgiven_after_s: float = 60.0
-    depth_tolerance_m: float = 1.0
+    depth_tolerance_m: Positive = 1.0
 
-    rate_limiters: str = DEFAULT_RATE_LIMITERS
-    """Asked of every engaged vehicle, the former value is restored afterwards; empty leaves rates alone."""
-    state_events_per_s: float = 10.0
+    state_events_per_s: Positive = 10.0
     """Most state reports per vehicle and second of the wall clock that are passed on."""
 
-    altimeter: AltimeterGeometry = "vertical"
-    """``vertical``: the range is the height above the bottom (DUNE's simulation); ``body``: fixed to the hull."""
-    max_range_m: float = 200.0
-    guard_radius_m: float = 20.0
+    max_range_m: Positive = 200.0
+    guard_radius_m: Positive = 20.0
     """Soundings within this distance of the vehicle count as the bottom near it."""
-    guard_window_s: float = 30.0
-    unknown_bottom_depth_m: float = 2.0
-    """Deepest reference while no bottom has been measured near the vehicle."""
+    guard_window_s: Positive = 30.0
 
-    def __post_init__(self) -> None:
-        def check(field: str, good: bool, right: str) -> None:
-            if not good:
-                raise ValueError(f"{field} = {getattr(self, field)!r}: it must be {right}")
-
-        check(
-            "imc_id",
-            0 < self.imc_id < 0xFFFF,
-            "between 0x0001 and 0xFFFE",
-        )
-        check("name", bool(self.name) and len(self.name) <= 64, "1 to 64 characters")
-        check("port", 0 < self.port <= 65535, "between 1 and 65535")
-        ports = self.announce_ports
-        check(
-            "announce_ports",
-            bool(ports) and all(0 < p <= 65535 for p in ports),
-            "at least one port, 1 to 65535",
-        )
-        check(
-            "multicast_group",
-            _is_multicast(self.multicast_group),
-            "an IPv4 multicast address such as 224.0.75.69",
-        )
-        check("interfaces", all(map(_is_ipv4, self.interfaces)), "IPv4 addresses of this machine's interfaces")
-        check("allowed_ids", all(0 < i < 0xFFFF for i in self.allowed_ids), "ids between 0x0001 and 0xFFFE")
-        check(
-            "allowed_addresses",
-            all(map(_is_network, self.allowed_addresses)),
-            "IPv4 addresses or networks such as 10.0.10.0/24, without host bits",
-        )
-        check("max_packets_per_s", self.max_packets_per_s >= 100, "at least 100")
-        check("time_scale", 0.01 <= self.time_scale <= 1000.0, "between 0.01 and 1000 (1 = real time)")
-        check("reference_period_s", 0.0 < self.reference_period_s < 5.0, "below 5 s, or vehicles give up")
-        check("plan_id", bool(self.plan_id), "a name that no other console uses")
-        place = self.position_deg
-        check(
-            "position_deg",
-            place is None or (len(place) == 2 and abs(place[0]) <= 90.0 and abs(place[1]) <= 180.0),
-            "latitude and longitude in degrees",
-        )
-        check("transport", self.transport in ("udp", "tcp"), "'udp' or 'tcp'")
-        check("altimeter", self.altimeter in ("vertical", "body"), "'vertical' or 'body'")
-        for field in (
-            "announce_period_s",
-            "heartbeat_period_s",
-            "telemetry_timeout_s",
-            "lost_after_s",
-            "release_after_s",
-            "follow_timeout_s",
-            "engage_timeout_s",
-            "start_timeout_s",
-            "answer_timeout_s",
-            "depth_tolerance_m",
-            "max_range_m",
-            "guard_radius_m",
-            "guard_window_s",
-            "state_events_per_s",
-        ):
-            check(field, getattr(self, field) > 0.0, "positive")
-
-
-def _is_ipv4(text: str) -> bool:
-    try:
-        ipaddress.IPv4Address(text)
-    except ValueError:
-        return False
-    return True
-
-
-def _is_network(text: str) -> bool:
-    try:
-        ipaddress.IPv4Network(text)
-    except ValueError:
-        return False
-    return True
-
-
-def _is_multicast(text: str) -> bool:
-    return _is_ipv4(text) and ipaddress.IPv4Address(text).is_multicast
+    def changed(self, **changes: object) -> Self:
+        """Return other settings. Raises ValueError, naming the field."""
+        return type(self).model_validate(dict(self) | changes)

@@ -180,13 +180,16 @@ def test_examples_are_taken_by_the_service(page: Path) -> None:
 def settings_rows(model: type[BaseModel] = Settings, prefix: str = "") -> Iterator[str]:
     """Yield the rows of the table of settings as docs/settings.md has to show them."""
     schema = model.model_json_schema()
+    kinds = {name: field.annotation for name, field in model.model_fields.items()}
+    sections = {name: kind for name, kind in kinds.items() if isinstance(kind, type) and issubclass(kind, BaseModel)}
     for name, field in model.model_fields.items():
-        if isinstance(field.annotation, type) and issubclass(field.annotation, BaseModel):
-            yield from settings_rows(field.annotation, f"{prefix}{name}.")
+        if name in sections:
             continue
         default = json.dumps(schema["properties"][name].get("default"))
         shown = "–" if default == "null" else f"`{default}`"
         yield f"| `{prefix}{name}` | {shown} | {values_of(schema['properties'][name])} | {field.description} |"
+    for name, section in sections.items():
+        yield from settings_rows(section, f"{prefix}{name}.")
 
 
 def values_of(schema: dict[str, Any]) -> str:

@@ -1,11 +1,24 @@
 """Settings: where they come from, and what a mistake in them is answered with."""
 
+import ast
+import re
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import pytest
+import typer
+from pydantic import BaseModel
 
+from app.cli import LogFormat, LogLevel
+from app.cli import app as command_line
+from app.exploration.planner.options import PlannerOptions
+from app.missions.fleet.links.imc import bridge_settings
+from app.missions.settings import ImcSettings
+from app.missions.spec.mission import MissionSpec
 from app.settings import Settings, SettingsError, is_loopback, load_settings
+from imc_bridge.settings import BridgeSettings, ConsoleSettings
+from tests.test_cli import ROOT
 
 
 @pytest.fixture(autouse=True)
@@ -24,7 +37,7 @@ def test_the_defaults_are_safe() -> None:
     assert settings.loopback
     assert not settings.insecure
     assert settings.migrates_itself
-    assert settings.service().database_url == "sqlite+aiosqlite:///bathyfleet.db"
+    assert settings.database_url == "sqlite+aiosqlite:///bathyfleet.db"
 
 
 def test_the_command_line_beats_the_environment_beats_the_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -181,3 +194,49 @@ def test_only_origins_may_use_the_api_from_elsewhere(origin: str, said: str) -> 
 def test_origins_with_and_without_a_port_are_taken() -> None:
     good = ("https://console.example", "http://10.0.0.5:8080", "http://[::1]:8080", "http://localhost:5173")
     assert load_settings(allowed_origins=good).allowed_origins == good
+
+
+def test_a_setting_of_the_bridge_is_declared_once_and_set_as_the_services() -> None:
+    offered = set(ImcSettings.model_fields) - {"enabled"}
+    assert offered == set(ConsoleSettings.model_fields)
+    assert bridge_settings(ImcSettings(id=7, interfaces=("10.0.0.1",)), 2.0) == BridgeSettings(
+        id=7, interfaces=("10.0.0.1",), time_scale=2.0
+    )
+
+
+def test_a_wrong_setting_of_the_bridge_stops_the_start_and_is_named() -> None:
+    with pytest.raises(SettingsError, match=r"imc\.interfaces\.0 is 'eth0'"):
+        load_settings(imc={"interfaces": ["eth0"]})
+
+
+def declared(model: type[BaseModel]) -> Iterator[str]:
+    """Yield the names of a model's settings and of those within them."""
+    for name, field in model.model_fields.items():
+        yield name
+        if isinstance(field.annotation, type) and issubclass(field.annotation, BaseModel):
+            yield from declared(field.annotation)
+
+
+def test_the_help_of_serve_tells_the_defaults_and_choices_of_the_settings() -> None:
+    told = 0
+    for option in typer.main.get_command(command_line).commands["serve"].params:  # type: ignore[attr-defined]
+        field = Settings.model_fields.get(option.name)
+        if default := re.search(r"\[default: (.*)\]", option.help):
+            told += 1
+            assert type(field.default)(default[1]) == field.default
+    for name, choices in (("log_level", LogLevel), ("log_format", LogFormat)):
+        assert tuple(choices) == get_args(Settings.model_fields[name].annotation)
+    assert told == 5
+
+
+@pytest.fixture(scope="module")
+def attributes_read() -> set[str]:
+    """Names of all attributes that the program reads."""
+    files = [file for package in ("app", "imc_bridge", "simulator") for file in (ROOT / package).rglob("*.py")]
+    nodes = (node for file in files for node in ast.walk(ast.parse(file.read_text())))
+    return {node.attr for node in nodes if isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Load)}
+
+
+@pytest.mark.parametrize("model", [Settings, BridgeSettings, PlannerOptions, MissionSpec])
+def test_every_setting_that_is_offered_is_read(model: type[BaseModel], attributes_read: set[str]) -> None:
+    assert set(declared(model)) <= attributes_read

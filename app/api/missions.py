@@ -1,6 +1,5 @@
 """Missions: describing, listing, moving through their states, and their vehicles."""
 
-from enum import StrEnum
 from typing import Annotated
 
 from fastapi import APIRouter, Body, Query, Request, Response
@@ -13,6 +12,7 @@ from app.api.problems import problems
 from app.api.schemas import API, ActionRequest, MissionId, NoteRequest, VehicleName
 from app.api.state import Service, State
 from app.missions.spec.mission import MissionSpec, VehicleSpec
+from app.missions.states import Action
 from app.missions.views.mission import ActionView, EventView, MissionSummary, MissionView, PreflightView, StepView
 from app.missions.views.telemetry import TelemetryView
 
@@ -39,16 +39,6 @@ EXAMPLE_SPEC = {
     "limits": {"max_step_m": 10, "min_depth_m": 2, "max_depth_m": 8},
     "planner": {"name": "cao"},
 }
-
-
-class Action(StrEnum):
-    """What an operator does with a mission."""
-
-    START = "start"
-    PAUSE = "pause"
-    RESUME = "resume"
-    ABORT = "abort"
-    FINISH = "finish"
 
 
 @router.post(
@@ -144,7 +134,7 @@ def _add_action(action: Action) -> None:
         mission_id: MissionId, service: Service, operator: Operator, body: ActionRequest | None = None
     ) -> ActionView:
         note = body.note if body is not None else ""
-        return await service.act(mission_id, action.value, actor=operator.name, note=note)
+        return await service.act(mission_id, action, actor=operator.name, note=note)
 
     router.add_api_route(
         f"/{{mission_id}}/{action}",

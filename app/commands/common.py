@@ -90,7 +90,7 @@ def with_missions(
     async def use() -> "T":
         await prepare_database(settings.database_url, may_upgrade=settings.migrates_itself)
         store = Store(settings.database_url)
-        closed = settings.service().model_copy(update={"imc": settings.imc.model_copy(update={"enabled": False})})
+        closed = settings.model_copy(update={"imc": settings.imc.model_copy(update={"enabled": False})})
         service = MissionService(closed, store)
         try:
             done = await run(service)

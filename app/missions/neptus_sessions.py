@@ -138,7 +138,7 @@ class NeptusSessions:
                 raise SessionRefusedError(f"the session's mission is {state}: press STOP, then RENEW for another one")
             self.link.locate(data, host)
             if state is MissionState.READY:
-                await self._service.act(mission_id, "start", actor=user, note="START in the panel")
+                await self._service.act(mission_id, Action.START, actor=user, note="START in the panel")
         except MissionError as error:
             raise SessionRefusedError(f"{error}. {error.remedy}") from error
         await self._warn_of_border(data)
@@ -218,7 +218,7 @@ class NeptusSessions:
         state = (await self._service.mission(mission_id)).state if mission_id is not None else None
         if mission_id is None or state in ENDED:
             return
-        await self._service.act(mission_id, "finish" if state in FLYING else "abort", actor=user, note=reason)
+        await self._service.act(mission_id, Action.FINISH if state in FLYING else Action.ABORT, actor=user, note=reason)
 
     async def _note(self, session: str, level: Level, message: str, time_step: int, host: str) -> None:
         await self._service.note(

@@ -278,16 +278,16 @@ class MissionService:
         async with self._supervisor.acting(mission_id):
             target = states.move(live.header.state, action)
             stops: list[StopReceipt] = []
-            if action in ("start", "resume"):
+            if action in (Action.START, Action.RESUME):
                 self._claims.check_team(live)
                 check_level_is_known(live)
-                if action == "start":
+                if action == Action.START:
                     self._claims.check_links(live)
                 self._claims.claim_team(live)
                 try:
                     await self._supervisor.set_state(live, target, note, actor, check=free_elsewhere(live))
                 except BaseException:
-                    if action == "start":
+                    if action == Action.START:
                         self._claims.release_team(live)
                     raise
                 self._supervisor.run(live)

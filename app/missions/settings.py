@@ -1,9 +1,11 @@
 """Settings of the mission service. ``app.settings`` composes them with those of the HTTP edge."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal, Self
+from typing import TYPE_CHECKING, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from imc_bridge.settings import ConsoleSettings
 
 if TYPE_CHECKING:
     from app.mapping.products.crowdsourced import Provider
@@ -15,58 +17,10 @@ class Section(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
-class ImcSettings(Section):
-    """How this service appears to IMC vehicles. Keep id and port fixed: vehicles remember them until they restart."""
+class ImcSettings(ConsoleSettings):
+    """How this service appears to IMC vehicles: what the bridge lets be set."""
 
     enabled: bool = Field(default=True, description="Listen for IMC vehicles and speak to them")
-    name: str = Field(default="bathyfleet", description="Name under which this service announces itself")
-    id: int = Field(default=0x3F01, ge=1, le=0xFFFE, description="Our IMC id, in the range of consoles")
-    port: int = Field(default=6101, ge=1, le=65535, description="UDP port on which we receive")
-    announce_ports: tuple[int, ...] = Field(
-        default=(30100, 30101, 30102, 30103, 30104),
-        description="UDP ports to which announces go; the first free one is listened on",
-    )
-    altimeter: Literal["vertical", "body"] = Field(
-        default="vertical",
-        description="vertical: the altimeter measures straight down whatever the attitude, as DUNE's simulation does; "
-        "body: it is fixed to the hull and leans with it",
-    )
-    loopback_only: bool = Field(default=False, description="Speak only to vehicles on this machine")
-    interfaces: tuple[str, ...] = Field(
-        default=(), description="IPv4 addresses of the interfaces to speak on; empty: all, also those that come later"
-    )
-    transport: Literal["udp", "tcp"] = Field(
-        default="udp", description="tcp: by TCP with vehicles that offer it, by UDP with the others"
-    )
-    position: tuple[Annotated[float, Field(ge=-90, le=90)], Annotated[float, Field(ge=-180, le=180)]] | None = Field(
-        default=None,
-        description="Latitude and longitude that are announced as ours; without them the first vehicle's. "
-        "DUNE's simulated radio range counts from there",
-    )
-    vehicles: tuple[str, ...] = Field(default=(), description="Names of the vehicles to talk to; empty: all")
-    allowed_ids: tuple[int, ...] = Field(
-        default=(), description="IMC ids of the vehicles and gateways to listen to; empty: all"
-    )
-    allowed_addresses: tuple[str, ...] = Field(
-        default=(),
-        description="IPv4 addresses or networks (10.0.10.0/24) to take IMC packets from; empty: all. "
-        "127.0.0.0/8 has to be among them for vehicles on this machine",
-    )
-    max_packets_per_s: int = Field(
-        default=5000,
-        ge=100,
-        le=1_000_000,
-        description="Most IMC packets a second from one vehicle, multiplied by time_scale; all strangers at one "
-        "address get a quarter of that",
-    )
-    rate_limiters: str = Field(
-        default="Distance:5, EstimatedState:10, "
-        "ServoPosition:0.1, EulerAngles:0.1, AngularVelocity:0.1, Acceleration:0.1",
-        description="Rates in Hz asked of every engaged vehicle and taken back at the end; empty: as they are",
-    )
-    unknown_bottom_depth_m: float = Field(
-        default=2.0, ge=0, le=100, description="Deepest reference where no bottom is known"
-    )
 
 
 class NeptusSettings(Section):
@@ -185,15 +139,21 @@ class ServiceSettings(Section):
 
     database_url: str = Field(
         default="sqlite+aiosqlite:///bathyfleet.db",
-        description="SQLAlchemy URL: sqlite+aiosqlite:///FILE or postgresql+asyncpg://…",
+        description="SQLAlchemy URL: sqlite+aiosqlite:///FILE or postgresql+asyncpg://USER:PASSWORD@HOST/NAME",
     )
     time_scale: float = Field(
         default=1.0, gt=0, le=1000, description="How much faster than wall time simulated vehicles live"
     )
     unconfined_imports: bool = Field(
-        default=False, description="Read imported files even where nothing keeps them from reading others"
+        default=False,
+        description="Read imported files also where the kernel has neither Landlock nor seccomp, which keep them from "
+        "reading other files",
     )
-    imc: ImcSettings = ImcSettings()
-    neptus: NeptusSettings = NeptusSettings()
-    simulation: SimulationSettings = SimulationSettings()
-    provider: ProviderSettings = ProviderSettings()
+    imc: ImcSettings = Field(default=ImcSettings(), description="The link to IMC vehicles")
+    neptus: NeptusSettings = Field(default=NeptusSettings(), description="The gateway for Neptus' ConvCAO panel")
+    simulation: SimulationSettings = Field(
+        default=SimulationSettings(), description="The world of vehicles of kind sim"
+    )
+    provider: ProviderSettings = Field(
+        default=ProviderSettings(), description="Who hands soundings in as crowdsourced bathymetry"
+    )

@@ -1,7 +1,6 @@
 """The states of a mission and the one table of moves between them."""
 
 from enum import StrEnum
-from typing import Literal
 
 
 class MissionState(StrEnum):
@@ -17,8 +16,15 @@ class MissionState(StrEnum):
     FAILED = "failed"
 
 
-Action = Literal["start", "pause", "resume", "abort", "finish"]
-"""What operators and consoles may ask of a mission."""
+class Action(StrEnum):
+    """What operators and consoles may ask of a mission."""
+
+    START = "start"
+    PAUSE = "pause"
+    RESUME = "resume"
+    ABORT = "abort"
+    FINISH = "finish"
+
 
 ENDED = frozenset({MissionState.FINISHED, MissionState.ABORTED, MissionState.FAILED})
 
@@ -55,6 +61,11 @@ class MoveRefusedError(Exception):
         self.action = action
         self.state = state
         self.remedy = _REMEDIES[state]
+
+
+def allowed_actions(state: MissionState) -> list[Action]:
+    """Return what may be asked of a mission in this state."""
+    return [action for action in Action if state in MOVES[action]]
 
 
 def move(state: MissionState, action: str) -> MissionState:

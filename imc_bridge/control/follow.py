@@ -114,7 +114,7 @@ class Follower(Control):
             # Its plan goes by our name, but it takes no reference of ours.
             self._evidence.taken_by = self.node.controller
             self._plan_ended(now)
-        if int(message.control_src) != self._settings.imc_id:
+        if int(message.control_src) != self._settings.id:
             return
         if int(message.state) == STATE_TIMEOUT:
             if self.phase is Phase.FOLLOWING:

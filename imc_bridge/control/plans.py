@@ -51,7 +51,7 @@ SURFACE_WAIT_S = 4
 def follow_plan(settings: BridgeSettings) -> Message:
     """The plan that makes a vehicle follow our references."""
     maneuver = imcpy.FollowReference()
-    maneuver.control_src = settings.imc_id
+    maneuver.control_src = settings.id
     maneuver.control_ent = ANY_ENTITY
     maneuver.timeout = settings.follow_timeout_s
     maneuver.loiter_radius = settings.loiter_radius_m

@@ -138,7 +138,7 @@ def _socket_findings(bridge: Bridge, *, heard: bool) -> list[Finding]:
     where = "loopback only" if settings.loopback_only else ", ".join(transport.own_addresses())
     findings = [
         ok(
-            f"id 0x{settings.imc_id:04X}, traffic on UDP {settings.port}, announces heard on UDP "
+            f"id 0x{settings.id:04X}, traffic on UDP {settings.port}, announces heard on UDP "
             f"{transport.announce_port}, interfaces: {where}"
         )
     ]
@@ -170,7 +170,7 @@ def _network_findings(bridge: Bridge, nodes: tuple[NodeDiagnosis, ...], missing:
         findings.append(
             problem(
                 Cause.OUR_ID_TAKEN,
-                f"our id 0x{settings.imc_id:04X} is announced by {bridge.double}, too",
+                f"our id 0x{settings.id:04X} is announced by {bridge.double}, too",
                 "Vehicles talk to whom they heard first: give one of the two another IMC id",
             )
         )
@@ -316,7 +316,7 @@ def _silence_finding(node: NodeView, bridge: Bridge, answer: Answer | None) -> F
         return problem(
             Cause.STALE_PORT,
             f"it answers on UDP {settings.port} to a fresh id, but not to ours: "
-            f"it remembers id 0x{settings.imc_id:04X} at another port",
+            f"it remembers id 0x{settings.id:04X} at another port",
             f"Go back to the port used before, or give this service another IMC id, or restart DUNE on {node.name}",
         )
     if answer is Answer.ON_OTHER_PORT:
@@ -425,12 +425,11 @@ def _plan_findings(node: NodeView, settings: BridgeSettings) -> list[Finding]:
         return [ok("in service and ready for a plan")]
     if node.state is NodeState.LOST:
         return []
-    if node.controller not in (None, settings.imc_id, 0xFFFF):
+    if node.controller not in (None, settings.id, 0xFFFF):
         return [
             note(
                 Cause.FOREIGN_CONTROL,
-                f"its maneuver takes references from console 0x{node.controller:04X} only; ours is "
-                f"0x{settings.imc_id:04X}",
+                f"its maneuver takes references from console 0x{node.controller:04X} only; ours is 0x{settings.id:04X}",
                 "Stop that plan on its console before a mission",
             )
         ]

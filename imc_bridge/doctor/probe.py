@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import asyncio
 import random
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import StrEnum
 
 import imcpy
@@ -75,7 +75,7 @@ async def probe(bridge: Bridge) -> dict[int, Answer]:
     silent = [node for node in bridge.nodes() if node.is_vehicle and _silent(node)]
     if not silent:
         return {}
-    taken = {node.imc_id for node in bridge.nodes()} | {bridge.settings.imc_id}
+    taken = {node.imc_id for node in bridge.nodes()} | {bridge.settings.id}
     first_id, second_id = random.sample([i for i in CONSOLE_IDS if i not in taken], 2)
     host = LOOPBACK if bridge.settings.loopback_only else "0.0.0.0"  # noqa: S104 - vehicles come from anywhere
     loop = asyncio.get_running_loop()
@@ -118,10 +118,10 @@ def _speak(
     bridge: Bridge, other: asyncio.DatagramTransport, guises: tuple[_Guise, _Guise], nodes: list[NodeView]
 ) -> None:
     for guise in guises:
-        settings = replace(bridge.settings, port=guise.port, imc_id=guise.imc_id, name=f"{bridge.settings.name}-probe")
+        settings = bridge.settings.changed(port=guise.port, id=guise.imc_id, name=f"{bridge.settings.name}-probe")
         bridge.transport.announce(
             lambda addresses, settings=settings: _packet(  # type: ignore[misc]
-                bridge, own_announce(settings, addresses, bridge.position_rad()), settings.imc_id, 0
+                bridge, own_announce(settings, addresses, bridge.position_rad()), settings.id, 0
             )
         )
     for node in nodes:

@@ -11,7 +11,7 @@ import json
 import zlib
 from collections import Counter
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import imcpy
@@ -92,9 +92,8 @@ def replay(
     if not records:
         raise RecordingError(f"{path} holds no packet")
     console, imc_id = _console(records, settings)
-    settings = replace(
-        settings,
-        imc_id=imc_id,
+    settings = settings.changed(
+        id=imc_id,
         port=console[1],
         vehicles=(),
         state_events_per_s=1000.0,
@@ -135,13 +134,13 @@ def _console(records: list[Recorded], settings: BridgeSettings) -> tuple[Address
         if record.dst[1] not in settings.announce_ports:
             listeners[record.dst] += 1
     for (address, imc_id), _ in speakers.most_common():
-        if imc_id == settings.imc_id and address in listeners:
+        if imc_id == settings.id and address in listeners:
             return address, imc_id
     if not listeners:
-        return ("127.0.0.1", settings.port), settings.imc_id
+        return ("127.0.0.1", settings.port), settings.id
     address = listeners.most_common(1)[0][0]
     ids = [imc_id for (src, imc_id), _ in speakers.most_common() if src == address]
-    return address, ids[0] if ids else settings.imc_id
+    return address, ids[0] if ids else settings.id
 
 
 def _time_scale(records: list[Recorded], console: Address, settings: BridgeSettings) -> float:

@@ -357,7 +357,7 @@ class Node:
     @property
     def foreign_controller(self) -> int | None:
         """The console that its maneuver listens to when that is not us."""
-        return None if self.controller in (None, ANY_CONSOLE, self._settings.imc_id) else self.controller
+        return None if self.controller in (None, ANY_CONSOLE, self._settings.id) else self.controller
 
     def take_entities(self, message: Message) -> None:
         """EntityList report: ``Name=id;…``."""
@@ -467,7 +467,7 @@ class Node:
         return Status(
             NodeState.ANNOUNCED,
             "announced but sends nothing to us: it may remember "
-            f"id 0x{self._settings.imc_id:04X} at another port (restart DUNE or return to that port), "
+            f"id 0x{self._settings.id:04X} at another port (restart DUNE or return to that port), "
             f"or a firewall blocks UDP port {self._settings.port}",
         )
 

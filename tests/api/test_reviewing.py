@@ -87,6 +87,22 @@ async def test_the_checklist_tells_a_problem_from_a_note(client: httpx.AsyncClie
     assert next(c for c in found["checks"] if c["id"] == "tide")["status"] == "problem"
 
 
+@pytest.mark.parametrize(
+    ("level", "battery", "status"),
+    [(40, "ok", "ok"), (39, "low", "warning"), (15, "low", "warning"), (14, "critical", "problem")],
+)
+async def test_the_checklist_and_the_vehicles_view_judge_a_battery_alike(
+    client: httpx.AsyncClient, path: str, level: float, battery: str, status: str
+) -> None:
+    name = (await client.get(path)).json()["vehicles"][0]["name"]
+    place = {"vehicle": name, "time_s": 1.79e9, "lat_deg": 41.1852, "lon_deg": -8.7046, "depth_m": 1.5}
+    await client.post(f"{path}/measurements", json={"items": [place | {"battery_pct": level}]})
+    vehicle = next(v for v in (await client.get(path)).json()["vehicles"] if v["name"] == name)
+    checks = (await client.get(f"{path}/preflight")).json()["checks"]
+    assert vehicle["battery"] == battery
+    assert [c["status"] for c in checks if c["id"] == f"battery.{name}"] == [status]
+
+
 async def test_notes_are_kept_in_the_log_and_empty_ones_refused(client: httpx.AsyncClient, path: str) -> None:
     note = await client.post(f"{path}/notes", json={"text": " Ferry at 14:10 "})
     assert (note.status_code, note.json()["message"], note.json()["kind"]) == (201, "Ferry at 14:10", "note")

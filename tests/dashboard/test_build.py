@@ -13,6 +13,8 @@ import pytest
 from hatchling.bridge.app import Application
 
 from app.main import create_app
+from app.missions.spec.mission import MissionSpec
+from app.missions.spec.search import DEFAULTS
 from app.settings import Settings
 
 ROOT = Path(__file__).parents[2]
@@ -125,12 +127,30 @@ def types_in(declarations: Path) -> str:
     return re.sub(r"\s*/\*\*.*?\*/", "", declarations.read_text(), flags=re.DOTALL)
 
 
-def test_the_types_are_those_of_the_service(tmp_path: Path) -> None:
-    generator = WEB / "node_modules" / ".bin" / "openapi-typescript"
-    if not generator.exists():
+@pytest.fixture
+def document(tmp_path: Path) -> Path:
+    """File with the service's OpenAPI document."""
+    if not (WEB / "node_modules").exists():
         pytest.skip("the front end's development packages are missing: npm ci in app/dashboard/web")
-    document = tmp_path / "openapi.json"
-    document.write_text(json.dumps(create_app(Settings()).openapi()))
+    file = tmp_path / "openapi.json"
+    file.write_text(json.dumps(create_app(Settings()).openapi()))
+    return file
+
+
+def test_the_forms_bounds_and_defaults_are_those_of_the_service(document: Path, tmp_path: Path) -> None:
+    made = tmp_path / "mission.json"
+    subprocess.run(["node", WEB / "mission.mjs", document, made], check=True, capture_output=True)
+    fields = json.loads(made.read_text())
+    assert fields == json.loads((WEB / "src" / "api" / "mission.json").read_text()), (
+        "what the service takes changed: run 'npm run schema' in app/dashboard/web against the running service"
+    )
+    assert fields["limits.max_step_m"]["maximum"] == 2000
+    assert fields["speed_mps"]["default"] == MissionSpec.model_fields["speed_mps"].default
+    assert fields["speed_mps"]["inSearch"] == DEFAULTS["speed_mps"]
+
+
+def test_the_types_are_those_of_the_service(document: Path, tmp_path: Path) -> None:
+    generator = WEB / "node_modules" / ".bin" / "openapi-typescript"
     made = tmp_path / "schema.d.ts"
     subprocess.run([generator, document, "-o", made], check=True, capture_output=True)
     assert types_in(made) == types_in(WEB / "src" / "api" / "schema.d.ts"), (

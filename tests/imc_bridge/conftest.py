@@ -7,7 +7,7 @@ import os
 import socket
 from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import asynccontextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -75,7 +75,7 @@ class Sea:
 
     async def connect(self, **changes: Any) -> Bridge:
         """Start a bridge; the former one must be closed."""
-        self.settings = replace(self.settings, **changes)
+        self.settings = self.settings.changed(**changes)
         self.bridge = Bridge(self.settings)
         await self.bridge.start(self.events.append)
         return self.bridge

@@ -2,7 +2,6 @@
 
 import asyncio
 import socket
-from dataclasses import replace
 
 import imcpy
 import pytest
@@ -39,7 +38,7 @@ async def test_healthy_vehicles_pass():
 async def test_nothing_heard_is_a_problem_with_ports_to_check():
     *announce_ports, port = free_ports(3)
     async with open_sea() as sea:
-        settings = replace(sea.settings, port=port, announce_ports=tuple(announce_ports))
+        settings = sea.settings.changed(port=port, announce_ports=tuple(announce_ports))
         diagnosis = await diagnose(settings, 0.1)
     assert diagnosis.causes == (Cause.NO_VEHICLE,)
     assert str(port) in diagnosis.text()
@@ -126,7 +125,7 @@ async def test_port_that_another_program_holds():
 async def test_port_that_changed_under_the_same_id():
     async with open_sea() as sea:
         await sea.ready()
-        sea.settings = replace(sea.settings, port=free_ports(1)[0])
+        sea.settings = sea.settings.changed(port=free_ports(1)[0])
         diagnosis = await examine(sea)
         assert diagnosis.causes == (Cause.STALE_PORT,)
         assert "restart DUNE" in diagnosis.text()
@@ -180,7 +179,7 @@ async def test_vehicle_of_a_doubtful_id_is_not_engaged(harbour):
 
 async def test_our_own_id_in_use_elsewhere(harbour):
     bridge, peer = harbour
-    peer.imc_id = bridge.settings.imc_id
+    peer.imc_id = bridge.settings.id
     peer.announce(bridge.transport.announce_port, sys_name="ccu-other")
     await until(lambda: bool(bridge.double), "it was noticed")
     assert Cause.OUR_ID_TAKEN in judge(bridge, 1.0).causes
@@ -188,9 +187,7 @@ async def test_our_own_id_in_use_elsewhere(harbour):
 
 
 async def test_clock_that_is_off_by_hours():
-    async with open_sea(
-        speed=1.0, clock_offset_s=3 * 3600.0, boot_s=0.1, bridge={"position_deg": (41.18, -8.7)}
-    ) as sea:
+    async with open_sea(speed=1.0, clock_offset_s=3 * 3600.0, boot_s=0.1, bridge={"position": (41.18, -8.7)}) as sea:
         await sea.ready()
         await until(lambda: all(node.bottom_sensors for node in sea.bridge.nodes()), "it has measured the bottom")
         diagnosis = judge(sea.bridge, 1.0)
@@ -209,7 +206,7 @@ async def test_packets_from_an_address_that_was_not_announced(harbour):
 async def test_named_vehicle_that_is_absent_is_told():
     async with open_sea() as sea:
         await sea.ready()
-        sea.bridge.settings = replace(sea.bridge.settings, vehicles=("lauv-sim-1", "lauv-seacon-9"))
+        sea.bridge.settings = sea.bridge.settings.changed(vehicles=("lauv-sim-1", "lauv-seacon-9"))
         assert "lauv-seacon-9 was not heard" in judge(sea.bridge, 1.0).text()
 
 

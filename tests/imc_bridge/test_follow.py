@@ -58,7 +58,7 @@ class Script:
 
     def echo(self, state=2, reference=None):
         message = imcpy.FollowRefState()
-        message.control_src = self.settings.imc_id
+        message.control_src = self.settings.id
         message.state = imcpy.FollowRefState.StateEnum(state)
         sent = self.of("Reference")
         if reference or sent:

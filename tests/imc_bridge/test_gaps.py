@@ -34,7 +34,7 @@ async def test_waypoints_are_reached_though_every_dive_breaks_the_link():
 
 async def test_console_that_announces_no_place_is_out_of_range_for_good():
     # Why the first announce waits for a place: DUNE's simulation keeps the first one.
-    async with open_sea(radio_range_m=RANGE_M, bridge={"position_deg": (0.0, 0.0)}) as sea:
+    async with open_sea(radio_range_m=RANGE_M, bridge={"position": (0.0, 0.0)}) as sea:
         await until(lambda: any("another port" in node.reason for node in sea.bridge.nodes()), "it stays mute")
 
 

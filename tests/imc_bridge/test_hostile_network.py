@@ -250,7 +250,7 @@ async def test_forged_packets_move_no_vehicle_that_is_led():
             for _ in range(20):
                 forger.state()
                 arrived = imcpy.FollowRefState()
-                arrived.control_src, arrived.state, arrived.proximity = sea.settings.imc_id, 3, 0x07
+                arrived.control_src, arrived.state, arrived.proximity = sea.settings.id, 3, 0x07
                 forger.send(arrived)
                 abort = imcpy.Abort()
                 forger.send(abort)

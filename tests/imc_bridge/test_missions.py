@@ -2,7 +2,6 @@
 
 import asyncio
 import statistics
-from dataclasses import replace
 
 import imcpy
 import pytest
@@ -211,10 +210,10 @@ async def test_vehicle_in_another_consoles_plan_is_neither_engaged_nor_stopped()
     async with open_sea() as sea:
         (name,) = await sea.ready()
         await sea.bridge.close()
-        other = await sea.connect(imc_id=0x4001, name="ccu-other", port=free_ports(1)[0], plan_id="theirs")
+        other = await sea.connect(id=0x4001, name="ccu-other", port=free_ports(1)[0], plan_id="theirs")
         await until(lambda: sea.state(name) is NodeState.READY, "the other console hears it")
         await other.engage(name)
-        ours = Bridge(replace(sea.settings, imc_id=0x3F05, port=free_ports(1)[0], plan_id="ours"))
+        ours = Bridge(sea.settings.changed(id=0x3F05, port=free_ports(1)[0], plan_id="ours"))
         await ours.start(lambda event: None)
         try:
             await until(
@@ -270,7 +269,7 @@ async def test_plan_that_ended_for_want_of_references_is_taken_up_again(north_m)
 
 def foreign_start(sea, source, plan_id, control_src):
     """A START of another console for the first vehicle."""
-    settings = replace(sea.settings, imc_id=control_src, plan_id=plan_id)
+    settings = sea.settings.changed(id=control_src, plan_id=plan_id)
     return encode(plan_control(OPERATION_START, 1, settings), src=source, dst=sea.fleet.nodes[0].imc_id, time_s=1.7e9)
 
 

@@ -2,7 +2,6 @@
 
 import asyncio
 import socket
-from dataclasses import replace
 
 import imcpy
 import pytest
@@ -30,7 +29,7 @@ async def two_interfaces(monkeypatch):
     """A bridge on a machine that seems to have two interfaces; both lie on the loopback device."""
     present = [LOOPBACK, SECOND]
     monkeypatch.setattr("imc_bridge.network.transport.list_interfaces", lambda: list(present))
-    bridge = Bridge(settings_on(position_deg=(41.0, -8.0)))
+    bridge = Bridge(settings_on(position=(41.0, -8.0)))
     await bridge.start(lambda event: None)
     yield bridge, present
     await bridge.close()
@@ -206,7 +205,7 @@ def test_stream_is_cut_into_its_packets_however_it_arrives(sizes, cuts, rubbish)
 
 
 async def test_interface_settings_are_checked_when_the_bridge_starts():
-    settings = replace(settings_on(), interfaces=("203.0.113.9",))
+    settings = settings_on().changed(interfaces=("203.0.113.9",))
     with pytest.raises(ValueError, match="this machine has no address 203"):
         await Bridge(settings).start(lambda event: None)
     await asyncio.sleep(0)

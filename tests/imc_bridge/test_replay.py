@@ -193,9 +193,7 @@ def test_what_we_send_equals_byte_for_byte_what_worked_with_real_vehicles(captur
             continue
         ours = ours_to_send(message, settings)
         assert ours is not None, f"nothing of ours stands for a {kind}"
-        packet = encode(
-            ours, src=settings.imc_id, dst=message.dst, time_s=message.timestamp, dst_ent=int(message.dst_ent)
-        )
+        packet = encode(ours, src=settings.id, dst=message.dst, time_s=message.timestamp, dst_ent=int(message.dst_ent))
         assert packet == record.packet, f"{kind}: {ours} instead of {message}"
     assert sum(sent.values()) > 50
 

@@ -2,7 +2,6 @@
 
 import asyncio
 import socket
-from dataclasses import replace
 
 import imcpy
 import pytest
@@ -137,7 +136,7 @@ async def test_closing_twice_and_starting_twice():
         await bridge.start(print)
     await bridge.close()
     await bridge.close()
-    again = Bridge(replace(settings))
+    again = Bridge(settings.changed())
     await again.start(print)
     await again.close()
     await asyncio.sleep(0)

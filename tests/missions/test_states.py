@@ -1,5 +1,7 @@
 """The life of a mission and what an operator may ask for."""
 
+import json
+from datetime import UTC, datetime
 from typing import Any
 
 import numpy as np
@@ -11,7 +13,9 @@ from shapely.geometry import Polygon
 
 from app.missions.maps.builder import make_grid
 from app.missions.spec.mission import MissionSpec
-from app.missions.states import ENDED, MOVES, MissionState, MoveRefusedError, move
+from app.missions.states import ENDED, MOVES, Action, MissionState, MoveRefusedError, allowed_actions, move
+from app.missions.views.messages import StateMessage
+from app.missions.views.mission import MissionSummary, Progress
 from tests.missions.builders import LAT, LON, lon_lat, make_spec, rectangle, spec_json
 
 S = MissionState
@@ -57,6 +61,22 @@ def test_whatever_is_asked_for_an_ended_mission_stays_ended(actions: list[str]) 
             continue
         assert TABLE[action, before] is state
         assert before not in ENDED
+
+
+@pytest.mark.parametrize("state", list(S))
+def test_something_may_be_asked_of_a_mission_until_it_has_ended(state: S) -> None:
+    assert allowed_actions(state) == [action for action in Action if (action, state) in TABLE]
+    assert (not allowed_actions(state)) is (state in ENDED)
+
+
+def test_one_entry_in_the_table_of_moves_allows_an_action_everywhere(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(MOVES, "resume", MOVES["resume"] | {S.FAILED: S.RUNNING})
+    at, nothing = datetime.now(UTC), {"step": 0, "steps": 1, "soundings": 0, "rejected": 0, "distance_m": 0}
+    summary = MissionSummary(
+        id="m", name="m", state=S.FAILED, created_at=at, updated_at=at, progress=Progress(**nothing, coverage_pct=0)
+    )
+    assert json.loads(StateMessage(mission=summary).model_dump_json())["mission"]["allowed_actions"] == ["resume"]
+    assert move(S.FAILED, "resume") is S.RUNNING
 
 
 def refusal(**changes: Any) -> str:

@@ -15,13 +15,13 @@ from app.missions.preflight.search import search_checks
 from app.missions.safety import WAITING_CIRCLE_M
 from app.missions.spec.mission import VehicleKind
 from app.missions.team import Member
-from app.missions.views.mission import CheckStatus, CheckView, PreflightView
+from app.missions.views.mission import BatteryState, CheckStatus, CheckView, PreflightView
 
-LOW_BATTERY_PCT, EMPTY_BATTERY_PCT = 40.0, 15.0
 FAR_M = 500.0
 """A vehicle that starts farther from the area than this may have been put into the wrong mission."""
 
 OK, NOTE, WARNING, PROBLEM = CheckStatus.OK, CheckStatus.NOTE, CheckStatus.WARNING, CheckStatus.PROBLEM
+_BATTERIES = {BatteryState.OK: OK, BatteryState.LOW: WARNING, BatteryState.CRITICAL: PROBLEM}
 
 
 def preflight(live: LiveMission, hub: FleetHub) -> PreflightView:
@@ -95,13 +95,13 @@ def _batteries(live: LiveMission, hub: FleetHub) -> Iterator[CheckView]:
                     remedy="Look at the vehicle",
                 )
             continue
-        low = level < LOW_BATTERY_PCT
+        status = _BATTERIES[BatteryState.of(level)]
         yield CheckView(
             id=f"battery.{member.name}",
             title=f"Battery of {member.name}",
-            status=PROBLEM if level < EMPTY_BATTERY_PCT else WARNING if low else OK,
+            status=status,
             message=f"{level:.0f} %",
-            remedy="Charge it, or take it out of the mission" if low else "",
+            remedy="" if status is OK else "Charge it, or take it out of the mission",
         )
 
 

@@ -18,6 +18,7 @@ from app.exploration.planner.options import PlannerOptions
 from app.mapping.georeference import LocalFrame
 from app.mapping.vertical import LOWEST_ASTRONOMICAL_TIDE, check_depth_datum
 from app.missions.spec.base import Latitude, Longitude, Model, Name, PolygonGeometry
+from app.missions.spec.search import DEFAULTS as SEARCH_DEFAULTS
 from app.missions.spec.search import SearchSpec, filled_in
 from app.missions.spec.targets import MOST_TARGETS, TargetSpec, Tracking
 
@@ -299,6 +300,7 @@ class MissionSpec(Model):
         default=None,
         description="With kind search, and only there: what is sought. Then planner.name is rollout unless given, and "
         "steps as many as the time window has room for",
+        json_schema_extra={"x-defaults": SEARCH_DEFAULTS},
     )
     speed_mps: float = Field(default=1.3, gt=0, le=5, description="Speed asked of the vehicles")
     arrival_radius_m: float = Field(

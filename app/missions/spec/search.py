@@ -11,6 +11,14 @@ MOST_OBSTACLES = 1000
 SPARE_STEPS = 3.0
 """Steps that a search may take, as a multiple of those of full length that the time window has room for."""
 
+DEFAULTS: dict[str, Any] = {
+    "planner": {"name": "rollout"},
+    "limits": {"max_step_m": 3.0, "keep_out_margin_m": 2.0},
+    "arrival_radius_m": 1.0,
+    "speed_mps": 1.0,
+}
+"""What a mission of kind ``search`` takes where nothing else is said, other than a survey."""
+
 
 class ScannerSpec(Model):
     """A laser scanner or an imaging sonar that looks round, on every vehicle."""
@@ -65,12 +73,11 @@ def filled_in(data: Any) -> Any:
     """Return a mission's raw description with what a search has for defaults; what cannot be read is left as it is."""
     if not isinstance(data, dict) or data.get("kind") != "search" or not isinstance(data.get("search"), dict):
         return data
-    filled: dict[str, Any] = {"planner": {}, "limits": {}, "arrival_radius_m": 1.0, "speed_mps": 1.0} | data
-    if isinstance(filled["planner"], dict):
-        filled["planner"] = {"name": "rollout"} | filled["planner"]
-    if isinstance(filled["limits"], dict):
-        limits = {"max_step_m": 3.0, "keep_out_margin_m": 2.0} | filled["limits"]
-        filled |= {"limits": limits}
+    filled: dict[str, Any] = DEFAULTS | data
+    for name in ("planner", "limits"):
+        if isinstance(filled[name], dict):
+            filled[name] = DEFAULTS[name] | filled[name]
+    if isinstance(limits := filled["limits"], dict):
         filled.setdefault("steps", _steps(filled["search"].get("window_s"), filled["speed_mps"], limits["max_step_m"]))
     return filled
 

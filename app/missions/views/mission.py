@@ -4,12 +4,12 @@ from datetime import datetime
 from enum import StrEnum
 from typing import Any
 
-from pydantic import Field, SkipValidation
+from pydantic import Field, SkipValidation, computed_field
 
 from app.missions.fleet.interface import LinkState, WaypointStatus
 from app.missions.spec.base import Latitude, Longitude
 from app.missions.spec.mission import MissionSpec, Sensor, VehicleKind
-from app.missions.states import MissionState
+from app.missions.states import Action, MissionState, allowed_actions
 from app.missions.views.base import View
 from app.missions.views.search import SearchProgress
 from app.missions.views.targets import TargetView
@@ -27,6 +27,26 @@ class PositionQuality(StrEnum):
     FADING = "fading"
     POOR = "poor"
     """Worse than the mission allows."""
+
+
+LOW_BATTERY_PCT, CRITICAL_BATTERY_PCT = 40.0, 15.0
+"""Below the first a mission should not be started without a thought, below the second not at all."""
+
+
+class BatteryState(StrEnum):
+    """What a battery's level is worth."""
+
+    OK = "ok"
+    LOW = "low"
+    CRITICAL = "critical"
+    """Too little for a start."""
+
+    @classmethod
+    def of(cls, level_pct: float) -> "BatteryState":
+        """Return what a level is worth."""
+        if level_pct < CRITICAL_BATTERY_PCT:
+            return cls.CRITICAL
+        return cls.LOW if level_pct < LOW_BATTERY_PCT else cls.OK
 
 
 class VehicleView(View):
@@ -64,6 +84,12 @@ class VehicleView(View):
     surfacing: bool = Field(default=False, description="On its way up, or at the surface, for a GPS fix")
     risings: int = Field(default=0, description="How often it was sent up for a fix in this mission")
     pursuing: str | None = Field(default=None, description="The target that it leaves the mapping for")
+
+    @computed_field  # type: ignore[prop-decorator]
+    @property
+    def battery(self) -> BatteryState | None:
+        """What its battery's level is worth; null while it has not said."""
+        return None if self.battery_pct is None else BatteryState.of(self.battery_pct)
 
 
 class WaypointView(View):
@@ -111,6 +137,12 @@ class MissionSummary(View):
     created_at: datetime
     updated_at: datetime
     progress: Progress
+
+    @computed_field  # type: ignore[prop-decorator]
+    @property
+    def allowed_actions(self) -> list[Action]:
+        """What may be asked of it in this state: ``POST /missions/{id}/start`` and so on."""
+        return allowed_actions(self.state)
 
 
 class MissionView(MissionSummary):

@@ -67,25 +67,8 @@ def make_imc_link(settings: ImcSettings, time_scale: float) -> "ImcFleetLink":
 
 
 def bridge_settings(settings: ImcSettings, time_scale: float) -> BridgeSettings:
-    """The bridge's settings as the service's describe them. Raises ValueError, naming the field."""
-    return BridgeSettings(
-        imc_id=settings.id,
-        name=settings.name,
-        port=settings.port,
-        loopback_only=settings.loopback_only,
-        announce_ports=settings.announce_ports,
-        altimeter=settings.altimeter,
-        interfaces=settings.interfaces,
-        transport=settings.transport,
-        position_deg=settings.position,
-        vehicles=settings.vehicles,
-        allowed_ids=settings.allowed_ids,
-        allowed_addresses=settings.allowed_addresses,
-        max_packets_per_s=settings.max_packets_per_s,
-        rate_limiters=settings.rate_limiters,
-        unknown_bottom_depth_m=settings.unknown_bottom_depth_m,
-        time_scale=time_scale,
-    )
+    """The bridge's settings as the service's describe them."""
+    return BridgeSettings(**settings.model_dump(exclude={"enabled"}), time_scale=time_scale)
 
 
 class ImcFleetLink:

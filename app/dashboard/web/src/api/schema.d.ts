@@ -1102,6 +1102,12 @@ export type webhooks = Record<string, never>;
 export interface components {
     schemas: {
         /**
+         * Action
+         * @description What operators and consoles may ask of a mission.
+         * @enum {string}
+         */
+        Action: "start" | "pause" | "resume" | "abort" | "finish";
+        /**
          * ActionRequest
          * @description What an operator adds to an action.
          * @example {
@@ -1202,6 +1208,12 @@ export interface components {
              */
             replayed: boolean;
         };
+        /**
+         * BatteryState
+         * @description What a battery's level is worth.
+         * @enum {string}
+         */
+        BatteryState: "ok" | "low" | "critical";
         /**
          * Block
          * @description The blocks of P of one mixing signal; both symmetric, with eigenvalues between e1 and e2.
@@ -2112,6 +2124,11 @@ export interface components {
              */
             updated_at: string;
             progress: components["schemas"]["Progress"];
+            /**
+             * Allowed Actions
+             * @description What may be asked of it in this state: ``POST /missions/{id}/start`` and so on.
+             */
+            readonly allowed_actions: components["schemas"]["Action"][];
         };
         /**
          * MissionView
@@ -2249,6 +2266,11 @@ export interface components {
              * @description What is known of the moving targets
              */
             targets: components["schemas"]["TargetView"][];
+            /**
+             * Allowed Actions
+             * @description What may be asked of it in this state: ``POST /missions/{id}/start`` and so on.
+             */
+            readonly allowed_actions: components["schemas"]["Action"][];
         };
         /**
          * NodeState
@@ -3940,6 +3962,8 @@ export interface components {
              * @description The target that it leaves the mapping for
              */
             pursuing: string | null;
+            /** @description What its battery's level is worth; null while it has not said. */
+            readonly battery: components["schemas"]["BatteryState"] | null;
         };
         /**
          * VehiclesMessage

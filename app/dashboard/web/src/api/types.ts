@@ -16,7 +16,8 @@ export type LinkState = Schemas["LinkState"];
 export type WaypointStatus = Schemas["WaypointStatus"];
 export type Severity = Schemas["Severity"];
 export type Level = Schemas["Level"];
-export type MissionAction = "start" | "pause" | "resume" | "abort" | "finish";
+export type MissionAction = Schemas["Action"];
+export type BatteryState = Schemas["BatteryState"];
 
 export type PolygonGeometry = Schemas["PolygonGeometry"];
 export type VehicleView = Complete<Schemas["VehicleView"]>;

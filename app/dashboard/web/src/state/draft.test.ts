@@ -128,7 +128,9 @@ describe("a drawn area", () => {
 });
 
 it("says before the start how long it takes at most and how dense it gets", () => {
-  expect(estimate({ ...draft, simulated: "2", steps: "100", max_step_m: "10" }, 10_000)).toEqual({
+  expect(
+    estimate({ ...draft, simulated: "2", steps: "100", max_step_m: "10", speed_mps: "1" }, 10_000),
+  ).toEqual({
     seconds: 1000,
     metres: 2000,
     spacing_m: 5,

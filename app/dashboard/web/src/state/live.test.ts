@@ -29,6 +29,7 @@ const vehicle = (
   heading_deg: null,
   speed_mps: null,
   battery_pct: null,
+  battery: null,
   position_sd_m: null,
   localization: "stated",
   surfacing: false,

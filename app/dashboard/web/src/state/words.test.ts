@@ -1,7 +1,7 @@
 import { describe, expect, it } from "vitest";
 import type { VehicleView, WaypointView } from "../api/types";
 import { age, clock, count, distance, duration, latitude, longitude, metres } from "./format";
-import { hasEnded, isAllowed, vehicleState } from "./words";
+import { batteryWords, hasEnded, isAllowed, vehicleState } from "./words";
 
 describe("numbers", () => {
   it.each([
@@ -62,9 +62,19 @@ describe("a vehicle's state in words", () => {
 });
 
 describe("commands", () => {
-  it("can always abort until the mission is over", () => {
-    for (const state of ["draft", "ready", "running", "paused", "finished", "aborted", "failed"] as const) {
-      expect(isAllowed("abort", state)).toBe(!hasEnded(state));
-    }
+  it("are those that the service allows; a mission of which nothing can be asked is over", () => {
+    expect(isAllowed("abort", { allowed_actions: ["abort", "finish"] })).toBe(true);
+    expect(isAllowed("start", { allowed_actions: ["abort", "finish"] })).toBe(false);
+    expect(hasEnded({ allowed_actions: ["abort"] })).toBe(false);
+    expect(hasEnded({ allowed_actions: [] })).toBe(true);
   });
+});
+
+it.each([
+  ["ok", 80, "80 %"],
+  ["low", 30, "▲ 30 %"],
+  ["critical", 10, "✕ 10 %"],
+  [null, null, "–"],
+] as const)("a battery that the service calls %s is written as %s", (battery, battery_pct, words) => {
+  expect(batteryWords({ battery, battery_pct } as VehicleView)).toBe(words);
 });

@@ -1,14 +1,17 @@
 /** States in the words an operator uses. */
 
 import type {
+  BatteryState,
   LinkState,
   MissionAction,
   MissionState,
+  MissionView,
   Severity,
   VehicleView,
   WaypointStatus,
   WaypointView,
 } from "../api/types";
+import { percent } from "./format";
 
 export const MISSION_WORDS: Record<MissionState, string> = {
   draft: "Draft, needs a vehicle",
@@ -91,17 +94,16 @@ export function vehicleState(
 
 const capital = (words: string): string => words.charAt(0).toUpperCase() + words.slice(1);
 
-const ALLOWED: Record<MissionAction, readonly MissionState[]> = {
-  start: ["ready"],
-  pause: ["running"],
-  resume: ["paused"],
-  finish: ["running", "paused"],
-  abort: ["draft", "ready", "running", "paused"],
-};
+const BATTERY_SIGNS: Record<BatteryState, string> = { ok: "", low: "▲ ", critical: "✕ " };
 
-export function isAllowed(action: MissionAction, state: MissionState): boolean {
-  return ALLOWED[action].includes(state);
-}
+/** A battery's level, with a sign where the service calls it low. */
+export const batteryWords = ({ battery, battery_pct }: VehicleView): string =>
+  `${BATTERY_SIGNS[battery ?? "ok"]}${percent(battery_pct)}`;
 
-export const hasEnded = (state: MissionState): boolean =>
-  state === "finished" || state === "aborted" || state === "failed";
+type Allowed = Pick<MissionView, "allowed_actions">;
+
+export const isAllowed = (action: MissionAction, mission: Allowed): boolean =>
+  mission.allowed_actions.includes(action);
+
+/** Whether nothing can be asked of a mission any more. */
+export const hasEnded = (mission: Allowed): boolean => mission.allowed_actions.length === 0;

@@ -1,55 +1,35 @@
-import { useSignal } from "@preact/signals";
-import { useEffect } from "preact/hooks";
-import type { StopView } from "../api/types";
-import { abortVehicle, act, refusal } from "../state/session";
+import { abortVehicle, act } from "../state/session";
 import { abortDialogOpen, abortOne, mission, type Vehicle, vehicles } from "../state/store";
 import { hasEnded } from "../state/words";
-import { Dialog } from "./Dialog";
-import { Receipts } from "./Receipts";
+import { Button } from "./Controls";
+import { StopDialog } from "./StopDialog";
 
-/**
- * Asks once, then stays until it has shown what every vehicle answered. Of the whole team, or of one vehicle, which can
- * be chosen here, too: the cards may be covered.
- */
+/** Of the whole team, or of one vehicle, which can be chosen here, too: the cards may be covered. */
 export function AbortDialog() {
-  const receipts = useSignal<readonly StopView[] | null>(null);
-  const sending = useSignal(false);
   const open = abortDialogOpen.value;
   const only = abortOne.value;
-
-  useEffect(() => {
-    if (open) receipts.value = null;
-  }, [open, only]);
-
-  const close = () => {
-    abortDialogOpen.value = false;
-    abortOne.value = null;
-  };
-  const abort = async () => {
-    sending.value = true;
-    try {
-      const answer = await (only ? abortVehicle(only) : act("abort"));
-      if (answer) receipts.value = answer.stops;
-    } finally {
-      sending.value = false;
-    }
-  };
-  const what = only ? `abort of ${only}` : "abort";
-  const refused = refusal.value?.what === what ? refusal.value.error : null;
-  const again = only !== null && mission.value !== null && hasEnded(mission.value.state);
-  const name = only ?? mission.value?.name ?? "the mission";
-  const asked = !open
-    ? []
-    : vehicles.value.filter((v) => v.view.active && (only === null || v.view.name === only));
-
+  const again = only !== null && mission.value !== null && hasEnded(mission.value);
+  const verb = again ? "Stop" : "Abort";
+  const team = open ? vehicles.value.filter((v) => v.view.active) : [];
+  const asked = team.filter((v) => only === null || v.view.name === only);
   return (
-    <Dialog open={open} onClose={close} title="abort-title" id="abort-dialog" kind="stopping" above>
-      <h2 id="abort-title">
-        {receipts.value ? doneTitle(only, again) : `${again ? "Stop" : "Abort"} ${name}?`}
-      </h2>
-      {receipts.value ? (
-        <Receipts stops={receipts.value} />
-      ) : (
+    <StopDialog
+      open={open}
+      onClose={() => {
+        abortDialogOpen.value = false;
+        abortOne.value = null;
+      }}
+      name="abort"
+      kind="stopping"
+      above
+      what={only ? `abort of ${only}` : "abort"}
+      question={`${verb} ${only ?? mission.value?.name ?? "the mission"}?`}
+      done={doneTitle(only, again)}
+      send={() => (only ? abortVehicle(only) : act("abort"))}
+      confirm={(sending) => (sending ? "Aborting…" : only ? `${verb} ${only}` : "Abort mission")}
+      confirmId="abort-confirm"
+    >
+      {(sending) => (
         <>
           <p>{consequence(only, again)}</p>
           <ul class="receipts" aria-live="polite">
@@ -57,35 +37,14 @@ export function AbortDialog() {
               <Asked
                 key={vehicle.view.name}
                 vehicle={vehicle}
-                sending={sending.value}
+                sending={sending}
                 choice={only === null && asked.length > 1}
               />
             ))}
           </ul>
         </>
       )}
-      {refused ? (
-        <p class="reason alarm" role="alert">
-          {refused.message}. {refused.remedy}
-        </p>
-      ) : null}
-      <div class="dialog-actions">
-        <button type="button" class="command" onClick={close} data-testid="abort-close">
-          {receipts.value ? "Close" : "Keep going"}
-        </button>
-        {receipts.value ? null : (
-          <button
-            type="button"
-            class="abort"
-            disabled={sending.value}
-            onClick={() => void abort()}
-            data-testid="abort-confirm"
-          >
-            {sending.value ? "Aborting…" : only ? `${again ? "Stop" : "Abort"} ${only}` : "Abort mission"}
-          </button>
-        )}
-      </div>
-    </Dialog>
+    </StopDialog>
   );
 }
 
@@ -99,16 +58,15 @@ function Asked({ vehicle, sending, choice }: { vehicle: Vehicle; sending: boolea
         {sending ? "waiting for its acknowledgement" : ""}
       </span>
       {choice && !sending ? (
-        <button
-          type="button"
-          class="abort-one"
-          data-testid={`abort-only-${name}`}
+        <Button
+          id={`abort-only-${name}`}
+          kind="abort-one"
           onClick={() => {
             abortOne.value = name;
           }}
         >
           Only {name}…
-        </button>
+        </Button>
       ) : null}
     </li>
   );

@@ -4,6 +4,7 @@ import { ServiceError } from "../api/client";
 import { me, signedOut, signIn, signOut, whyNotCommand } from "../state/access";
 import { said } from "../state/session";
 import { accountOpen } from "../state/store";
+import { Button, sets, Typed } from "./Controls";
 import { Dialog } from "./Dialog";
 
 /** Who uses the page, always in sight. */
@@ -12,30 +13,44 @@ export function AccountButton() {
   if (!who) return null;
   const words = `${who.name}, role ${who.role}`;
   return (
-    <button
-      type="button"
-      class={`tool account${whyNotCommand.value ? " looks-only" : ""}`}
-      data-testid="account"
+    <Button
+      id="account"
+      kind={`tool account${whyNotCommand.value ? " looks-only" : ""}`}
       title={`Signed in: ${words}`}
-      onClick={() => {
-        accountOpen.value = true;
-      }}
+      onClick={sets(accountOpen, true)}
     >
       <span class="account-name">{who.name}</span>
       <small>{whyNotCommand.value ? `${who.role}: looks only` : who.role}</small>
-    </button>
+    </Button>
   );
 }
 
 export function AccountDialog() {
   const fault = useSignal("");
   const who = me.value;
-  const close = () => {
-    accountOpen.value = false;
-  };
+  const close = sets(accountOpen, false);
+  const leaving = (
+    <Button
+      id="sign-out"
+      kind="command primary"
+      onClick={() => {
+        signOut().catch((error: unknown) => {
+          fault.value = said(error);
+        });
+      }}
+    >
+      Sign out
+    </Button>
+  );
   return (
-    <Dialog open={accountOpen.value} onClose={close} title="account-title" id="account-dialog">
-      <h2 id="account-title">{who?.local ? "Nobody has to sign in yet" : `Signed in as ${who?.name}`}</h2>
+    <Dialog
+      open={accountOpen.value}
+      onClose={close}
+      name="account"
+      heading={who?.local ? "Nobody has to sign in yet" : `Signed in as ${who?.name}`}
+      fault={fault.value}
+      actions={who?.signed_in ? leaving : null}
+    >
       {who?.local ? (
         <p>
           No access token was made, so whoever runs the service commands it from this machine.{" "}
@@ -47,30 +62,6 @@ export function AccountDialog() {
           Role {who?.role}. {whyNotCommand.value || "This role commands missions."}
         </p>
       )}
-      {fault.value ? (
-        <p class="reason alarm" role="alert">
-          {fault.value}
-        </p>
-      ) : null}
-      <div class="dialog-actions">
-        <button type="button" class="command" onClick={close} data-testid="account-close">
-          Close
-        </button>
-        {who?.signed_in ? (
-          <button
-            type="button"
-            class="command primary"
-            data-testid="sign-out"
-            onClick={() => {
-              signOut().catch((error: unknown) => {
-                fault.value = said(error);
-              });
-            }}
-          >
-            Sign out
-          </button>
-        ) : null}
-      </div>
     </Dialog>
   );
 }
@@ -109,15 +100,7 @@ export function SignIn() {
       </p>
       <label class="field">
         Access token
-        <input
-          type="password"
-          autocomplete="current-password"
-          value={text.value}
-          data-testid="token"
-          onInput={(event) => {
-            text.value = event.currentTarget.value;
-          }}
-        />
+        <Typed text={text} id="token" type="password" autocomplete="current-password" />
       </label>
       <button type="submit" class="command primary" disabled={sending.value || text.value.trim() === ""}>
         {sending.value ? "Signing in…" : "Sign in"}

@@ -6,6 +6,7 @@ import { areasIn, sizeOf } from "../map/area";
 import { centred, cornersOf } from "../state/draft";
 import { distance } from "../state/format";
 import { type Drawing, drawing, drawingReady, editing, editingReady, mapCentre } from "../state/store";
+import { Button, FileButton } from "./Controls";
 import { Fault, Text, useForm } from "./Fields";
 
 /** Where to map: drawn on the map, typed as a rectangle, or read from a file; and where not to go. */
@@ -44,10 +45,9 @@ export function AreaFields() {
     others.value = [];
     set({ source: "drawn", ring });
   };
-  const read = async (file: File | undefined) => {
-    if (!file) return;
+  const read = (name: string, text: string) => {
     try {
-      const found = areasIn(file.name, await file.text());
+      const found = areasIn(name, text);
       set({ source: "drawn", ring: found.area, keepOut: [...draft.keepOut, ...found.keepOut] });
       note.value = found.note;
       others.value = found.others;
@@ -59,36 +59,23 @@ export function AreaFields() {
     <fieldset>
       <legend>Area</legend>
       <div class="draw-buttons">
-        <button
-          type="button"
-          class="command"
-          data-testid="draw-polygon"
+        <Button
+          id="draw-polygon"
           aria-pressed={drawing.value?.shape === "polygon"}
           onClick={() => begin("polygon", take)}
         >
           Draw corners
-        </button>
-        <button
-          type="button"
-          class="command"
-          data-testid="draw-rectangle"
+        </Button>
+        <Button
+          id="draw-rectangle"
           aria-pressed={drawing.value?.shape === "rectangle"}
           onClick={() => begin("rectangle", take)}
         >
           Draw rectangle
-        </button>
-        <label class="command file">
+        </Button>
+        <FileButton accept=".geojson,.json,.kml" id="area-file" onText={read}>
           From a file
-          <input
-            type="file"
-            accept=".geojson,.json,.kml"
-            data-testid="area-file"
-            onChange={(event) => {
-              void read(event.currentTarget.files?.[0]);
-              event.currentTarget.value = "";
-            }}
-          />
-        </label>
+        </FileButton>
       </div>
       {drawing.value ? (
         <p class="hint" role="status" data-testid="drawing" data-ready={drawingReady.value}>
@@ -111,18 +98,16 @@ export function AreaFields() {
       {others.value.length > 0 ? (
         <div class="other-areas">
           {others.value.map((ring, i) => (
-            <button
+            <Button
+              id={`other-area-${i + 1}`}
               key={ring.join()}
-              type="button"
-              class="command"
-              data-testid={`other-area-${i + 1}`}
               onClick={() => {
                 others.value = others.value.map((one) => (one === ring ? draft.ring : one));
                 set({ source: "drawn", ring });
               }}
             >
               Take the one of {(sizeOf(ring).area_m2 / 1e4).toFixed(2)} ha
-            </button>
+            </Button>
           ))}
         </div>
       ) : null}
@@ -134,14 +119,14 @@ export function AreaFields() {
             <Text field="east_m" label="To the east, m" numeric />
             <Text field="north_m" label="To the north, m" numeric />
           </div>
-          <button type="button" class="link-button" onClick={() => set(centred(draft, mapCentre.value))}>
+          <Button kind="link-button" onClick={() => set(centred(draft, mapCentre.value))}>
             Place it in the middle of the map
-          </button>
+          </Button>
         </>
       ) : (
-        <button type="button" class="link-button" onClick={() => set({ source: "typed" })}>
+        <Button kind="link-button" onClick={() => set({ source: "typed" })}>
           Type a rectangle instead
-        </button>
+        </Button>
       )}
       {size && !faults.ring ? (
         <p class="hint" data-testid="area-size">
@@ -151,25 +136,23 @@ export function AreaFields() {
       ) : null}
       <Fault field="ring" />
       <div class="zones">
-        <button
-          type="button"
-          class="link-button"
-          data-testid="draw-keep-out"
+        <Button
+          id="draw-keep-out"
+          kind="link-button"
           onClick={() => begin("polygon", (ring) => set({ keepOut: [...draft.keepOut, ring] }))}
         >
           + Keep-out zone
-        </button>
+        </Button>
         {draft.keepOut.map((zone, i) => (
           <span key={zone.join()} class="zone">
             Zone {i + 1}
-            <button
-              type="button"
-              class="tool small"
+            <Button
+              kind="tool small"
               aria-label={`Remove keep-out zone ${i + 1}`}
               onClick={() => set({ keepOut: draft.keepOut.filter((_, k) => k !== i) })}
             >
               ✕
-            </button>
+            </Button>
           </span>
         ))}
       </div>

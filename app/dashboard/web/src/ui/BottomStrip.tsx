@@ -6,6 +6,7 @@ import { shownStep } from "../state/replay";
 import { mission, replayStep, stripHeight, type Tab, tab, view } from "../state/store";
 import { Charts } from "./Charts";
 import { Compare } from "./Compare";
+import { Button } from "./Controls";
 import { EventLog } from "./EventLog";
 import { Files } from "./Files";
 import { Review } from "./Review";
@@ -68,16 +69,15 @@ export function BottomStrip() {
           <Toggle name="files">Files</Toggle>
           <Toggle name="compare">Compare</Toggle>
         </nav>
-        <button
-          type="button"
-          class="log-toggle"
+        <Button
+          id="toggle-log"
+          kind="log-toggle"
           aria-expanded={tab.value === "log"}
-          data-testid="toggle-log"
           onClick={() => toggle("log")}
         >
           <b>Log {tab.value === "log" ? "▾" : "▴"}</b>{" "}
           <span class="newest">{newest?.message ?? "nothing yet"}</span>
-        </button>
+        </Button>
       </div>
     </section>
   );
@@ -89,15 +89,9 @@ function toggle(name: Tab): void {
 
 function Toggle({ name, children }: { name: Tab; children: ComponentChildren }) {
   return (
-    <button
-      type="button"
-      class="command"
-      aria-expanded={tab.value === name}
-      data-testid={`toggle-${name}`}
-      onClick={() => toggle(name)}
-    >
+    <Button id={`toggle-${name}`} aria-expanded={tab.value === name} onClick={() => toggle(name)}>
       {children} {tab.value === name ? "▾" : "▴"}
-    </button>
+    </Button>
   );
 }
 

@@ -5,6 +5,7 @@ import { fetchSteps, fetchTelemetry, noteFault } from "../state/session";
 import { colourOf, isDark, mission, selectedId, steps, telemetry, view } from "../state/store";
 import { figuresOver, type Metric } from "../state/telemetry";
 import { hasEnded } from "../state/words";
+import { Choice, into, titles } from "./Controls";
 import { Plot } from "./Plot";
 
 const METRICS = {
@@ -23,7 +24,7 @@ export function Charts() {
   // The view changes several times a second; steps and samples seldom.
   const step = useComputed(() => mission.value?.progress.step);
   const samples = useComputed(() => view.value.samples);
-  const ended = useComputed(() => mission.value !== null && hasEnded(mission.value.state));
+  const ended = useComputed(() => mission.value !== null && hasEnded(mission.value));
   useSignalEffect(() => {
     step.value;
     fetchSteps().catch(noteFault);
@@ -83,19 +84,7 @@ export function Charts() {
       <div>
         <label class="metric">
           <span class="visually-hidden">Figure of the vehicles</span>
-          <select
-            value={metric.value}
-            data-testid="metric"
-            onChange={(event) => {
-              metric.value = event.currentTarget.value as Metric;
-            }}
-          >
-            {Object.entries(METRICS).map(([name, m]) => (
-              <option key={name} value={name}>
-                {m.title}
-              </option>
-            ))}
-          </select>
+          <Choice value={metric.value} options={titles(METRICS)} id="metric" onChoose={into(metric)} />
         </label>
         <Plot
           title={title}

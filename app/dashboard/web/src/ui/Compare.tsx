@@ -1,13 +1,14 @@
 import "./Compare.css";
 import { useSignal, useSignalEffect } from "@preact/signals";
 import { api } from "../api/client";
-import type { MissionView, StepView } from "../api/types";
+import type { MissionSummary, MissionView, StepView } from "../api/types";
 import { differenceOf, type SeaFloor, withTiles } from "../map/seafloor";
 import { count, distance, duration, metres, percent } from "../state/format";
 import { figuresOf } from "../state/history";
 import { fetchSteps, noteFault, said } from "../state/session";
 import { mission, missions, seaFloor, steps } from "../state/store";
 import { MISSION_WORDS } from "../state/words";
+import { Choice } from "./Controls";
 import { Plot } from "./Plot";
 
 interface Other {
@@ -42,24 +43,22 @@ export function Compare() {
     <div class="log compare" data-testid="compare">
       <label class="field">
         Compare with
-        <select
+        <Choice
           value={chosen.value}
-          data-testid="compare-with"
-          onChange={(event) => {
+          options={[
+            ["", "Choose a mission"],
+            ...(missions.value ?? [])
+              .filter((m) => m.id !== present.id)
+              .map(
+                (m) => [m.id, `${m.name}, ${MISSION_WORDS[m.state].toLowerCase()}, ${createdAt(m)}`] as const,
+              ),
+          ]}
+          id="compare-with"
+          onChoose={(id) => {
             fault.value = "";
-            chosen.value = event.currentTarget.value;
+            chosen.value = id;
           }}
-        >
-          <option value="">Choose a mission</option>
-          {(missions.value ?? [])
-            .filter((m) => m.id !== present.id)
-            .map((m) => (
-              <option key={m.id} value={m.id}>
-                {m.name}, {MISSION_WORDS[m.state].toLowerCase()},{" "}
-                {m.created_at.slice(0, 16).replace("T", " ")}
-              </option>
-            ))}
-        </select>
+        />
       </label>
       {fault.value ? (
         <p class="alarm" role="alert">
@@ -70,6 +69,8 @@ export function Compare() {
     </div>
   );
 }
+
+const createdAt = (m: MissionSummary) => m.created_at.slice(0, 16).replace("T", " ");
 
 async function fetchOther(id: string): Promise<Other> {
   const mission = await api.mission(id);

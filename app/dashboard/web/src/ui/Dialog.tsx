@@ -6,13 +6,20 @@
 import "./Dialog.css";
 import type { ComponentChildren } from "preact";
 import { useEffect, useRef } from "preact/hooks";
+import { Button, Trouble } from "./Controls";
 
 interface DialogProps {
   open: boolean;
   onClose: () => void;
-  /** Id of the element that names it. */
-  title: string;
-  id: string;
+  name: string;
+  id?: string;
+  heading: ComponentChildren;
+  /** What went wrong; empty when all is well. */
+  fault?: string;
+  /** Words of the button that closes it. */
+  closing?: string;
+  /** Further buttons. */
+  actions?: ComponentChildren;
   kind?: string;
   /** Over another dialog. */
   above?: boolean;
@@ -27,8 +34,12 @@ const stack: object[] = [];
 export function Dialog({
   open,
   onClose,
-  title,
-  id,
+  name,
+  id = `${name}-dialog`,
+  heading,
+  fault = "",
+  closing = "Close",
+  actions,
   kind = "",
   above = false,
   data = {},
@@ -72,11 +83,19 @@ export function Dialog({
       <dialog
         ref={dialog}
         class={`dialog ${kind}${above ? " above" : ""}`}
-        aria-labelledby={title}
+        aria-labelledby={`${name}-title`}
         data-testid={id}
         {...data}
       >
+        <h2 id={`${name}-title`}>{heading}</h2>
         {children}
+        <Trouble words={fault} />
+        <div class="dialog-actions">
+          <Button id={`${name}-close`} onClick={onClose}>
+            {closing}
+          </Button>
+          {actions}
+        </div>
       </dialog>
     </>
   );

@@ -6,13 +6,19 @@ import { whyNotCommand } from "../state/access";
 import { clock } from "../state/format";
 import { said } from "../state/session";
 import { openAlarms, selectedId, takeAlarms, view } from "../state/store";
+import { Button, Choice, into, same, Typed } from "./Controls";
 
 const SIGNS: Record<Level, string> = { info: "·", warning: "▲", alarm: "✕" };
 const MOST_SHOWN = 300;
+const LEAST = [
+  ["all", "All lines"],
+  ["important", "Warnings and alarms"],
+  ["notes", "Notes"],
+] as const;
 
 /** The mission's log, newest first, with a field for what the next watch should know. */
 export function EventLog() {
-  const least = useSignal<"all" | "important" | "notes">("all");
+  const least = useSignal<(typeof LEAST)[number][0]>("all");
   const kind = useSignal("");
   const words = useSignal("");
   const kinds = useComputed(() => [...new Set(view.value.events.map((e) => e.kind))].sort());
@@ -27,42 +33,20 @@ export function EventLog() {
     <div class="log" data-testid="log">
       <NoteForm />
       <div class="filters">
-        <select
-          aria-label="Which lines"
+        <Choice
+          label="Which lines"
           value={least.value}
-          data-testid="log-level"
-          onChange={(event) => {
-            least.value = event.currentTarget.value as typeof least.value;
-          }}
-        >
-          <option value="all">All lines</option>
-          <option value="important">Warnings and alarms</option>
-          <option value="notes">Notes</option>
-        </select>
-        <select
-          aria-label="Kind of line"
-          value={kind.value}
-          onChange={(event) => {
-            kind.value = event.currentTarget.value;
-          }}
-        >
-          <option value="">Every kind</option>
-          {kinds.value.map((name) => (
-            <option key={name} value={name}>
-              {name}
-            </option>
-          ))}
-        </select>
-        <input
-          type="search"
-          aria-label="Words in the line"
-          placeholder="Words"
-          value={words.value}
-          data-testid="log-words"
-          onInput={(event) => {
-            words.value = event.currentTarget.value;
-          }}
+          options={LEAST}
+          id="log-level"
+          onChoose={into(least)}
         />
+        <Choice
+          label="Kind of line"
+          value={kind.value}
+          options={[["", "Every kind"], ...same(kinds.value)]}
+          onChoose={into(kind)}
+        />
+        <Typed text={words} type="search" label="Words in the line" placeholder="Words" id="log-words" />
       </div>
       {lines.length === 0 ? <p class="empty">No line is like that.</p> : null}
       <ol aria-label="Log, newest first">
@@ -110,16 +94,12 @@ function NoteForm() {
         void write();
       }}
     >
-      <input
-        type="text"
-        aria-label="Note for the log"
+      <Typed
+        text={text}
+        label="Note for the log"
         placeholder="Note for the next watch"
         maxLength={2000}
-        value={text.value}
-        data-testid="note"
-        onInput={(event) => {
-          text.value = event.currentTarget.value;
-        }}
+        id="note"
       />
       <button
         type="submit"
@@ -149,9 +129,9 @@ export function Alarms() {
         <b>✕ {clock(new Date(newest.time), "utc")} UTC</b> {newest.message}
         {alarms.length > 1 ? <small> and {alarms.length - 1} more in the log</small> : null}
       </p>
-      <button type="button" class="command" onClick={takeAlarms} data-testid="take-alarms">
+      <Button id="take-alarms" onClick={takeAlarms}>
         Taken
-      </button>
+      </Button>
     </section>
   );
 }

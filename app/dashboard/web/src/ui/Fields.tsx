@@ -3,6 +3,8 @@
 import { type ComponentChildren, createContext } from "preact";
 import { useContext } from "preact/hooks";
 import type { Draft, Faults } from "../state/draft";
+import { type Field, type FieldName, fieldsOf, schemaOf } from "../state/fields";
+import { Choice, same } from "./Controls";
 
 export interface FormState {
   draft: Draft;
@@ -18,10 +20,8 @@ export function useForm(): FormState {
   return form;
 }
 
-type TextField = Exclude<
-  keyof Draft,
-  "chosen" | "ring" | "keepOut" | "obstacles" | "options" | "source" | "kind" | "base"
->;
+/** Fields whose value is any text. */
+type TextField = { [K in keyof Draft]: string extends Draft[K] ? K : never }[keyof Draft];
 
 interface TextProps {
   field: TextField;
@@ -49,6 +49,49 @@ export function Text({ field, label, placeholder = "", numeric = false, hint = "
       />
       <Fault field={field} />
     </label>
+  );
+}
+
+/** The plain values of one part of the form, as the service and the table of fields declare them. */
+export function Part({ of }: { of: Field["part"] }) {
+  const { draft } = useForm();
+  return fieldsOf(draft.kind, of).map(([name, field]) => <Plain key={name} name={name} field={field} />);
+}
+
+function Plain({ name, field }: { name: FieldName; field: Field }) {
+  const { draft, set } = useForm();
+  const { type, enum: choices, description = "" } = schemaOf(field);
+  const label = field.unit ? `${field.label}, ${field.unit}` : field.label;
+  const change = (text: string) => set({ [name]: text });
+  if (type === "boolean") {
+    return (
+      <label class="check" title={description}>
+        <input
+          type="checkbox"
+          checked={draft[name] === "true"}
+          data-testid={`field-${name}`}
+          onChange={(event) => change(String(event.currentTarget.checked))}
+        />
+        {label}
+      </label>
+    );
+  }
+  if (choices) {
+    return (
+      <label class="field" title={description}>
+        {label}
+        <Choice value={draft[name]} options={same(choices)} id={`field-${name}`} onChoose={change} />
+      </label>
+    );
+  }
+  return (
+    <Text
+      field={name}
+      label={label}
+      placeholder={field.placeholder ?? ""}
+      numeric={type !== "string"}
+      hint={description}
+    />
   );
 }
 

@@ -4,6 +4,7 @@ import { api, ServiceError } from "../api/client";
 import type { ProductView, QualityView } from "../api/types";
 import { duration, megabytes } from "../state/format";
 import { now, selectedId, view } from "../state/store";
+import { Button } from "./Controls";
 
 /** A file that is on its way. */
 interface Making {
@@ -80,15 +81,13 @@ export function Files() {
       <ul>
         {products.value.map((product) => (
           <li key={product.name}>
-            <button
-              type="button"
-              class="command"
+            <Button
+              id={`file-${product.name}`}
               disabled={making.value[product.name] !== undefined || (product.needs_map && !hasMap.value)}
-              data-testid={`file-${product.name}`}
               onClick={() => download(product)}
             >
               {product.name}
-            </button>
+            </Button>
             <span>{product.title}</span>
             {making.value[product.name] ? <Progress making={making.value[product.name] as Making} /> : null}
           </li>

@@ -1,19 +1,17 @@
 import "./FleetDialog.css";
 import type { VehicleView } from "../api/types";
-import { age, metres, percent, place } from "../state/format";
+import { age, metres, place } from "../state/format";
 import { coordinateFormat, fleet, fleetOpen, missions } from "../state/store";
-import { vehicleState } from "../state/words";
+import { batteryWords, vehicleState } from "../state/words";
+import { sets } from "./Controls";
 import { Dialog } from "./Dialog";
 
 /** Every vehicle that the service knows of, in a mission or not, one a line. */
 export function FleetDialog() {
   const open = fleetOpen.value;
-  const close = () => {
-    fleetOpen.value = false;
-  };
+  const close = sets(fleetOpen, false);
   return (
-    <Dialog open={open} onClose={close} title="fleet-title" id="fleet-dialog" kind="fleet">
-      <h2 id="fleet-title">Fleet</h2>
+    <Dialog open={open} onClose={close} name="fleet" heading="Fleet" kind="fleet">
       {fleet.value.length === 0 ? (
         <p class="empty">
           No vehicle was heard yet. Switch one on within reach of this network; the link check says what is
@@ -51,11 +49,6 @@ export function FleetDialog() {
           </table>
         </div>
       )}
-      <div class="dialog-actions">
-        <button type="button" class="command" data-testid="fleet-close" onClick={close}>
-          Close
-        </button>
-      </div>
     </Dialog>
   );
 }
@@ -75,7 +68,7 @@ function Line({ vehicle: v }: { vehicle: VehicleView }) {
         {v.mission_id === null ? "free" : <a href={`#/missions/${v.mission_id}`}>{name ?? "shown below"}</a>}
       </td>
       <td>{age(v.age_s)}</td>
-      <td>{percent(v.battery_pct)}</td>
+      <td>{batteryWords(v)}</td>
       <td>{metres(v.depth_m)}</td>
       <td>{metres(v.altitude_m)}</td>
       <td>{v.speed_mps === null ? "–" : `${v.speed_mps.toFixed(1)} m/s`}</td>

@@ -4,6 +4,7 @@ import { useEffect, useRef } from "preact/hooks";
 import type { ForecastView } from "../api/types";
 import { distance, duration, metres, percent } from "../state/format";
 import { said } from "../state/session";
+import { Button } from "./Controls";
 
 /**
  * What a quick simulation says of a mission. It is asked for by a button; `of` names what it was made of, so that it is
@@ -51,21 +52,19 @@ export function Forecast({ of, ask }: { of: string; ask: (gone: AbortSignal) => 
       {waiting.value ? (
         <p class="hint">
           Simulating the mission over several floors, half a minute or so…{" "}
-          <button
-            type="button"
-            class="command"
+          <Button
             onClick={() => {
               request.current?.abort();
               waiting.value = false;
             }}
           >
             Stop
-          </button>
+          </Button>
         </p>
       ) : view ? null : (
-        <button type="button" class="command" data-testid="ask-forecast" onClick={() => void start()}>
+        <Button id="ask-forecast" onClick={() => void start()}>
           Forecast by a quick simulation
-        </button>
+        </Button>
       )}
     </section>
   );

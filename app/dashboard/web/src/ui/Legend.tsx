@@ -5,7 +5,7 @@ import { useEffect, useRef } from "preact/hooks";
 import type { LayerView } from "../api/types";
 import { LANDMARK_COLOURS, LANDMARK_WORDS, landmarkShares } from "../map/landmarks";
 import { paletteOf, type Range, rangeFault, shareOutside, symbolOf } from "../map/layers";
-import { DEPTH_PALETTES, type DepthPalette, type Palette } from "../map/palette";
+import { DEPTH_PALETTES, type Palette } from "../map/palette";
 import type { SeaFloor } from "../map/seafloor";
 import { SITE_COLOURS, SITE_WORDS } from "../map/site";
 import {
@@ -22,6 +22,7 @@ import {
   showSite,
   site,
 } from "../state/store";
+import { Button, Choice, into, titles } from "./Controls";
 
 /** Layer switch, colour scale and its range, which stays what the operator set until changed. */
 export function Legend() {
@@ -34,22 +35,13 @@ export function Legend() {
     <section class="legend" aria-label="Map layer and legend">
       <label class="layer-choice">
         <span class="visually-hidden">Layer</span>
-        <select
+        <Choice
           value={layer.value}
-          data-testid="layer"
+          options={layers.value.filter(({ scale }) => scale !== null).map(({ name, title }) => [name, title])}
           title={sentence(shown.meaning)}
-          onChange={(event) => {
-            layer.value = event.currentTarget.value;
-          }}
-        >
-          {layers.value
-            .filter(({ scale }) => scale !== null)
-            .map(({ name, title }) => (
-              <option key={name} value={name}>
-                {title}
-              </option>
-            ))}
-        </select>
+          id="layer"
+          onChoose={into(layer)}
+        />
       </label>
       {map && range ? (
         palette ? (
@@ -97,24 +89,18 @@ function Scale({ shown, palette, range }: { shown: LayerView; palette: Palette; 
       </div>
       <span class="range-kind">
         {fixed ? (
-          <button
-            type="button"
-            class="link-button"
-            data-testid="range-fit"
-            onClick={() => setRange(undefined)}
-          >
+          <Button id="range-fit" kind="link-button" onClick={() => setRange(undefined)}>
             Fit to data
-          </button>
+          </Button>
         ) : (
-          <button
-            type="button"
-            class="link-button"
-            data-testid="range-fix"
+          <Button
+            id="range-fix"
+            kind="link-button"
             title="The colours follow the data now. Keep them, so that a colour goes on meaning the same value"
             onClick={() => setRange(range)}
           >
             Keep range
-          </button>
+          </Button>
         )}
         {fixed && map ? <Outside share={shareOutside(map, shown, range)} /> : null}
       </span>
@@ -157,20 +143,13 @@ function Options({ shown }: { shown: LayerView }) {
       {shown.palette === "deep" ? (
         <label>
           <span class="visually-hidden">Colours of depths</span>
-          <select
+          <Choice
             value={depthPalette.value}
-            data-testid="palette"
+            options={titles(DEPTH_PALETTES)}
             title="Colours of depths"
-            onChange={(event) => {
-              depthPalette.value = event.currentTarget.value as DepthPalette;
-            }}
-          >
-            {Object.entries(DEPTH_PALETTES).map(([name, { title }]) => (
-              <option key={name} value={name}>
-                {title}
-              </option>
-            ))}
-          </select>
+            id="palette"
+            onChoose={into(depthPalette)}
+          />
         </label>
       ) : null}
       <Check signal={showContours} id="contours">

@@ -1,11 +1,13 @@
 import "./LinksDialog.css";
 import { useSignal } from "@preact/signals";
 import { useEffect } from "preact/hooks";
-import { api, ServiceError } from "../api/client";
+import { api } from "../api/client";
 import type { DoctorView, Finding, VehicleDiagnosis } from "../api/types";
 import { clock } from "../state/format";
+import { said } from "../state/session";
 import { linksOpen } from "../state/store";
 import { FINDING_SIGNS, FINDING_TONES } from "../state/words";
+import { sets } from "./Controls";
 import { Dialog } from "./Dialog";
 
 const AGAIN_MS = 5000;
@@ -23,7 +25,7 @@ export function LinksDialog() {
         found.value = await api.doctor();
         trouble.value = "";
       } catch (error) {
-        trouble.value = error instanceof ServiceError ? `${error.message}. ${error.remedy}` : String(error);
+        trouble.value = said(error);
       }
     };
     void ask();
@@ -31,18 +33,17 @@ export function LinksDialog() {
     return () => clearInterval(again);
   }, [open]);
 
-  const close = () => {
-    linksOpen.value = false;
-  };
+  const close = sets(linksOpen, false);
   const view = found.value;
   return (
-    <Dialog open={open} onClose={close} title="links-title" id="links-dialog" kind="links">
-      <h2 id="links-title">Links to IMC vehicles</h2>
-      {trouble.value ? (
-        <p class="reason alarm" role="alert">
-          {trouble.value}
-        </p>
-      ) : null}
+    <Dialog
+      open={open}
+      onClose={close}
+      name="links"
+      heading="Links to IMC vehicles"
+      fault={trouble.value}
+      kind="links"
+    >
       {view ? (
         <div aria-live="polite">
           <Findings findings={view.own} />
@@ -51,11 +52,6 @@ export function LinksDialog() {
           ))}
         </div>
       ) : null}
-      <div class="dialog-actions">
-        <button type="button" class="command" onClick={close} data-testid="links-close">
-          Close
-        </button>
-      </div>
     </Dialog>
   );
 }

@@ -1,4 +1,5 @@
 import "./MapTools.css";
+import type { Signal } from "@preact/signals";
 import type { ComponentChildren } from "preact";
 import { wayBetween } from "../map/geo";
 import { distance } from "../state/format";
@@ -13,6 +14,7 @@ import {
   showTargets,
   showTracks,
 } from "../state/store";
+import { Button, flips, sets } from "./Controls";
 
 /** Buttons on the map's edge: show the area, measure, what is drawn, look at it in space. */
 export function MapTools({ onFit }: { onFit: () => void }) {
@@ -33,49 +35,23 @@ export function MapTools({ onFit }: { onFit: () => void }) {
         >
           <path d="M2,14 L14,2 L18,6 L6,18 Z M6,10 l2,2 M9,7 l2,2 M12,4 l2,2" />
         </Tool>
-        <Tool
-          label={`Tracks: ${showTracks.value ? "shown" : "hidden"}`}
-          pressed={showTracks.value}
-          onClick={() => {
-            showTracks.value = !showTracks.value;
-          }}
-        >
+        <Shown what="Tracks" signal={showTracks}>
           <path d="M3,17 C3,9 10,13 10,8 S17,9 17,3" />
-        </Tool>
+        </Shown>
         {mission.value?.spec.search ? (
-          <Tool
-            label={`What was looked at: ${showSite.value ? "shown" : "hidden"}`}
-            pressed={showSite.value}
-            id="show-site"
-            onClick={() => {
-              showSite.value = !showSite.value;
-            }}
-          >
+          <Shown what="What was looked at" signal={showSite} id="show-site">
             <path d="M2,10 C5,4 15,4 18,10 C15,16 5,16 2,10 M10,7.5 a2.5,2.5 0 1 1 -0.01,0" />
-          </Tool>
+          </Shown>
         ) : null}
         {mission.value?.targets.length ? (
-          <Tool
-            label={`Targets: ${showTargets.value ? "shown" : "hidden"}`}
-            pressed={showTargets.value}
-            id="show-targets"
-            onClick={() => {
-              showTargets.value = !showTargets.value;
-            }}
-          >
+          <Shown what="Targets" signal={showTargets} id="show-targets">
             <path d="M10,2 v4 M10,14 v4 M2,10 h4 M14,10 h4 M10,6 a4,4 0 1 1 -0.01,0" />
-          </Tool>
+          </Shown>
         ) : null}
         {mission.value?.spec.limits.com_range_m ? (
-          <Tool
-            label={`Communication range: ${showRanges.value ? "shown" : "hidden"}`}
-            pressed={showRanges.value}
-            onClick={() => {
-              showRanges.value = !showRanges.value;
-            }}
-          >
+          <Shown what="Communication range" signal={showRanges}>
             <path d="M10,10 h0.01 M6,14 a6,6 0 1 1 8,0 M3,17 a10,10 0 1 1 14,0" />
-          </Tool>
+          </Shown>
         ) : null}
         <Tool
           label={`Positions in ${coordinateFormat.value === "decimal" ? "decimal degrees" : "degrees and minutes"}`}
@@ -92,9 +68,7 @@ export function MapTools({ onFit }: { onFit: () => void }) {
           label="Look at the sea floor in space"
           id="open-3d"
           disabled={!seaFloor.value}
-          onClick={() => {
-            in3d.value = true;
-          }}
+          onClick={sets(in3d, true)}
         >
           <path d="M2,13 L8,5 L12,10 L14,8 L18,13 M2,13 L10,18 L18,13" />
         </Tool>
@@ -124,15 +98,9 @@ function Measured() {
               )}
             </b>
           </span>
-          <button
-            type="button"
-            class="link-button"
-            onClick={() => {
-              measured.value = [];
-            }}
-          >
+          <Button kind="link-button" onClick={sets(measured, [])}>
             Anew
-          </button>
+          </Button>
         </>
       ) : (
         <span>Click on the map, corner after corner.</span>
@@ -148,6 +116,22 @@ interface ToolProps {
   id?: string;
   onClick: () => void;
   children: ComponentChildren;
+}
+
+/** Shows or hides something. */
+function Shown({
+  what,
+  signal,
+  ...rest
+}: { what: string; signal: Signal<boolean> } & Pick<ToolProps, "id" | "children">) {
+  return (
+    <Tool
+      label={`${what}: ${signal.value ? "shown" : "hidden"}`}
+      pressed={signal.value}
+      onClick={flips(signal)}
+      {...rest}
+    />
+  );
 }
 
 function Tool({ label, pressed, disabled = false, id, onClick, children }: ToolProps) {

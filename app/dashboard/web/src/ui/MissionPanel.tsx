@@ -6,6 +6,7 @@ import { count } from "../state/format";
 import { deleteMission, selectMission } from "../state/session";
 import { copied, describing, fleetOpen, mission, missions, selectedId, serviceFault } from "../state/store";
 import { MISSION_SIGNS, MISSION_WORDS } from "../state/words";
+import { Button, sets } from "./Controls";
 import { NewMissionForm } from "./NewMissionForm";
 
 export function MissionPanel() {
@@ -22,28 +23,12 @@ function MissionList() {
     <>
       <header class="panel-head">
         <h2>Missions</h2>
-        <button
-          type="button"
-          class="command"
-          data-testid="open-fleet"
-          onClick={() => {
-            fleetOpen.value = true;
-          }}
-        >
+        <Button id="open-fleet" onClick={sets(fleetOpen, true)}>
           Fleet
-        </button>
-        <button
-          type="button"
-          class="command"
-          data-testid="new-mission"
-          disabled={whyNotCommand.value !== ""}
-          title={whyNotCommand.value}
-          onClick={() => {
-            describing.value = true;
-          }}
-        >
+        </Button>
+        <Button id="new-mission" commands onClick={sets(describing, true)}>
           + New
-        </button>
+        </Button>
       </header>
       {list === null && !serviceFault.value ? <p class="empty">Asking the service…</p> : null}
       {list?.length === 0 ? (
@@ -88,10 +73,8 @@ function Actions({ of: { id, state, progress } }: { of: MissionSummary }) {
   const forbidden = whyNotCommand.value;
   return (
     <div class="mission-actions">
-      <button
-        type="button"
-        class="command"
-        data-testid="copy-mission"
+      <Button
+        id="copy-mission"
         disabled={forbidden !== "" || mission.value?.id !== id}
         title={forbidden || "Describe a new mission that begins as a copy of this one"}
         onClick={() => {
@@ -100,40 +83,23 @@ function Actions({ of: { id, state, progress } }: { of: MissionSummary }) {
         }}
       >
         Copy
-      </button>
+      </Button>
       {asked.value ? (
         <>
-          <button
-            type="button"
-            class="command"
-            data-testid="confirm-delete"
-            onClick={() => void deleteMission(id)}
-          >
+          <Button id="confirm-delete" onClick={() => void deleteMission(id)}>
             Delete it for good
-          </button>
-          <button
-            type="button"
-            class="command"
-            onClick={() => {
-              asked.value = false;
-            }}
-          >
-            Keep it
-          </button>
+          </Button>
+          <Button onClick={sets(asked, false)}>Keep it</Button>
         </>
       ) : (
-        <button
-          type="button"
-          class="command"
-          data-testid="delete-mission"
+        <Button
+          id="delete-mission"
           disabled={forbidden !== "" || !empty || atSea}
           title={forbidden || (empty && !atSea ? "" : "What was measured is kept")}
-          onClick={() => {
-            asked.value = true;
-          }}
+          onClick={sets(asked, true)}
         >
           Delete…
-        </button>
+        </Button>
       )}
     </div>
   );

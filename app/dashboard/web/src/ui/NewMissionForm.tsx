@@ -19,12 +19,14 @@ import {
   placeOf,
   simulatedNames,
   toMission,
+  turnedInto,
 } from "../state/draft";
 import { distance, duration } from "../state/format";
 import { createMission, said } from "../state/session";
 import { copied, describing, draftShapes, drawing, fleet, mapCentre } from "../state/store";
 import { AreaFields } from "./AreaFields";
-import { Fault, Form, Text, useForm } from "./Fields";
+import { Button, Choice, FileButton, same, useEscape } from "./Controls";
+import { Fault, Form, Part, Text, useForm } from "./Fields";
 import { Forecast } from "./Forecast";
 import { SearchFields } from "./SearchFields";
 
@@ -34,7 +36,6 @@ export function NewMissionForm() {
   const faults = useSignal<Faults>({});
   const refused = useSignal<ServiceError | null>(null);
   const sending = useSignal(false);
-  const tideFault = useSignal("");
 
   useSignalEffect(() => {
     draftShapes.value = {
@@ -43,17 +44,13 @@ export function NewMissionForm() {
       marks: draft.value.kind === "search" ? draftMarks(draft.value) : [],
     };
   });
-  useEffect(() => {
-    const stopDrawing = (event: KeyboardEvent) => {
-      if (event.key === "Escape") drawing.value = null;
-    };
-    window.addEventListener("keydown", stopDrawing);
-    return () => {
-      window.removeEventListener("keydown", stopDrawing);
+  useEscape(drawing);
+  useEffect(
+    () => () => {
       draftShapes.value = null;
-      drawing.value = null;
-    };
-  }, []);
+    },
+    [],
+  );
 
   const close = () => {
     describing.value = false;
@@ -96,11 +93,6 @@ export function NewMissionForm() {
       sending.value = false;
     }
   };
-  const readTide = async (file: File | undefined) => {
-    tideFault.value = "";
-    if (file) set({ tide_table: await file.text(), tide_source: file.name });
-  };
-
   return (
     <Form.Provider value={{ draft: draft.value, faults: faults.value, set }}>
       <form
@@ -111,9 +103,7 @@ export function NewMissionForm() {
       >
         <header class="panel-head">
           <h2>{original ? "Copy of a mission" : "New mission"}</h2>
-          <button type="button" class="command" onClick={close}>
-            Cancel
-          </button>
+          <Button onClick={close}>Cancel</Button>
         </header>
         <Text field="name" label="Name" placeholder="Leixões quay" />
         <Kind />
@@ -136,49 +126,29 @@ export function NewMissionForm() {
         ) : (
           <>
             <Planner />
-            <Text field="steps" label="Steps" numeric hint="How many waypoints every vehicle gets" />
+            <Part of="course" />
             <Expected />
           </>
         )}
         <details>
           <summary>Limits and grid</summary>
           <div class="pair">
-            <Text field="max_step_m" label="Largest step, m" numeric />
-            <Text field="speed_mps" label="Speed, m/s" numeric />
-            <Text field="min_depth_m" label="Shallowest, m" numeric hint="Shallowest depth of travel" />
-            <Text field="max_depth_m" label="Deepest, m" numeric hint="Deepest depth of travel" />
-            <Text field="min_altitude_m" label="Altitude, m" numeric hint="Least height above the bottom" />
-            <Text
-              field="min_separation_m"
-              label="Apart, m"
-              numeric
-              hint="Between vehicles at similar depth"
-            />
-            <Text field="com_range_m" label="Com. range, m" placeholder="unlimited" numeric />
-            <Text field="cell_m" label="Cell, m" numeric hint="Side of the map's cells" />
-            <Text
-              field="accuracy_m"
-              label="Accuracy, m"
-              numeric
-              hint="Deviation below which a cell is known"
-            />
+            <Part of="limits" />
           </div>
         </details>
         <details>
           <summary>Tide</summary>
           <div class="pair">
-            <Text field="tide_m" label="Level, m" placeholder="none" numeric />
+            <Part of="tide" />
             <Text field="tide_source" label="From where" placeholder="gauge" />
           </div>
-          <label class="command file">
+          <FileButton
+            accept=".tid,.txt"
+            id="tide-file"
+            onText={(name, text) => set({ tide_table: text, tide_source: name })}
+          >
             {draft.value.tide_table ? `Table: ${draft.value.tide_source}` : "Table (.tid)"}
-            <input
-              type="file"
-              accept=".tid,.txt"
-              data-testid="tide-file"
-              onChange={(event) => void readTide(event.currentTarget.files?.[0])}
-            />
-          </label>
+          </FileButton>
           <p class="hint">Tides can be set and changed at any time; soundings keep their raw values.</p>
         </details>
         {refused.value ? (
@@ -209,7 +179,7 @@ function Kind() {
         name="kind"
         checked={draft.kind === kind}
         data-testid={`kind-${kind}`}
-        onChange={() => set({ kind })}
+        onChange={() => set(turnedInto(kind, draft))}
       />
       <span>
         <b>{title}</b> <small>{words}</small>
@@ -297,17 +267,12 @@ function Planner() {
         <summary>More planners and their settings</summary>
         <label class="field">
           Planner
-          <select
+          <Choice
             value={draft.planner}
-            data-testid="field-planner"
-            onChange={(event) => set({ planner: event.currentTarget.value })}
-          >
-            {(planners.value.length > 0 ? planners.value.map((p) => p.name) : [draft.planner]).map((name) => (
-              <option key={name} value={name}>
-                {name}
-              </option>
-            ))}
-          </select>
+            options={same(planners.value.length > 0 ? planners.value.map((p) => p.name) : [draft.planner])}
+            id="field-planner"
+            onChoose={(planner) => set({ planner })}
+          />
           {other ? <small>{other.summary}</small> : null}
         </label>
         <Options schema={planners.value.find((p) => p.name === draft.planner)?.options} />
@@ -418,14 +383,9 @@ function Described({ spec }: { spec: VehicleSpec }) {
         onInput={(event) => change([{ ...spec, name: event.currentTarget.value.trim() }])}
       />
       <small>{spec.kind === "imc" ? "IMC" : spec.kind}</small>
-      <button
-        type="button"
-        class="tool small"
-        aria-label={`Leave ${spec.name} out`}
-        onClick={() => change([])}
-      >
+      <Button kind="tool small" aria-label={`Leave ${spec.name} out`} onClick={() => change([])}>
         ✕
-      </button>
+      </Button>
     </div>
   );
 }

@@ -1,6 +1,6 @@
 import "./Notices.css";
 import { useSignal } from "@preact/signals";
-import { signedOut, whyNotCommand } from "../state/access";
+import { signedOut } from "../state/access";
 import { emptyDraft, toMission } from "../state/draft";
 import { createMission, refusal, said } from "../state/session";
 import {
@@ -17,6 +17,7 @@ import {
   socketStatus,
 } from "../state/store";
 import { SignIn } from "./Account";
+import { Button, sets } from "./Controls";
 
 /** What stands in the middle when there is nothing to show, or something is wrong: always with what to do next. */
 export function Notices() {
@@ -36,15 +37,7 @@ export function Notices() {
           <p>
             <b>✕ {refused.what} was refused:</b> {refused.error.message}. {refused.error.remedy}
           </p>
-          <button
-            type="button"
-            class="command"
-            onClick={() => {
-              refusal.value = null;
-            }}
-          >
-            Taken
-          </button>
+          <Button onClick={sets(refusal, null)}>Taken</Button>
         </div>
       ) : null}
       <Guide />
@@ -92,35 +85,19 @@ function NoMission({ none }: { none: boolean }) {
           ? `${heard} vehicle${heard > 1 ? "s are" : " is"} heard.`
           : "No vehicle is heard yet: switch one on within reach, see Links for what is missing, or try it with simulated ones."}
       </p>
-      <button
-        type="button"
-        class="command primary"
+      <Button
+        kind="command primary"
         onClick={() => {
           panelOpen.value = true;
           describing.value = none;
         }}
       >
         {none ? "New mission" : "Show missions"}
-      </button>
-      <button
-        type="button"
-        class="command"
-        data-testid="try"
-        disabled={whyNotCommand.value !== ""}
-        title={whyNotCommand.value}
-        onClick={() => void tryIt()}
-      >
+      </Button>
+      <Button id="try" commands onClick={() => void tryIt()}>
         Try with two simulated vehicles
-      </button>
-      <button
-        type="button"
-        class="command"
-        onClick={() => {
-          linksOpen.value = true;
-        }}
-      >
-        Links
-      </button>
+      </Button>
+      <Button onClick={sets(linksOpen, true)}>Links</Button>
       {fault.value ? <p class="fault">{fault.value}</p> : null}
     </div>
   );

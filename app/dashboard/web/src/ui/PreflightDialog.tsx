@@ -3,9 +3,9 @@ import { useSignal } from "@preact/signals";
 import { useEffect } from "preact/hooks";
 import { api } from "../api/client";
 import type { CheckStatus, PreflightView } from "../api/types";
-import { whyNotCommand } from "../state/access";
 import { act, busyWith, refusal, said } from "../state/session";
 import { mission, preflightOpen, selectedId } from "../state/store";
+import { Button, sets } from "./Controls";
 import { Dialog } from "./Dialog";
 import { Forecast } from "./Forecast";
 
@@ -44,30 +44,41 @@ export function PreflightDialog() {
     };
   }, [open]);
 
-  const close = () => {
-    preflightOpen.value = false;
-  };
+  const close = sets(preflightOpen, false);
   const start = async () => {
     if (await act("start")) close();
   };
   const view = found.value;
   const problems = view?.checks.filter((c) => c.status === "problem").length ?? 0;
   const refused = refusal.value?.what === "start" ? refusal.value.error : null;
+  const starting = (
+    <Button
+      id="confirm-start"
+      kind="command primary"
+      commands
+      disabled={!view?.ready || busyWith.value !== null}
+      onClick={() => void start()}
+    >
+      {busyWith.value === "start"
+        ? "Starting…"
+        : problems > 0
+          ? `${problems} problem${problems > 1 ? "s" : ""} to solve first`
+          : "Start mission"}
+    </Button>
+  );
   return (
     <Dialog
       open={open}
       onClose={close}
-      title="preflight-title"
+      name="preflight"
       id="preflight"
+      heading={`Start ${mission.value?.name ?? "the mission"}?`}
+      fault={refused ? said(refused) : fault.value}
+      closing="Not yet"
+      actions={starting}
       kind="preflight"
       data={{ "data-ready": view?.ready ?? "unknown" }}
     >
-      <h2 id="preflight-title">Start {mission.value?.name ?? "the mission"}?</h2>
-      {fault.value || refused ? (
-        <p class="reason alarm" role="alert">
-          {refused ? `${refused.message}. ${refused.remedy}` : fault.value}
-        </p>
-      ) : null}
       {view ? null : <p>Looking at the vehicles…</p>}
       <ul class="checklist">
         {view?.checks.map((check) => (
@@ -86,25 +97,6 @@ export function PreflightDialog() {
       {open && selectedId.value && mission.value?.spec.kind !== "search" ? (
         <Forecast of={selectedId.value} ask={(gone) => api.forecast(selectedId.peek() ?? "", gone)} />
       ) : null}
-      <div class="dialog-actions">
-        <button type="button" class="command" onClick={close} data-testid="preflight-close">
-          Not yet
-        </button>
-        <button
-          type="button"
-          class="command primary"
-          disabled={!view?.ready || busyWith.value !== null || whyNotCommand.value !== ""}
-          title={whyNotCommand.value}
-          data-testid="confirm-start"
-          onClick={() => void start()}
-        >
-          {busyWith.value === "start"
-            ? "Starting…"
-            : problems > 0
-              ? `${problems} problem${problems > 1 ? "s" : ""} to solve first`
-              : "Start mission"}
-        </button>
-      </div>
     </Dialog>
   );
 }

@@ -6,6 +6,7 @@ import type { SoundingState, SoundingView } from "../api/types";
 import { metres } from "../state/format";
 import { said } from "../state/session";
 import { chosenSounding, reviewed, selectedId, view } from "../state/store";
+import { Button, Choice, into, Typed } from "./Controls";
 
 const WORDS: Record<SoundingState, string> = {
   used: "used",
@@ -70,31 +71,24 @@ export function Review() {
   return (
     <div class="log review" data-testid="review">
       <div class="filters">
-        <select
-          aria-label="Which soundings"
+        <Choice
+          label="Which soundings"
           value={filter.value}
-          data-testid="review-filter"
-          onChange={(event) => {
-            filter.value = event.currentTarget.value as typeof filter.value;
-          }}
-        >
-          <option value="">Everything that is not simply used</option>
-          {(["rejected", "doubted", "withdrawn", "restored", "used"] as const).map((state) => (
-            <option key={state} value={state}>
-              {WORDS[state]}
-            </option>
-          ))}
-        </select>
-        <input
-          type="text"
-          aria-label="Why: kept in the log"
+          options={[
+            ["", "Everything that is not simply used"],
+            ...(["rejected", "doubted", "withdrawn", "restored", "used"] as const).map(
+              (state) => [state, WORDS[state]] as const,
+            ),
+          ]}
+          id="review-filter"
+          onChoose={into(filter)}
+        />
+        <Typed
+          text={note}
+          label="Why: kept in the log"
           placeholder="Why (kept in the log)"
           maxLength={500}
-          value={note.value}
-          data-testid="review-note"
-          onInput={(event) => {
-            note.value = event.currentTarget.value;
-          }}
+          id="review-note"
         />
         <span>
           {total.value} sounding{total.value === 1 ? "" : "s"}
@@ -111,11 +105,7 @@ export function Review() {
           <Row key={s.id} sounding={s} busy={busy.value === s.id} onRule={rule} />
         ))}
       </ol>
-      {next.value !== null ? (
-        <button type="button" class="command" onClick={() => load(next.value ?? 0)}>
-          More
-        </button>
-      ) : null}
+      {next.value !== null ? <Button onClick={() => load(next.value ?? 0)}>More</Button> : null}
     </div>
   );
 }
@@ -138,30 +128,23 @@ function Row({ sounding: s, busy, onRule }: RowProps) {
         if (chosen) element?.scrollIntoView({ block: "nearest" });
       }}
     >
-      <button
-        type="button"
-        class="link-button"
+      <Button
+        kind="link-button"
         title="Show it on the map"
         onClick={() => {
           chosenSounding.value = s.id;
         }}
       >
         {s.vehicle} #{s.id}
-      </button>
+      </Button>
       <b>{metres(s.depth_m ?? s.raw_depth_m, 2)}</b>
       <span class="message">
         {WORDS[s.state]}
         {s.reason ? <small>: {s.reason}</small> : null}
       </span>
-      <button
-        type="button"
-        class="command"
-        disabled={busy}
-        data-testid={`rule-${s.id}`}
-        onClick={() => onRule(s, counts ? "reject" : "restore")}
-      >
+      <Button id={`rule-${s.id}`} disabled={busy} onClick={() => onRule(s, counts ? "reject" : "restore")}>
         {busy ? "…" : counts ? "Reject" : "Restore"}
-      </button>
+      </Button>
     </li>
   );
 }

@@ -12,7 +12,7 @@ export function SearchCard() {
   if (!mission.value || !search || !spec) return null;
   const vehicles = mission.value.vehicles.length;
   const allBack = search.back.length >= vehicles;
-  const ended = hasEnded(mission.value.state);
+  const ended = hasEnded(mission.value);
   const { words, sign, tone } = verdict(
     search.left_s,
     spec.window_s,

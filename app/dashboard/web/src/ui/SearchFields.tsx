@@ -1,32 +1,22 @@
 import "./SearchFields.css";
 import { useSignal } from "@preact/signals";
-import { useEffect } from "preact/hooks";
 import { areasIn } from "../map/area";
 import { typedPlace } from "../state/draft";
 import { picking } from "../state/store";
-import { Fault, Text, useForm } from "./Fields";
+import { Button, FileButton, useEscape } from "./Controls";
+import { Fault, Part, Text, useForm } from "./Fields";
 
 /** What a search looks for, where its vehicles enter, how long they have, and what is known to stand there. */
 export function SearchFields() {
   const { draft, set } = useForm();
   const note = useSignal("");
-  useEffect(() => {
-    const stop = (event: KeyboardEvent) => {
-      if (event.key === "Escape") picking.value = null;
-    };
-    window.addEventListener("keydown", stop);
-    return () => {
-      window.removeEventListener("keydown", stop);
-      picking.value = null;
-    };
-  }, []);
-  const read = async (file: File | undefined) => {
-    if (!file) return;
+  useEscape(picking);
+  const read = (name: string, text: string) => {
     try {
-      const { area, keepOut, others } = areasIn(file.name, await file.text());
+      const { area, keepOut, others } = areasIn(name, text);
       const obstacles = [area, ...keepOut, ...others];
       set({ obstacles: [...draft.obstacles, ...obstacles] });
-      note.value = `${file.name}: ${obstacles.length} obstacle${obstacles.length === 1 ? "" : "s"}`;
+      note.value = `${name}: ${obstacles.length} obstacle${obstacles.length === 1 ? "" : "s"}`;
     } catch (error) {
       note.value = error instanceof Error ? error.message : String(error);
     }
@@ -37,34 +27,21 @@ export function SearchFields() {
       <Place field="goal" label="Goal" />
       <Place field="entry" label="Entry and exit" />
       <div class="pair">
-        <Text field="goal_radius_m" label="Radius of the goal, m" numeric />
-        <Text field="window_min" label="Back within, min" numeric hint="From the first step; pauses count" />
-        <Text field="safety_m" label="From obstacles, m" numeric hint="Also from what nobody has looked at" />
-        <Text field="reach_m" label="Scanner reaches, m" numeric />
+        <Part of="search" />
       </div>
-      <label class="command file">
+      <FileButton accept=".geojson,.json,.kml" id="obstacles-file" onText={read}>
         Known obstacles from a file
-        <input
-          type="file"
-          accept=".geojson,.json,.kml"
-          data-testid="obstacles-file"
-          onChange={(event) => {
-            void read(event.currentTarget.files?.[0]);
-            event.currentTarget.value = "";
-          }}
-        />
-      </label>
+      </FileButton>
       {draft.obstacles.length > 0 ? (
         <span class="zone">
           {draft.obstacles.length} known
-          <button
-            type="button"
-            class="tool small"
+          <Button
+            kind="tool small"
             aria-label="Forget the known obstacles"
             onClick={() => set({ obstacles: [] })}
           >
             ✕
-          </button>
+          </Button>
         </span>
       ) : null}
       {note.value ? (
@@ -83,11 +60,9 @@ function Place({ field, label }: { field: "goal" | "entry"; label: string }) {
   return (
     <div class="picked">
       <Text field={field} label={label} placeholder="latitude, longitude" />
-      <button
-        type="button"
-        class="command"
+      <Button
+        id={`pick-${field}`}
         aria-pressed={waiting}
-        data-testid={`pick-${field}`}
         onClick={() => {
           picking.value = waiting
             ? null
@@ -95,7 +70,7 @@ function Place({ field, label }: { field: "goal" | "entry"; label: string }) {
         }}
       >
         {waiting ? "Click on the map…" : "Pick"}
-      </button>
+      </Button>
     </div>
   );
 }

@@ -5,6 +5,7 @@ import { DEPTH_PALETTES } from "../map/palette";
 import type { SceneVehicle } from "../map/scene";
 import { replayed } from "../state/replay";
 import { depthPalette, in3d, isDark, rangeOf, seaFloor, theme, vehicles, view } from "../state/store";
+import { Button, sets } from "./Controls";
 
 /** The sea floor in space over the whole map. */
 export function SpaceView() {
@@ -73,19 +74,10 @@ export function SpaceView() {
             }}
           />
         </label>
-        <button type="button" class="command" onClick={() => reset.current()}>
-          From the south
-        </button>
-        <button
-          type="button"
-          class="command primary"
-          data-testid="close-3d"
-          onClick={() => {
-            in3d.value = false;
-          }}
-        >
+        <Button onClick={() => reset.current()}>From the south</Button>
+        <Button id="close-3d" kind="command primary" onClick={sets(in3d, false)}>
           Back to the map
-        </button>
+        </Button>
       </div>
       {fault.value ? (
         <p class="notice alarm" role="alert">

@@ -1,9 +1,9 @@
 import "./TimeSlider.css";
-import { whyNotCommand } from "../state/access";
 import { clock } from "../state/format";
 import { pace, playing, replay, showPresent } from "../state/replay";
 import { finishOpen, mission, replayStep, steps } from "../state/store";
 import { hasEnded, isAllowed } from "../state/words";
+import { Button, sets } from "./Controls";
 
 /** How far the mission has come, and back to any step of it. */
 export function TimeSlider() {
@@ -12,19 +12,18 @@ export function TimeSlider() {
   const { step: last, steps: planned } = present.progress;
   const shown = replayStep.value;
   const past = steps.value.find((s) => s.number === shown);
-  const over = hasEnded(present.state);
+  const over = hasEnded(present);
   return (
     <div class={`timeline${shown === null ? "" : " past"}`}>
       <span class="steps">
         Step <b data-testid="step">{shown ?? last}</b> of {shown === null ? planned : last}
       </span>
-      <button
-        type="button"
-        class="tool"
-        data-testid="play"
-        aria-label={playing.value ? "Stop the replay" : "Replay the mission"}
-        title={playing.value ? "Stop the replay" : "Replay the mission"}
+      <Button
+        id="play"
+        kind="tool"
         disabled={last === 0}
+        title={playing.value ? "Stop the replay" : "Replay the mission"}
+        aria-label={playing.value ? "Stop the replay" : "Replay the mission"}
         onClick={async () => {
           if (playing.value) {
             playing.value = false;
@@ -35,7 +34,7 @@ export function TimeSlider() {
         }}
       >
         {playing.value ? "❚❚" : "▶"}
-      </button>
+      </Button>
       <input
         type="range"
         min={last > 0 ? 1 : 0}
@@ -53,19 +52,16 @@ export function TimeSlider() {
       {shown === null ? (
         <>
           <span class="when">{over ? "as it ended" : "live"}</span>
-          {isAllowed("finish", present.state) ? (
-            <button
-              type="button"
-              class="command finish"
-              data-testid="finish"
-              disabled={whyNotCommand.value !== ""}
-              title={whyNotCommand.value || "End the mission before its last step"}
-              onClick={() => {
-                finishOpen.value = true;
-              }}
+          {isAllowed("finish", present) ? (
+            <Button
+              id="finish"
+              kind="command finish"
+              commands
+              title="End the mission before its last step"
+              onClick={sets(finishOpen, true)}
             >
               Finish early…
-            </button>
+            </Button>
           ) : null}
         </>
       ) : (
@@ -88,9 +84,9 @@ export function TimeSlider() {
               ))}
             </select>
           </label>
-          <button type="button" class="command primary" data-testid="to-present" onClick={showPresent}>
+          <Button id="to-present" kind="command primary" onClick={showPresent}>
             {over ? "To the end" : "Live"}
-          </button>
+          </Button>
         </>
       )}
     </div>

@@ -21,38 +21,33 @@ import {
 import { decidingFor } from "../state/waiting";
 import { isAllowed, MISSION_SIGNS, MISSION_WORDS, type Tone } from "../state/words";
 import { AccountButton } from "./Account";
+import { Button, flips, sets } from "./Controls";
 
 export function TopBar() {
   const present = mission.value;
   const past = replayStep.value !== null;
   return (
     <header class="top-bar">
-      <button
-        type="button"
-        class="tool"
+      <Button
+        id="toggle-missions"
+        kind="tool"
+        title="Missions"
         aria-label="Missions"
         aria-expanded={panelOpen.value}
         aria-controls="missions"
-        title="Missions"
-        data-testid="toggle-missions"
-        onClick={() => {
-          panelOpen.value = !panelOpen.value;
-        }}
+        onClick={flips(panelOpen)}
       >
         ☰
-      </button>
-      <button
-        type="button"
-        class="tool"
-        aria-label="Links to vehicles"
+      </Button>
+      <Button
+        id="open-links"
+        kind="tool"
         title="Links: what is missing"
-        data-testid="open-links"
-        onClick={() => {
-          linksOpen.value = true;
-        }}
+        aria-label="Links to vehicles"
+        onClick={sets(linksOpen, true)}
       >
         ⇄
-      </button>
+      </Button>
       <div class="title">
         <h1 data-testid="mission-name">{present?.name ?? "bathyfleet"}</h1>
         {present ? <MissionLine /> : <p class="state">No mission chosen</p>}
@@ -78,17 +73,16 @@ export function TopBar() {
         <Command action="pause" label="Pause" />
         <Command action="resume" label="Resume" />
       </div>
-      <button
-        type="button"
-        class="abort"
-        data-testid="abort"
-        disabled={!present || !isAllowed("abort", present.state) || whyNotCommand.value !== ""}
+      <Button
+        id="abort"
+        kind="abort"
+        disabled={!present || !isAllowed("abort", present) || whyNotCommand.value !== ""}
         title={
           !present
             ? "No mission is chosen"
             : whyNotCommand.value
               ? whyNotCommand.value
-              : isAllowed("abort", present.state)
+              : isAllowed("abort", present)
                 ? "Stop every vehicle of this mission"
                 : `This mission is over: ${MISSION_WORDS[present.state].toLowerCase()}`
         }
@@ -98,7 +92,7 @@ export function TopBar() {
         }}
       >
         Abort all
-      </button>
+      </Button>
     </header>
   );
 }
@@ -197,22 +191,20 @@ function LinkSummary() {
 
 /** Shown only when the state allows it, so that there is never more than one way forward. */
 function Command({ action, label }: { action: MissionAction; label: string }) {
-  const state = mission.value?.state;
-  if (!state || !isAllowed(action, state)) return null;
+  if (!mission.value || !isAllowed(action, mission.value)) return null;
   return (
-    <button
-      type="button"
-      class="command primary"
-      data-testid={action}
-      disabled={busyWith.value !== null || whyNotCommand.value !== ""}
-      title={whyNotCommand.value}
+    <Button
+      id={action}
+      kind="command primary"
+      commands
+      disabled={busyWith.value !== null}
       onClick={() => {
         if (action === "start") preflightOpen.value = true;
         else void act(action);
       }}
     >
       {busyWith.value === action ? `${label}…` : label}
-    </button>
+    </Button>
   );
 }
 
@@ -222,17 +214,16 @@ const THEME_SIGNS = { system: "◐", light: "☀", dark: "☾", contrast: "◼" 
 function ThemeSwitch() {
   const words = `Colours: ${theme.value}. Change to ${NEXT_THEME[theme.value]}`;
   return (
-    <button
-      type="button"
-      class="tool theme"
-      aria-label={words}
+    <Button
+      id="theme"
+      kind="tool theme"
       title={words}
-      data-testid="theme"
+      aria-label={words}
       onClick={() => {
         theme.value = NEXT_THEME[theme.value];
       }}
     >
       {THEME_SIGNS[theme.value]}
-    </button>
+    </Button>
   );
 }

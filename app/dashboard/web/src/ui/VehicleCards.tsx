@@ -1,6 +1,5 @@
 import "./VehicleCards.css";
-import { whyNotCommand } from "../state/access";
-import { age, clock, metres, percent } from "../state/format";
+import { age, clock, metres } from "../state/format";
 import { localizationWords } from "../state/localization";
 import { replayed } from "../state/replay";
 import { rejoin } from "../state/session";
@@ -14,7 +13,8 @@ import {
   type Vehicle,
   vehicles,
 } from "../state/store";
-import { hasEnded, vehicleState, WAYPOINT_WORDS } from "../state/words";
+import { batteryWords, hasEnded, vehicleState, WAYPOINT_WORDS } from "../state/words";
+import { Button } from "./Controls";
 import { WaypointShape } from "./marks";
 import { SearchCard } from "./SearchCard";
 import { TargetCards } from "./TargetCards";
@@ -38,16 +38,13 @@ export function VehicleCards() {
   );
 }
 
-const LOW_BATTERY_PCT = 25;
-
 function Card({ vehicle }: { vehicle: Vehicle }) {
   const then = replayed.value?.find((one) => one.vehicle === vehicle.view.name);
   if (replayStep.value !== null) return <PastCard vehicle={vehicle} depth_m={then?.depth_m ?? null} />;
   const v = vehicle.view;
   const state = vehicleState(v, vehicle.waypoint);
   const away = v.kind === "sim" && v.link === "unknown";
-  const ended = mission.value !== null && hasEnded(mission.value.state);
-  const low = v.battery_pct !== null && v.battery_pct < LOW_BATTERY_PCT;
+  const ended = mission.value !== null && hasEnded(mission.value);
   return (
     <article
       class={`card ${state.tone}${v.active ? "" : " left"}${vehicle.stale && !away ? " stale" : ""}`}
@@ -72,12 +69,9 @@ function Card({ vehicle }: { vehicle: Vehicle }) {
           <dt>Altitude</dt>
           <dd>{metres(v.altitude_m)}</dd>
         </div>
-        <div class={low ? "low" : ""}>
+        <div class={v.battery ?? ""}>
           <dt>Battery</dt>
-          <dd>
-            {low ? "▲ " : ""}
-            {percent(v.battery_pct)}
-          </dd>
+          <dd>{batteryWords(v)}</dd>
         </div>
         <div class={vehicle.stale && !away ? "late" : ""}>
           <dt>Heard</dt>
@@ -106,19 +100,17 @@ function Card({ vehicle }: { vehicle: Vehicle }) {
         </p>
       ) : null}
       {v.active && mission.value && (!ended || unstopped.value.has(v.name)) ? (
-        <button
-          type="button"
-          class="abort-one"
-          data-testid={`abort-${v.name}`}
-          disabled={whyNotCommand.value !== ""}
-          title={whyNotCommand.value}
+        <Button
+          id={`abort-${v.name}`}
+          kind="abort-one"
+          commands
           onClick={() => {
             abortOne.value = v.name;
             abortDialogOpen.value = true;
           }}
         >
           {ended ? `Stop ${v.name} again` : `Abort ${v.name}`}
-        </button>
+        </Button>
       ) : null}
       {v.active ? null : (
         <p class="small left-at" data-testid={`left-${v.name}`}>
@@ -127,16 +119,15 @@ function Card({ vehicle }: { vehicle: Vehicle }) {
         </p>
       )}
       {!v.active && !ended ? (
-        <button
-          type="button"
-          class="command again"
-          data-testid={`rejoin-${v.name}`}
-          disabled={whyNotCommand.value !== ""}
-          title={whyNotCommand.value || "Let it take part again, as it was described"}
+        <Button
+          id={`rejoin-${v.name}`}
+          kind="command again"
+          commands
+          title="Let it take part again, as it was described"
           onClick={() => void rejoin(v.name)}
         >
           Add again
-        </button>
+        </Button>
       ) : null}
       {v.reason ? <p class={`reason ${state.tone}`}>{v.reason}</p> : null}
       {vehicle.waypoint?.reason ? <p class={`reason ${state.tone}`}>{vehicle.waypoint.reason}</p> : null}

@@ -1,6 +1,6 @@
 /** Keeps the map in step with the page's state. */
 
-import { effect } from "@preact/signals";
+import { effect, type Signal } from "@preact/signals";
 import { render } from "preact";
 import type { LngLat, Place, WaypointView } from "../api/types";
 import type { Chart, Padding, Pin } from "../map/chart";
@@ -138,21 +138,23 @@ function followDraft(chart: Chart): () => void {
   };
 }
 
-function followDrawing(chart: Chart): () => void {
+/** Fetches the map's tools when something is wanted of them, and ends them when it is not any more. */
+function followTools<T>(
+  signal: Signal<T | null>,
+  ready: Signal<boolean>,
+  begin: (tools: typeof import("../map/draw"), wanted: T) => Promise<() => void>,
+): () => void {
   return effect(() => {
-    const wanted = drawing.value;
-    drawingReady.value = false;
+    const wanted = signal.value;
+    ready.value = false;
     if (!wanted) return;
     let ended = false;
     let end = () => {};
-    void import("../map/draw").then(async ({ draw }) => {
+    void import("../map/draw").then(async (tools) => {
       if (ended) return;
-      end = await draw(chart, wanted.shape, (ring) => {
-        wanted.onDrawn(ring);
-        if (drawing.peek() === wanted) drawing.value = null;
-      });
+      end = await begin(tools, wanted);
       if (ended) end();
-      else drawingReady.value = true;
+      else ready.value = true;
     });
     return () => {
       ended = true;
@@ -161,25 +163,16 @@ function followDrawing(chart: Chart): () => void {
   });
 }
 
-function followEditing(chart: Chart): () => void {
-  return effect(() => {
-    const wanted = editing.value;
-    editingReady.value = false;
-    if (!wanted) return;
-    let ended = false;
-    let end = () => {};
-    void import("../map/draw").then(async ({ edit }) => {
-      if (ended) return;
-      end = await edit(chart, wanted.ring, wanted.onChanged);
-      if (ended) end();
-      else editingReady.value = true;
-    });
-    return () => {
-      ended = true;
-      end();
-    };
-  });
-}
+const followDrawing = (chart: Chart) =>
+  followTools(drawing, drawingReady, ({ draw }, wanted) =>
+    draw(chart, wanted.shape, (ring) => {
+      wanted.onDrawn(ring);
+      if (drawing.peek() === wanted) drawing.value = null;
+    }),
+  );
+
+const followEditing = (chart: Chart) =>
+  followTools(editing, editingReady, ({ edit }, wanted) => edit(chart, wanted.ring, wanted.onChanged));
 
 function followSeaFloor(chart: Chart): () => void {
   let map: SeaFloor | null = null;

@@ -1,0 +1,40 @@
+/**
+ * Writes what the form needs of the service's OpenAPI document: type, bounds and defaults of a mission's plain fields, by
+ * their paths. node mission.mjs DOCUMENT FILE
+ */
+
+import { readFile, writeFile } from "node:fs/promises";
+
+const [source, target] = process.argv.slice(2);
+const text = source.startsWith("http") ? await (await fetch(source)).text() : await readFile(source, "utf8");
+const { schemas } = JSON.parse(text).components;
+const KEPT = /^(type|minimum|maximum|exclusiveMinimum|exclusiveMaximum|maxItems|enum|default|description)$/;
+
+/** A schema without references; of alternatives the one that is not null. */
+function whole({ $ref, anyOf, ...own }) {
+  if ($ref) return { ...whole(schemas[$ref.split("/").at(-1)]), ...own };
+  const kinds = anyOf?.filter(({ type }) => type !== "null");
+  return kinds ? { ...whole(kinds[0]), ...own, nullable: kinds.length < anyOf.length } : own;
+}
+
+function* leaves(schema, path = []) {
+  const { properties, items, prefixItems, examples, nullable, ...rest } = whole(schema);
+  const inner = Object.entries(properties ?? prefixItems ?? {});
+  if (path.join(".") === "planner.options") return;
+  for (const [name, one] of inner) yield* leaves(one, [...path, name]);
+  if (properties) return;
+  if (items) yield* leaves(items, path);
+  const kept = Object.entries(rest).filter(([key]) => KEPT.test(key));
+  const example = typeof examples?.[0] === "number" ? { example: examples[0] } : {};
+  yield [path.join("."), { ...Object.fromEntries(kept), ...example, ...(nullable ? { nullable } : {}) }];
+}
+
+/** Values by their paths. */
+const flat = (tree, path = []) =>
+  Object.entries(tree).flatMap(([name, value]) =>
+    typeof value === "object" ? flat(value, [...path, name]) : [[[...path, name].join("."), value]],
+  );
+
+const fields = Object.fromEntries(leaves(schemas.MissionSpec));
+for (const [path, value] of flat(schemas.MissionSpec.properties.search["x-defaults"])) fields[path].inSearch = value;
+await writeFile(target, `${JSON.stringify(fields, null, 2)}\n`);

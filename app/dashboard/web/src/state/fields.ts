@@ -1,0 +1,191 @@
+/** The form's fields for plain values of a mission, declared once; type, bounds, default and help are the service's. Pure. */
+
+import SPEC from "../api/mission.json";
+import type { NewMission } from "../api/types";
+
+export type MissionKind = NonNullable<NewMission["kind"]>;
+
+/** What the service says of a value; `inSearch` is the default of searches that is another one. */
+export interface Schema {
+  type: string;
+  description?: string;
+  minimum?: number;
+  exclusiveMinimum?: number;
+  maximum?: number;
+  exclusiveMaximum?: number;
+  enum?: readonly string[];
+  default?: unknown;
+  example?: number;
+  inSearch?: unknown;
+  nullable?: boolean;
+}
+
+export interface Field {
+  /** Where the value stands in a mission. */
+  path: keyof typeof SPEC;
+  /** Where it stands in the form. */
+  part: "course" | "limits" | "search" | "tide";
+  label: string;
+  unit?: string;
+  placeholder?: string;
+  /** Only of this kind of mission. */
+  kind?: MissionKind;
+  /** May stay empty, and does at first. */
+  optional?: true;
+  /** How many of the service's units one of the form's is. */
+  factor?: number;
+}
+
+export const FIELDS = {
+  steps: { path: "steps", part: "course", label: "Steps", kind: "survey" },
+  goal_radius_m: {
+    path: "search.goal_radius_m",
+    part: "search",
+    label: "Radius of the goal",
+    unit: "m",
+    kind: "search",
+  },
+  window_min: {
+    path: "search.window_s",
+    part: "search",
+    label: "Back within",
+    unit: "min",
+    kind: "search",
+    factor: 60,
+  },
+  safety_m: { path: "search.safety_m", part: "search", label: "From obstacles", unit: "m", kind: "search" },
+  reach_m: {
+    path: "search.scanner.reach_m",
+    part: "search",
+    label: "Scanner reaches",
+    unit: "m",
+    kind: "search",
+  },
+  max_step_m: { path: "limits.max_step_m", part: "limits", label: "Largest step", unit: "m" },
+  speed_mps: { path: "speed_mps", part: "limits", label: "Speed", unit: "m/s" },
+  min_depth_m: { path: "limits.min_depth_m", part: "limits", label: "Shallowest", unit: "m", kind: "survey" },
+  max_depth_m: { path: "limits.max_depth_m", part: "limits", label: "Deepest", unit: "m" },
+  min_altitude_m: { path: "limits.min_altitude_m", part: "limits", label: "Altitude", unit: "m" },
+  min_separation_m: { path: "limits.min_separation_m", part: "limits", label: "Apart", unit: "m" },
+  com_range_m: {
+    path: "limits.com_range_m",
+    part: "limits",
+    label: "Com. range",
+    unit: "m",
+    placeholder: "unlimited",
+    optional: true,
+  },
+  cell_m: { path: "cell_m", part: "limits", label: "Cell", unit: "m" },
+  accuracy_m: { path: "accuracy_m", part: "limits", label: "Accuracy", unit: "m" },
+  tide_m: {
+    path: "tide.level_m",
+    part: "tide",
+    label: "Level",
+    unit: "m",
+    placeholder: "none",
+    optional: true,
+  },
+} as const satisfies Record<string, Field>;
+
+export type FieldName = keyof typeof FIELDS;
+/** Every field's value as it is typed. */
+export type Texts = Record<FieldName, string>;
+
+export const schemaOf = ({ path }: Pick<Field, "path">): Schema => SPEC[path];
+
+/** The fields of a kind of mission, or those that stand in one part of the form. */
+export function fieldsOf(kind: MissionKind, part?: Field["part"]): [FieldName, Field][] {
+  const all = Object.entries(FIELDS) as [FieldName, Field][];
+  return all.filter(([, field]) => (field.kind ?? kind) === kind && (part ?? field.part) === field.part);
+}
+
+/** What a field begins with: what the service takes where nothing is said, or its example. */
+export function startOf(field: Field, kind: MissionKind): string {
+  const { default: usual, example, inSearch } = schemaOf(field);
+  return textOf(field, kind === "search" && inSearch !== undefined ? inSearch : (usual ?? example));
+}
+
+/** What all fields begin with. */
+export function startTexts(kind: MissionKind): Texts {
+  return textsWith((field) => startOf(field, kind));
+}
+
+/** A value of a mission as it is typed. */
+export function textOf(field: Field, value: unknown): string {
+  if (value == null || (field.optional && value === schemaOf(field).default)) return "";
+  return String(typeof value === "number" ? value / (field.factor ?? 1) : value);
+}
+
+/** The texts of a mission that there is; what it lacks begins as in a new one. */
+export function textsOf(mission: unknown, kind: MissionKind): Texts {
+  return textsWith((field) => {
+    const value = field.path
+      .split(".")
+      .reduce((part, key) => (part as Tree | null | undefined)?.[key], mission);
+    return value === undefined ? startOf(field, kind) : textOf(field, value);
+  });
+}
+
+function textsWith(text: (field: Field) => string): Texts {
+  return Object.fromEntries(Object.entries(FIELDS).map(([name, field]) => [name, text(field)])) as Texts;
+}
+
+/** What a typed text stands for in a mission; undefined: nothing, null: no value. */
+export function typedValue(field: Field, text: string): unknown {
+  const { type, nullable } = schemaOf(field);
+  if (text.trim() === "") return nullable ? null : undefined;
+  if (type === "boolean") return text === "true";
+  return type === "string" ? text : Number(text) * (field.factor ?? 1);
+}
+
+type Tree = { [key: string]: unknown };
+
+/** A mission with the values that were typed. */
+export function withTexts(mission: Tree, texts: Texts, kind: MissionKind): Tree {
+  return fieldsOf(kind).reduce((made, [name, field]) => {
+    const value = typedValue(field, texts[name]);
+    return value === undefined ? made : put(made, field.path.split("."), value);
+  }, mission);
+}
+
+function put(tree: Tree, [key = "", ...rest]: string[], value: unknown): Tree {
+  return { ...tree, [key]: rest.length > 0 ? put((tree[key] ?? {}) as Tree, rest, value) : value };
+}
+
+/** What is wrong with a typed text; empty when nothing is. */
+export function fieldFault(field: Field, text: string): string {
+  const schema = schemaOf(field);
+  const isNumber = schema.type === "number" || schema.type === "integer";
+  if (!isNumber || (field.optional && text.trim() === "")) return "";
+  return numberFault(field.label, text, schema, field.factor);
+}
+
+/** What is wrong with a typed number; bounds are in units of which `factor` make one of the text's. */
+export function numberFault(label: string, text: string, schema: Schema, factor = 1): string {
+  const value = Number(text);
+  if (text.trim() === "" || !Number.isFinite(value)) return `${label} needs a number`;
+  if (schema.type === "integer" && !Number.isInteger(value)) return `${label} needs a whole number`;
+  return isWithin(value * factor, schema) ? "" : `${label} must be ${boundsIn(schema, factor)}`;
+}
+
+export function isWithin(value: number, schema: Schema): boolean {
+  const { minimum = -Infinity, exclusiveMinimum = -Infinity } = schema;
+  const { maximum = Infinity, exclusiveMaximum = Infinity } = schema;
+  return value >= minimum && value > exclusiveMinimum && value <= maximum && value < exclusiveMaximum;
+}
+
+function boundsIn(schema: Schema, factor: number): string {
+  const { minimum, maximum } = schema;
+  if (minimum !== undefined && maximum !== undefined) {
+    return `between ${minimum / factor} and ${maximum / factor}`;
+  }
+  const words = [
+    ["at least", minimum],
+    ["more than", schema.exclusiveMinimum],
+    ["at most", maximum],
+    ["less than", schema.exclusiveMaximum],
+  ] as const;
+  return words
+    .flatMap(([how, bound]) => (bound === undefined ? [] : [`${how} ${bound / factor}`]))
+    .join(" and ");
+}
