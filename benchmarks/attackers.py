@@ -27,9 +27,9 @@ from urllib.parse import quote
 import httpx
 import imcpy
 
-from tests.faults import leading_out
-from tests.faults.missions import FRAME, mission_of
-from tests.faults.service import Service
+from tests.support.faults import leading_out
+from tests.support.faults.missions import FRAME, mission_of
+from tests.support.faults.service import Service
 
 ATTACKER = "127.0.0.66"
 NOBODY = 65_534

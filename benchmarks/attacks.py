@@ -31,8 +31,8 @@ sys.path.insert(0, str(ROOT))
 from attackers import ATTACKS, Attacked  # noqa: E402
 from imc_report import write_section  # noqa: E402
 
-from tests.faults.service import Service  # noqa: E402
-from tests.ports import free_ports  # noqa: E402
+from tests.support.faults.service import Service  # noqa: E402
+from tests.support.ports import free_ports  # noqa: E402
 
 PAGE = ROOT / "docs" / "results" / "attacks.md"
 HEAD = """# Attacks: what was tried

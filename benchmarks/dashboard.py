@@ -31,7 +31,7 @@ ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT))
 
 from app.mapping.georeference import LocalFrame  # noqa: E402
-from tests.dashboard.service import Service  # noqa: E402
+from tests.support.dashboard.service import Service  # noqa: E402
 
 RESULTS = ROOT / "docs" / "results" / "dashboard.md"
 CHROMIUM = "/usr/bin/chromium"

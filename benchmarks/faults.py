@@ -20,8 +20,8 @@ from typing import Any
 
 from imc_report import write_section
 
-from tests.faults import imc_scenes, scenes
-from tests.faults.disks import small_disk
+from tests.support.faults import imc_scenes, scenes
+from tests.support.faults.disks import small_disk
 
 HEAD = """# Faults: what was tried
 

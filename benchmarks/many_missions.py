@@ -27,7 +27,7 @@ from imc_report import LOAD, write_section  # noqa: E402
 from opening import Watch  # noqa: E402
 
 from app.mapping.georeference import LocalFrame  # noqa: E402
-from tests.dashboard.service import Service  # noqa: E402
+from tests.support.dashboard.service import Service  # noqa: E402
 
 SIDE_M = 120.0
 APART_DEG = 0.01

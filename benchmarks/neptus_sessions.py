@@ -18,9 +18,9 @@ from app.missions.views.soundings import Verdict
 from app.storage.prepare import prepare_database
 from simulator.terrain import Terrain
 from simulator.terrain_files import load_terrain
-from tests.missions.neptus_gateway import SESSION, Gateway
-from tests.missions.neptus_panel import DVL, FORWARD, Auv, RealPanel
-from tests.ports import free_ports
+from tests.support.neptus.gateway import SESSION, Gateway
+from tests.support.neptus.panel import DVL, FORWARD, Auv, RealPanel
+from tests.support.ports import free_ports
 
 ROWS = COLS = 100
 CENTRE = 41.1855, -8.7045

@@ -29,7 +29,7 @@ from dashboard import CHROMIUM, FLAGS, SIDE_M, create_mission  # noqa: E402
 from filling import fill  # noqa: E402
 from imc_report import LOAD, write_section  # noqa: E402
 
-from tests.dashboard.service import Service  # noqa: E402
+from tests.support.dashboard.service import Service  # noqa: E402
 
 ORIGIN = (41.185, -8.705)
 TOGETHER_S = 0.01

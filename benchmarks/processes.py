@@ -24,9 +24,9 @@ sys.path.insert(0, str(ROOT))
 
 from imc_report import LOAD, write_section  # noqa: E402
 
-from tests.databases import Databases, query  # noqa: E402
-from tests.faults.missions import mission_of  # noqa: E402
-from tests.faults.service import Service, service_in  # noqa: E402
+from tests.support.databases import Databases, query  # noqa: E402
+from tests.support.faults.missions import mission_of  # noqa: E402
+from tests.support.faults.service import Service, service_in  # noqa: E402
 
 WARM_UP_S = 10.0
 PATIENCE_S = 60.0

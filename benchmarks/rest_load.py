@@ -29,7 +29,7 @@ sys.path.insert(0, str(ROOT))
 from dashboard import START_S, Boat, begin, create_mission  # noqa: E402
 from imc_report import LOAD, write_section  # noqa: E402
 
-from tests.dashboard.service import Service  # noqa: E402
+from tests.support.dashboard.service import Service  # noqa: E402
 
 LENGTH = re.compile(rb"content-length: (\d+)", re.IGNORECASE)
 MIX = {"mission": 40, "measurements": 25, "waypoint": 20, "missions": 5, "vehicles": 5, "ready": 5}

@@ -29,7 +29,7 @@ sys.path.insert(0, str(ROOT))
 from dashboard import START_S, Boat, create_mission  # noqa: E402
 from imc_report import LOAD, write_section  # noqa: E402
 
-from tests.dashboard.service import Service  # noqa: E402
+from tests.support.dashboard.service import Service  # noqa: E402
 
 TABLES = ("soundings", "positions", "telemetry", "steps", "waypoints", "events", "batches")
 SIDE_M = 300.0

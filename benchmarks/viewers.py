@@ -29,7 +29,7 @@ from dashboard import RATE_HZ, begin, beside, create_mission  # noqa: E402
 from imc_report import LOAD, write_section  # noqa: E402
 from opening import Watch  # noqa: E402
 
-from tests.dashboard.service import Service  # noqa: E402
+from tests.support.dashboard.service import Service  # noqa: E402
 
 SLOW_S = 2.0
 VEHICLES = 10

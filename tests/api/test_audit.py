@@ -13,7 +13,7 @@ from app.api import audit_log
 from app.api.tokens import Role, TokenStore
 from app.settings import Settings
 from app.storage.database import Database
-from tests.api.conftest import make_client, mission_spec, running, soundings
+from tests.support.rest import make_client, mission_spec, running, soundings
 
 
 @pytest.fixture

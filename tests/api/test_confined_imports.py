@@ -13,9 +13,8 @@ import httpx
 import pytest
 
 from app.missions.operations import reading, uploads
-from tests.api.conftest import make_client, mission_spec, running
-from tests.api.test_imports import prior_text
-from tests.faults.leading_out import grids, told
+from tests.support.faults.leading_out import grids, told
+from tests.support.rest import make_client, mission_spec, prior_text, running
 
 GRID = {"crs": "EPSG:4326", "sd_m": 0.3, "positive": "down"}
 

@@ -15,7 +15,7 @@ from app.descriptors import allow_descriptors
 from app.main import Server
 from app.settings import Settings
 from app.storage.database import Database
-from tests.api.conftest import make_client, mission_spec, running
+from tests.support.rest import make_client, mission_spec, running
 
 MOST = 40
 Connection = tuple[asyncio.StreamReader, asyncio.StreamWriter]

@@ -27,9 +27,9 @@ from app.api.tokens import Role, TokenStore
 from app.missions.settings import ImcSettings
 from app.settings import Settings
 from app.storage.database import Database
-from tests.api.conftest import mission_spec, running_in_thread, soundings
-from tests.api.test_openapi import CONTRACT
-from tests.databases import Databases
+from tests.support.contract import CONTRACT
+from tests.support.databases import Databases
+from tests.support.rest import mission_spec, running_in_thread, soundings
 
 # What the schema cannot say, the answer does: rings are closed, planners exist, max is above min, tables and files are
 # what they are called, profiles go down, there is a reference grid to differ from.

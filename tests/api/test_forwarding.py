@@ -11,7 +11,7 @@ from app.api import spool
 from app.api.spool import Spool
 from app.main import Server
 from app.settings import Settings
-from tests.api.conftest import make_client, mission_spec, running, soundings
+from tests.support.rest import make_client, mission_spec, running, soundings
 
 KIB = 1024
 

@@ -12,7 +12,7 @@ from app.main import Server, create_app
 from app.settings import Settings
 from app.storage import migrate
 from app.storage.prepare import DatabaseNotReadyError
-from tests.api.conftest import mission_spec, soundings
+from tests.support.rest import mission_spec, soundings
 
 
 @pytest.mark.parametrize("prefix", ["", "/api/v1"])

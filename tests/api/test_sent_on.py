@@ -19,7 +19,7 @@ from app.settings import Settings
 from app.storage.database import Database
 from app.storage.models import MissionOwnerRow, MissionRow, ProcessRow
 from app.storage.process_lock import ProcessLock
-from tests.api.conftest import make_client, mission_spec, running, soundings
+from tests.support.rest import make_client, mission_spec, running, soundings
 
 
 @dataclass

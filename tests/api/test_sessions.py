@@ -8,10 +8,7 @@ import websockets
 
 from app.api import auth
 from app.main import Server
-from tests.api.conftest import mission_spec
-from tests.api.test_auth import Guarded, guarded, new_mission, path
-
-__all__ = ["guarded", "path"]
+from tests.support.rest import Guarded, mission_spec, new_mission
 
 
 def own_page(guarded: Guarded) -> dict[str, str]:

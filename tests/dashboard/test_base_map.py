@@ -9,9 +9,9 @@ import pytest
 from PIL import Image
 from playwright.sync_api import Browser, Page
 
-from .pmtiles import plain_tile, tile_at, write_pmtiles
-from .service import Service
-from .steps import show
+from tests.support.dashboard.pmtiles import plain_tile, tile_at, write_pmtiles
+from tests.support.dashboard.service import Service
+from tests.support.dashboard.steps import show
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(400)]
 

@@ -1,5 +1,6 @@
 import pytest
-from situations import SQUARE
+
+from tests.support.situations import SQUARE
 
 
 @pytest.fixture

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from situations import SQUARE, make_belief, make_situation
 
 from app.estimation import RangeSensor, SingleBeam
 from app.exploration.core.bottom import Bottom
@@ -13,6 +12,7 @@ from app.exploration.core.problem import Belief, Situation
 from app.exploration.planner.options import PlannerOptions
 from app.exploration.planners import PLANNERS, create_planner
 from app.exploration.survey.error import expected_roughness
+from tests.support.situations import SQUARE, make_belief, make_situation
 
 QUICK = {"search": 30, "candidates": 24, "rollouts": 20}
 KINDS = [

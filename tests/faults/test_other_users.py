@@ -14,11 +14,11 @@ from typing import Any
 import httpx
 import pytest
 
-from tests.conftest import PROJECT
-from tests.faults.other_users import SERVICE, as_user, holding, modes, needs_root, open_folder, stranger
-from tests.faults.service import Service, service_in
-from tests.faults.stranger import NEW_MISSION
-from tests.ports import free_ports
+from tests.support.faults.other_users import SERVICE, as_user, holding, modes, needs_root, open_folder, stranger
+from tests.support.faults.service import Service, service_in
+from tests.support.faults.stranger import NEW_MISSION
+from tests.support.paths import PROJECT
+from tests.support.ports import free_ports
 
 pytestmark = [needs_root, pytest.mark.timeout(600)]
 

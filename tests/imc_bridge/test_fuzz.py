@@ -6,7 +6,8 @@ import subprocess
 import sys
 from pathlib import Path
 
-ROOT = Path(__file__).parents[2]
+from tests.support.paths import PROJECT
+
 CORPUS = Path(__file__).parent / "corpus" / "outcomes.jsonl"
 
 REPLAY = """
@@ -30,8 +31,8 @@ print(json.dumps({
 def run(*arguments: str) -> dict[str, object]:
     ended = subprocess.run(
         [sys.executable, *arguments],
-        cwd=ROOT,
-        env=os.environ | {"PYTHONPATH": os.pathsep.join([str(ROOT), str(ROOT / "benchmarks")])},
+        cwd=PROJECT,
+        env=os.environ | {"PYTHONPATH": os.pathsep.join([str(PROJECT), str(PROJECT / "benchmarks")])},
         capture_output=True,
         text=True,
         check=False,

@@ -11,7 +11,7 @@ import pytest
 
 from imc_bridge import BridgeSettings, Sounding, SoundingRefused, StateReport
 from imc_bridge.logs import LogError, VehicleLog
-from tests.imc_bridge import log_writer as writer
+from tests.support.imc import log_writer as writer
 
 SETTINGS = BridgeSettings()
 

@@ -6,12 +6,9 @@ import pytest
 from app.missions.service import MissionService
 from app.missions.settings import ImcSettings, ServiceSettings
 from app.storage.database import Database
-from tests.imc_bridge.conftest import captures
-from tests.missions.fleet import Harbour
-from tests.missions.neptus_gateway import COLS, ROWS, Gateway
-from tests.ports import free_ports
-
-__all__ = ["captures"]
+from tests.support.missions.harbour import Harbour
+from tests.support.neptus.gateway import COLS, ROWS, Gateway
+from tests.support.ports import free_ports
 
 
 @pytest.fixture

@@ -10,8 +10,8 @@ from app.missions.service import MissionService
 from app.missions.states import MissionState
 from app.missions.views.imports import ImportOptions
 from app.missions.views.mission import CheckStatus, VehicleView
-from tests.missions.builders import make_spec
-from tests.missions.fleet import Harbour, Rover, sim_spec, until, until_step
+from tests.support.missions.harbour import Harbour, Rover, sim_spec, until, until_step
+from tests.support.missions.specs import make_spec
 
 
 def by_name(views: list[VehicleView], name: str) -> VehicleView:
@@ -64,7 +64,7 @@ async def test_simulated_vehicles_are_put_away_with_their_mission_and_stay_in_si
 
 
 async def test_a_search_is_flown_after_a_survey_with_vehicles_of_the_same_names(service: MissionService) -> None:
-    from tests.missions.test_search_missions import search_spec
+    from tests.support.missions.searches import search_spec
 
     search = search_spec()
     names = [vehicle.name for vehicle in search.vehicles]

@@ -12,10 +12,10 @@ from app.storage.database import Database
 from imc_bridge import BridgeSettings
 from simulator.dune import DuneFleet, DuneOptions, default_specs
 from simulator.seafloors import generate
-from tests.imc_bridge.conftest import Peer
-from tests.missions.builders import make_spec
-from tests.missions.fleet import until
-from tests.ports import free_ports
+from tests.support.imc.sea import Peer
+from tests.support.missions.harbour import until
+from tests.support.missions.specs import make_spec
+from tests.support.ports import free_ports
 
 SPEED = 20.0
 ORIGIN = (41.185, -8.705)

@@ -11,9 +11,9 @@ import rasterio
 from app.main import serve
 from app.missions.settings import ImcSettings
 from app.settings import Settings
-from tests.databases import query
-from tests.missions.builders import FRAME, spec_json
-from tests.missions.polling import PollingVehicle
+from tests.support.databases import query
+from tests.support.missions.polling import PollingVehicle
+from tests.support.missions.specs import FRAME, spec_json
 
 SIDE_M = 50.0
 STEPS = 12

@@ -22,37 +22,9 @@ from app.missions.states import MissionState
 from app.missions.views.mission import CheckStatus
 from app.missions.views.soundings import Verdict
 from simulator.car_parks import car_park, harbour_basin
-from tests.missions.builders import lon_lat, rectangle
-from tests.missions.fleet import Harbour, Rover, until, until_state
-
-SIDE_M = 30.0
-
-
-def search_json(**changes: Any) -> dict[str, Any]:
-    """A basin of 30 x 30 m: a quay in the east is known, a pontoon across half of the middle is not."""
-    search = {
-        "goal": lon_lat(8, 25),
-        "goal_radius_m": 5.0,
-        "entry": lon_lat(14, 5),
-        "window_s": 4000.0,
-        "safety_m": 1.5,
-        "scanner": {"reach_m": 10.0, "resolution_deg": 2.0},
-        "obstacles": [rectangle(27, 0, 30, 30)],
-        "simulated_obstacles": [rectangle(0, 14, 15, 16)],
-    }
-    values: dict[str, Any] = {
-        "name": "Basin",
-        "kind": "search",
-        "area": rectangle(0, 0, SIDE_M, SIDE_M),
-        "vehicles": [{"name": "boat", "kind": "sim", "depth_m": 0}],
-        "limits": {"max_step_m": 4.0, "min_depth_m": 0.0, "min_altitude_m": 0.1},
-        "search": search | changes.pop("search", {}),
-    }
-    return values | changes
-
-
-def search_spec(**changes: Any) -> MissionSpec:
-    return MissionSpec.model_validate(search_json(**changes))
+from tests.support.missions.harbour import Harbour, Rover, until, until_state
+from tests.support.missions.searches import search_json, search_spec
+from tests.support.missions.specs import lon_lat, rectangle
 
 
 def all_round(east: float, north: float, time_s: float, **changes: Any) -> Scan:

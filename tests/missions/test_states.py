@@ -12,7 +12,7 @@ from shapely.geometry import Polygon
 from app.missions.maps.builder import make_grid
 from app.missions.spec.mission import MissionSpec
 from app.missions.states import ENDED, MOVES, MissionState, MoveRefusedError, move
-from tests.missions.builders import LAT, LON, lon_lat, make_spec, rectangle, spec_json
+from tests.support.missions.specs import LAT, LON, lon_lat, make_spec, rectangle, spec_json
 
 S = MissionState
 TABLE = {

@@ -15,9 +15,9 @@ from app.missions.states import MissionState, MoveRefusedError
 from app.missions.views.corrections import TideCorrection
 from app.missions.views.soundings import Ruling
 from app.storage import missions as mission_queries
-from tests.missions.builders import make_spec
-from tests.missions.fleet import Harbour, Rover, sim_spec, state_of, until, until_state, until_step
-from tests.missions.test_reviewing import NOT_USED, measured
+from tests.support.missions.harbour import Harbour, Rover, sim_spec, state_of, until, until_state, until_step
+from tests.support.missions.measured import NOT_USED, measured
+from tests.support.missions.specs import make_spec
 
 S = MissionState
 LONG_S = 20.0

@@ -15,9 +15,9 @@ from app.storage.database import Database
 from simulator.dune import DuneFleet, DuneOptions, default_specs
 from simulator.seafloors import generate
 from simulator.targets import RangingNoise, TargetSpec
-from tests.missions.builders import LAT, LON, lon_lat, make_spec, rectangle
-from tests.missions.fleet import Harbour, Rover, until, until_state
-from tests.ports import free_ports
+from tests.support.missions.harbour import Harbour, Rover, until, until_state
+from tests.support.missions.specs import LAT, LON, lon_lat, make_spec, rectangle
+from tests.support.ports import free_ports
 
 TAG = (20.0, 18.0, 5.0)
 

@@ -8,6 +8,7 @@ import pytest
 from simulator import seafloors
 from simulator.terrain import TerrainError
 from simulator.terrain_files import load_terrain, save_npz
+from tests.support.paths import TERRAINS
 
 pytestmark = pytest.mark.filterwarnings("ignore:Use `@` matmul:PendingDeprecationWarning")
 
@@ -219,9 +220,7 @@ def test_a_truncated_archive_is_refused(tmp_path):
 
 
 def real_terrains():
-    default = Path(__file__).resolve().parents[3] / "shared" / "terrains"
-    folder = Path(os.environ.get("BATHYFLEET_TERRAINS", default))
-    return sorted(p for p in folder.glob("*") if p.name.endswith((".npz", ".csv.gz")) and "large" not in p.name)
+    return sorted(p for p in TERRAINS.glob("*") if p.name.endswith((".npz", ".csv.gz")) and "large" not in p.name)
 
 
 @pytest.mark.terrains

@@ -19,8 +19,8 @@ from app.storage.backup import BackupError, back_up, contents_of, restore_to
 from app.storage.database import Database
 from app.storage.models import Base, MissionRow, SoundingRow
 from app.storage.retention import ended_before, give_space_back, remove
-from tests.databases import Databases
-from tests.storage.rows import mission, one_of_each, sounding
+from tests.support.databases import Databases
+from tests.support.rows import mission, one_of_each, sounding
 
 WRITER = """
 import sqlite3, sys

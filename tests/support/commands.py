@@ -1,0 +1,36 @@
+"""The command line in a process of its own."""
+
+import contextlib
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+COMMAND = [sys.executable, "-c", "import sys; sys.argv[0] = 'bathyfleet'; from app.cli import main; main()"]
+
+
+@contextlib.contextmanager
+def serving(folder: Path, environment: dict[str, str], *arguments: str) -> Iterator[tuple[subprocess.Popen[str], str]]:
+    """``bathyfleet serve`` on a free port, and its address."""
+    process = subprocess.Popen(
+        [*COMMAND, "serve", "--port", "0", *arguments],
+        cwd=folder,
+        env=environment,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    assert process.stderr is not None
+    try:
+        seen = ""
+        for line in process.stderr:
+            seen += line
+            if found := re.search(r"bathyfleet answers at (\S+)", line):
+                yield process, found[1]
+                return
+        pytest.fail(f"it did not start: {seen}")
+    finally:
+        process.kill()
+        process.communicate()

@@ -1,0 +1,115 @@
+"""The real service in a process of its own, which a test can kill and start again."""
+
+import contextlib
+import os
+import socket
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import httpx
+
+from tests.support.paths import PROJECT
+
+BATHYFLEET = [sys.executable, "-c", "from app.cli import main; main()"]
+START_LIMIT_S = 180
+
+# About 59 m by 56 m.
+AREA = {
+    "type": "Polygon",
+    "coordinates": [[[-8.705, 41.185], [-8.7043, 41.185], [-8.7043, 41.1855], [-8.705, 41.1855], [-8.705, 41.185]]],
+}
+
+
+class Service:
+    """``bathyfleet serve`` with simulated vehicles, on one port and one database for all its lives."""
+
+    def __init__(self, folder: Path, **settings: str) -> None:
+        with socket.socket() as probe:
+            probe.bind(("127.0.0.1", 0))
+            self.port: int = probe.getsockname()[1]
+        self.url = f"http://127.0.0.1:{self.port}"
+        self._folder = folder
+        self._settings = {f"BATHYFLEET_{name.upper()}": value for name, value in settings.items()}
+        self._log = folder / "service.log"
+        self._process: subprocess.Popen[bytes] | None = None
+
+    @property
+    def _environment(self) -> dict[str, str]:
+        # Settings of whoever runs the tests are not this service's.
+        kept = {name: value for name, value in os.environ.items() if not name.startswith("BATHYFLEET_")}
+        return kept | {
+            "BATHYFLEET_DATABASE_URL": f"sqlite+aiosqlite:///{self._folder / 'service.db'}",
+            "BATHYFLEET_IMC__ENABLED": "false",
+            "BATHYFLEET_TIME_SCALE": "5",
+            **self._settings,
+            "PYTHONPATH": os.pathsep.join([str(PROJECT), os.environ.get("PYTHONPATH", "")]),
+        }
+
+    def make_token(self, name: str, role: str) -> str:
+        """Make an access token on the command line; from then on the service asks for one."""
+        made = subprocess.run(
+            [*BATHYFLEET, "token", "create", name, "--role", role],
+            cwd=self._folder,
+            env=self._environment,
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        return made.stdout.split()[-1]
+
+    def start(self) -> None:
+        """Start and wait until requests are answered."""
+        with self._log.open("ab") as log:
+            self._process = subprocess.Popen(
+                [*BATHYFLEET, "serve", "--port", str(self.port)],
+                cwd=self._folder,
+                env=self._environment,
+                stderr=log,
+                stdout=log,
+            )
+        end = time.monotonic() + START_LIMIT_S
+        while time.monotonic() < end and self._process.poll() is None:
+            with contextlib.suppress(httpx.TransportError):
+                if httpx.get(f"{self.url}/api/v1/health/live").is_success:
+                    return
+        self.kill()
+        raise AssertionError(f"the service did not start:\n{self._log.read_text()}")
+
+    def kill(self) -> None:
+        """End the process without any warning to it."""
+        if self._process is not None:
+            self._process.kill()
+            self._process.wait()
+            self._process = None
+
+    @property
+    def pid(self) -> int:
+        """Of the running process."""
+        assert self._process is not None
+        return self._process.pid
+
+    def get(self, path: str) -> Any:
+        answer = httpx.get(f"{self.url}/api/v1{path}", timeout=60)
+        return answer.raise_for_status().json()
+
+    def post(self, path: str, content: dict[str, Any]) -> Any:
+        answer = httpx.post(f"{self.url}/api/v1{path}", json=content, timeout=60)
+        return answer.raise_for_status().json()
+
+    def create(self, **changes: Any) -> str:
+        """Describe a mission over the API and return its id."""
+        spec = {
+            "name": "Harbour basin",
+            "area": AREA,
+            "steps": 400,
+            "vehicles": [{"name": "sim-1", "kind": "sim", "sensor": "dvl"}],
+            "planner": {"name": "random"},
+        }
+        answer = httpx.post(f"{self.url}/api/v1/missions", json=spec | changes, timeout=60)
+        return str(answer.raise_for_status().json()["id"])
+
+    def act(self, mission: str, action: str) -> None:
+        httpx.post(f"{self.url}/api/v1/missions/{mission}/{action}", timeout=60).raise_for_status()
