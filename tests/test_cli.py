@@ -17,6 +17,7 @@ import pytest
 import rasterio
 
 from app.cli import main
+from tests.support import commands
 from tests.support.commands import serving
 from tests.support.imc import log_writer as writer
 from tests.support.paths import PROJECT
@@ -37,8 +38,7 @@ Run = Callable[..., Ended]
 
 @pytest.fixture
 def environment() -> dict[str, str]:
-    kept = {name: value for name, value in os.environ.items() if not name.startswith("BATHYFLEET_")}
-    return kept | {"PYTHONPATH": str(PROJECT), "COLUMNS": "200", "NO_COLOR": "1", "BATHYFLEET_IMC__ENABLED": "false"}
+    return commands.environment(COLUMNS="200", NO_COLOR="1")
 
 
 @pytest.fixture

@@ -1,7 +1,6 @@
 """The documentation says what is true: commands, options, paths, settings, examples and links exist as written."""
 
 import json
-import os
 import re
 import runpy
 import shlex
@@ -34,7 +33,7 @@ from app.main import create_app
 from app.missions.spec.mission import Limits, MissionSpec
 from app.settings import Settings
 from simulator.__main__ import app as simulator_app
-from tests.support.commands import serving
+from tests.support.commands import environment, serving
 from tests.support.paths import PROJECT
 
 PAGES = sorted([*PROJECT.glob("*.md"), *PROJECT.glob("docs/*.md")])
@@ -218,8 +217,6 @@ def test_the_table_of_settings_is_complete_and_true() -> None:
 
 
 def test_the_polling_vehicle_of_the_guide_completes_a_mission(tmp_path: Path) -> None:
-    kept = {name: value for name, value in os.environ.items() if not name.startswith("BATHYFLEET_")}
-    environment = kept | {"PYTHONPATH": str(PROJECT), "BATHYFLEET_IMC__ENABLED": "false"}
     guide = PROJECT / "docs" / "rest.md"
     [program] = [block.text for block in blocks(guide, "python") if "def post(" in block.text]
     mission = next(json.loads(b.text) for b in blocks(guide, "json") if '"kind": "rest"' in b.text)
@@ -227,7 +224,7 @@ def test_the_polling_vehicle_of_the_guide_completes_a_mission(tmp_path: Path) ->
     script.write_text(program)
 
     with (
-        serving(tmp_path, environment, "--log-level", "warning") as (_, url),
+        serving(tmp_path, environment(), "--log-level", "warning") as (_, url),
         httpx.Client(base_url=f"{url}{API}", timeout=60.0) as api,
     ):
         mission_id = api.post("/missions", json=mission | {"steps": 4}).json()["id"]
@@ -235,7 +232,7 @@ def test_the_polling_vehicle_of_the_guide_completes_a_mission(tmp_path: Path) ->
 
         def swim(vehicle: dict[str, Any], lat: str) -> int:
             command = [sys.executable, str(script), f"{url}{API}", mission_id, vehicle["name"], lat, "-8.7048"]
-            return subprocess.run(command, env=environment, check=False).returncode
+            return subprocess.run(command, env=environment(), check=False).returncode
 
         with ThreadPoolExecutor() as pool:
             codes = list(pool.map(swim, mission["vehicles"], ["41.1851", "41.1852"]))

@@ -13,7 +13,7 @@ from app.missions.settings import ImcSettings
 from app.settings import Settings
 from app.storage.database import Database
 from tests.support.databases import Databases
-from tests.support.rest import Guarded, make_client, mission_spec, new_mission, running, running_in_thread
+from tests.support.rest import Guarded, make_client, make_tokens, mission_spec, new_mission, running, running_in_thread
 
 
 @pytest.fixture(scope="session")
@@ -73,14 +73,13 @@ async def guarded(make_settings: Callable[..., Settings]) -> AsyncIterator[Guard
     settings = make_settings()
     database = Database(settings.database_url)
     store = TokenStore(database)
-    tokens = {role.value: (await store.create(f"the {role}", role))[1] for role in Role}
-    tokens["rover"] = (await store.create("rover", Role.VEHICLE, vehicle="rover"))[1]
+    tokens = await make_tokens(store)
     tokens["expired"] = (await store.create("old", Role.ADMIN, expires_at=datetime.now(UTC) - timedelta(seconds=1)))[1]
     async with (
         running(settings) as server,
         make_client(server) as client,
     ):
-        yield Guarded(server, client, tokens, store)
+        yield Guarded(server=server, client=client, tokens=tokens, store=store)
     await database.close()
 
 

@@ -14,7 +14,8 @@ from affine import Affine
 from app.mapping.georeference import LocalFrame
 from app.settings import Settings
 from tests.support.faults.hostile import sparse_tif
-from tests.support.rest import AREA, make_client, mission_spec, prior_text, running, soundings
+from tests.support.missions.specs import AREA
+from tests.support.rest import make_client, mission_spec, prior_text, running, soundings
 
 FRAME = LocalFrame(AREA["coordinates"][0][0][1], AREA["coordinates"][0][0][0])  # type: ignore[index]
 

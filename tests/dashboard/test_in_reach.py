@@ -7,8 +7,9 @@ import pytest
 from playwright.sync_api import Browser, Page, expect
 
 from tests.support.dashboard.browser import PATIENCE_MS
-from tests.support.dashboard.service import AREA, Service
+from tests.support.dashboard.service import Service
 from tests.support.dashboard.steps import by_id, expect_state, show, start
+from tests.support.missions.specs import AREA
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(600)]
 

@@ -6,7 +6,8 @@ import pytest
 from playwright.sync_api import expect
 
 from tests.support.dashboard.browser import Watched
-from tests.support.dashboard.service import AREA, Service
+from tests.support.dashboard.service import Service
+from tests.support.missions.specs import AREA
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(400)]
 

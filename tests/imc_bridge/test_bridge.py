@@ -10,8 +10,9 @@ import pytest
 from imc_bridge import Bridge, LinkChange, NodeState, RefusedError, Sounding, WaypointChange, WaypointStatus
 from imc_bridge.control.plans import OPERATION_START, plan_control
 from imc_bridge.network.codec import encode
-from tests.support.imc.sea import Peer, open_sea, until
+from tests.support.imc.sea import Peer, open_sea
 from tests.support.ports import free_ports
+from tests.support.waiting import until
 
 S, A, R = WaypointStatus.SENT, WaypointStatus.ACKNOWLEDGED, WaypointStatus.REACHED
 

@@ -11,9 +11,10 @@ import pytest
 
 from imc_bridge import Bridge, BridgeSettings, NodeState, Sounding, StateReport, WaypointStatus
 from imc_bridge.nodes.refusals import Refused
-from tests.support.imc.sea import open_sea, until
+from tests.support.imc.sea import open_sea
 from tests.support.imc.speaker import VEHICLE, Speaker
 from tests.support.ports import free_ports
+from tests.support.waiting import until
 
 
 class Scene:

@@ -4,7 +4,8 @@ import pytest
 
 from imc_bridge import Guidance, LinkChange, NodeState, Restarted, WaypointChange, WaypointStatus
 from imc_bridge.doctor.doctor import Cause, judge
-from tests.support.imc.sea import open_sea, until
+from tests.support.imc.sea import open_sea
+from tests.support.waiting import until
 
 ACKNOWLEDGED, REFUSED = WaypointStatus.ACKNOWLEDGED, WaypointStatus.REFUSED
 

@@ -9,10 +9,10 @@ from app.missions.service import MissionService
 from app.missions.settings import ImcSettings, ServiceSettings
 from app.missions.spec.mission import MissionSpec
 from app.missions.states import MissionState
-from app.storage.database import Database
 from imc_bridge import Bridge, LinkChange, NodeState, RefusedError, WaypointStatus
-from tests.support.imc.sea import Sea, open_sea, until
-from tests.support.missions.harbour import until as until_done
+from tests.support.imc.sea import Sea, open_sea
+from tests.support.missions.harbour import Harbour
+from tests.support.waiting import until
 
 COMMANDS = {message().msg_id.to_bytes(2, "little") for message in (imcpy.PlanControl, imcpy.Abort)}
 REFERENCE = imcpy.Reference().msg_id.to_bytes(2, "little")
@@ -72,10 +72,8 @@ async def test_a_mission_goes_on_by_itself_when_its_vehicle_hears_again(
     speed = 10.0
     async with open_sea(connected=False, speed=speed) as sea:
         imc = ImcSettings(port=sea.settings.port, announce_ports=sea.settings.announce_ports, loopback_only=True)
-        settings = make_settings(imc=imc, time_scale=speed)
-        database = Database(settings.database_url)
-        service = MissionService(settings, database)
-        await service.startup()
+        harbour = Harbour(make_settings)
+        service = await harbour.open(imc=imc, time_scale=speed)
         await sea.launch()
         try:
             assert sea.fleet is not None
@@ -98,24 +96,23 @@ async def test_a_mission_goes_on_by_itself_when_its_vehicle_hears_again(
             async def ended() -> bool:
                 return (await service.mission(mission.id)).state in (MissionState.FINISHED, MissionState.FAILED)
 
-            await until_done(ready, "the vehicle is ready")
+            await until(ready, "the vehicle is ready")
             await service.act(mission.id, "start", actor="tester")
-            await until_done(under_way, "it is under way")
+            await until(under_way, "it is under way")
             link = Deaf(bridge)
             link.mute(COMMANDS | {REFERENCE})
             link.deafen()
             go_on_for_ever(sea)
-            await until_done(lambda: said(f"{name} is lost: silent for"), "the operator is told")
-            await until_done(lambda: not bridge.nodes()[0].engaged, "it was given up")
+            await until(lambda: said(f"{name} is lost: silent for"), "the operator is told")
+            await until(lambda: not bridge.nodes()[0].engaged, "it was given up")
             link.hear()
-            await until_done(lambda: said("executes our plan"), "engaging it again did not succeed")
+            await until(lambda: said("executes our plan"), "engaging it again did not succeed")
             link.speak()
-            await until_done(ended, "the mission has ended")
+            await until(ended, "the mission has ended")
             view = await service.mission(mission.id)
             assert (view.state, view.progress.step) == (MissionState.FINISHED, 3), view.reason
         finally:
-            await service.shutdown()
-            await database.close()
+            await harbour.close()
 
 
 async def test_a_bridge_that_was_held_up_blames_no_vehicle():

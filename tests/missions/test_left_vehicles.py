@@ -10,8 +10,9 @@ from app.missions.service import MissionService
 from app.missions.states import MissionState
 from app.missions.views.imports import ImportOptions
 from app.missions.views.mission import CheckStatus, VehicleView
-from tests.support.missions.harbour import Harbour, Rover, sim_spec, until, until_step
+from tests.support.missions.harbour import Harbour, Rover, sim_spec, until_step
 from tests.support.missions.specs import make_spec
+from tests.support.waiting import until
 
 
 def by_name(views: list[VehicleView], name: str) -> VehicleView:

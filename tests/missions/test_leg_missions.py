@@ -7,15 +7,14 @@ from pathlib import Path
 import pytest
 from pydantic import ValidationError
 
-from app.missions.service import MissionService
 from app.missions.settings import ImcSettings, ServiceSettings
 from app.missions.spec.mission import MissionSpec, VehicleSpec
 from app.missions.states import MissionState
-from app.storage.database import Database
 from imc_bridge import NodeState, Sounding
 from imc_bridge.logs import VehicleLog
 from tests.support.imc.sea import open_sea
-from tests.support.missions.harbour import until
+from tests.support.missions.harbour import Harbour
+from tests.support.waiting import until
 
 SPEED = 20.0
 
@@ -30,10 +29,8 @@ async def test_a_mission_by_legs_finishes_without_contact_under_water_and_has_ev
             loopback_only=True,
             unknown_bottom_depth_m=2.5,
         )
-        settings = make_settings(imc=imc, time_scale=SPEED)
-        database = Database(settings.database_url)
-        service = MissionService(settings, database)
-        await service.startup()
+        harbour = Harbour(make_settings)
+        service = await harbour.open(imc=imc, time_scale=SPEED)
         await sea.launch()
         try:
             assert sea.fleet is not None
@@ -85,8 +82,7 @@ async def test_a_mission_by_legs_finishes_without_contact_under_water_and_has_ev
             assert imported.duplicate > 0, "which the log holds as well"
             assert accepted >= {event.time_s for event in measured}, "nothing that was measured is missing"
         finally:
-            await service.shutdown()
-            await database.close()
+            await harbour.close()
             await asyncio.sleep(0)
 
 

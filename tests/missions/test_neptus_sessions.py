@@ -15,9 +15,9 @@ from app.missions.maps.builder import make_grid
 from app.missions.states import MissionState
 from app.missions.views.soundings import Verdict
 from imc_bridge.neptus import SessionRefusedError
-from tests.support.missions.harbour import until
 from tests.support.neptus.gateway import COLS, ROWS, SESSION, Gateway
 from tests.support.neptus.panel import ALTIMETER, DVL, FORWARD, NEAR_M, Auv, RealPanel
+from tests.support.waiting import until
 
 SOON_S = 0.3
 

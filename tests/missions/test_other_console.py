@@ -8,14 +8,14 @@ from app.missions.fleet.interface import LinkState
 from app.missions.service import MissionService
 from app.missions.settings import ImcSettings, ServiceSettings
 from app.missions.views.mission import Level
-from app.storage.database import Database
 from imc_bridge import BridgeSettings
 from simulator.dune import DuneFleet, DuneOptions, default_specs
 from simulator.seafloors import generate
 from tests.support.imc.sea import Peer
-from tests.support.missions.harbour import until
+from tests.support.missions.harbour import Harbour
 from tests.support.missions.specs import make_spec
 from tests.support.ports import free_ports
+from tests.support.waiting import until
 
 SPEED = 20.0
 ORIGIN = (41.185, -8.705)
@@ -27,14 +27,12 @@ async def test_a_vehicle_aborted_elsewhere_is_left_alone_until_the_mission_is_re
 ) -> None:
     *announce_ports, port, base_port = free_ports(5)
     imc = ImcSettings(port=port, announce_ports=tuple(announce_ports), loopback_only=True)
-    settings = make_settings(imc=imc, time_scale=SPEED)
     floor = generate("slope", 0, width_m=60.0, height_m=60.0, origin=ORIGIN)
     specs = default_specs(1, floor, base_port=base_port)
-    database = Database(settings.database_url)
-    service = MissionService(settings, database)
+    harbour = Harbour(make_settings)
     console = Peer(BridgeSettings(port=port, announce_ports=tuple(announce_ports)), 0x4001, "ccu-other")
     async with DuneFleet(floor, specs, speed=SPEED, options=DuneOptions(announce_ports=tuple(announce_ports))) as fleet:
-        await service.startup()
+        service = await harbour.open(imc=imc, time_scale=SPEED)
         try:
             for announce_port in announce_ports:
                 console.announce(announce_port, sys_type=imcpy.SystemType.CCU)
@@ -70,8 +68,7 @@ async def test_a_vehicle_aborted_elsewhere_is_left_alone_until_the_mission_is_re
             assert link_of(service) is not LinkState.ENGAGED
         finally:
             console.close()
-            await service.shutdown()
-            await database.close()
+            await harbour.close()
 
 
 def link_of(service: MissionService) -> LinkState | None:

@@ -22,9 +22,10 @@ from app.missions.states import MissionState
 from app.missions.views.mission import CheckStatus
 from app.missions.views.soundings import Verdict
 from simulator.car_parks import car_park, harbour_basin
-from tests.support.missions.harbour import Harbour, Rover, until, until_state
+from tests.support.missions.harbour import Harbour, Rover, until_state
 from tests.support.missions.searches import search_json, search_spec
 from tests.support.missions.specs import lon_lat, rectangle
+from tests.support.waiting import until
 
 
 def all_round(east: float, north: float, time_s: float, **changes: Any) -> Scan:

@@ -40,8 +40,9 @@ from app.missions.views.mission import Level
 from app.missions.views.soundings import Verdict
 from app.storage.database import Database
 from app.storage.models import MissionRow, MissionVehicleRow, SoundingRow, StepRow, WaypointRow
-from tests.support.missions.harbour import CLOCK_S, Harbour, Rover, sim_spec, state_of, until, until_state, until_step
+from tests.support.missions.harbour import CLOCK_S, Harbour, Rover, sim_spec, state_of, until_state, until_step
 from tests.support.missions.specs import lon_lat, make_spec, rectangle
+from tests.support.waiting import until
 
 S = MissionState
 

@@ -15,9 +15,10 @@ from app.missions.states import MissionState, MoveRefusedError
 from app.missions.views.corrections import TideCorrection
 from app.missions.views.soundings import Ruling
 from app.storage import missions as mission_queries
-from tests.support.missions.harbour import Harbour, Rover, sim_spec, state_of, until, until_state, until_step
+from tests.support.missions.harbour import Harbour, Rover, sim_spec, state_of, until_state, until_step
 from tests.support.missions.measured import NOT_USED, measured
 from tests.support.missions.specs import make_spec
+from tests.support.waiting import until
 
 S = MissionState
 LONG_S = 20.0

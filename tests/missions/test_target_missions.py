@@ -15,9 +15,10 @@ from app.storage.database import Database
 from simulator.dune import DuneFleet, DuneOptions, default_specs
 from simulator.seafloors import generate
 from simulator.targets import RangingNoise, TargetSpec
-from tests.support.missions.harbour import Harbour, Rover, until, until_state
+from tests.support.missions.harbour import Harbour, Rover, until_state
 from tests.support.missions.specs import LAT, LON, lon_lat, make_spec, rectangle
 from tests.support.ports import free_ports
+from tests.support.waiting import until
 
 TAG = (20.0, 18.0, 5.0)
 

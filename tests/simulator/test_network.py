@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from simulator.network import NetworkFaults, UdpEndpoint
+from tests.support.waiting import until
 
 
 @pytest.fixture
@@ -40,12 +41,6 @@ def pair(udp):
     return opening
 
 
-async def until(condition):
-    async with asyncio.timeout(10):
-        while not condition():  # noqa: ASYNC110
-            await asyncio.sleep(0.002)
-
-
 async def send_numbers(sender, receiver, n):
     for k in range(n):
         sender.send(k.to_bytes(2, "big"), receiver.address)
@@ -59,7 +54,7 @@ def numbers(came):
 async def test_a_perfect_network_delivers_everything_in_order(pair):
     sender, receiver, came = await pair(NetworkFaults())
     await send_numbers(sender, receiver, 50)
-    await until(lambda: len(came) == 50)
+    await until(lambda: len(came) == 50, "50 packets came")
     assert numbers(came) == list(range(50))
 
 
@@ -68,7 +63,7 @@ async def test_losses_happen_at_their_rate_and_by_seed(pair):
     for seed in (5, 5, 6):
         sender, receiver, came = await pair(NetworkFaults(loss=0.3), seed)
         await send_numbers(sender, receiver, 300)
-        await until(lambda: len(came) == 300 - sender.counts.lost)  # noqa: B023
+        await until(lambda: len(came) == 300 - sender.counts.lost, "all packets came")  # noqa: B023
         lost.append(sorted(set(range(300)) - set(numbers(came))))
     assert lost[0] == lost[1] != lost[2]
     assert 60 < len(lost[0]) < 120
@@ -77,14 +72,14 @@ async def test_losses_happen_at_their_rate_and_by_seed(pair):
 async def test_duplicates_arrive_twice(pair):
     sender, receiver, came = await pair(NetworkFaults(duplicate=1.0))
     await send_numbers(sender, receiver, 20)
-    await until(lambda: len(came) == 40)
+    await until(lambda: len(came) == 40, "40 packets came")
     assert sorted(numbers(came)) == sorted([*range(20)] * 2)
 
 
 async def test_reordered_packets_are_overtaken(pair):
     sender, receiver, came = await pair(NetworkFaults(reorder=0.3, hold_s=0.02))
     await send_numbers(sender, receiver, 60)
-    await until(lambda: len(came) == 60)
+    await until(lambda: len(came) == 60, "60 packets came")
     assert sorted(numbers(came)) == list(range(60))
     assert numbers(came) != list(range(60))
 
@@ -94,7 +89,7 @@ async def test_delayed_packets_come_later(pair):
     loop = asyncio.get_running_loop()
     before = loop.time()
     sender.send(b"x", receiver.address)
-    await until(lambda: came)
+    await until(lambda: came, "a packet came")
     assert loop.time() - before >= 0.05
 
 
@@ -105,7 +100,7 @@ async def test_closing_forgets_what_is_under_way(pair, udp):
     sender.send(b"y", receiver.address)
     other, _ = await udp()
     other.send(b"z", receiver.address)
-    await until(lambda: came)
+    await until(lambda: came, "a packet came")
     assert came == [b"z"]
 
 
@@ -113,7 +108,7 @@ async def test_what_is_received_suffers_too(udp):
     receiver, came = await udp(NetworkFaults(loss=1.0))
     sender, _ = await udp()
     sender.send(b"x", receiver.address)
-    await until(lambda: receiver.counts.lost == 1)
+    await until(lambda: receiver.counts.lost == 1, "one packet is lost")
     assert came == []
 
 

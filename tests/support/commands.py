@@ -1,6 +1,7 @@
 """The command line in a process of its own."""
 
 import contextlib
+import os
 import re
 import subprocess
 import sys
@@ -9,7 +10,16 @@ from pathlib import Path
 
 import pytest
 
+from tests.support.paths import PROJECT
+
 COMMAND = [sys.executable, "-c", "import sys; sys.argv[0] = 'bathyfleet'; from app.cli import main; main()"]
+
+
+def environment(**variables: str) -> dict[str, str]:
+    """Variables for a process that runs this tree: settings of whoever runs the tests are not its own."""
+    kept = {name: value for name, value in os.environ.items() if not name.startswith("BATHYFLEET_")}
+    path = os.pathsep.join([str(PROJECT), *filter(None, [os.environ.get("PYTHONPATH")])])
+    return kept | {"PYTHONPATH": path, "BATHYFLEET_IMC__ENABLED": "false"} | variables
 
 
 @contextlib.contextmanager

@@ -8,15 +8,10 @@ from typing import Any
 import httpx
 import numpy as np
 
-from app.api.tokens import TokenStore
+from app.api.tokens import Role, TokenStore
 from app.main import Server, serve
 from app.settings import Settings
-
-# About 55 m by 55 m.
-AREA = {
-    "type": "Polygon",
-    "coordinates": [[[-8.705, 41.185], [-8.7043, 41.185], [-8.7043, 41.1855], [-8.705, 41.1855], [-8.705, 41.185]]],
-}
+from tests.support.missions.specs import AREA
 
 
 def mission_spec(**changes: Any) -> dict[str, Any]:
@@ -87,17 +82,30 @@ def running_in_thread(settings: Settings) -> Iterator[Server]:
         thread.join(30)
 
 
-@dataclass
-class Guarded:
-    """A service with tokens, and one token of each role."""
+@dataclass(kw_only=True)
+class Tokens:
+    """One token of each role, by the role, and one of the vehicle ``rover``."""
+
+    store: TokenStore
+    tokens: dict[str, str]
+
+    def as_(self, name: str) -> dict[str, str]:
+        """Headers that show a token."""
+        return {"Authorization": f"Bearer {self.tokens[name]}"}
+
+
+async def make_tokens(store: TokenStore) -> dict[str, str]:
+    """Tokens as :class:`Tokens` has them."""
+    tokens = {role.value: (await store.create(f"the {role}", role))[1] for role in Role}
+    return tokens | {"rover": (await store.create("rover", Role.VEHICLE, vehicle="rover"))[1]}
+
+
+@dataclass(kw_only=True)
+class Guarded(Tokens):
+    """A service with tokens."""
 
     server: Server
     client: httpx.AsyncClient
-    tokens: dict[str, str]
-    store: TokenStore
-
-    def as_(self, name: str) -> dict[str, str]:
-        return {"Authorization": f"Bearer {self.tokens[name]}"}
 
 
 async def new_mission(guarded: Guarded) -> str:

@@ -18,7 +18,8 @@ from imc_bridge.control.acoustics import (
 )
 from imc_bridge.control.plans import OPERATION_START, OPERATION_STOP, goto_maneuver, leg_plan, plan_control
 from simulator.dune.node import FakeDune
-from tests.support.imc.sea import Peer, Sea, open_sea, read_capture, until
+from tests.support.imc.sea import Peer, Sea, open_sea, read_capture
+from tests.support.waiting import until
 
 GATEWAY, GATEWAY_ID = "manta-1", 0x8012
 WAYPOINT = Waypoint("m", 1, 41.185, -8.705, 3.0)

@@ -4,7 +4,8 @@ import imcpy
 import pytest
 
 from imc_bridge import Guidance, WaypointChange, WaypointStatus
-from tests.support.imc.sea import Sea, open_sea, until
+from tests.support.imc.sea import Sea, open_sea
+from tests.support.waiting import until
 
 ACKNOWLEDGED, REACHED, REFUSED = WaypointStatus.ACKNOWLEDGED, WaypointStatus.REACHED, WaypointStatus.REFUSED
 

@@ -4,7 +4,8 @@ import pytest
 
 from imc_bridge import LinkChange, NodeState, Sounding, SoundingRefused, WaypointChange, WaypointStatus
 from imc_bridge.doctor.doctor import Cause, judge
-from tests.support.imc.sea import open_sea, until
+from tests.support.imc.sea import open_sea
+from tests.support.waiting import until
 
 RANGE_M = 5000.0
 

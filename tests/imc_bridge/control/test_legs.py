@@ -17,7 +17,8 @@ from imc_bridge import (
     WaypointStatus,
 )
 from imc_bridge.control.plans import leg_plan, leg_time_s
-from tests.support.imc.sea import Sea, open_sea, until
+from tests.support.imc.sea import Sea, open_sea
+from tests.support.waiting import until
 
 RADIO_M = 2000.0
 SENT, ACKNOWLEDGED, REACHED, REFUSED = (

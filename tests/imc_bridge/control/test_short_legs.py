@@ -3,7 +3,8 @@
 import pytest
 
 from imc_bridge import Guidance, LinkChange, NodeState, WaypointChange, WaypointStatus
-from tests.support.imc.sea import Sea, open_sea, until
+from tests.support.imc.sea import Sea, open_sea
+from tests.support.waiting import until
 
 RADIO_M = 2000.0
 SPEED = 10.0

@@ -12,8 +12,9 @@ from imc_bridge.doctor.replay import RecordingError
 from imc_bridge.settings import BridgeSettings
 from simulator.dune import DuneFleet, DuneOptions, VehicleSpec
 from simulator.network import NetworkFaults
-from tests.support.imc.sea import open_sea, until
+from tests.support.imc.sea import open_sea
 from tests.support.ports import free_ports
+from tests.support.waiting import until
 
 LISTEN_S = 1.2
 """24 s of vehicles that live 20 times faster."""

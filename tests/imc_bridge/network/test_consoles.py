@@ -7,7 +7,8 @@ import imcpy
 
 from imc_bridge import Bridge
 from imc_bridge.network.consoles import MAX_MARKS, SHOW_PERIOD_S, Board, Mark
-from tests.support.imc.sea import Peer, open_sea, until
+from tests.support.imc.sea import Peer, open_sea
+from tests.support.waiting import until
 
 
 def test_marks_are_shown_again_and_again_until_they_are_taken_down():

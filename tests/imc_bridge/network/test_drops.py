@@ -11,8 +11,9 @@ from imc_bridge import Bridge, BridgeSettings, PacketsDropped, PortInUseError
 from imc_bridge.doctor.doctor import Cause, judge
 from imc_bridge.network.drops import RECENT_WALL_S, DropMeter
 from imc_bridge.network.sieve import LOUD
-from tests.support.imc.sea import open_sea, until
+from tests.support.imc.sea import open_sea
 from tests.support.ports import free_ports
+from tests.support.waiting import until
 
 
 def flood(port: int, count: int = 20_000) -> None:

@@ -12,8 +12,9 @@ from hypothesis import strategies as st
 from imc_bridge import Bridge, BridgeSettings, NodeState, WaypointStatus
 from imc_bridge.network.streams import PacketSplitter
 from imc_bridge.network.transport import Interface, list_interfaces
-from tests.support.imc.sea import Peer, open_sea, until
+from tests.support.imc.sea import Peer, open_sea
 from tests.support.ports import free_ports
+from tests.support.waiting import until
 
 GROUP = "224.0.75.69"
 LOOPBACK = Interface("127.0.0.1", "127.255.255.255")

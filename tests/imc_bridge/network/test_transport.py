@@ -8,8 +8,9 @@ import imcpy
 import pytest
 
 from imc_bridge import Bridge, BridgeSettings, NodeState, PortInUseError
-from tests.support.imc.sea import Peer, open_sea, until
+from tests.support.imc.sea import Peer, open_sea
 from tests.support.ports import free_ports
+from tests.support.waiting import until
 
 
 async def test_taken_port_is_told_with_a_remedy():

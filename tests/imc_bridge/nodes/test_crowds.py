@@ -20,9 +20,10 @@ from imc_bridge.nodes.refusals import Refused
 from imc_bridge.nodes.roster import Roster
 from simulator import seafloors
 from simulator.dune import default_specs
-from tests.support.imc.sea import open_sea, until
+from tests.support.imc.sea import open_sea
 from tests.support.imc.speaker import Speaker
 from tests.support.ports import free_ports
+from tests.support.waiting import until
 
 FIRST_FORGED = 0x2000
 HOSTS = tuple(f"127.0.0.{last}" for last in range(2, 12))

@@ -33,9 +33,9 @@ from simulator import seafloors
 from simulator.dune import DuneFleet, DuneOptions, default_specs
 from simulator.dune.plan import PlanState
 from simulator.terrain import Terrain
-from tests.support.missions.harbour import until
 from tests.support.missions.specs import LAT, LON
 from tests.support.ports import free_ports
+from tests.support.waiting import until
 
 SPEED = 20.0
 MISSION = "m1"

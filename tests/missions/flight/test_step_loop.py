@@ -11,7 +11,8 @@ from app.missions.flight.commit import StepCommit
 from app.missions.flight.decision import Decision
 from app.missions.service import MissionService
 from app.missions.states import MissionState
-from tests.support.missions.harbour import sim_spec, until, until_state
+from tests.support.missions.harbour import sim_spec, until_state
+from tests.support.waiting import until
 
 REASON = "leaves no safe depth"
 

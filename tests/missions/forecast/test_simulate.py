@@ -13,8 +13,9 @@ from app.missions.forecast.simulate import Flown, Forecast, forecast
 from app.missions.service import MissionService
 from app.missions.spec.mission import MissionSpec
 from app.missions.states import MissionState
-from tests.support.missions.harbour import sim_spec, until, until_state
+from tests.support.missions.harbour import sim_spec, until_state
 from tests.support.missions.specs import make_spec
+from tests.support.waiting import until
 
 NONE = np.zeros((0, 4))
 

@@ -14,8 +14,9 @@ from app.missions.views.mission import CheckStatus, EventView, Level
 from simulator.seafloors import generate
 from simulator.sensors import SensorKind, SonarNoise
 from simulator.world import SimulatedVehicle
-from tests.support.missions.harbour import Rover, until
+from tests.support.missions.harbour import Rover
 from tests.support.missions.specs import LAT, LON, lon_lat, make_spec, rectangle
+from tests.support.waiting import until
 
 AREA = np.array([[0.0, 0], [100, 0], [100, 100], [0, 100]])
 ZONE = np.array([[40.0, 40], [60, 40], [60, 60], [40, 60]])

@@ -2,10 +2,8 @@
 
 import asyncio
 import json
-import os
 import signal
 import subprocess
-import sys
 import time
 from collections.abc import AsyncIterator, Callable
 from pathlib import Path
@@ -20,6 +18,7 @@ from app.missions.settings import ServiceSettings
 from app.missions.views.soundings import LogImportView
 from app.storage import missions as mission_queries
 from app.storage.database import Database
+from tests.support.commands import COMMAND, environment
 from tests.support.databases import query
 from tests.support.imc import log_writer as writer
 from tests.support.missions.specs import make_spec, rectangle
@@ -192,8 +191,8 @@ async def test_what_cannot_be_imported_is_refused_and_nothing_is_stored(
     assert stored(database_url) == []
 
 
-def kill_after_the_first_batch(command: list[str], environment: dict[str, str], database: str) -> None:
-    with subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+def kill_after_the_first_batch(command: list[str], database: str) -> None:
+    with subprocess.Popen(command, env=environment(), stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
         while not stored(database) and process.poll() is None:
             time.sleep(0.005)
         process.send_signal(signal.SIGKILL)
@@ -204,20 +203,10 @@ async def test_a_command_that_was_killed_and_run_again_has_imported_everything_o
 ) -> None:
     mission = await service.create(make_spec(area=rectangle(0, 0, 30, 1600)))
     log = writer.write(tmp_path / "Data.lsf.gz", writer.survey(5000))
-    command = [
-        sys.executable,
-        "-c",
-        "from app.cli import main; main()",
-        "import-log",
-        mission.id[:8],
-        str(log),
-        "--json",
-    ]
-    command += ["--database", database_url]
-    environment = {name: value for name, value in os.environ.items() if not name.startswith("BATHYFLEET_")}
-    await asyncio.to_thread(kill_after_the_first_batch, command, environment, database_url)
+    command = [*COMMAND, "import-log", mission.id[:8], str(log), "--json", "--database", database_url]
+    await asyncio.to_thread(kill_after_the_first_batch, command, database_url)
     ended = await asyncio.to_thread(
-        subprocess.run, command, env=environment, cwd=tmp_path, capture_output=True, text=True, check=False
+        subprocess.run, command, env=environment(), cwd=tmp_path, capture_output=True, text=True, check=False
     )
     assert (ended.returncode, ended.stderr) == (0, ""), "no progress bar where there is no terminal"
     (view,) = json.loads(ended.stdout)

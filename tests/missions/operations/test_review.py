@@ -7,9 +7,10 @@ from app.missions.errors import ConflictError, SoundingNotFoundError
 from app.missions.service import MissionService
 from app.missions.soundings.measurement import Measurement
 from app.missions.views.soundings import Ruling, SoundingState
-from tests.support.missions.harbour import CLOCK_S, Harbour, until
+from tests.support.missions.harbour import CLOCK_S, Harbour
 from tests.support.missions.measured import NOT_USED, measured
 from tests.support.missions.specs import lon_lat, make_spec
+from tests.support.waiting import until
 
 
 async def depth_at(service: MissionService, mission: str, item: Measurement) -> float:

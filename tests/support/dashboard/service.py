@@ -1,26 +1,18 @@
 """The real service in a process of its own, which a test can kill and start again."""
 
 import contextlib
-import os
 import socket
 import subprocess
-import sys
 import time
 from pathlib import Path
 from typing import Any
 
 import httpx
 
-from tests.support.paths import PROJECT
+from tests.support.commands import COMMAND, environment
+from tests.support.missions.specs import AREA
 
-BATHYFLEET = [sys.executable, "-c", "from app.cli import main; main()"]
 START_LIMIT_S = 180
-
-# About 59 m by 56 m.
-AREA = {
-    "type": "Polygon",
-    "coordinates": [[[-8.705, 41.185], [-8.7043, 41.185], [-8.7043, 41.1855], [-8.705, 41.1855], [-8.705, 41.185]]],
-}
 
 
 class Service:
@@ -38,20 +30,14 @@ class Service:
 
     @property
     def _environment(self) -> dict[str, str]:
-        # Settings of whoever runs the tests are not this service's.
-        kept = {name: value for name, value in os.environ.items() if not name.startswith("BATHYFLEET_")}
-        return kept | {
-            "BATHYFLEET_DATABASE_URL": f"sqlite+aiosqlite:///{self._folder / 'service.db'}",
-            "BATHYFLEET_IMC__ENABLED": "false",
-            "BATHYFLEET_TIME_SCALE": "5",
-            **self._settings,
-            "PYTHONPATH": os.pathsep.join([str(PROJECT), os.environ.get("PYTHONPATH", "")]),
-        }
+        database_url = f"sqlite+aiosqlite:///{self._folder / 'service.db'}"
+        own = {"BATHYFLEET_DATABASE_URL": database_url, "BATHYFLEET_TIME_SCALE": "5"} | self._settings
+        return environment(**own)
 
     def make_token(self, name: str, role: str) -> str:
         """Make an access token on the command line; from then on the service asks for one."""
         made = subprocess.run(
-            [*BATHYFLEET, "token", "create", name, "--role", role],
+            [*COMMAND, "token", "create", name, "--role", role],
             cwd=self._folder,
             env=self._environment,
             capture_output=True,
@@ -64,7 +50,7 @@ class Service:
         """Start and wait until requests are answered."""
         with self._log.open("ab") as log:
             self._process = subprocess.Popen(
-                [*BATHYFLEET, "serve", "--port", str(self.port)],
+                [*COMMAND, "serve", "--port", str(self.port)],
                 cwd=self._folder,
                 env=self._environment,
                 stderr=log,

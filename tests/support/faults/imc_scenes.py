@@ -12,19 +12,10 @@ import imcpy
 
 from simulator.network import NetworkFaults
 from tests.support.faults.cut import Afar, cable
-from tests.support.faults.missions import (
-    FRAME,
-    check_rows,
-    ended,
-    log_of,
-    mission_of,
-    started,
-    state_of,
-    steps_more,
-    until,
-)
+from tests.support.faults.missions import FRAME, check_rows, ended, log_of, mission_of, started, state_of, steps_more
 from tests.support.faults.sea import LIMITS, NAMES, OTHERS, OURS, Sea, imc_vehicles
 from tests.support.faults.service import PATIENCE_S, Service, service_in
+from tests.support.waiting import until
 
 SAME_M = 0.05
 """Two places that are nearer are the same."""

@@ -2,7 +2,7 @@
 
 import asyncio
 from collections import Counter
-from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
+from collections.abc import AsyncIterator, Sequence
 from contextlib import asynccontextmanager
 from typing import Any
 
@@ -13,6 +13,7 @@ from shapely.geometry import Point, Polygon
 from app.mapping.georeference import LocalFrame
 from tests.support.faults.service import PATIENCE_S, Service
 from tests.support.missions.polling import PollingVehicle
+from tests.support.waiting import until
 
 SIDE_M = 60.0
 FRAME = LocalFrame(41.185, -8.705)
@@ -63,16 +64,6 @@ async def flying(
         for task in tasks:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
-
-
-async def until(condition: Callable[[], Awaitable[Any]], what: str, patience_s: float = PATIENCE_S) -> None:
-    """Wait for a condition; fail by its name when it does not come."""
-    try:
-        async with asyncio.timeout(patience_s):
-            while not await condition():  # noqa: ASYNC110 - the condition is of another process
-                await asyncio.sleep(0.02)
-    except TimeoutError:
-        raise AssertionError(f"waited {patience_s:g} s in vain until {what}") from None
 
 
 async def steps_more(service: Service, mission_id: str, count: int) -> None:

@@ -14,19 +14,10 @@ from typing import Any
 import httpx
 
 from tests.support.faults.disks import Disk
-from tests.support.faults.missions import (
-    FRAME,
-    check_rows,
-    ended,
-    flying,
-    log_of,
-    pollers,
-    state_of,
-    steps_more,
-    until,
-)
+from tests.support.faults.missions import FRAME, check_rows, ended, flying, log_of, pollers, state_of, steps_more
 from tests.support.faults.service import PATIENCE_S, Service, service_in
 from tests.support.missions.polling import PollingVehicle
+from tests.support.waiting import until
 
 LONGEST_DELAY_S = 0.4
 

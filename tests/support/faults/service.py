@@ -1,7 +1,6 @@
 """The real service as a process of its own, which tests start, kill and keep from its disk."""
 
 import asyncio
-import os
 import sqlite3
 import sys
 from collections.abc import AsyncIterator, Sequence
@@ -11,6 +10,7 @@ from typing import Any
 
 import httpx
 
+from tests.support.commands import COMMAND, environment
 from tests.support.ports import free_ports
 
 PATIENCE_S = 300.0
@@ -79,13 +79,13 @@ class Service:
         """Begin a process; it is not ready yet."""
         serve = ["serve", "--host", self.host, "--port", str(self.port), "--log-format", "json"]
         serve += ["--database", self.database_url]
-        program = [str(LAUNCHER)] if self._world is not None else ["-c", "from app.cli import main; main()"]
+        program = [sys.executable, str(LAUNCHER)] if self._world is not None else COMMAND
         ours = {f"BATHYFLEET_{name}": value for name, value in self._settings.items()}
-        rest = {key: value for key, value in os.environ.items() if not key.startswith("BATHYFLEET_")}
+        world = {f"FAULTS_{name}": value for name, value in (self._world or {}).items()}
         with (self.folder / "service.log").open("ab") as log:
             self.process = await asyncio.create_subprocess_exec(
-                *(*self._prefix, sys.executable, *program, *serve),
-                env=rest | ours | {f"FAULTS_{name}": value for name, value in (self._world or {}).items()},
+                *(*self._prefix, *program, *serve),
+                env=environment(**ours, **world),
                 cwd=self.folder,
                 stdout=log,
                 stderr=log,

@@ -1,17 +1,15 @@
 """A small sea with real sockets: fake DUNE vehicles and a bridge on ports of their own."""
 
-import asyncio
 import gzip
 import json
 import socket
-from collections.abc import AsyncIterator, Callable, Iterator
+from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
 import imcpy
-import pytest
 
 from imc_bridge import Bridge, BridgeEvent, BridgeSettings, NodeState, Waypoint, WaypointChange, WaypointStatus
 from simulator import seafloors
@@ -19,21 +17,10 @@ from simulator.dune import DuneFleet, DuneOptions, default_specs
 from simulator.network import NetworkFaults
 from simulator.terrain import Terrain
 from tests.support.ports import free_ports
+from tests.support.waiting import until
 
 SPEED = 20.0
-PATIENCE_WALL_S = 120.0
-"""A condition is waited for this long; only on a machine that is very busy it comes near that."""
 Event = TypeVar("Event")
-
-
-async def until(condition: Callable[[], bool], what: str) -> None:
-    """Wait for a condition; fail by its name when it does not come."""
-    try:
-        async with asyncio.timeout(PATIENCE_WALL_S):
-            while not condition():  # noqa: ASYNC110 - the condition is any state of any part
-                await asyncio.sleep(0.01)
-    except TimeoutError:
-        pytest.fail(f"waited {PATIENCE_WALL_S:g} s in vain until {what}")
 
 
 @dataclass

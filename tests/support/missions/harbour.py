@@ -3,7 +3,7 @@
 import asyncio
 import contextlib
 import itertools
-from collections.abc import Awaitable, Callable
+from collections.abc import Callable
 from typing import Any
 
 from app.missions.errors import ConflictError, VehicleNotFoundError
@@ -15,22 +15,9 @@ from app.missions.states import MissionState
 from app.missions.views.mission import MissionView
 from app.storage.database import Database
 from tests.support.missions.specs import lon_lat, spec_json
+from tests.support.waiting import until
 
-PATIENCE_S = 180.0
 CLOCK_S = 1_795_225_140.0
-
-
-async def until(condition: Callable[[], Any] | Callable[[], Awaitable[Any]], what: str) -> None:
-    """Wait for a condition; fail by its name when it does not come."""
-    try:
-        async with asyncio.timeout(PATIENCE_S):
-            while True:
-                holds = condition()
-                if await holds if isinstance(holds, Awaitable) else holds:
-                    return
-                await asyncio.sleep(0.01)
-    except TimeoutError:
-        raise AssertionError(f"waited {PATIENCE_S:g} s in vain until {what}") from None
 
 
 class Harbour:

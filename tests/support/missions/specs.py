@@ -7,6 +7,11 @@ from app.missions.spec.mission import MissionSpec
 
 LAT, LON = 41.185, -8.705
 FRAME = LocalFrame(LAT, LON)
+AREA = {
+    "type": "Polygon",
+    "coordinates": [[[-8.705, 41.185], [-8.7043, 41.185], [-8.7043, 41.1855], [-8.705, 41.1855], [-8.705, 41.185]]],
+}
+"""59 m by 56 m in the harbour of Leixoes."""
 
 
 def rectangle(west_m: float, south_m: float, east_m: float, north_m: float) -> dict[str, Any]:

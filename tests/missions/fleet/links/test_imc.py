@@ -15,8 +15,9 @@ from app.missions.fleet.interface import (
 )
 from app.missions.fleet.links.imc import ImcFleetLink, make_imc_link
 from app.missions.settings import ImcSettings
-from tests.support.imc.sea import open_sea, until
+from tests.support.imc.sea import open_sea
 from tests.support.ports import free_ports
+from tests.support.waiting import until
 
 
 async def test_one_waypoint_from_engaging_to_stopping():

@@ -19,8 +19,8 @@ from app.api.tokens import Role, TokenStore
 from app.missions.fleet.links.neptus import GATHER_S, gateway_settings
 from app.missions.settings import NeptusSettings
 from app.missions.states import MissionState
-from tests.support.missions.harbour import until
 from tests.support.neptus.gateway import COLS, ROWS, SESSION, Gateway
+from tests.support.waiting import until
 
 MAX_DEPTH_M = 50.0
 FIRST_DEPTH_M, SEPARATION_M = 1.5, 1.5
