@@ -7,7 +7,7 @@ import pytest
 from tests.support.faults.scenes import killed_again_and_again
 
 KILLS, STEPS = 3, 30
-"""The long version is ``benchmarks/faults.py``."""
+"""The long version is ``benchmarks/service/faults.py``."""
 
 
 @pytest.mark.timeout(900)

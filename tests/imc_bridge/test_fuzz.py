@@ -1,11 +1,11 @@
 """Mutated packets, by the command that throws millions of them, and a corpus of those that once led somewhere new."""
 
 import json
-import os
 import subprocess
 import sys
 from pathlib import Path
 
+from tests.support.commands import environment
 from tests.support.paths import PROJECT
 
 CORPUS = Path(__file__).parent / "corpus" / "outcomes.jsonl"
@@ -14,7 +14,7 @@ REPLAY = """
 import asyncio, json, sys
 from collections import Counter
 from pathlib import Path
-from imc_fuzz import replay
+from benchmarks.imc.fuzz import replay
 targets = asyncio.run(replay(Path(sys.argv[1]).read_text().splitlines()))
 bridges = [target.bridge for target in targets]
 print(json.dumps({
@@ -32,7 +32,7 @@ def run(*arguments: str) -> dict[str, object]:
     ended = subprocess.run(
         [sys.executable, *arguments],
         cwd=PROJECT,
-        env=os.environ | {"PYTHONPATH": os.pathsep.join([str(PROJECT), str(PROJECT / "benchmarks")])},
+        env=environment(),
         capture_output=True,
         text=True,
         check=False,
@@ -42,7 +42,7 @@ def run(*arguments: str) -> dict[str, object]:
 
 
 def test_mutated_packets_neither_break_anything_nor_get_through():
-    result = run("benchmarks/imc_fuzz.py", "--packets", "20000", "--seed", "7")
+    result = run("-m", "benchmarks.imc.fuzz", "--packets", "20000", "--seeds", "7")
     assert result["handler_errors"] == {}
     assert result["impossible_events"] == 0
     assert result["decoded"] > 5000

@@ -1,14 +1,9 @@
-"""What missions claim to know on the way: the small version of ``benchmarks/claims.py``."""
-
-import sys
-from pathlib import Path
+"""What missions claim to know on the way: the small version of ``benchmarks/mapping/claims.py``."""
 
 import pytest
 
+from benchmarks.mapping.claims import Survey, claims_of
 from simulator.seafloors import generate
-
-sys.path.append(str(Path(__file__).resolve().parents[3] / "benchmarks"))
-from claims import Survey, claims_of
 
 SHORT = Survey(vehicles=2, steps=40, max_step_m=10.0, cell_m=2.0, spacing_m=1.0)
 

@@ -1,6 +1,6 @@
 """What can go wrong, each as a scene with a real service: it asserts what must hold and returns figures.
 
-Tests play them short, ``benchmarks/faults.py`` at length.
+Tests play them short, ``benchmarks/service/faults.py`` at length.
 """
 
 import asyncio

@@ -1,13 +1,11 @@
 """How long one planning step of CAO takes, over vehicles, landmarks and candidates, in the papers' cube.
 
-``python benchmarks/explore_step.py [--json FILE]``. Beside the milliseconds stands the time relative to a plain numpy
-evaluation of the same candidates, measured in the same run, which does not depend on the machine.
+``python -m benchmarks.planning.explore_step [--write]``. Beside the milliseconds stands the time relative to a plain
+numpy evaluation of the same candidates, measured in the same run, which does not depend on the machine.
 """
 
-import argparse
-import json
 import time
-from pathlib import Path
+from typing import Any
 
 import numpy as np
 from rich.console import Console
@@ -18,6 +16,7 @@ from app.exploration.core.constraints import Constraints
 from app.exploration.core.problem import Belief, Situation
 from app.exploration.planner.options import PlannerOptions
 from app.exploration.planners import create_planner, warm_up
+from benchmarks.common.report import PLANNING, make_parser, write_section
 
 STEPS = 15
 NUMPY_CANDIDATES = 50
@@ -99,19 +98,17 @@ def survey_ms(vehicles: int, landmarks: int, candidates: int) -> tuple[float, fl
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--json", type=Path, help="also write the figures to this file")
-    file = parser.parse_args().json
+    file = make_parser(__doc__, PLANNING).parse_args().write
     warm_up(RangeSensor())
     plan_ms(2, 1000, 100)
     table = Table("curve", "vehicles", "landmarks", "configurations", "median ms", "numpy ms", "of numpy")
-    rows = []
+    figures: dict[str, Any] = {}
     for curve, cases in CURVES.items():
         for case in cases:
             ours, plain = plan_ms(*case), numpy_ms(*case)
-            rows.append(
-                dict(zip(("vehicles", "landmarks", "candidates"), case, strict=True))
-                | {"curve": curve, "median_ms": ours, "numpy_ms": plain, "ratio": ours / plain}
+            vehicles, landmarks, candidates = case
+            figures[f"{curve}: {vehicles} vehicles, {landmarks} landmarks, {candidates} candidates"] = (
+                f"{ours:.1f} ms, {ours / plain:.3f} of numpy's {plain:.0f} ms"
             )
             table.add_row(curve, *(str(x) for x in case), f"{ours:.1f}", f"{plain:.0f}", f"{ours / plain:.3f}")
     surveys = Table("bathymeter mission: vehicles", "nodes", "candidates per vehicle", "median ms", "worst ms")
@@ -119,8 +116,7 @@ def main() -> None:
         median, worst = survey_ms(*case)
         surveys.add_row(*(str(x) for x in case), f"{median:.1f}", f"{worst:.1f}")
     Console().print(table, surveys)
-    if file is not None:
-        file.write_text(json.dumps(rows, indent=1) + "\n")
+    write_section(file, PLANNING, "One step of CAO", figures)
 
 
 if __name__ == "__main__":

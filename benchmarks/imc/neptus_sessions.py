@@ -1,6 +1,6 @@
 """Whole sessions of a panel that behaves as Neptus' real one, against the real gateway, at length and in real time.
 
-``python benchmarks/neptus_sessions.py --terrain FILE.npz --steps 49 --scale 5 --lost 10 --spoilt 20 --restart 30``
+``python -m benchmarks.imc.neptus_sessions --terrain FILE.npz --steps 49 --scale 5 --lost 10 --spoilt 20 --restart 30``
 """
 
 import argparse
@@ -10,12 +10,14 @@ import tempfile
 import threading
 import time
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from app.missions.settings import ImcSettings, ServiceSettings
 from app.missions.views.soundings import Verdict
 from app.storage.prepare import prepare_database
+from benchmarks.common.report import IMC, make_parser, write_section
 from simulator.terrain import Terrain
 from simulator.terrain_files import load_terrain
 from tests.support.neptus.gateway import SESSION, Gateway
@@ -27,7 +29,7 @@ CENTRE = 41.1855, -8.7045
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = make_parser(__doc__, IMC)
     parser.add_argument("--terrain", type=Path, required=True, help="sea floor of at least 100 m x 100 m")
     parser.add_argument("--steps", type=int, default=49)
     parser.add_argument("--scale", type=float, default=1.0, help="how much faster than the panel its vehicles live")
@@ -35,10 +37,14 @@ def main() -> None:
     parser.add_argument("--lost", type=int, nargs="*", default=[], help="steps whose upload is lost")
     parser.add_argument("--spoilt", type=int, nargs="*", default=[], help="steps whose upload is refused")
     parser.add_argument("--restart", type=int, default=0, help="step at which the service is restarted")
-    print(json.dumps(asyncio.run(fly(parser.parse_args()))))
+    options = parser.parse_args()
+    result = asyncio.run(fly(options))
+    print(json.dumps(result))
+    title = f"A session of {options.steps} steps with Neptus' panel"
+    write_section(options.write, IMC, title, result, hidden={options.terrain: "FILE.npz"})
 
 
-async def fly(asked: argparse.Namespace) -> dict[str, object]:
+async def fly(asked: argparse.Namespace) -> dict[str, Any]:
     """One session; returns its figures."""
     terrain = load_terrain(asked.terrain)
     with tempfile.TemporaryDirectory() as folder:
@@ -75,7 +81,7 @@ async def fly(asked: argparse.Namespace) -> dict[str, object]:
             panel.close()
 
 
-async def _figures(gateway: Gateway, panel: RealPanel, terrain: Terrain, took_s: float) -> dict[str, object]:
+async def _figures(gateway: Gateway, panel: RealPanel, terrain: Terrain, took_s: float) -> dict[str, Any]:
     mission = await gateway.mission()
     area = gateway.service_area()
     rows = await gateway.service.soundings(mission.id)

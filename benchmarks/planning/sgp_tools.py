@@ -1,6 +1,6 @@
 """Plans of SGP-Tools for ``survey_peers.py``, in a Python of its own: it needs numpy < 2 and TensorFlow.
 
-    python benchmarks/sgp_tools.py
+    python benchmarks/planning/sgp_tools.py
 
 Reads one JSON object per line from standard input and answers each with one line; ``plan`` says what they hold. Needs
 nothing of this project. Everything is SGP-Tools' own: hyperparameters (``get_model_params``), first routes (k-means and

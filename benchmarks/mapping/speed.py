@@ -6,7 +6,6 @@ import time
 from collections.abc import Callable, Iterable
 
 import numpy as np
-from mapping_terrains import sound, wide_floor
 
 from app.arrays import FloatArray
 from app.mapping.compare import difference, interval_coverage
@@ -14,6 +13,7 @@ from app.mapping.gaussian import GaussianInterpolator, choose_width
 from app.mapping.gp import GaussianProcessMap, warm_up
 from app.mapping.likelihood import SLOPE_SD, Hyperparameters
 from app.mapping.types import Grid, Soundings
+from benchmarks.mapping.terrains import sound, wide_floor
 
 Table = Callable[[Iterable[str], Iterable[Iterable[str]]], list[str]]
 CHECKED_EVERY = 3  # rows and columns of large maps

@@ -1,26 +1,21 @@
 """What missions claim to know on the way, beside what their end and the true sea floor make of it.
 
-    python benchmarks/claims.py [--terrains FOLDER] [--only NAME ...] [--planners cao lawnmower] [--seeds 0]
-                                [--write docs/results/claims.md]
+    python -m benchmarks.mapping.claims [--terrains FOLDER] [--only NAME ...] [--planners cao lawnmower] [--seeds 0]
+                                [--write]
 
 Missions are flown without a network, by their own planner, decisions and maps, over the sea floors of 100 x 100 m that
-`benchmarks/mapping.py` uses, and over generated ones of 1 km². At 1, 2, 5, 10, 20 and 50 % of the steps stand: the
+`benchmarks.mapping.maps` uses, and over generated ones of 1 km². At 1, 2, 5, 10, 20 and 50 % of the steps stand: the
 coverage that is claimed; the coverage of the same soundings under the model that was learned of all of them
 (`MapBuilder.as_of`); the part of the claimed cells whose depth is right, within two of the asked accuracy; mean
 deviation and true error.
 """
 
-import argparse
-import os
-import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from mapping_terrains import terrains
 
-from app.evaluation.runs.facts import made
 from app.mapping.georeference import LocalFrame
 from app.mapping.gp import warm_up
 from app.missions.forecast.request import starts_of
@@ -28,8 +23,11 @@ from app.missions.forecast.simulate import fly
 from app.missions.maps.builder import MapBuilder
 from app.missions.spec.mission import MissionSpec
 from app.missions.team import Team
+from benchmarks.common.report import Page, facts, make_parser, write_page
+from benchmarks.mapping.terrains import terrains
 from simulator.seafloors import generate
 from simulator.terrain import Terrain
+from tests.support.paths import TERRAINS
 
 PARTS = (1, 2, 5, 10, 20, 50)
 MAPS_AT = (1, 2, 3, 5, 7, 10, 15, 20, 30, 40, 50, 65, 80, 100)
@@ -190,14 +188,11 @@ def summary(found: list[Claims]) -> list[str]:
 
 
 def main() -> None:
-    folder = os.environ.get("BATHYFLEET_TERRAINS", str(Path(__file__).resolve().parents[2] / "shared" / "terrains"))
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--terrains", type=Path, default=Path(folder))
+    parser = make_parser(__doc__, Page("claims.md"), seeds=[0])
+    parser.add_argument("--terrains", type=Path, default=TERRAINS)
     parser.add_argument("--only", nargs="*", default=[])
     parser.add_argument("--planners", nargs="*", default=["cao", "lawnmower"])
-    parser.add_argument("--seeds", nargs="*", type=int, default=[0])
     parser.add_argument("--accuracy", type=float, default=0.25, help="metres")
-    parser.add_argument("--write", type=Path, help="file for the tables, Markdown")
     options = parser.parse_args()
     warm_up()
     found = []
@@ -208,13 +203,12 @@ def main() -> None:
                 print(row(found[-1]), flush=True)
     if not found:
         parser.error(f"no sea floor is called {' or '.join(options.only)}")
-    command = f"python {' '.join(['benchmarks/claims.py', *sys.argv[1:]])}".replace(str(options.terrains), "FOLDER")
     head = "| sea floor | planner | " + " | ".join(f"{part} %" for part in PARTS) + " | fall |"
     lines = [
         "# What missions claim to know",
         "",
-        *(f"- {name}: {value}" for name, value in made(command, 1).items()),
-        f"- seeds: {', '.join(map(str, options.seeds))}; accuracy asked: {options.accuracy:g} m",
+        *facts(seeds=options.seeds, hidden={options.terrains: "FOLDER"}),
+        f"- accuracy asked: {options.accuracy:g} m",
         "",
         "What the figures mean is in [how the map is made](../maps.md#what-is-known). All missions, by the part flown:",
         "",
@@ -234,7 +228,7 @@ def main() -> None:
     if options.write is None:
         print(text)
     else:
-        options.write.write_text(text, encoding="utf-8")
+        write_page(options.write, text)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""What a fleet at DUNE's full rate costs the bridge: ``python benchmarks/imc_fleet.py [--vehicles 50] [--rate 400]``.
+"""What a fleet at DUNE's full rate costs the bridge: ``python -m benchmarks.imc.fleet [--vehicles 50] [--rate 400]``.
 
 A second process plays the vehicles on real UDP sockets: each announces itself, takes our FollowReference plan, echoes
 every Reference and sends the mix of packets that DUNE sends, most of which nobody here needs. Printed is one JSON
@@ -6,7 +6,6 @@ object with the CPU seconds per second (``cpu_share``, of one core) of the proce
 where ``packets_per_s`` is what was asked for: a machine that is busy with other things drops packets.
 """
 
-import argparse
 import asyncio
 import json
 import math
@@ -18,8 +17,8 @@ from typing import Any
 
 import imcpy
 import psutil
-from imc_report import write_section
 
+from benchmarks.common.report import IMC, make_parser, write_section
 from imc_bridge import Bridge, BridgeSettings, NodeState, StateReport, Waypoint
 
 ANNOUNCE_PORTS = (32100, 32101)
@@ -176,11 +175,10 @@ async def measure(vehicles: int, seconds: float, sent: Any) -> dict[str, Any]:
 
 def main() -> None:
     """Run both processes and print the result."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = make_parser(__doc__, IMC)
     parser.add_argument("--vehicles", type=int, default=50)
     parser.add_argument("--rate", type=int, default=400, help="packets per second and vehicle")
     parser.add_argument("--seconds", type=float, default=10.0)
-    parser.add_argument("--write", type=Path, help="page of results in which this run gets a section")
     options = parser.parse_args()
     context = multiprocessing.get_context("spawn")
     done, sent = context.Event(), context.Value("q", 0)
@@ -192,8 +190,7 @@ def main() -> None:
         done.set()
         fleet.join(5.0)
     print(json.dumps(result))
-    if options.write is not None:
-        write_section(options.write, f"{options.vehicles} vehicles, {options.rate} packets/s each", result, {})
+    write_section(options.write, IMC, f"{options.vehicles} vehicles, {options.rate} packets/s each", result)
 
 
 if __name__ == "__main__":

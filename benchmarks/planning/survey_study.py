@@ -1,7 +1,7 @@
 """The survey planner beside its yardsticks on all sea floors: every symmetry of the square, budgets, samplings, sonars.
 
-    python benchmarks/survey_study.py --terrains FOLDER [--symmetries 0:8] [--budgets 2.5,1.0]
-        [--samplings step,continuous] [--sounders single] [--only NAME,...] [--jobs 1] [--out docs/results] [--no-run]
+    python -m benchmarks.planning.survey_study --terrains FOLDER [--seeds 0 1 ...] [--budgets 2.5,1.0]
+        [--samplings step,continuous] [--sounders single] [--only NAME,...] [--jobs 1] [--write] [--no-run]
 
 Each run is what ``bathyfleet evaluate survey`` does: 2 vehicles, 500 steps, noise of 1 % of the range. Runs are kept in
 ``survey.jsonl`` as soon as they are done, so that the study can be interrupted and goes on where it was; ``survey.md``
@@ -18,7 +18,6 @@ import numpy as np
 from rich.progress import Progress as ProgressBar
 
 from app.estimation import Sensor
-from app.evaluation.runs.facts import made
 from app.evaluation.runs.jobs import Progress, run_jobs
 from app.evaluation.runs.store import Results
 from app.evaluation.runs.summary import spread
@@ -28,6 +27,7 @@ from app.evaluation.survey.symmetry import turned, turned_soundings
 from app.evaluation.survey.world import Sampling, Sounder, SurveyScenario
 from app.exploration.planner.options import PlannerOptions
 from app.mapping.types import Soundings
+from benchmarks.common.report import Page, facts, make_parser, write_page
 from simulator.seafloors import generate
 from simulator.terrain import Terrain
 from simulator.terrain_files import load_terrain
@@ -121,10 +121,10 @@ def study_jobs(
     return jobs
 
 
-def report(runs: Sequence[Run], facts: Mapping[str, str]) -> str:
+def report(runs: Sequence[Run], head: Sequence[str]) -> str:
     """Return the report in Markdown."""
     lines = ["# Surveys: the field experiment beside its yardsticks", ""]
-    lines += [f"- {name}: {value}" for name, value in facts.items()]
+    lines += head
     lines += [
         "",
         f"{VEHICLES} vehicles, {STEPS} steps, noise 1 % of the range to the bottom. RMSE in metres of the default map,"
@@ -225,31 +225,33 @@ def numbers(text: str) -> list[int]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = make_parser(__doc__, Page("survey.md"), seeds=range(8))
     parser.add_argument("--terrains", type=Path, help="folder of terrain files")
-    parser.add_argument("--symmetries", type=numbers, default=list(range(8)))
     parser.add_argument("--budgets", default="2.5,1.0", help="largest steps in metres")
     parser.add_argument("--samplings", default="step,continuous")
     parser.add_argument("--sounders", default="single")
     parser.add_argument("--only", help="terrains, separated by commas")
     parser.add_argument("--jobs", type=int, default=1)
-    parser.add_argument("--out", type=Path, default=Path("docs/results"))
+    parser.add_argument("--runs", type=Path, default=Page("survey.jsonl").path, help="where runs are kept")
     parser.add_argument("--no-run", action="store_true")
     given = parser.parse_args()
     floors = chosen_floors(parser, given.terrains, given.only)
     budgets = [float(part) for part in given.budgets.split(",")]
-    jobs = study_jobs(floors, given.symmetries, budgets, given.samplings.split(","), given.sounders.split(","))
-    given.out.mkdir(parents=True, exist_ok=True)
-    results = Results(given.out / "survey.jsonl")
+    jobs = study_jobs(floors, given.seeds, budgets, given.samplings.split(","), given.sounders.split(","))
+    results = Results(given.runs)
     open_ = [] if given.no_run else [job for job in jobs if job.key not in results.runs]
     with ProgressBar(disable=not open_) as bar:
         task = bar.add_task("surveys", total=len(open_))
         for run in run_jobs(open_, given.jobs, lambda job, step: bar.update(task, description=job.title)):
             results.add(run)
             bar.advance(task)
-    facts = made("python benchmarks/survey_study.py --terrains FOLDER", given.jobs)
-    (given.out / "survey.md").write_text(report(list(results.runs.values()), facts), encoding="utf-8")
-    print(f"{given.out / 'survey.md'}: {len(open_)} runs made, {len(results.runs)} kept")
+    head = facts(command="python -m benchmarks.planning.survey_study --terrains FOLDER --write", processes=given.jobs)
+    text = report(list(results.runs.values()), head)
+    if given.write is None:
+        print(text)
+    else:
+        write_page(given.write, text)
+    print(f"{given.runs}: {len(open_)} runs made, {len(results.runs)} kept")
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Many missions at once: ``python benchmarks/many_missions.py [--missions 20] [--seconds 60]``.
+"""Many missions at once: ``python -m benchmarks.service.many_missions [--missions 20] [--seconds 60]``.
 
 The real service flies so many missions of simulated vehicles at the same time, each with planner, map and safety check
 of its own. Measured are the steps that were committed, how long decisions took and how long vehicles circled for them,
@@ -8,10 +8,7 @@ object.
 
 import argparse
 import json
-import signal
 import sqlite3
-import sys
-import tempfile
 import time
 from pathlib import Path
 from typing import Any
@@ -20,14 +17,11 @@ import httpx
 import numpy as np
 import psutil
 
-ROOT = Path(__file__).parents[1]
-sys.path.insert(0, str(ROOT))
-
-from imc_report import LOAD, write_section  # noqa: E402
-from opening import Watch  # noqa: E402
-
-from app.mapping.georeference import LocalFrame  # noqa: E402
-from tests.support.dashboard.service import Service  # noqa: E402
+from app.mapping.georeference import LocalFrame
+from benchmarks.common.report import LOAD, make_parser, write_section
+from benchmarks.service.boats import running_service
+from benchmarks.service.opening import Watch
+from tests.support.dashboard.service import Service
 
 SIDE_M = 120.0
 APART_DEG = 0.01
@@ -118,24 +112,16 @@ def measure(service: Service, file: Path, options: argparse.Namespace) -> dict[s
 
 def main() -> None:
     """Run and print."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = make_parser(__doc__, LOAD)
     parser.add_argument("--missions", type=int, default=20)
     parser.add_argument("--vehicles", type=int, default=2, help="of each mission")
     parser.add_argument("--seconds", type=float, default=60.0)
     parser.add_argument("--pace", type=float, default=1.0, help="how much faster than the wall clock vehicles live")
-    parser.add_argument("--write", action="store_true", help=f"write a section of docs/results/{LOAD.name}")
     options = parser.parse_args()
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # so that the service is ended, too
-    with tempfile.TemporaryDirectory() as folder:
-        service = Service(Path(folder), log_level="warning", time_scale=f"{options.pace:g}")
-        service.start()
-        try:
-            result = measure(service, Path(folder) / "service.db", options)
-        finally:
-            service.kill()
+    with running_service(log_level="warning", time_scale=f"{options.pace:g}") as service:
+        result = measure(service, service.database, options)
     print(json.dumps(result))
-    if options.write:
-        write_section(LOAD, f"{options.missions} missions at once", result, {})
+    write_section(options.write, LOAD, f"{options.missions} missions at once", result)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Mutated packets for the bridge: ``python benchmarks/imc_fuzz.py [--packets 1000000] [--seed 0] [--captures DIR]``.
+"""Mutated packets for the bridge: ``python -m benchmarks.imc.fuzz [--packets 1000000] [--seeds 0] [--captures DIR]``.
 
 Packets of recorded sessions (or, without any, of every message the bridge takes in) are flipped, cut, spliced and
 filled with extreme numbers; most get a right checksum afterwards, so that they reach the parsers and gates. Printed
@@ -11,7 +11,6 @@ no deeper than any ocean. ``--keep FILE`` writes the first packet of every kind 
 the bridge and the gate said to it) into a corpus, which the tests feed in again; take it without ``--captures``.
 """
 
-import argparse
 import asyncio
 import contextlib
 import dataclasses
@@ -30,7 +29,6 @@ from typing import Any
 
 import imcpy
 import numpy as np
-from imc_report import write_section
 from numba import njit
 from shapely.geometry import Polygon
 
@@ -39,6 +37,7 @@ from app.missions.fleet.links.imc import sounding_report
 from app.missions.soundings.corrections import Corrections
 from app.missions.soundings.gate import MAX_OCEAN_DEPTH_M, Gate
 from app.missions.spec.mission import Tide
+from benchmarks.common.report import IMC, make_parser, write_section
 from imc_bridge import Bridge, BridgeSettings, LinkChange, RefusedError, Sounding, StateReport, Waypoint
 from imc_bridge.events import SoundingRefused
 from imc_bridge.network.codec import message_ids, message_name
@@ -360,21 +359,21 @@ async def fuzz(packets: int, seed: int, captures: Path | None = None, keep: Path
 
 def main() -> None:
     """Run and print; exit code 1 when a handler failed."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = make_parser(__doc__, IMC, seeds=[0])
     parser.add_argument("--packets", type=int, default=1_000_000)
-    parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--captures", type=Path)
     parser.add_argument("--keep", type=Path, help="file that the first packet of each kind is written to")
-    parser.add_argument("--write", type=Path, help="page of results in which this run gets a section")
     options = parser.parse_args()
-    result = asyncio.run(fuzz(options.packets, options.seed, options.captures, options.keep))
-    print(json.dumps(result))
-    if options.write is not None:
+    failed = False
+    for seed in options.seeds:
+        result = asyncio.run(fuzz(options.packets, seed, options.captures, options.keep))
+        print(json.dumps(result), flush=True)
         of = "made-up messages" if options.captures is None else "recorded sessions"
         title = f"{options.packets:,} mutated packets of {of}".replace(",", " ")
-        write_section(options.write, title, result, {options.captures: "CAPTURES"})
-    grown = result["growth_mb"] > MOST_GROWTH_MB
-    sys.exit(1 if result["handler_errors"] or result["impossible_events"] or grown else 0)
+        write_section(options.write, IMC, title, result, seeds=[seed], hidden={options.captures: "CAPTURES"})
+        grown = result["growth_mb"] > MOST_GROWTH_MB
+        failed |= bool(result["handler_errors"] or result["impossible_events"] or grown)
+    sys.exit(1 if failed else 0)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Several service processes on one database: ``python benchmarks/processes.py [--counts 1,2] [--kills 5]``.
+"""Several service processes on one database: ``python -m benchmarks.service.processes [--counts 1,2] [--kills 5]``.
 
 A PostgreSQL server of its own, real services, simulated vehicles that live so fast that the missions are bounded by
 processor time. Counted are the steps that all missions together commit in a while, for each number of processes; then
@@ -10,7 +10,6 @@ import argparse
 import asyncio
 import json
 import statistics
-import sys
 import tempfile
 import time
 from contextlib import AsyncExitStack, ExitStack
@@ -19,14 +18,10 @@ from typing import Any
 
 import httpx
 
-ROOT = Path(__file__).parents[1]
-sys.path.insert(0, str(ROOT))
-
-from imc_report import LOAD, write_section  # noqa: E402
-
-from tests.support.databases import Databases, query  # noqa: E402
-from tests.support.faults.missions import mission_of  # noqa: E402
-from tests.support.faults.service import Service, service_in  # noqa: E402
+from benchmarks.common.report import LOAD, make_parser, write_section
+from tests.support.databases import Databases, query
+from tests.support.faults.missions import mission_of
+from tests.support.faults.service import Service, service_in
 
 WARM_UP_S = 10.0
 PATIENCE_S = 60.0
@@ -121,19 +116,17 @@ async def measure(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
 
 def main() -> None:
     """Run and print."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = make_parser(__doc__, LOAD)
     parser.add_argument("--counts", type=lambda text: [int(n) for n in text.split(",")], default=[1, 2])
     parser.add_argument("--missions", type=int, default=8)
     parser.add_argument("--seconds", type=float, default=60.0, help="for which steps are counted")
     parser.add_argument("--pace", type=float, default=60.0, help="how much faster than the wall clock vehicles live")
     parser.add_argument("--kills", type=int, default=5)
-    parser.add_argument("--write", action="store_true", help=f"write a section of docs/results/{LOAD.name}")
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         result = asyncio.run(measure(options, Path(folder)))
     print(json.dumps(result))
-    if options.write:
-        write_section(LOAD, "Several processes on one database", result, {})
+    write_section(options.write, LOAD, "Several processes on one database", result)
 
 
 if __name__ == "__main__":

@@ -1,18 +1,15 @@
-"""How long a mission of millions of soundings takes to open: ``python benchmarks/opening.py [--soundings 5000000]``.
+"""How long a mission of millions of soundings takes to open.
 
-A database is filled, then the real service is started twice. The first start knows no map of the mission and makes it;
-the second opens the mission by the map that was stored. Measured from the first request on: the mission, the live
-view's first message, and the map's tiles, as the dashboard asks for them; meanwhile another client asks every 10 ms
-whether the process lives: the longest it waited is how long anything else was held up. ``--browser``: the page, too,
-in Chromium. Printed is one JSON object.
+``python -m benchmarks.service.opening [--soundings 5000000]``. A database is filled, then the real service is started
+twice. The first start knows no map of the mission and makes it; the second opens the mission by the map that was
+stored. Measured from the first request on: the mission, the live view's first message, and the map's tiles, as the
+dashboard asks for them; meanwhile another client asks every 10 ms whether the process lives: the longest it waited is
+how long anything else was held up. ``--browser``: the page, too, in Chromium. Printed is one JSON object.
 """
 
-import argparse
 import asyncio
 import json
-import signal
 import sys
-import tempfile
 import threading
 import time
 from pathlib import Path
@@ -22,14 +19,11 @@ import httpx
 import psutil
 import websockets
 
-ROOT = Path(__file__).parents[1]
-sys.path.insert(0, str(ROOT))
-
-from dashboard import CHROMIUM, FLAGS, SIDE_M, create_mission  # noqa: E402
-from filling import fill  # noqa: E402
-from imc_report import LOAD, write_section  # noqa: E402
-
-from tests.support.dashboard.service import Service  # noqa: E402
+from benchmarks.common.report import LOAD, make_parser, write_section
+from benchmarks.service.boats import SIDE_M, create_mission, running_service
+from benchmarks.service.dashboard import CHROMIUM, FLAGS
+from benchmarks.service.filling import fill
+from tests.support.dashboard.service import Service
 
 ORIGIN = (41.185, -8.705)
 TOGETHER_S = 0.01
@@ -124,35 +118,29 @@ def start_s(service: Service) -> float:
 
 def main() -> None:
     """Run and print."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = make_parser(__doc__, LOAD)
     parser.add_argument("--soundings", type=int, default=5_000_000)
     parser.add_argument("--browser", action="store_true")
-    parser.add_argument("--write", action="store_true", help=f"write a section of docs/results/{LOAD.name}")
     options = parser.parse_args()
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # so that the service is ended, too
-    with tempfile.TemporaryDirectory() as folder:
-        service = Service(Path(folder), log_level="warning")
-        try:
+    with running_service(log_level="warning") as service:
+        mission = create_mission(service, 10)
+        service.kill()
+        fill(service.database, mission, options.soundings, SIDE_M, ORIGIN)
+        result: dict[str, Any] = {"soundings": options.soundings, "cells": round(SIDE_M) ** 2}
+        result["start_s"] = start_s(service)
+        result["without_a_stored_map"] = open_mission(service, mission)
+        wait_until_stored(service.database, mission)
+        service.kill()
+        result["start_again_s"] = start_s(service)
+        result["with_its_stored_map"] = open_mission(service, mission)
+        if options.browser:
+            service.kill()
             service.start()
-            mission = create_mission(service, 10)
-            service.kill()
-            fill(Path(folder) / "service.db", mission, options.soundings, SIDE_M, ORIGIN)
-            result: dict[str, Any] = {"soundings": options.soundings, "cells": round(SIDE_M) ** 2}
-            result["start_s"] = start_s(service)
-            result["without_a_stored_map"] = open_mission(service, mission)
-            wait_until_stored(Path(folder) / "service.db", mission)
-            service.kill()
-            result["start_again_s"] = start_s(service)
-            result["with_its_stored_map"] = open_mission(service, mission)
-            if options.browser:
-                service.kill()
-                service.start()
-                result["page_s"] = browser_s(service, mission)
-        finally:
-            service.kill()
+            result["page_s"] = browser_s(service, mission)
     print(json.dumps(result))
-    if options.write:
-        write_section(LOAD, f"Opening a mission of {options.soundings:,} soundings".replace(",", " "), result, {})
+    write_section(
+        options.write, LOAD, f"Opening a mission of {options.soundings:,} soundings".replace(",", " "), result
+    )
     sys.exit(0 if result["with_its_stored_map"]["all_s"] <= 2.0 else 1)
 
 

@@ -1,4 +1,4 @@
-"""What goes wrong at sea, at length: ``python benchmarks/faults.py [SCENE …] [--write docs/results/faults.md]``.
+"""What goes wrong at sea, at length: ``python -m benchmarks.service.faults [SCENE …] [--write]``.
 
 The scenes of ``tests/faults`` with the real service as a process of its own: killed again and again, without room on
 its disk, locked out of its database, with a clock that jumps, a network that loses and delays, vehicles that lie
@@ -7,7 +7,6 @@ waypoint lies in the area, that no order comes twice, and that the operator is t
 scene; ``--write`` puts it into a page. A scene that does not hold ends the command with exit code 1.
 """
 
-import argparse
 import asyncio
 import json
 import sys
@@ -15,21 +14,24 @@ import tempfile
 import time
 import traceback
 from collections.abc import Awaitable, Callable
+from itertools import product
 from pathlib import Path
 from typing import Any
 
-from imc_report import write_section
-
+from benchmarks.common.report import Page, make_parser, write_section
 from tests.support.faults import imc_scenes, scenes
 from tests.support.faults.disks import small_disk
 
-HEAD = """# Faults: what was tried
+PAGE = Page(
+    "faults.md",
+    """# Faults: what was tried
 
-Every section is written by the command that stands in it (`--write` with this page's path). The service runs as a
+Every section is written by the command that stands in it (`--write`). The service runs as a
 process of its own with the database it has in the field; polling vehicles repeat what was not answered, IMC vehicles
 are the simulator's fake DUNE nodes. In every scene it is asserted that no accepted sounding is lost or stored twice,
 that every waypoint lies in the area, that no vehicle is sent to an earlier step again, and that log and page say why.
-"""
+""",
+)
 
 Scene = Callable[[Path, int], Awaitable[dict[str, Any]]]
 
@@ -108,26 +110,23 @@ SCENES: dict[str, tuple[str, Scene]] = {
 
 def main() -> None:
     """Play and print; exit code 1 when a scene did not hold."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = make_parser(__doc__, PAGE, seeds=[2026])
     parser.add_argument("scene", nargs="*", choices=[*SCENES, []], help="which ones; without any: all")
-    parser.add_argument("--seed", type=int, default=2026)
-    parser.add_argument("--write", type=Path, help="page of results in which each scene gets a section")
     options = parser.parse_args()
     broken = 0
-    for name in options.scene or SCENES:
+    for name, seed in product(options.scene or SCENES, options.seeds):
         title, scene = SCENES[name]
         begun = time.monotonic()
         with tempfile.TemporaryDirectory(prefix="bathyfleet-faults-") as folder:
             try:
-                result = asyncio.run(scene(Path(folder), options.seed))
+                result = asyncio.run(scene(Path(folder), seed))
             except (AssertionError, TimeoutError):
                 traceback.print_exc()
                 broken += 1
                 continue
         result["wall_s"] = round(time.monotonic() - begun)
         print(json.dumps({"scene": name} | result), flush=True)
-        if options.write is not None:
-            write_section(options.write, title, result, {}, head=HEAD)
+        write_section(options.write, PAGE, title, result, seeds=[seed])
     sys.exit(1 if broken else 0)
 
 

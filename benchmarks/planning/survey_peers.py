@@ -1,9 +1,9 @@
 """The survey planner beside SGP-Tools, a published planner of informative paths, in the papers' field experiment.
 
     python -m venv PEER && PEER/bin/pip install "sgptools>=2.0"
-    python benchmarks/survey_peers.py --terrains FOLDER --peer-python PEER/bin/python [--only NAME,...]
-        [--symmetries 1:2] [--budgets 2.5,1.0] [--sampling step] [--methods ours,offline] [--iterations 25]
-        [--ours docs/results/survey.jsonl] [--jobs 1] [--out docs/results] [--no-run]
+    python -m benchmarks.planning.survey_peers --terrains FOLDER --peer-python PEER/bin/python [--only NAME,...]
+        [--seeds 1] [--budgets 2.5,1.0] [--sampling step] [--methods ours,offline] [--iterations 25]
+        [--ours docs/results/survey.jsonl] [--jobs 1] [--write] [--no-run]
 
 SGP-Tools has a Python of its own because it needs numpy < 2 and this project numpy >= 2 (``sgp_tools.py`` talks to it).
 2 vehicles, 500 steps, noise of 1 % of the range, terrains as in ``survey_study.py``. Methods:
@@ -23,7 +23,6 @@ kept in ``survey-peers.jsonl`` as soon as they are done, so that the comparison 
 was (with other ``--iterations`` those of SGP-Tools are made anew); ``survey-peers.md`` reports those that are there.
 """
 
-import argparse
 import subprocess
 import sys
 import tempfile
@@ -36,16 +35,16 @@ from typing import Any
 import numpy as np
 import orjson
 from rich.progress import Progress as ProgressBar
-from survey_study import PATCHY, STEPS, VEHICLES, StudyJob, chosen_floors, numbers, study_jobs
 
 from app.arrays import FloatArray
-from app.evaluation.runs.facts import made
 from app.evaluation.runs.jobs import Progress, run_jobs
 from app.evaluation.runs.store import Results
 from app.evaluation.survey.run import judge
 from app.evaluation.survey.world import SOUNDING_RATE_HZ, SPEED_MPS, SurveyScenario, fly_routes
 from app.exploration.lines.lawnmower import lawnmower_routes
 from app.mapping.types import Soundings
+from benchmarks.common.report import Page, facts, make_parser, write_page
+from benchmarks.planning.survey_study import PATCHY, STEPS, VEHICLES, StudyJob, chosen_floors, study_jobs
 
 METHODS = ("ours", "offline", "adaptive")
 REPLAN_AT = (0.25, 0.5, 0.75)
@@ -200,10 +199,10 @@ def fly(scenario: SurveyScenario, paths: FloatArray, part: float) -> tuple[Sound
     return log.soundings, np.array(flown)
 
 
-def report(runs: Sequence[Run], facts: Mapping[str, str]) -> str:
+def report(runs: Sequence[Run], head: Sequence[str]) -> str:
     """Return the report in Markdown."""
     lines = ["# Surveys: beside SGP-Tools", ""]
-    lines += [f"- {name}: {value}" for name, value in facts.items()]
+    lines += head
     peers = [r for r in runs if r["method"] != "ours"]
     for versions in dict.fromkeys(", ".join(f"{k} {v}" for k, v in r["versions"].items()) for r in peers):
         lines += [f"- SGP-Tools in its own Python: {versions}"]
@@ -267,13 +266,18 @@ def command_for(runs: Sequence[Run]) -> str:
     peers = [run for run in runs if run["method"] != "ours"]
     choices = {
         "--only": sorted({run["terrain"] for run in runs}),
-        "--symmetries": sorted({run["symmetry"] for run in runs}),
+        "--seeds": sorted({run["symmetry"] for run in runs}),
         "--methods": [method for method in METHODS if any(run["method"] == method for run in runs)],
         "--iterations": sorted({run["iterations"] for run in peers}),
     }
-    given = [f"{option} {','.join(map(str, values))}" for option, values in choices.items() if values]
+    given = [
+        f"{option} {(' ' if option == '--seeds' else ',').join(map(str, values))}"
+        for option, values in choices.items()
+        if values
+    ]
     given += ["--ours docs/results/survey.jsonl"] if any(run.get("taken_from") for run in runs) else []
-    return " ".join(["python benchmarks/survey_peers.py --terrains FOLDER --peer-python PEER/bin/python", *given])
+    program = "python -m benchmarks.planning.survey_peers --terrains FOLDER --peer-python PEER/bin/python"
+    return " ".join([program, *given, "--write"])
 
 
 def is_kept(job: OursJob | PeerJob, runs: Mapping[str, Run]) -> bool:
@@ -296,10 +300,9 @@ def taken(file: Path | None, jobs: Iterable[OursJob]) -> list[dict[str, Any]]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = make_parser(__doc__, Page("survey-peers.md"), seeds=[1])
     parser.add_argument("--terrains", type=Path, help="folder of terrain files")
     parser.add_argument("--peer-python", default=sys.executable, help="a Python that has SGP-Tools")
-    parser.add_argument("--symmetries", type=numbers, default=[1])
     parser.add_argument("--budgets", default="2.5,1.0", help="largest steps in metres")
     parser.add_argument("--sampling", choices=("step", "continuous"), default="step")
     parser.add_argument("--methods", default="ours,offline", help=f"of {', '.join(METHODS)}")
@@ -307,7 +310,7 @@ def main() -> None:
     parser.add_argument("--iterations", type=int, default=25, help="of SGP-Tools' optimiser per plan")
     parser.add_argument("--ours", type=Path, help="runs of survey_study.py to take ours from")
     parser.add_argument("--jobs", type=int, default=1)
-    parser.add_argument("--out", type=Path, default=Path("docs/results"))
+    parser.add_argument("--runs", type=Path, default=Page("survey-peers.jsonl").path, help="where runs are kept")
     parser.add_argument("--no-run", action="store_true")
     given = parser.parse_args()
     methods = given.methods.split(",")
@@ -321,7 +324,7 @@ def main() -> None:
     budgets = [float(part) for part in given.budgets.split(",")]
     ours: list[OursJob] = []
     jobs: list[OursJob | PeerJob] = []
-    for study in study_jobs(floors, given.symmetries, budgets, [given.sampling], ["single"]):
+    for study in study_jobs(floors, given.seeds, budgets, [given.sampling], ["single"]):
         key = study.key.removesuffix("/single")
         for method in methods:
             if method == "ours":
@@ -330,8 +333,7 @@ def main() -> None:
             else:
                 scenario = study.job.scenario
                 jobs.append(PeerJob(f"{key}/{method}", method, scenario, given.peer_python, given.iterations))
-    given.out.mkdir(parents=True, exist_ok=True)
-    results = Results(given.out / "survey-peers.jsonl")
+    results = Results(given.runs)
     for run in taken(given.ours, (job for job in ours if job.key not in results.runs)):
         results.add(run)
     open_ = [] if given.no_run else [job for job in jobs if not is_kept(job, results.runs)]
@@ -340,9 +342,13 @@ def main() -> None:
         for run in run_jobs(open_, given.jobs, lambda job, step: bar.update(task, description=job.title)):
             results.add(run)
             bar.advance(task)
-    facts = made(command_for(list(results.runs.values())), given.jobs)
-    (given.out / "survey-peers.md").write_text(report(list(results.runs.values()), facts), encoding="utf-8")
-    print(f"{given.out / 'survey-peers.md'}: {len(open_)} runs made, {len(results.runs)} kept")
+    head = facts(command=command_for(list(results.runs.values())), processes=given.jobs)
+    text = report(list(results.runs.values()), head)
+    if given.write is None:
+        print(text)
+    else:
+        write_page(given.write, text)
+    print(f"{given.runs}: {len(open_)} runs made, {len(results.runs)} kept")
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""What many live viewers cost the service: ``python benchmarks/viewers.py [--viewers 200] [--slow 20]``.
+"""What many live viewers cost the service: ``python -m benchmarks.service.viewers [--viewers 200] [--slow 20]``.
 
 The real service with ten vehicles that report five times a second; so many WebSockets look at the mission, some of them
 slowly: they take one message in two seconds. Measured are the service's processor time and memory with one viewer and
@@ -6,30 +6,21 @@ with all of them, how late positions reach those who keep up, and how often a sl
 object.
 """
 
-import argparse
 import asyncio
 import contextlib
 import json
-import signal
-import sys
-import tempfile
 import time
 from datetime import datetime
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import psutil
 import websockets
 
-ROOT = Path(__file__).parents[1]
-sys.path.insert(0, str(ROOT))
-
-from dashboard import RATE_HZ, begin, beside, create_mission  # noqa: E402
-from imc_report import LOAD, write_section  # noqa: E402
-from opening import Watch  # noqa: E402
-
-from tests.support.dashboard.service import Service  # noqa: E402
+from benchmarks.common.report import LOAD, make_parser, write_section
+from benchmarks.service.boats import RATE_HZ, begin, beside, create_mission, running_service
+from benchmarks.service.opening import Watch
+from tests.support.dashboard.service import Service
 
 SLOW_S = 2.0
 VEHICLES = 10
@@ -84,31 +75,23 @@ async def look(service: Service, mission: str, viewers: int, slow: int, seconds:
 
 def main() -> None:
     """Run and print."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = make_parser(__doc__, LOAD)
     parser.add_argument("--viewers", type=int, default=200)
     parser.add_argument("--slow", type=int, default=20, help="of them take one message in two seconds")
     parser.add_argument("--seconds", type=float, default=20.0)
-    parser.add_argument("--write", action="store_true", help=f"write a section of docs/results/{LOAD.name}")
     options = parser.parse_args()
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # so that the service is ended, too
-    with tempfile.TemporaryDirectory() as folder:
-        service = Service(Path(folder), log_level="warning", time_scale="1", max_streams="1000")
-        service.start()
-        try:
-            mission = create_mission(service, VEHICLES, cell_m=2.0)
-            begin(service, mission, VEHICLES)
-            with beside("--sail", service.url, mission, str(VEHICLES), "1.0"):
-                time.sleep(5.0)
-                one = asyncio.run(look(service, mission, 1, 0, options.seconds))
-                many = asyncio.run(look(service, mission, options.viewers, options.slow, options.seconds))
-        finally:
-            service.kill()
+    with running_service(log_level="warning", time_scale="1", max_streams="1000") as service:
+        mission = create_mission(service, VEHICLES, cell_m=2.0)
+        begin(service, mission, VEHICLES)
+        with beside("sail", service.url, mission, str(VEHICLES), "1.0"):
+            time.sleep(5.0)
+            one = asyncio.run(look(service, mission, 1, 0, options.seconds))
+            many = asyncio.run(look(service, mission, options.viewers, options.slow, options.seconds))
     result = {"vehicles": VEHICLES, "reports_per_s": VEHICLES * RATE_HZ, "one": one, "many": many}
     more = (many["service_cores"] - one["service_cores"]) / max(options.viewers - 1, 1)
     result["cores_per_viewer"] = round(more, 5)
     print(json.dumps(result))
-    if options.write:
-        write_section(LOAD, f"{options.viewers} live viewers", result, {})
+    write_section(options.write, LOAD, f"{options.viewers} live viewers", result)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""A day of a mission: ``python benchmarks/soak.py [--hours 24] [--pace 60]``.
+"""A day of a mission: ``python -m benchmarks.service.soak [--hours 24] [--pace 60]``.
 
 The real service with simulated vehicles runs a mission at ``--pace`` times the wall clock: a day takes 24 minutes.
 Two pages watch it (one takes its time), a client reads missions and maps, and a vehicle of another mission posts
@@ -10,10 +10,7 @@ import argparse
 import asyncio
 import contextlib
 import json
-import signal
 import sqlite3
-import sys
-import tempfile
 import time
 from pathlib import Path
 from typing import Any
@@ -23,13 +20,9 @@ import numpy as np
 import psutil
 import websockets
 
-ROOT = Path(__file__).parents[1]
-sys.path.insert(0, str(ROOT))
-
-from dashboard import START_S, Boat, create_mission  # noqa: E402
-from imc_report import LOAD, write_section  # noqa: E402
-
-from tests.support.dashboard.service import Service  # noqa: E402
+from benchmarks.common.report import LOAD, make_parser, write_section
+from benchmarks.service.boats import START_S, Boat, create_mission, running_service
+from tests.support.dashboard.service import Service
 
 TABLES = ("soundings", "positions", "telemetry", "steps", "waypoints", "events", "batches")
 SIDE_M = 300.0
@@ -37,7 +30,7 @@ SIDE_M = 300.0
 
 def create_soak(service: Service, vehicles: int) -> str:
     """A mission that does not end within a day."""
-    from dashboard import FRAME
+    from benchmarks.service.boats import FRAME
 
     corners = [(0, 0), (SIDE_M, 0), (SIDE_M, SIDE_M), (0, SIDE_M), (0, 0)]
     ring = [[float(lon), float(lat)] for lat, lon in (FRAME.to_geographic(e, n) for e, n in corners)]
@@ -186,23 +179,15 @@ def summary(hours: list[dict[str, Any]], tables: dict[str, float], options: argp
 
 def main() -> None:
     """Run and print."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = make_parser(__doc__, LOAD)
     parser.add_argument("--hours", type=float, default=24.0, help="of the mission's time")
     parser.add_argument("--pace", type=float, default=60.0, help="how much faster than the wall clock vehicles live")
     parser.add_argument("--vehicles", type=int, default=2)
-    parser.add_argument("--write", action="store_true", help=f"write a section of docs/results/{LOAD.name}")
     options = parser.parse_args()
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # so that the service is ended, too
-    with tempfile.TemporaryDirectory() as folder:
-        service = Service(Path(folder), log_level="warning", time_scale=f"{options.pace:g}")
-        service.start()
-        try:
-            result = asyncio.run(live(service, Path(folder) / "service.db", options))
-        finally:
-            service.kill()
+    with running_service(log_level="warning", time_scale=f"{options.pace:g}") as service:
+        result = asyncio.run(live(service, service.database, options))
     print(json.dumps(result))
-    if options.write:
-        write_section(LOAD, f"{options.hours:g} hours of a mission", result, {})
+    write_section(options.write, LOAD, f"{options.hours:g} hours of a mission", result)
 
 
 if __name__ == "__main__":

@@ -1,30 +1,28 @@
 """The map's figures in one run: reconstruction, calibration, gross errors, exactness, speed; beside other libraries.
 
-    python benchmarks/mapping.py [--terrains FOLDER] [--only NAME ...] [--seeds 1] [--parts PART ...] [--huge]
-                                 [--write docs/results/mapping.md]
+    python -m benchmarks.mapping.maps [--terrains FOLDER] [--only NAME ...] [--seeds 0] [--parts PART ...] [--huge]
+                                 [--write]
 
 Other libraries take part where they are installed: `pip install .[benchmarks]`. Seconds are of the processor in the
 tables of reconstruction and of the clock in those of speed, where all cores work.
 """
 
-import argparse
-import os
-import sys
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
-from mapping_methods import METHODS, Method, ours
-from mapping_speed import exactness, speed
-from mapping_terrains import DESIGNS, PATCHY, sound, terrains, with_outliers
 
 from app.arrays import FloatArray
-from app.evaluation.runs.facts import made
 from app.mapping.compare import difference, interval_coverage
 from app.mapping.gp import warm_up
 from app.mapping.outliers import flag_outliers
 from app.mapping.types import Grid, Soundings
+from benchmarks.common.report import Page, facts, make_parser, write_page
+from benchmarks.mapping.methods import METHODS, Method, ours
+from benchmarks.mapping.speed import exactness, speed
+from benchmarks.mapping.terrains import DESIGNS, PATCHY, sound, terrains, with_outliers
+from tests.support.paths import TERRAINS
 
 Terrains = list[tuple[str, FloatArray]]
 PROBABILITIES = (0.68, 0.95)
@@ -45,17 +43,17 @@ def table(head: Iterable[str], rows: Iterable[Iterable[str]]) -> list[str]:
     return [f"| {line} |" for line in lines] + [""]
 
 
-def reconstruction(floors: Terrains, seeds: int) -> list[str]:
+def reconstruction(floors: Terrains, seeds: Sequence[int]) -> list[str]:
     out = ["## Reconstruction", ""]
     for design in ("random", "lines 4.2 m", "lines 10 m"):
         rows = []
         all_figures = []
         for name, floor in floors:
             figures = np.zeros((len(METHODS), 4))
-            for seed in range(seeds):
+            for seed in seeds:
                 grid, truth, s = sound(floor, design, seed)
                 figures += [run(method, s, grid, truth) for method in METHODS.values()]
-            figures /= seeds
+            figures /= len(seeds)
             all_figures.append(figures)
             rows.append([name, *(f"{x:.4f}" for x in figures[:, 0])])
             print(design, *rows[-1], flush=True)
@@ -72,14 +70,14 @@ def reconstruction(floors: Terrains, seeds: int) -> list[str]:
     return out
 
 
-def calibration(floors: Terrains, seeds: int) -> list[str]:
+def calibration(floors: Terrains, seeds: Sequence[int]) -> list[str]:
     rows = []
     figures = np.zeros((len(floors), len(DESIGNS), 2))
     for i, (name, floor) in enumerate(floors):
         for j, design in enumerate(DESIGNS):
-            for seed in range(seeds):
+            for seed in seeds:
                 grid, truth, s = sound(floor, design, seed)
-                figures[i, j] += np.array(run(ours, s, grid, truth)[2:]) / seeds
+                figures[i, j] += np.array(run(ours, s, grid, truth)[2:]) / len(seeds)
         rows.append([name, *(f"{100 * a:.0f} / {100 * b:.0f}" for a, b in figures[i])])
         print("calibration", *rows[-1], flush=True)
     mean = figures.mean(axis=0)
@@ -100,11 +98,11 @@ def calibration(floors: Terrains, seeds: int) -> list[str]:
     return out + table(["terrain", *DESIGNS], rows)
 
 
-def gross_errors(floors: Terrains, seeds: int) -> list[str]:
+def gross_errors(floors: Terrains, seeds: Sequence[int]) -> list[str]:
     rows = []
     for name, floor in floors:
         figures = []
-        for seed in range(seeds):
+        for seed in seeds:
             grid, truth, s = sound(floor, "random", seed)
             spoiled, wrong = with_outliers(s, seed)
             rejected = flag_outliers(spoiled).rejected
@@ -122,25 +120,20 @@ def gross_errors(floors: Terrains, seeds: int) -> list[str]:
 
 
 def main() -> None:
-    folder = os.environ.get("BATHYFLEET_TERRAINS", str(Path(__file__).resolve().parents[2] / "shared" / "terrains"))
     parts = ("reconstruction", "calibration", "outliers", "exactness", "speed")
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--terrains", type=Path, default=Path(folder))
+    parser = make_parser(__doc__, Page("mapping.md"), seeds=[0])
+    parser.add_argument("--terrains", type=Path, default=TERRAINS)
     parser.add_argument("--only", nargs="*", default=[])
-    parser.add_argument("--seeds", type=int, default=1)
     parser.add_argument("--parts", nargs="*", choices=parts, default=parts)
     parser.add_argument("--huge", action="store_true", help="also 5 million soundings onto 4000 x 4000 cells")
-    parser.add_argument("--write", type=Path, help="file for the tables, Markdown")
     options = parser.parse_args()
     floors = list(terrains(options.terrains, options.only))
     if not floors:
         parser.error(f"no terrain files in {options.terrains}; give the folder with --terrains")
     warm_up()
     lines = ["# The map's figures", ""]
-    command = f"python {' '.join(['benchmarks/mapping.py', *sys.argv[1:]])}".replace(str(options.terrains), "FOLDER")
-    head = made(command, 1)
-    lines += [f"- {name}: {value}" for name, value in head.items()]
-    lines += [f"- compared: {', '.join(METHODS)}", f"- seeds per terrain: {options.seeds}", ""]
+    lines += facts(seeds=options.seeds, hidden={options.terrains: "FOLDER"})
+    lines += [f"- compared: {', '.join(METHODS)}", ""]
     for part in options.parts:
         if part == "reconstruction":
             lines += reconstruction(floors, options.seeds)
@@ -156,7 +149,7 @@ def main() -> None:
     if options.write is None:
         print(text)
     else:
-        options.write.write_text(text, encoding="utf-8")
+        write_page(options.write, text)
 
 
 if __name__ == "__main__":

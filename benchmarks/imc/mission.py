@@ -1,4 +1,4 @@
-"""A whole mission over IMC: ``python benchmarks/imc_mission.py [--steps 100] [--loss 0.05] [--kill-at 50]``.
+"""A whole mission over IMC: ``python -m benchmarks.imc.mission [--steps 100] [--loss 0.05] [--kill-at 50]``.
 
 The mission service, its database and planner run as they do for real vehicles; two fake DUNE nodes in processes of
 their own are the vehicles. ``--radio-range 5000`` ends their radio at the surface, as in the recorded session
@@ -23,7 +23,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from imc_report import write_section
 
 from app.api import logs
 from app.mapping.georeference import LocalFrame
@@ -36,6 +35,7 @@ from app.missions.states import ENDED
 from app.storage.database import Database
 from app.storage.missions import waypoints_of_step
 from app.storage.prepare import prepare_database
+from benchmarks.common.report import IMC, make_parser, write_section
 from imc_bridge import BridgeSettings, NodeState, Sounding, StateReport
 from imc_bridge.logs import VehicleLog
 from simulator.seafloors import generate
@@ -52,12 +52,12 @@ BACK_AFTER_WALL_S = 1.0
 class Vehicle:
     """One vehicle's DUNE in a process of its own, which can be killed and started again."""
 
-    def __init__(self, number: int, options: argparse.Namespace, logs: Path) -> None:
+    def __init__(self, number: int, options: argparse.Namespace, seed: int, logs: Path) -> None:
         self.name = NAMES[number]
         self._start_m = (SIDE_M * (number + 1) / (options.vehicles + 1.0), 10.0)
         self._command = [
             *(sys.executable, "-m", "simulator", "--vehicles", "1", "--names", self.name, "--ids", f"{0x1E + number}"),
-            *("--family", options.family, "--size", f"{SIDE_M:g}", "--seed", f"{options.seed}"),
+            *("--family", options.family, "--size", f"{SIDE_M:g}", "--seed", f"{seed}"),
             *("--origin", ",".join(map(str, ORIGIN)), "--base-port", f"{32220 + 10 * number}"),
             *("--announce-ports", f"{ANNOUNCE_PORTS[0]}-{ANNOUNCE_PORTS[-1]}", "--speed", f"{options.speed:g}"),
             *("--loss", f"{options.loss:g}", "--radio-range", f"{options.radio_range:g}", "--log-dir", str(logs)),
@@ -107,11 +107,11 @@ def mission(options: argparse.Namespace) -> MissionSpec:
     )
 
 
-async def fly(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
+async def fly(options: argparse.Namespace, seed: int, folder: Path) -> dict[str, Any]:
     """Fly the mission; what came of it."""
-    floor = generate(options.family, options.seed, width_m=SIDE_M, height_m=SIDE_M, origin=ORIGIN)
+    floor = generate(options.family, seed, width_m=SIDE_M, height_m=SIDE_M, origin=ORIGIN)
     logs = folder / "logs"
-    vehicles = [Vehicle(number, options, logs) for number in range(options.vehicles)]
+    vehicles = [Vehicle(number, options, seed, logs) for number in range(options.vehicles)]
     url = f"sqlite+aiosqlite:///{folder / 'mission.db'}"
     imc = ImcSettings(port=PORT, announce_ports=ANNOUNCE_PORTS, loopback_only=True)
     await prepare_database(url, may_upgrade=True)
@@ -269,7 +269,7 @@ def title(options: argparse.Namespace) -> str:
 
 def main() -> None:
     """Run and print."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = make_parser(__doc__, IMC, seeds=[0])
     parser.add_argument("--steps", type=int, default=100)
     parser.add_argument("--speed", type=float, default=10.0)
     parser.add_argument("--loss", type=float, default=0.0)
@@ -281,21 +281,21 @@ def main() -> None:
     parser.add_argument("--stops", action="store_true", help="pause and abort in the middle, with a busy core")
     parser.add_argument("--planner", default="cao")
     parser.add_argument("--family", default="harbour")
-    parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--guidance", choices=("follow", "legs"), default="follow")
     parser.add_argument("--progress", action="store_true")
-    parser.add_argument("--write", type=Path, help="page of results in which this run gets a section")
     options = parser.parse_args()
     logs.configure("warning", "console", sys.stderr)
-    with tempfile.TemporaryDirectory() as folder:
-        result = asyncio.run(fly(options, Path(folder)))
-    print(json.dumps(result))
-    if options.write is not None:
-        write_section(options.write, title(options), result, {})
-    accurate = result["mean_abs_error_m"] is not None and result["mean_abs_error_m"] <= 0.2
-    astray = [result["waypoints"].get(status, 0) for status in (WaypointStatus.REFUSED, WaypointStatus.MISSED)]
-    whole = result["steps"] == options.steps or options.stops
-    sys.exit(0 if accurate and whole and not any(astray) else 1)
+    failed = False
+    for seed in options.seeds:
+        with tempfile.TemporaryDirectory() as folder:
+            result = asyncio.run(fly(options, seed, Path(folder)))
+        print(json.dumps(result), flush=True)
+        write_section(options.write, IMC, title(options), result, seeds=[seed])
+        accurate = result["mean_abs_error_m"] is not None and result["mean_abs_error_m"] <= 0.2
+        astray = [result["waypoints"].get(status, 0) for status in (WaypointStatus.REFUSED, WaypointStatus.MISSED)]
+        whole = result["steps"] == options.steps or options.stops
+        failed |= not (accurate and whole) or any(astray)
+    sys.exit(1 if failed else 0)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""What REST requests cost the service: ``python benchmarks/rest_load.py [--rate 1000] [--seconds 20]``.
+"""What REST requests cost the service: ``python -m benchmarks.service.rest_load [--rate 1000] [--seconds 20]``.
 
 The real service runs in a process of its own on a new SQLite file, ten vehicles that speak REST in a running mission.
 One lean client (raw sockets, requests made ahead, answers looked at for status and length only) sends a mix over kept
@@ -10,26 +10,19 @@ import argparse
 import json
 import re
 import selectors
-import signal
 import socket
 import statistics
 import sys
-import tempfile
 import time
 from collections import Counter, deque
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import psutil
 
-ROOT = Path(__file__).parents[1]
-sys.path.insert(0, str(ROOT))
-
-from dashboard import START_S, Boat, begin, create_mission  # noqa: E402
-from imc_report import LOAD, write_section  # noqa: E402
-
-from tests.support.dashboard.service import Service  # noqa: E402
+from benchmarks.common.report import LOAD, make_parser, write_section
+from benchmarks.service.boats import START_S, Boat, begin, create_mission, running_service
+from tests.support.dashboard.service import Service
 
 LENGTH = re.compile(rb"content-length: (\d+)", re.IGNORECASE)
 MIX = {"mission": 40, "measurements": 25, "waypoint": 20, "missions": 5, "vehicles": 5, "ready": 5}
@@ -176,29 +169,21 @@ def measure(service: Service, requests: Requests, options: argparse.Namespace, r
 
 def main() -> None:
     """Run and print."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = make_parser(__doc__, LOAD)
     parser.add_argument("--rate", type=float, default=1000.0, help="requests per second; 0: as many as are answered")
     parser.add_argument("--seconds", type=float, default=20.0)
     parser.add_argument("--connections", type=int, default=16)
     parser.add_argument("--open", action="store_true", help="without access tokens")
     parser.add_argument("--log", default="info", help="the service's log level")
-    parser.add_argument("--write", action="store_true", help=f"write a section of docs/results/{LOAD.name}")
     options = parser.parse_args()
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # so that the service is ended, too
-    with tempfile.TemporaryDirectory() as folder:
-        service = Service(Path(folder), log_level=options.log, time_scale="1")
-        service.start()
-        try:
-            mission = create_mission(service, VEHICLES, cell_m=2.0)
-            begin(service, mission, VEHICLES)
-            token = "" if options.open else service.make_token("benchmark", "operator")
-            result = measure(service, Requests(service, mission, token), options, options.rate)
-        finally:
-            service.kill()
+    with running_service(log_level=options.log, time_scale="1") as service:
+        mission = create_mission(service, VEHICLES, cell_m=2.0)
+        begin(service, mission, VEHICLES)
+        token = "" if options.open else service.make_token("benchmark", "operator")
+        result = measure(service, Requests(service, mission, token), options, options.rate)
     print(json.dumps(result))
-    if options.write:
-        asked = f"{options.rate:g} REST requests/s" if options.rate else "As many REST requests as are answered"
-        write_section(LOAD, f"{asked}, mixed", result, {})
+    asked = f"{options.rate:g} REST requests/s" if options.rate else "As many REST requests as are answered"
+    write_section(options.write, LOAD, f"{asked}, mixed", result)
     sys.exit(1 if result["errors"] else 0)
 
 

@@ -1,4 +1,4 @@
-"""What attackers try, against the real service: ``python benchmarks/attacks.py [ATTACK …] [--write]``.
+"""What attackers try, against the real service: ``python -m benchmarks.service.attacks [ATTACK …] [--write]``.
 
 Strangers without a token, holders of a vehicle's token, operators whose files are not what they say, another user of
 this machine, and senders on the vehicles' network. Each attack is bounded and stays on this machine's loopback. The
@@ -25,24 +25,22 @@ from typing import Any
 import httpx
 import psutil
 
-ROOT = Path(__file__).parents[1]
-sys.path.insert(0, str(ROOT))
+from benchmarks.common.report import Page, make_parser, write_section
+from benchmarks.service.attackers import ATTACKS, Attacked
+from tests.support.faults.service import Service
+from tests.support.ports import free_ports
 
-from attackers import ATTACKS, Attacked  # noqa: E402
-from imc_report import write_section  # noqa: E402
-
-from tests.support.faults.service import Service  # noqa: E402
-from tests.support.ports import free_ports  # noqa: E402
-
-PAGE = ROOT / "docs" / "results" / "attacks.md"
-HEAD = """# Attacks: what was tried
+PAGE = Page(
+    "attacks.md",
+    """# Attacks: what was tried
 
 Every section is written by the command that stands in it. The service runs as a process of its own with access tokens;
 attackers are other processes and connections of the same machine, which take part of its two cores themselves.
 `live_p99_ms` is how long `/health/live` took meanwhile, on new connections, in 99 of 100 cases; it is asked to be
 at most 250. `memory_after` is the service's resident memory once the attack is over, over what it was before; it is
 asked to be at most 1.10. `gained` lists what the attacker got; nothing is asked for.
-"""
+""",
+)
 MOST_LIVE_MS = 250.0
 MOST_MEMORY = 1.10
 SETTLING_S = 30.0
@@ -71,7 +69,7 @@ async def watched(service: Service, figures: dict[str, Any]) -> AsyncIterator[No
     process = psutil.Process(service.pid)
     before = peak = process.memory_info().rss
     watcher = await asyncio.create_subprocess_exec(
-        sys.executable, __file__, "--probe", str(service.port), stdin=-1, stdout=-1
+        sys.executable, "-m", "benchmarks.service.attacks", "--probe", str(service.port), stdin=-1, stdout=-1
     )
 
     async def look() -> None:
@@ -150,9 +148,8 @@ async def play(name: str) -> dict[str, Any]:
 
 def main() -> None:
     """Play and print; exit code 1 when an attack did not hold."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = make_parser(__doc__, PAGE)
     parser.add_argument("attack", nargs="*", choices=[*ATTACKS, []], help="which ones; without any: all")
-    parser.add_argument("--write", action="store_true", help="write docs/results/attacks.md")
     parser.add_argument("--probe", type=int, help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.probe is not None:
@@ -163,8 +160,7 @@ def main() -> None:
         figures = asyncio.run(play(name))
         broken += not figures["held"]
         print(json.dumps({"attack": name} | figures), flush=True)
-        if options.write:
-            write_section(PAGE, ATTACKS[name][0], figures, {}, head=HEAD)
+        write_section(options.write, PAGE, ATTACKS[name][0], figures)
     sys.exit(1 if broken else 0)
 
 
