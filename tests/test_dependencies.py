@@ -72,7 +72,12 @@ def test_no_version_with_a_known_weakness_is_installed_or_asked_for(advisory: di
 def test_licences_go_together_with_ours(name: str) -> None:
     about = importlib.metadata.metadata(name)
     classifiers = [text for text in about.get_all("Classifier", []) if text.startswith("License")]
-    said = [about.get("License-Expression"), (about.get("License") or "")[:200], *classifiers, SAID_ELSEWHERE.get(name)]
+    said = [
+        *about.get_all("License-Expression", []),
+        *(text[:200] for text in about.get_all("License", [])),
+        *classifiers,
+        SAID_ELSEWHERE.get(name),
+    ]
     words = " ".join(text for text in said if text)
     assert COMPATIBLE.search(words), f"{name}: {words or 'no licence'}"
     assert not RECIPROCAL.search(words), f"{name}: {words}"

@@ -60,7 +60,7 @@ MARKS = 10
 MOST_GROWTH_MB = 4.0
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
+@njit(cache=True)
 def crc(data: np.ndarray) -> int:
     """CRC-16/ARC."""
     value = 0

@@ -134,6 +134,8 @@ async def fly(options: argparse.Namespace, seed: int, folder: Path) -> dict[str,
             if not killed and view.progress.step >= options.kill_at:
                 killed = True
                 [place] = [v for v in view.vehicles if v.name == vehicles[0].name]
+                if place.lat_deg is None or place.lon_deg is None:
+                    raise SystemExit(f"nobody knows where {place.name} is")
                 vehicles[0].kill()
                 await asyncio.sleep(BACK_AFTER_WALL_S)
                 vehicles[0].start(floor.frame.to_local(place.lat_deg, place.lon_deg))
@@ -207,7 +209,7 @@ async def summary(
         "wall_s": round(time.monotonic() - begun, 1),
         "waypoints": statuses,
         "waypoints_per_minute": round(60.0 * statuses.get("reached", 0) / (time.monotonic() - begun), 1),
-        "dropped_packets": sum(metric.value for metric in PACKETS_DROPPED.collect()[0].samples[:1]),
+        "dropped_packets": sum(sample.value for sample in next(iter(PACKETS_DROPPED.collect())).samples[:1]),
         "lost": [
             f"{vehicle.name} {'engaged' if change.engaged else 'not engaged'}: {change.reason}"
             for vehicle in service.doctor().vehicles

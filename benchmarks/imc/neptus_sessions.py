@@ -51,8 +51,10 @@ async def fly(asked: argparse.Namespace) -> dict[str, Any]:
         gateway = _gateway(Path(folder))
         await prepare_database(gateway.settings.database_url, may_upgrade=True)
         await gateway.open()
+        ftp_port, http_port = gateway.ports
         panel = RealPanel(
-            *gateway.ports,
+            ftp_port,
+            http_port,
             lambda row, col: _depth_m(terrain, row, col),
             ROWS,
             COLS,

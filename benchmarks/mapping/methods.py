@@ -50,7 +50,7 @@ def _without_plane(s: Soundings) -> tuple[FloatArray, FloatArray]:
     """Return depths minus their least-squares plane, and its coefficients (3,)."""
     basis = np.column_stack([np.ones(len(s)), s.east_m, s.north_m])
     plane, *_ = np.linalg.lstsq(basis, s.depth_m, rcond=None)
-    return s.depth_m - basis @ plane, plane
+    return s.depth_m - basis @ plane, np.asarray(plane, float)
 
 
 def _plane_on(grid: Grid, plane: FloatArray) -> FloatArray:

@@ -12,6 +12,7 @@ import os
 import sys
 import time
 from importlib.metadata import PackageNotFoundError, version
+from typing import Any
 
 OBJECTIVE_PER_SIDE = 36
 """The sparse GP is to explain a grid of that many points per side."""
@@ -26,7 +27,7 @@ BUDGET_WEIGHT = 20.0
 ATTENTIVE_SCALES = 5
 
 
-def plan(asked):
+def plan(asked: dict[str, Any]) -> dict[str, Any]:
     """Return paths and how long they took, in CPU seconds of one thread.
 
     ``asked``: ``side_m`` (2), ``starts_m`` (vehicles, 2), ``distance_m`` of each vehicle, ``max_step_m``, ``soundings``
@@ -90,7 +91,7 @@ def plan(asked):
     }
 
 
-def learn(asked, side, scale):
+def learn(asked: dict[str, Any], side: Any, scale: Any) -> tuple[Any, Any]:
     """Return kernel and noise variance from standardised soundings."""
     data = np.array(asked["soundings"])
     data = data[:: -(-len(data) // LEARN_FROM)]
@@ -107,7 +108,7 @@ def learn(asked, side, scale):
     return kernel, max(float(noise), 1e-4)
 
 
-def first_routes(objective, starts, budget, seed):
+def first_routes(objective: Any, starts: Any, budget: float, seed: int) -> Any:
     """Return routes (vehicles, waypoints, 2) through as many k-means points as the budget pays for.
 
     Each vehicle has its share of equal size from west to east: SGP-Tools' solver with limits for several vehicles found
@@ -132,13 +133,13 @@ def first_routes(objective, starts, budget, seed):
     raise RuntimeError("SGP-Tools found no routes within the budget")
 
 
-def versions():
+def versions() -> dict[str, str]:
     """Return the versions of what plans."""
     names = ("sgptools", "gpflow", "tensorflow", "ortools", "numpy")
     return {"python": sys.version.split()[0], **{name: version(name) for name in names}}
 
 
-def main():
+def main() -> None:
     out = os.fdopen(os.dup(1), "w")
     os.dup2(2, 1)  # what libraries print is not an answer
     for line in sys.stdin:

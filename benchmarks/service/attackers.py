@@ -215,7 +215,7 @@ async def descriptions(attacked: Attacked) -> Found:
 async def external_storage(attacked: Attacked) -> Found:
     """An operator's token: files whose depths, links or transformations lie in other files of the server."""
     found: Found = {"gained": []}
-    options = {"crs": "EPSG:4326", "sd_m": 0.3, "positive": "down"}
+    options: dict[str, Any] = {"crs": "EPSG:4326", "sd_m": 0.3, "positive": "down"}
     statuses: Counter[str] = Counter()
     async with attacked.client("operator") as api:
         for name, content in leading_out.grids(attacked.service.folder).items():
@@ -421,11 +421,11 @@ def _intrude(said: Any, port: int, folder: Path, ftp_port: int, mission: str) ->
                 path.open("rb").close()
                 gained.append(f"reads {path.name}")
     act = f"/api/v1/missions/{mission}/pause"
-    for method, path in (("GET", "/api/v1/missions"), ("POST", act)):
+    for method, target in (("GET", "/api/v1/missions"), ("POST", act)):
         line = http.client.HTTPConnection("127.0.0.1", port, timeout=20)
-        line.request(method, path, "{}" if method == "POST" else None, {"Content-Type": "application/json"})
+        line.request(method, target, "{}" if method == "POST" else None, {"Content-Type": "application/json"})
         if line.getresponse().status < 400:
-            gained.append(f"{method} {path}")
+            gained.append(f"{method} {target}")
     for _ in range(10):  # reset as soon as it is sent, so that nobody can be asked whose connection it was
         with socket.create_connection(("127.0.0.1", port)) as hasty:
             head = f"POST {act} HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: 2\r\nContent-Type: application/json"

@@ -154,7 +154,7 @@ async def watch(url: str, mission: str, viewers: int) -> None:
         fetching = asyncio.create_task(fetch())
         async with websockets.connect(address, max_size=None) as socket:
             async for message in socket:
-                if '"type":"map"' in message[:40] or '"type":"snapshot"' in message[:40]:  # type: ignore[operator]
+                if '"type":"map"' in message[:40] or '"type":"snapshot"' in message[:40]:
                     wanted.set()
         fetching.cancel()
 

@@ -141,7 +141,7 @@ class Bench:
             time.sleep(seconds)
             return 100 * (cpu_s(pid) - begin) / (time.monotonic() - clock)
 
-        found = {}
+        found: dict[int, list[float]] = {}
         # There and back again, so that a drift of the machine counts for both.
         for count in (1, 50, 50, 1):
             with beside("watch", self.service.url, self.mission, str(count)):

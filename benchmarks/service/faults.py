@@ -13,7 +13,7 @@ import sys
 import tempfile
 import time
 import traceback
-from collections.abc import Awaitable, Callable
+from collections.abc import Callable, Coroutine
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -33,7 +33,7 @@ that every waypoint lies in the area, that no vehicle is sent to an earlier step
 """,
 )
 
-Scene = Callable[[Path, int], Awaitable[dict[str, Any]]]
+Scene = Callable[[Path, int], Coroutine[Any, Any, dict[str, Any]]]
 
 
 async def killed(folder: Path, seed: int) -> dict[str, Any]:

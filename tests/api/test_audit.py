@@ -108,7 +108,7 @@ async def test_no_secret_is_ever_logged(
                 (url, {"subprotocols": [websockets.Subprotocol(secret)]}),
             ):
                 try:
-                    async with websockets.connect(target, **more) as live:  # type: ignore[arg-type]
+                    async with websockets.connect(target, **more) as live:
                         await live.recv()
                 except websockets.WebSocketException:
                     pass

@@ -17,7 +17,7 @@ from tests.support.faults.hostile import sparse_tif
 from tests.support.missions.specs import AREA
 from tests.support.rest import make_client, mission_spec, prior_text, running, soundings
 
-FRAME = LocalFrame(AREA["coordinates"][0][0][1], AREA["coordinates"][0][0][0])  # type: ignore[index]
+FRAME = LocalFrame(AREA["coordinates"][0][0][1], AREA["coordinates"][0][0][0])
 
 
 def reference_tif(depth_m: float = 10.0) -> bytes:
@@ -77,7 +77,8 @@ async def test_the_same_file_counts_once_however_often_it_is_sent(client: httpx.
 
 
 async def test_an_import_survives_a_restart(make_settings: Any) -> None:
-    path, first = "", {}
+    path = ""
+    first: dict[str, Any] = {}
     for run in range(2):
         async with running(make_settings()) as server, make_client(server) as client:
             if run == 0:

@@ -5,6 +5,7 @@ from collections.abc import AsyncIterator, Callable
 from contextlib import AsyncExitStack
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import httpx
 import pytest
@@ -55,7 +56,7 @@ async def test_everyone_has_there_the_role_that_he_has_here(two: Two) -> None:
     assert seen.status_code == 200, seen.text
     assert (await two.at_other.get(two.path)).status_code == 401
     assert (await two.at_other.post(f"{two.path}/start", headers=two.as_("viewer"))).status_code == 403
-    bound = {"json": {"items": soundings(2, vehicle="two")}, "headers": two.as_("rover")}
+    bound: dict[str, Any] = {"json": {"items": soundings(2, vehicle="two")}, "headers": two.as_("rover")}
     refused = await two.at_other.post(f"{two.path}/measurements", **bound)
     assert (refused.status_code, "belongs to vehicle 'rover'" in refused.json()["detail"]) == (403, True)
     assert (await two.at_other.get("/missions", headers=two.as_("viewer"))).json()[0]["id"] in two.path

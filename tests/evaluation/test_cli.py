@@ -1,4 +1,5 @@
 import json
+from typing import Any
 
 import pytest
 from typer.testing import CliRunner
@@ -16,17 +17,17 @@ SURVEY = {"rmse_m", "l2_norm", "samples", "distance_m", "time_s", "coverage_pct"
 
 
 @pytest.fixture(scope="module")
-def terrain(tmp_path_factory):
+def terrain(tmp_path_factory: pytest.TempPathFactory) -> Any:
     file = tmp_path_factory.mktemp("floor") / "harbour.npz"
     save_npz(generate("harbour", 0, width_m=40.0, height_m=40.0), file)
     return str(file)
 
 
-def call(*arguments):
+def call(*arguments: Any) -> Any:
     return CliRunner().invoke(evaluate_app, list(arguments))
 
 
-def test_one_run_prints_one_object(terrain):
+def test_one_run_prints_one_object(terrain: Any) -> None:
     result = call("explore", "--terrain", terrain, "--landmarks", "80", "--steps", "5", "--json")
     assert result.exit_code == 0
     document = json.loads(result.stdout)
@@ -34,7 +35,7 @@ def test_one_run_prints_one_object(terrain):
     assert len(document["history"]) == 5
 
 
-def test_several_runs_print_runs_and_a_summary(terrain):
+def test_several_runs_print_runs_and_a_summary(terrain: Any) -> None:
     result = call(
         "explore", "--terrain", terrain, "--landmarks", "80", "--steps", "4",
         "--planner", "cao,random", "--seeds", "0:2",
@@ -52,7 +53,7 @@ def test_several_runs_print_runs_and_a_summary(terrain):
     assert spread["min"] <= spread["mean"] <= spread["max"]
 
 
-def test_any_number_of_processes_gives_the_same_runs_in_the_same_order(terrain):
+def test_any_number_of_processes_gives_the_same_runs_in_the_same_order(terrain: Any) -> None:
     arguments = ("explore", "--terrain", terrain, "--landmarks", "60", "--steps", "3", "--planner", "random,lawnmower",
                  "--seeds", "0:2", "--json")  # fmt: skip
     one, two = (json.loads(call(*arguments, "--jobs", str(n)).stdout)["runs"] for n in (1, 2))
@@ -62,14 +63,14 @@ def test_any_number_of_processes_gives_the_same_runs_in_the_same_order(terrain):
     assert one == two
 
 
-def test_every_cell_can_be_a_landmark(terrain):
+def test_every_cell_can_be_a_landmark(terrain: Any) -> None:
     result = call(
         "explore", "--terrain", terrain, "--landmarks", "all", "--steps", "1", "--planner", "random", "--json"
     )
     assert json.loads(result.stdout)["landmarks"] == 1600
 
 
-def test_the_team_may_change_and_zones_be_kept_out(terrain):
+def test_the_team_may_change_and_zones_be_kept_out(terrain: Any) -> None:
     result = call(
         "explore", "--terrain", terrain, "--landmarks", "80", "--steps", "6", "--planner", "lawnmower",
         "--keep-out", "0.1", "--lose", "1@2,3@4", "--join", "2@5", "--line-of-sight", "--json",
@@ -79,14 +80,14 @@ def test_the_team_may_change_and_zones_be_kept_out(terrain):
     assert document["robots"] == 3
 
 
-def test_explore_under_limited_communication(terrain):
+def test_explore_under_limited_communication(terrain: Any) -> None:
     result = call("explore", "--terrain", terrain, "--landmarks", "60", "--steps", "6", "--capacity", "10", "--json")
     document = json.loads(result.stdout)
     assert document["capacity"] == 10
     assert 0 < document["message_bytes"] <= 6 * 3 * (64 + 64 + 20)
 
 
-def test_survey_prints_the_planner_beside_its_yardsticks(terrain):
+def test_survey_prints_the_planner_beside_its_yardsticks(terrain: Any) -> None:
     result = call(
         "survey", "--terrain", terrain, "--steps", "12", "--max-step", "8", "--sampling", "continuous", "--json"
     )
@@ -96,7 +97,7 @@ def test_survey_prints_the_planner_beside_its_yardsticks(terrain):
     assert "recorded_track" not in document
 
 
-def test_without_json_a_table_is_printed(terrain):
+def test_without_json_a_table_is_printed(terrain: Any) -> None:
     result = call("explore", "--terrain", terrain, "--landmarks", "50", "--steps", "3", "--planner", "random")
     assert "remaining_pct" in result.stdout
 
@@ -120,7 +121,7 @@ def test_without_json_a_table_is_printed(terrain):
         (["--terrain", "/nowhere/at-all.npz"], ["at-all.npz"]),
     ],
 )
-def test_wrong_input_is_refused_in_words(terrain, arguments, words):
+def test_wrong_input_is_refused_in_words(terrain: Any, arguments: Any, words: Any) -> None:
     result = call("explore", "--terrain", terrain, *arguments)
     assert result.exit_code == 2
     for word in words:

@@ -1,8 +1,10 @@
+from typing import Any
+
 import pytest
 
 from tests.support.situations import SQUARE
 
 
 @pytest.fixture
-def square():
+def square() -> Any:
     return SQUARE

@@ -3,6 +3,7 @@
 import asyncio
 import statistics
 from dataclasses import replace
+from functools import partial
 
 import imcpy
 import pytest
@@ -10,14 +11,14 @@ import pytest
 from imc_bridge import Bridge, LinkChange, NodeState, RefusedError, Sounding, WaypointChange, WaypointStatus
 from imc_bridge.control.plans import OPERATION_START, plan_control
 from imc_bridge.network.codec import encode
-from tests.support.imc.sea import Peer, open_sea
+from tests.support.imc.sea import Peer, Sea, open_sea
 from tests.support.ports import free_ports
 from tests.support.waiting import until
 
 S, A, R = WaypointStatus.SENT, WaypointStatus.ACKNOWLEDGED, WaypointStatus.REACHED
 
 
-def truth_errors(sea):
+def truth_errors(sea: Sea) -> list[float]:
     """Sounded minus true depth at every footprint within the terrain."""
     errors = []
     for sounding in sea.of(Sounding):
@@ -30,7 +31,7 @@ def truth_errors(sea):
 @pytest.mark.parametrize(
     ("loss", "sensor"), [(0.0, "single"), (0.05, "single"), (0.0, "dvl")], ids=["clean", "5 % loss", "dvl"]
 )
-async def test_two_vehicles_follow_three_waypoints_and_stop(loss, sensor):
+async def test_two_vehicles_follow_three_waypoints_and_stop(loss: float, sensor: str) -> None:
     async with open_sea(vehicles=2, loss=loss, sensor=sensor) as sea:
         names = await sea.ready()
         await asyncio.gather(*(sea.bridge.engage(name) for name in names))
@@ -57,7 +58,7 @@ async def test_two_vehicles_follow_three_waypoints_and_stop(loss, sensor):
     assert all(sounding.position_sd_m is not None for sounding in sea.of(Sounding)[-20:])
 
 
-async def test_repeated_order_is_harmless_and_a_new_one_replaces_the_old():
+async def test_repeated_order_is_harmless_and_a_new_one_replaces_the_old() -> None:
     async with open_sea() as sea:
         (name,) = await sea.ready()
         await sea.bridge.engage(name)
@@ -72,7 +73,7 @@ async def test_repeated_order_is_harmless_and_a_new_one_replaces_the_old():
         assert sea.statuses(name, 1) == [S, A, R]
 
 
-async def test_waypoint_close_by_counts_as_reached_where_the_vehicle_circles():
+async def test_waypoint_close_by_counts_as_reached_where_the_vehicle_circles() -> None:
     async with open_sea() as sea:
         (name,) = await sea.ready()
         await sea.bridge.engage(name)
@@ -85,7 +86,7 @@ async def test_waypoint_close_by_counts_as_reached_where_the_vehicle_circles():
 
 
 @pytest.mark.parametrize("family", ["slope", "smooth"])
-async def test_guard_keeps_the_vehicle_off_the_bottom(family):
+async def test_guard_keeps_the_vehicle_off_the_bottom(family: str) -> None:
     async with open_sea(family=family) as sea:
         (name,) = await sea.ready()
         await until(lambda: bool(sea.of(Sounding)), "the bottom was measured")
@@ -102,7 +103,7 @@ async def test_guard_keeps_the_vehicle_off_the_bottom(family):
         assert min(altitudes) > 1.0
 
 
-async def test_unknown_vehicle_and_unengaged_vehicle_are_refused_with_a_remedy():
+async def test_unknown_vehicle_and_unengaged_vehicle_are_refused_with_a_remedy() -> None:
     async with open_sea() as sea:
         (name,) = await sea.ready()
         with pytest.raises(RefusedError, match=rf"never heard of \(known: {name}\)"):
@@ -113,19 +114,23 @@ async def test_unknown_vehicle_and_unengaged_vehicle_are_refused_with_a_remedy()
         assert (await sea.bridge.stop(name)).acknowledged
 
 
-async def test_stop_is_safe_to_repeat_and_to_follow_by_engaging_again():
+async def test_stop_is_safe_to_repeat_and_to_follow_by_engaging_again() -> None:
     async with open_sea() as sea:
         (name,) = await sea.ready()
+
+        def acknowledged(step: int) -> bool:
+            return A in sea.statuses(name, step)
+
         for step in range(2):
             await sea.bridge.engage(name)
             sea.bridge.goto(name, sea.waypoint(step, 50, 60, 1.0))
-            await until(lambda step=step: A in sea.statuses(name, step), "it was acknowledged")
+            await until(partial(acknowledged, step), "it was acknowledged")
             for stop in await asyncio.gather(sea.bridge.stop(name), sea.bridge.stop(name)):
                 assert stop.acknowledged
             assert (await sea.bridge.stop(name)).acknowledged
 
 
-async def test_silent_vehicle_is_lost_its_stop_unacknowledged_and_its_waypoint_refused():
+async def test_silent_vehicle_is_lost_its_stop_unacknowledged_and_its_waypoint_refused() -> None:
     async with open_sea() as sea:
         (name,) = await sea.ready()
         await sea.bridge.engage(name)
@@ -145,7 +150,7 @@ async def test_silent_vehicle_is_lost_its_stop_unacknowledged_and_its_waypoint_r
         assert "no acknowledgement within 0.3 s" in stop.detail
 
 
-async def test_vehicle_that_reboots_goes_on_to_its_waypoint():
+async def test_vehicle_that_reboots_goes_on_to_its_waypoint() -> None:
     async with open_sea() as sea:
         (name,) = await sea.ready()
         await sea.bridge.engage(name)
@@ -157,7 +162,7 @@ async def test_vehicle_that_reboots_goes_on_to_its_waypoint():
         assert sea.statuses(name, 0) == [S, A, R]
 
 
-async def test_vehicle_that_follows_an_earlier_run_of_ours_is_engaged_anew():
+async def test_vehicle_that_follows_an_earlier_run_of_ours_is_engaged_anew() -> None:
     async with open_sea() as sea:
         (name,) = await sea.ready()
         await sea.bridge.engage(name)
@@ -177,17 +182,17 @@ async def test_vehicle_that_follows_an_earlier_run_of_ours_is_engaged_anew():
 class Console(Peer):
     """Another console, which the vehicles know."""
 
-    async def introduce(self, sea):
+    async def introduce(self, sea: Sea) -> None:
         for port in self.settings.announce_ports:
             self.announce(port, sys_type=imcpy.SystemType.CCU)
         await asyncio.sleep(0)
 
-    def command(self, sea, message):
+    def command(self, sea: Sea, message: imcpy.Message) -> None:
         packet = encode(message, src=self.imc_id, dst=sea.fleet.nodes[0].imc_id, time_s=1.7e9)
         self.sock.sendto(packet, sea.fleet.nodes[0].address)
 
 
-async def test_abort_by_another_console_is_respected():
+async def test_abort_by_another_console_is_respected() -> None:
     async with open_sea() as sea:
         (name,) = await sea.ready()
         console = Console(sea.settings, 0x4001, "ccu-other")
@@ -208,7 +213,7 @@ async def test_abort_by_another_console_is_respected():
         console.close()
 
 
-async def test_vehicle_in_another_consoles_plan_is_neither_engaged_nor_stopped():
+async def test_vehicle_in_another_consoles_plan_is_neither_engaged_nor_stopped() -> None:
     async with open_sea() as sea:
         (name,) = await sea.ready()
         await sea.bridge.close()
@@ -231,7 +236,7 @@ async def test_vehicle_in_another_consoles_plan_is_neither_engaged_nor_stopped()
             await ours.close()
 
 
-async def test_closing_stops_every_vehicle_and_restores_its_rates():
+async def test_closing_stops_every_vehicle_and_restores_its_rates() -> None:
     async with open_sea(vehicles=2) as sea:
         names = await sea.ready()
         former = [node._rate_text for node in sea.fleet.nodes]
@@ -242,7 +247,7 @@ async def test_closing_stops_every_vehicle_and_restores_its_rates():
         await until(lambda: [node._rate_text for node in sea.fleet.nodes] == former, "the rates are as before")
 
 
-async def test_rates_are_restored_though_packets_are_lost():
+async def test_rates_are_restored_though_packets_are_lost() -> None:
     async with open_sea(loss=0.3) as sea:
         (name,) = await sea.ready()
         node = sea.fleet.nodes[0]
@@ -254,7 +259,7 @@ async def test_rates_are_restored_though_packets_are_lost():
 
 
 @pytest.mark.parametrize("north_m", [30.0, 95.0], ids=["near: DUNE expects a new path", "far: it times out"])
-async def test_plan_that_ended_for_want_of_references_is_taken_up_again(north_m):
+async def test_plan_that_ended_for_want_of_references_is_taken_up_again(north_m: float) -> None:
     async with open_sea() as sea:
         (name,) = await sea.ready()
         await sea.bridge.engage(name)
@@ -262,21 +267,21 @@ async def test_plan_that_ended_for_want_of_references_is_taken_up_again(north_m)
         await until(lambda: A in sea.statuses(name, 0), "it was acknowledged")
         node, send = sea.fleet.nodes[0], sea.bridge.transport.send
         reference = imcpy.Reference().msg_id.to_bytes(2, "little")
-        sea.bridge.transport.send = lambda packet, to: packet[2:4] == reference or send(packet, to)
+        sea.bridge.transport.send = lambda packet, address: packet[2:4] == reference or send(packet, address)
         await until(lambda: node.plan.maneuver is None, "the vehicle has given up")
         sea.bridge.transport.send = send
         await sea.reached(name, 0)
         assert sea.statuses(name, 0) == [S, A, R]
 
 
-def foreign_start(sea, source, plan_id, control_src):
+def foreign_start(sea: Sea, source: int, plan_id: str, control_src: int) -> bytes:
     """A START of another console for the first vehicle."""
     settings = replace(sea.settings, imc_id=control_src, plan_id=plan_id)
     return encode(plan_control(OPERATION_START, 1, settings), src=source, dst=sea.fleet.nodes[0].imc_id, time_s=1.7e9)
 
 
 @pytest.mark.parametrize("plan_id", ["home", "bathyfleet"])
-async def test_vehicle_that_another_console_takes_over_is_let_go(plan_id):
+async def test_vehicle_that_another_console_takes_over_is_let_go(plan_id: str) -> None:
     async with open_sea() as sea:
         (name,) = await sea.ready()
         console = Console(sea.settings, 0x4001, "ccu-other")
@@ -301,7 +306,7 @@ async def test_vehicle_that_another_console_takes_over_is_let_go(plan_id):
         console.close()
 
 
-async def test_vehicle_that_is_still_booting_is_engaged_when_it_is_ready():
+async def test_vehicle_that_is_still_booting_is_engaged_when_it_is_ready() -> None:
     async with open_sea(boot_s=12.0) as sea:
         await until(lambda: sea.state("lauv-sim-1") is NodeState.ACTIVE, "it is heard")
         assert "boot" in sea.bridge.nodes()[0].reason
@@ -309,7 +314,7 @@ async def test_vehicle_that_is_still_booting_is_engaged_when_it_is_ready():
         assert sea.fleet.nodes[0].plan.maneuver is not None
 
 
-async def test_plan_that_the_vehicle_refuses_is_told_in_its_words():
+async def test_plan_that_the_vehicle_refuses_is_told_in_its_words() -> None:
     async with open_sea() as sea:
         (name,) = await sea.ready()
         plan = sea.fleet.nodes[0].plan

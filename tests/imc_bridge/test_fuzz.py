@@ -4,6 +4,7 @@ import json
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 from tests.support.commands import environment
 from tests.support.paths import PROJECT
@@ -28,7 +29,7 @@ print(json.dumps({
 """
 
 
-def run(*arguments: str) -> dict[str, object]:
+def run(*arguments: str) -> dict[str, Any]:
     ended = subprocess.run(
         [sys.executable, *arguments],
         cwd=PROJECT,
@@ -41,7 +42,7 @@ def run(*arguments: str) -> dict[str, object]:
     return json.loads(ended.stdout)
 
 
-def test_mutated_packets_neither_break_anything_nor_get_through():
+def test_mutated_packets_neither_break_anything_nor_get_through() -> None:
     result = run("-m", "benchmarks.imc.fuzz", "--packets", "20000", "--seeds", "7")
     assert result["handler_errors"] == {}
     assert result["impossible_events"] == 0
@@ -51,7 +52,7 @@ def test_mutated_packets_neither_break_anything_nor_get_through():
     assert result["nodes"] <= 256
 
 
-def test_what_once_led_somewhere_new_does_no_harm():
+def test_what_once_led_somewhere_new_does_no_harm() -> None:
     result = run("-c", REPLAY, str(CORPUS))
     assert result["handler_errors"] == {}
     assert result["impossible_events"] == 0

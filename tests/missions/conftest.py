@@ -13,7 +13,7 @@ from tests.support.ports import free_ports
 
 @pytest.fixture
 def make_settings(database_url: str) -> Callable[..., ServiceSettings]:
-    def make(**changes: object) -> ServiceSettings:
+    def make(**changes: Any) -> ServiceSettings:
         values = {
             "database_url": database_url,
             "imc": ImcSettings(enabled=False),

@@ -5,6 +5,7 @@ from collections.abc import Callable
 import imcpy
 import pytest
 
+from app.missions.fleet.links.imc import ImcFleetLink
 from app.missions.service import MissionService
 from app.missions.settings import ImcSettings, ServiceSettings
 from app.missions.spec.mission import MissionSpec
@@ -27,7 +28,7 @@ class Deaf:
 
     def mute(self, kinds: set[bytes]) -> None:
         """Lose what is sent of these kinds."""
-        self._bridge.transport.send = lambda packet, to: packet[2:4] in kinds or self._send(packet, to)
+        self._bridge.transport.send = lambda packet, address: packet[2:4] in kinds or self._send(packet, address)
 
     def deafen(self) -> None:
         """Lose everything that comes in."""
@@ -42,7 +43,7 @@ class Deaf:
         self._bridge.transport.send = self._send
 
 
-async def test_a_vehicle_that_goes_on_with_our_plan_is_asked_until_it_hears():
+async def test_a_vehicle_that_goes_on_with_our_plan_is_asked_until_it_hears() -> None:
     async with open_sea() as sea:
         (name,) = await sea.ready()
         await sea.bridge.engage(name)
@@ -76,7 +77,6 @@ async def test_a_mission_goes_on_by_itself_when_its_vehicle_hears_again(
         service = await harbour.open(imc=imc, time_scale=speed)
         await sea.launch()
         try:
-            assert sea.fleet is not None
             name = sea.fleet.nodes[0].name
             bridge = bridge_of(service)
             mission = await service.create(mission_over(sea, name, steps=3))
@@ -115,7 +115,7 @@ async def test_a_mission_goes_on_by_itself_when_its_vehicle_hears_again(
             await harbour.close()
 
 
-async def test_a_bridge_that_was_held_up_blames_no_vehicle():
+async def test_a_bridge_that_was_held_up_blames_no_vehicle() -> None:
     async with open_sea() as sea:
         (name,) = await sea.ready()
         await sea.bridge.engage(name)
@@ -132,7 +132,6 @@ async def test_a_bridge_that_was_held_up_blames_no_vehicle():
 
 def go_on_for_ever(sea: Sea) -> None:
     """Let the vehicle's plan not end though references cease, which gives the test its time."""
-    assert sea.fleet is not None
     maneuver = sea.fleet.nodes[0].plan.maneuver
     assert maneuver is not None
     maneuver.failure = lambda now_s: None
@@ -140,7 +139,7 @@ def go_on_for_ever(sea: Sea) -> None:
 
 def bridge_of(service: MissionService) -> Bridge:
     """The bridge of a service's IMC link."""
-    return next(link._bridge for link in service._hub._links.values() if link.kind == "imc")
+    return next(link._bridge for link in service._hub._links.values() if isinstance(link, ImcFleetLink))
 
 
 def mission_over(sea: Sea, name: str, steps: int) -> MissionSpec:

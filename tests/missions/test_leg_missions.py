@@ -33,7 +33,6 @@ async def test_a_mission_by_legs_finishes_without_contact_under_water_and_has_ev
         service = await harbour.open(imc=imc, time_scale=SPEED)
         await sea.launch()
         try:
-            assert sea.fleet is not None
             name = sea.fleet.nodes[0].name
             corners = [sea.floor.frame.to_geodetic(*place) for place in ((5, 5), (95, 5), (95, 95), (5, 95), (5, 5))]
             spec = MissionSpec.model_validate(
@@ -100,7 +99,7 @@ def list_logs(folder: Path) -> list[Path]:
         ({"guidance": "sonar"}, "guidance"),
     ],
 )
-def test_how_a_vehicle_is_led_has_to_make_sense(changes, words) -> None:
+def test_how_a_vehicle_is_led_has_to_make_sense(changes: dict[str, str], words: str) -> None:
     with pytest.raises(ValidationError, match=words):
         VehicleSpec.model_validate({"name": "a"} | changes)
 

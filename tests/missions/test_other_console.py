@@ -1,6 +1,6 @@
 """A mission over IMC beside another console, which may take a vehicle away; only our operator gives it back."""
 
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 
 import imcpy
 
@@ -75,5 +75,5 @@ def link_of(service: MissionService) -> LinkState | None:
     return next((info.state for info, _ in service._hub.vehicles() if info.name == NAME), None)
 
 
-async def later_than(step: Callable[[], object], number: int) -> bool:
-    return await step() > number  # type: ignore[misc, operator]
+async def later_than(step: Callable[[], Awaitable[int]], number: int) -> bool:
+    return await step() > number

@@ -201,7 +201,7 @@ def test_the_way_in_goes_round_keep_out_zones() -> None:
     (leg,) = decision.legs
     assert leg.refusal == ""
     zone, area = Polygon(spec.to_local(spec.keep_out[0])), Polygon(spec.local_area())
-    way = LineString([(-40, 35), leg.target_m[:2]])
+    way = LineString([(-40.0, 35.0), tuple(leg.target_m[:2])])
     assert area.covers(Point(leg.target_m[:2]))
     assert way.distance(zone) > 0
 
@@ -277,7 +277,7 @@ def test_without_a_margin_legs_may_pass_along_a_zone() -> None:
     assert constraints.feasible(np.array([[19.5, 28.0, 2.0]]), np.array([[[19.5, 33.0, 2.0]]]))[0]
 
 
-def test_a_circle_lies_inside_clear_of_keep_outs_and_apart_from_others():
+def test_a_circle_lies_inside_clear_of_keep_outs_and_apart_from_others() -> None:
     start, target, radius = np.array([45.0, 5.0]), np.array([50.0, 12.0]), 8.0
     centre = safety.circling_room(LIMITS, start, target, radius, [np.array([[40.0, 30.0], [30.0, 40.0]])])
     assert centre is not None
@@ -297,7 +297,9 @@ def test_a_circle_lies_inside_clear_of_keep_outs_and_apart_from_others():
     ],
     ids=["area", "keep-out and others", "others"],
 )
-def test_where_there_is_no_room_for_a_circle_none_is_given(start, target, radius, taken):
+def test_where_there_is_no_room_for_a_circle_none_is_given(
+    start: tuple[float, float], target: tuple[float, float], radius: float, taken: list[list[list[float]]]
+) -> None:
     ways = [np.array(way) for way in taken]
     assert safety.circling_room(LIMITS, np.array(start), np.array(target), radius, ways) is None
 
@@ -305,5 +307,5 @@ def test_where_there_is_no_room_for_a_circle_none_is_given(start, target, radius
 @pytest.mark.parametrize(
     ("water_level_m", "below_m"), [(0.0, 10.0), (-1.5, 8.5), (2.0, 10.0)], ids=["datum", "low water", "high water"]
 )
-def test_depths_below_the_surface_are_on_the_safe_side(water_level_m, below_m):
+def test_depths_below_the_surface_are_on_the_safe_side(water_level_m: float, below_m: float) -> None:
     assert safety.below_surface_m(np.array([10.0]), water_level_m) == pytest.approx(below_m)

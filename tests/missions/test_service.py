@@ -157,7 +157,7 @@ async def test_ending_a_mission_stops_its_vehicles_and_frees_them(
     assert (await kinds(service, mission_id)).count("stop") == 2
     for refused in ("start", "pause", "resume", "abort", "finish"):
         with pytest.raises(MoveRefusedError) as caught:
-            await service.act(mission_id, refused, actor="Ana")  # type: ignore[arg-type]
+            await service.act(mission_id, refused, actor="Ana")
         assert "create a new mission" in caught.value.remedy.lower()
     with pytest.raises(ConflictError, match="takes no more vehicles"):
         await service.add_vehicle(mission_id, VehicleSpec(name="c", kind="sim"))
@@ -305,7 +305,7 @@ async def test_vehicles_join_and_leave_while_a_mission_runs(service: MissionServ
     await service.add_vehicle(mission_id, VehicleSpec(name="a", kind="sim"))
     await until(flown_by("a"), "the one that came back reached a waypoint")
     async with database.reading() as session:
-        assert (await session.get(MissionVehicleRow, (mission_id, "a"))).slot == 0  # type: ignore[union-attr]
+        assert (await session.get(MissionVehicleRow, (mission_id, "a"))).slot == 0
     with pytest.raises(ConflictError, match="takes part already"):
         await service.add_vehicle(mission_id, VehicleSpec(name="a", kind="sim"))
     with pytest.raises(VehicleNotFoundError, match="'x' takes no part"):
@@ -761,7 +761,7 @@ async def test_events_are_ordered_and_can_be_taken_up_after_any(harbour: Harbour
     assert [line.data["state"] for line in every if line.kind == "state"] == ["ready", "running", "finished"]
     for i, line in enumerate(every):
         assert await harbour.service.events(mission_id, after=line.id) == every[i + 1 :]
-    paged = []
+    paged: list[Any] = []
     while page := await harbour.service.events(mission_id, after=paged[-1].id if paged else 0, limit=2):
         paged += page
     assert paged == every

@@ -127,7 +127,7 @@ async def test_a_stop_does_not_wait_for_the_database(harbour: Harbour, whole: bo
     await until_step(service, mission, 1)
     async with harbour.database.writing():
         abort = service.act(mission, "abort", actor="Ana") if whole else service.abort_vehicle(mission, "a")
-        answer = asyncio.create_task(abort)  # type: ignore[var-annotated]
+        answer = asyncio.create_task(abort)
         async with asyncio.timeout(LONG_S):
 
             async def stopped() -> bool:

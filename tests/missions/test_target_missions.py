@@ -53,12 +53,15 @@ async def test_posted_ranges_find_a_target_and_a_restart_does_not_forget_it(
     (before,) = await service.targets(mission.id)
     await service.act(mission.id, "pause", actor="Ana")
     assert before.accurate
+    assert before.east_m is not None
+    assert before.north_m is not None
     assert math.hypot(before.east_m - TAG[0], before.north_m - TAG[1]) < 3.0
     assert (await service.mission(mission.id)).targets[0].name == "tag-1"
 
     service = await harbour.reopen()
     (after,) = await service.targets(mission.id)
     assert (after.ranges, after.rejected) == (before.ranges, before.rejected)
+    assert after.sd_east_m is not None
     assert after.east_m == pytest.approx(before.east_m, abs=max(0.5, 3 * after.sd_east_m))
     again = await service.measure(mission.id, round_trip(30, 1000.0), idempotency_key="one")
     assert again.replayed

@@ -4,6 +4,8 @@ import json
 import signal
 import subprocess
 import sys
+from pathlib import Path
+from signal import Signals
 
 import pytest
 from typer.testing import CliRunner
@@ -15,7 +17,7 @@ from tests.support.paths import PROJECT
 from tests.support.ports import free_ports
 
 
-def launch(*arguments):
+def launch(*arguments: str) -> subprocess.Popen[str]:
     announce, port = free_ports(2)
     return subprocess.Popen(  # the interpreter and arguments are ours
         [
@@ -37,7 +39,7 @@ def launch(*arguments):
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_it_tells_when_it_is_ready_and_stops_cleanly(tmp_path, number):
+def test_it_tells_when_it_is_ready_and_stops_cleanly(tmp_path: Path, number: Signals) -> None:
     save_npz(seafloors.generate("slope", 1, origin=(41.2, -8.6)), tmp_path / "floor.npz")
     with launch("--vehicles", "3", "--terrain", str(tmp_path / "floor.npz"), "--speed", "20") as process:
         told = json.loads(process.stdout.readline())
@@ -49,7 +51,7 @@ def test_it_tells_when_it_is_ready_and_stops_cleanly(tmp_path, number):
     assert (process.returncode, out, err) == (0, "", "")
 
 
-def test_vehicles_can_be_named_numbered_and_placed():
+def test_vehicles_can_be_named_numbered_and_placed() -> None:
     with launch(
         *("--names", "rex,max", "--ids", "0x1e,31", "--origin", "40.0,-9.0", "--sensor", "dvl"),
         *("--start", "10,20", "--start", "30,40,1"),
@@ -83,13 +85,13 @@ def test_vehicles_can_be_named_numbered_and_placed():
         (["--size", "0"], "width_m is 0"),
     ],
 )
-def test_wrong_options_say_what_would_be_right(arguments, message):
+def test_wrong_options_say_what_would_be_right(arguments: list[str], message: str) -> None:
     result = CliRunner().invoke(app, arguments)
     assert result.exit_code == 2
     assert message in result.output.replace("\n", " ")
 
 
-def test_help_lists_every_option():
+def test_help_lists_every_option() -> None:
     result = CliRunner().invoke(app, ["--help"], env={"COLUMNS": "200"})
     assert result.exit_code == 0
     for option in ("--terrain", "--family", "--loss", "--duplicate", "--drift", "--names", "--json-ready", "--chatter"):

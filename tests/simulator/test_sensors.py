@@ -1,10 +1,12 @@
 import math
+from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from app.arrays import FloatArray
 from simulator import seafloors
 from simulator.sensors import SensorKind, Sonar, SonarNoise, beams_of, cast_rays, to_local_frame
 from simulator.terrain import Terrain
@@ -15,12 +17,12 @@ RUGGED = seafloors.generate("rugged", 0)
 PERFECT = SonarNoise()
 
 
-def plane(slope_east, slope_north, depth):
+def plane(slope_east: float, slope_north: float, depth: float) -> Terrain:
     at = np.arange(200) + 0.5
     return Terrain(depth + slope_east * (at[None, :] - 100) + slope_north * (at[:, None] - 100), 1.0)
 
 
-def slow_range(terrain, origin, direction, limit):
+def slow_range(terrain: Terrain, origin: tuple[float, float, float], direction: FloatArray, limit: float) -> float:
     """March in steps of a centimetre."""
     for r in np.arange(0.0, limit, 0.01):
         e, n, d = (o + r * u for o, u in zip(origin, direction, strict=True))
@@ -35,8 +37,8 @@ def slow_range(terrain, origin, direction, limit):
     tilt=st.floats(0, math.radians(60)),
     azimuth=st.floats(0, 2 * math.pi),
 )
-def test_rays_meet_a_plane_where_geometry_says(slopes, tilt, azimuth):
-    terrain = plane(*slopes, 30.0)
+def test_rays_meet_a_plane_where_geometry_says(slopes: tuple[float, float], tilt: float, azimuth: float) -> None:
+    terrain = plane(slopes[0], slopes[1], 30.0)
     u = np.array([math.sin(tilt) * math.sin(azimuth), math.sin(tilt) * math.cos(azimuth), math.cos(tilt)])
     expected = 30.0 / (u[2] - slopes[0] * u[0] - slopes[1] * u[1]) * 0.9
     found = cast_rays(terrain, 100.0, 100.0, 3.0, u[None, :], 200.0)[0]
@@ -44,7 +46,7 @@ def test_rays_meet_a_plane_where_geometry_says(slopes, tilt, azimuth):
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_rays_on_rugged_ground_agree_with_a_slow_march(seed):
+def test_rays_on_rugged_ground_agree_with_a_slow_march(seed: int) -> None:
     rng = np.random.default_rng(seed)
     tilt, azimuth = rng.uniform(0, 1.2, 12), rng.uniform(0, 2 * math.pi, 12)
     u = np.column_stack([np.sin(tilt) * np.sin(azimuth), np.sin(tilt) * np.cos(azimuth), np.cos(tilt)])
@@ -53,13 +55,13 @@ def test_rays_on_rugged_ground_agree_with_a_slow_march(seed):
     np.testing.assert_allclose(found, expected, atol=0.011)
 
 
-def test_rays_that_meet_nothing_return_nothing():
+def test_rays_that_meet_nothing_return_nothing() -> None:
     up_and_away = np.array([[0.0, 0.0, -1.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
     found = cast_rays(FLAT, 50.0, 50.0, 1.0, up_and_away, 10.0)
     assert np.isnan(found).all(), "surface, water, and a bottom out of range"
 
 
-def test_rays_leave_unknown_floor_alone():
+def test_rays_leave_unknown_floor_alone() -> None:
     z = np.full((50, 50), 10.0)
     z[:, 20:30] = np.nan
     terrain = Terrain(z, 1.0)
@@ -72,7 +74,7 @@ def test_rays_leave_unknown_floor_alone():
     ("beam", "heading_deg", "towards"),
     [(0, 0, "north"), (1, 0, "east"), (2, 0, "south"), (3, 0, "west"), (0, 90, "east"), (1, 90, "south")],
 )
-def test_dvl_beams_point_along_the_heading_and_at_right_angles(beam, heading_deg, towards):
+def test_dvl_beams_point_along_the_heading_and_at_right_angles(beam: int, heading_deg: int, towards: str) -> None:
     e, n, d = to_local_frame(beams_of(SensorKind.DVL).body, math.radians(heading_deg), 0.0, 0.0)[beam]
     side = {"north": (0, 1), "east": (1, 0), "south": (0, -1), "west": (-1, 0)}[towards]
     tilt = math.radians(22.5)
@@ -80,7 +82,7 @@ def test_dvl_beams_point_along_the_heading_and_at_right_angles(beam, heading_deg
     assert d == pytest.approx(math.cos(tilt))
 
 
-def test_pitching_up_lifts_the_bow_beam_and_rolling_to_starboard_lifts_the_port_beam():
+def test_pitching_up_lifts_the_bow_beam_and_rolling_to_starboard_lifts_the_port_beam() -> None:
     body = beams_of(SensorKind.DVL).body
     level, up, rolled = (to_local_frame(body, 0.3, pitch, roll) for pitch, roll in ((0, 0), (0.1, 0), (0, 0.1)))
     assert up[0, 2] < level[0, 2]
@@ -90,12 +92,12 @@ def test_pitching_up_lifts_the_bow_beam_and_rolling_to_starboard_lifts_the_port_
 
 
 @given(h=st.floats(-3, 3), p=st.floats(-1, 1), r=st.floats(-1, 1))
-def test_turning_keeps_lengths_and_angles(h, p, r):
+def test_turning_keeps_lengths_and_angles(h: Any, p: Any, r: Any) -> None:
     turned = to_local_frame(np.eye(3), h, p, r)
     np.testing.assert_allclose(turned @ turned.T, np.eye(3), atol=1e-12)
 
 
-def test_the_swath_lies_across_the_heading():
+def test_the_swath_lies_across_the_heading() -> None:
     directions = to_local_frame(beams_of(SensorKind.MULTIBEAM, swath_beams=9).body, 0.0, 0.0, 0.0)
     np.testing.assert_allclose(directions[:, 1], 0.0, atol=1e-12)
     angles = np.degrees(np.arctan2(directions[:, 0], directions[:, 2]))
@@ -103,27 +105,27 @@ def test_the_swath_lies_across_the_heading():
 
 
 @pytest.mark.parametrize("kind", list(SensorKind))
-def test_a_perfect_sonar_sees_the_floor(kind):
+def test_a_perfect_sonar_sees_the_floor(kind: SensorKind) -> None:
     sonar = Sonar(kind, PERFECT, np.random.default_rng(0))
     ranges = sonar.ping(FLAT, Motion(50.0, 50.0, 2.0, 0.7))
     expected = (FLAT.max_depth_m - 2.0) / np.cos(sonar.beams.tilt_rad)
     np.testing.assert_allclose(ranges, expected, atol=2e-3)
 
 
-def pings(noise, n=4000):
+def pings(noise: SonarNoise, n: int = 4000) -> FloatArray:
     sonar = Sonar(SensorKind.SINGLE, noise, np.random.default_rng(1))
     motion = Motion(50.0, 50.0, 2.0)
     true = FLAT.max_depth_m - 2.0
     return np.array([sonar.ping(FLAT, motion)[0] for _ in range(n)]) / true
 
 
-def test_noise_is_multiplicative():
+def test_noise_is_multiplicative() -> None:
     ratio = pings(SonarNoise(relative_sd=0.1))
     assert ratio.mean() == pytest.approx(1.0, abs=0.01)
     assert ratio.std() == pytest.approx(0.1, abs=0.01)
 
 
-def test_outliers_come_short_or_double_at_their_rate():
+def test_outliers_come_short_or_double_at_their_rate() -> None:
     ratio = pings(SonarNoise(outlier_rate=0.2))
     wrong = np.abs(ratio - 1.0) > 1e-9
     assert wrong.mean() == pytest.approx(0.2, abs=0.03)
@@ -131,17 +133,17 @@ def test_outliers_come_short_or_double_at_their_rate():
     assert (ratio[wrong] < 1.0).mean() == pytest.approx(0.5, abs=0.08)
 
 
-def test_dropouts_return_nothing_at_their_rate():
+def test_dropouts_return_nothing_at_their_rate() -> None:
     assert np.isnan(pings(SonarNoise(dropout_rate=0.3))).mean() == pytest.approx(0.3, abs=0.03)
 
 
-def test_out_of_range_is_no_return():
+def test_out_of_range_is_no_return() -> None:
     sonar = Sonar(SensorKind.SINGLE, PERFECT, np.random.default_rng(0), max_range_m=5.0)
     assert np.isnan(sonar.ping(FLAT, Motion(50.0, 50.0, 0.0))[0])
     assert np.isnan(sonar.ping(FLAT, Motion(-50.0, 50.0, 0.0))[0]), "nothing is known out there"
 
 
 @pytest.mark.parametrize("field", ["relative_sd", "outlier_rate", "dropout_rate"])
-def test_impossible_noise_is_refused(field):
+def test_impossible_noise_is_refused(field: str) -> None:
     with pytest.raises(ValueError, match=f"{field} is -0.1"):
         SonarNoise(**{field: -0.1})

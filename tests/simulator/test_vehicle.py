@@ -1,5 +1,6 @@
 import math
 from itertools import pairwise
+from typing import Any
 
 import pytest
 from hypothesis import given, settings
@@ -11,9 +12,9 @@ NO_ERROR = (0.0, 0.0)
 DEEP = 100.0
 
 
-def fly(vehicle, seconds, bottom=DEEP, error=NO_ERROR):
+def fly(vehicle: Vehicle, seconds: int, bottom: Any = DEEP, error: Any = NO_ERROR) -> list[tuple[float, ...]]:
     """Motions after each step."""
-    track = []
+    track: list[tuple[float, ...]] = []
     for _ in range(round(seconds / STEP_S)):
         vehicle.step(error, bottom)
         m = vehicle.motion
@@ -21,7 +22,7 @@ def fly(vehicle, seconds, bottom=DEEP, error=NO_ERROR):
     return track
 
 
-def distance(vehicle, target):
+def distance(vehicle: Vehicle, target: Target) -> float:
     return math.hypot(vehicle.motion.east_m - target.east_m, vehicle.motion.north_m - target.north_m)
 
 
@@ -34,7 +35,7 @@ def distance(vehicle, target):
     heading=st.floats(-math.pi, math.pi),
     loiter=st.booleans(),
 )
-def test_the_limits_are_never_exceeded(east, north, z, speed, heading, loiter):
+def test_the_limits_are_never_exceeded(east: Any, north: Any, z: Any, speed: Any, heading: Any, loiter: Any) -> None:
     limits = VehicleLimits()
     vehicle = Vehicle(Motion(heading_rad=heading), limits)
     vehicle.goto(Target(east, north, z, speed))
@@ -58,7 +59,7 @@ def test_the_limits_are_never_exceeded(east, north, z, speed, heading, loiter):
     heading=st.floats(-math.pi, math.pi),
     current=st.tuples(st.floats(-0.3, 0.3), st.floats(-0.3, 0.3)),
 )
-def test_every_target_is_passed_closely(east, north, heading, current):
+def test_every_target_is_passed_closely(east: Any, north: Any, heading: Any, current: Any) -> None:
     vehicle = Vehicle(Motion(heading_rad=heading), current=current)
     target = Target(east, north, 3.0)
     vehicle.goto(target)
@@ -71,7 +72,7 @@ def test_every_target_is_passed_closely(east, north, heading, current):
     assert nearest < 1.5
 
 
-def test_it_flies_straight_in_a_cross_current():
+def test_it_flies_straight_in_a_cross_current() -> None:
     vehicle = Vehicle(current=(0.3, 0.0))
     vehicle.goto(Target(0.0, 200.0, 2.0))
     track = fly(vehicle, 120)
@@ -79,7 +80,7 @@ def test_it_flies_straight_in_a_cross_current():
 
 
 @pytest.mark.parametrize("asked", [1.0, 1.2, 1.5])
-def test_it_keeps_speed_and_depth(asked):
+def test_it_keeps_speed_and_depth(asked: float) -> None:
     vehicle = Vehicle()
     vehicle.goto(Target(0.0, 1000.0, 4.0, asked))
     track = fly(vehicle, 90)
@@ -89,7 +90,7 @@ def test_it_keeps_speed_and_depth(asked):
     assert max(p[2] for p in track) < 4.3, "no overshoot towards the bottom"
 
 
-def test_it_keeps_altitude_over_a_slope():
+def test_it_keeps_altitude_over_a_slope() -> None:
     vehicle = Vehicle()
     vehicle.goto(Target(0.0, 1000.0, 3.0, 1.2, by_altitude=True))
     for _ in range(1500):
@@ -100,7 +101,7 @@ def test_it_keeps_altitude_over_a_slope():
 
 @pytest.mark.parametrize("clockwise", [True, False])
 @pytest.mark.parametrize("radius", [5.0, 7.5, 20.0])
-def test_it_circles_around_a_reached_target(radius, clockwise):
+def test_it_circles_around_a_reached_target(radius: float, clockwise: bool) -> None:
     vehicle = Vehicle()
     target = Target(30.0, 20.0, 3.0)
     vehicle.goto(target)
@@ -113,21 +114,21 @@ def test_it_circles_around_a_reached_target(radius, clockwise):
     assert (turned > 0) == clockwise
 
 
-def test_without_motor_it_floats_up_and_stays_up():
+def test_without_motor_it_floats_up_and_stays_up() -> None:
     vehicle = Vehicle(Motion(depth_m=2.0))
     track = fly(vehicle, 60)
     assert track[-1][2] == 0.0
     assert track[-1][5] == 0.0
 
 
-def test_without_motor_it_drifts_with_the_current():
+def test_without_motor_it_drifts_with_the_current() -> None:
     vehicle = Vehicle(current=(0.2, -0.1))
     fly(vehicle, 100)
     assert vehicle.motion.east_m == pytest.approx(20.0)
     assert vehicle.motion.north_m == pytest.approx(-10.0)
 
 
-def test_the_bottom_stops_it():
+def test_the_bottom_stops_it() -> None:
     vehicle = Vehicle()
     vehicle.goto(Target(0.0, 500.0, 20.0))
     hits = [vehicle.step(NO_ERROR, 6.0) for _ in range(600)]
@@ -135,7 +136,7 @@ def test_the_bottom_stops_it():
     assert vehicle.motion.depth_m == 6.0
 
 
-def test_it_steers_by_where_it_believes_to_be():
+def test_it_steers_by_where_it_believes_to_be() -> None:
     vehicle = Vehicle()
     target = Target(0.0, 60.0, 2.0)
     vehicle.goto(target)
@@ -146,7 +147,7 @@ def test_it_steers_by_where_it_believes_to_be():
     assert nearest < 1.0
 
 
-def test_a_new_vehicle_is_idle():
+def test_a_new_vehicle_is_idle() -> None:
     vehicle = Vehicle()
     assert vehicle.guidance is Guidance.IDLE
     fly(vehicle, 10)
@@ -154,7 +155,7 @@ def test_a_new_vehicle_is_idle():
 
 
 @given(st.floats(-100, 100))
-def test_wrapped_angles_are_the_same_angle(angle):
+def test_wrapped_angles_are_the_same_angle(angle: Any) -> None:
     wrapped = wrap(angle)
     assert -math.pi < wrapped <= math.pi
     assert math.cos(wrapped) == pytest.approx(math.cos(angle), abs=1e-9)

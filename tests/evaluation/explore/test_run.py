@@ -1,7 +1,9 @@
+from typing import Any
+
 import numpy as np
 import pytest
 
-from app.evaluation.explore.run import run_explore
+from app.evaluation.explore.run import ExploreRun, run_explore
 from app.evaluation.explore.team_changes import TeamChanges
 from app.evaluation.explore.world import CubeTerrain, ExploreScenario, World
 from app.exploration.core.constraints import inside_area
@@ -9,18 +11,22 @@ from app.exploration.planner.options import PlannerOptions
 from simulator.seafloors import generate
 from simulator.terrain import Terrain
 
+NO_CHANGES = TeamChanges()
+
 
 @pytest.fixture(scope="module")
-def smooth():
+def smooth() -> Any:
     return generate("smooth", 2, width_m=80.0, height_m=60.0)
 
 
-def run(terrain, planner, steps=120, seed=0, changes=TeamChanges(), **options):  # noqa: B008 - frozen
+def run(
+    terrain: Terrain, planner: str, steps: int = 120, seed: int = 0, changes: TeamChanges = NO_CHANGES, **options: Any
+) -> ExploreRun:
     scenario = ExploreScenario(terrain, landmarks=300, steps=steps, seed=seed, changes=changes)
     return run_explore(scenario, planner, PlannerOptions(**options))
 
 
-def test_the_cube_keeps_the_aspect_and_casts_depths(smooth):
+def test_the_cube_keeps_the_aspect_and_casts_depths(smooth: Terrain) -> None:
     cube = CubeTerrain(smooth)
     assert cube.half.tolist() == [1.0, 0.75]
     axis = np.linspace(-1, 1, 200)
@@ -29,7 +35,7 @@ def test_the_cube_keeps_the_aspect_and_casts_depths(smooth):
     assert 0.95 < depth.max() <= 1.0
 
 
-def test_remaining_landmarks_only_ever_decrease(smooth):
+def test_remaining_landmarks_only_ever_decrease(smooth: Terrain) -> None:
     result = run(smooth, "cao")
     assert (np.diff(result.history) <= 0.0).all()
     assert result.remaining_pct == result.history[-1]
@@ -49,14 +55,14 @@ def test_remaining_landmarks_only_ever_decrease(smooth):
         ("fdsa-tried", 18),
     ],
 )
-def test_same_seed_same_run(smooth, planner, tries):
+def test_same_seed_same_run(smooth: Terrain, planner: str, tries: int) -> None:
     first, second = (run(smooth, planner, steps=15, tries=2) for _ in range(2))
     assert first.history == second.history
     assert first.distance == second.distance
     assert first.real_tries == 15 * tries
 
 
-def test_planners_stand_in_the_expected_order(smooth):
+def test_planners_stand_in_the_expected_order(smooth: Terrain) -> None:
     left = {
         "random": run(smooth, "random").remaining_pct,
         "osarses": run(smooth, "osarses", tries=5).remaining_pct,
@@ -65,14 +71,14 @@ def test_planners_stand_in_the_expected_order(smooth):
     assert left["cao"] < left["osarses"] < left["random"]
 
 
-def test_the_first_term_alone_is_a_deadlock_that_the_other_terms_resolve(smooth):
+def test_the_first_term_alone_is_a_deadlock_that_the_other_terms_resolve(smooth: Terrain) -> None:
     left = {terms: run(smooth, "osarses", tries=5, objective=terms).remaining_pct for terms in ("J", "J+J1+J2", "full")}
     assert left["J"] > 80.0
     assert left["full"] < left["J"] - 20.0
     assert left["J+J1+J2"] < left["J"] - 10.0
 
 
-def test_polynomial_cao_learns_from_contributions_and_beats_chance(smooth):
+def test_polynomial_cao_learns_from_contributions_and_beats_chance(smooth: Terrain) -> None:
     by_vehicle, of_team, random = (
         run(smooth, "cao", steps=200, regressors="polynomial", contribution="vehicle").remaining_pct,
         run(smooth, "cao", steps=200, regressors="polynomial", contribution="team").remaining_pct,
@@ -81,7 +87,7 @@ def test_polynomial_cao_learns_from_contributions_and_beats_chance(smooth):
     assert by_vehicle < of_team < random
 
 
-def test_vehicles_never_touch_the_true_bottom(smooth):
+def test_vehicles_never_touch_the_true_bottom(smooth: Terrain) -> None:
     world = World(ExploreScenario(smooth))
     deep = world.positions + np.array([0.0, 0.0, 5.0])
     lifted = world.clear(deep)
@@ -90,7 +96,7 @@ def test_vehicles_never_touch_the_true_bottom(smooth):
 
 
 @pytest.mark.parametrize("planner", ["cao", "lawnmower", "random", "rollout", "osarses"])
-def test_a_lost_vehicle_does_not_stall_the_others(smooth, planner):
+def test_a_lost_vehicle_does_not_stall_the_others(smooth: Terrain, planner: str) -> None:
     result = run(smooth, planner, steps=40, changes=TeamChanges(lost=((2, 10),)), tries=2)
     assert result.history[-1] < result.history[10]
 
@@ -108,20 +114,23 @@ def test_a_lost_vehicle_does_not_stall_the_others(smooth, planner):
     ],
     ids=["nothing", "keep-out", "loss", "newcomer", "two", "many"],
 )
-def test_who_has_a_plan_finishes_whatever_happens_and_hardly_breaks_a_limit(smooth, planner, happens):
+def test_who_has_a_plan_finishes_whatever_happens_and_hardly_breaks_a_limit(
+    smooth: Terrain, planner: str, happens: dict[str, Any]
+) -> None:
     scenario = ExploreScenario(smooth, landmarks=300, steps=280, **happens)
     result = run_explore(scenario, planner, PlannerOptions(rollouts=100))
     assert result.t99 is not None
     assert result.broken_constraints <= 0.04 * scenario.robots * scenario.steps
 
 
-def test_rollouts_finish_before_the_lawnmower(smooth):
+def test_rollouts_finish_before_the_lawnmower(smooth: Terrain) -> None:
     first = {name: run(smooth, name, steps=250).t99 for name in ("rollout", "lawnmower")}
-    assert None not in first.values()
+    assert first["rollout"] is not None
+    assert first["lawnmower"] is not None
     assert first["rollout"] < first["lawnmower"]
 
 
-def test_vehicles_keep_their_numbers_when_others_leave_and_join(smooth):
+def test_vehicles_keep_their_numbers_when_others_leave_and_join(smooth: Terrain) -> None:
     changes = TeamChanges(lost=((1, 2), (4, 3)), joining=((2, 2),))
     world = World(ExploreScenario(smooth, landmarks=300, changes=changes))
     third = world.positions[2]
@@ -140,7 +149,7 @@ def test_vehicles_keep_their_numbers_when_others_leave_and_join(smooth):
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_a_newcomer_is_launched_within_range_of_a_team_member_at_its_height(smooth, seed):
+def test_a_newcomer_is_launched_within_range_of_a_team_member_at_its_height(smooth: Terrain, seed: int) -> None:
     scenario = ExploreScenario(
         smooth, landmarks=10, seed=seed, changes=TeamChanges(joining=((1, 1),)), keep_out_fraction=0.15
     )
@@ -157,7 +166,7 @@ def test_a_newcomer_is_launched_within_range_of_a_team_member_at_its_height(smoo
     assert inside_area(scenario.constraints, newcomer[None, :2])[0]
 
 
-def test_landmarks_lie_outside_the_keep_out_zones(smooth):
+def test_landmarks_lie_outside_the_keep_out_zones(smooth: Terrain) -> None:
     for landmarks in (200, None):
         scenario = ExploreScenario(smooth, landmarks=landmarks, keep_out_fraction=0.2)
         world = World(scenario)
@@ -165,7 +174,7 @@ def test_landmarks_lie_outside_the_keep_out_zones(smooth):
         assert np.isfinite(world.truth).all()
 
 
-def test_every_cell_of_known_depth_is_a_landmark_when_asked():
+def test_every_cell_of_known_depth_is_a_landmark_when_asked() -> None:
     z = np.random.default_rng(0).uniform(3.0, 9.0, (6, 8))
     z[2, 3] = np.nan
     world = World(ExploreScenario(Terrain(z, 2.0), landmarks=None))
@@ -175,7 +184,7 @@ def test_every_cell_of_known_depth_is_a_landmark_when_asked():
     )
 
 
-def test_the_sea_floor_hides_what_lies_behind_it_when_asked():
+def test_the_sea_floor_hides_what_lies_behind_it_when_asked() -> None:
     z = np.full((40, 40), 10.0)
     z[:, 19:21] = 2.0
     open_, hidden = (World(ExploreScenario(Terrain(z, 1.0), line_of_sight=los)) for los in (False, True))
@@ -187,7 +196,7 @@ def test_the_sea_floor_hides_what_lies_behind_it_when_asked():
     np.testing.assert_array_equal(open_.visible(beside)[0, before], hidden.visible(beside)[0, before])
 
 
-def test_a_broken_limit_is_counted_once_per_vehicle(smooth):
+def test_a_broken_limit_is_counted_once_per_vehicle(smooth: Terrain) -> None:
     world = World(ExploreScenario(smooth))
     assert world.broken(world.positions) == 0
     too_far = world.positions + np.array([0.08, 0.0, 0.0])

@@ -1,6 +1,8 @@
 """PCAO18's simulation, its yardsticks and the training: against slow references, and killed in the middle."""
 
 from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import orjson
@@ -27,35 +29,36 @@ SMALL = {"robots": 2, "landmarks": 60, "steps": 12}
 
 
 @pytest.fixture(scope="module")
-def floor():
+def floor() -> Any:
     return SeaFloor(sea_floor("harbour:3"))
 
 
 @pytest.fixture(scope="module")
-def task(floor):
+def task(floor: Any) -> Any:
     return TrainingTask((floor, SeaFloor(sea_floor("ridge:3"))), (0, 1), **SMALL)
 
 
 @pytest.mark.parametrize("sonar", [SONAR, Multibeam(0.1, 0.4, 0.3, 1, 0.0), Multibeam(0.1, 0.3, 0.05, 9, 1.2)])
-def test_the_kernels_beams_meet_what_the_sonars_do(floor, sonar):
+def test_the_kernels_beams_meet_what_the_sonars_do(floor: SeaFloor, sonar: Multibeam) -> None:
     physics = replace(floor, sonar=sonar).physics
     rng = np.random.default_rng(0)
     landmarks = np.column_stack([rng.uniform(-0.4, 0.4, (400, 2)), rng.uniform(-0.1, 0.5, 400)])
     for heading in rng.uniform(0, 2 * np.pi, 6):
         expected = sonar.meets(np.zeros(3), Attitude(heading), landmarks)
-        got = [meets(physics, *offset, np.sin(heading), np.cos(heading)) >= 0.0 for offset in landmarks]
+        turn = np.sin(heading), np.cos(heading)
+        got = [meets(physics, east, north, up, *turn) >= 0.0 for east, north, up in landmarks]
         np.testing.assert_array_equal(got, expected)
     assert 0 < expected.sum() < 400
 
 
-def test_the_kernels_floor_is_the_terrains(floor):
+def test_the_kernels_floor_is_the_terrains(floor: SeaFloor) -> None:
     xy = np.random.default_rng(1).uniform(-1.0, 1.0, (300, 2))
     expected = floor.cube.depth_at(xy)
     got = [floor_at(floor.raster, floor.physics, x, y) for x, y in xy]
     np.testing.assert_allclose(got, expected, atol=1e-12)
 
 
-def test_a_flight_never_loses_what_it_knows_and_repeats_itself(floor, task):
+def test_a_flight_never_loses_what_it_knows_and_repeats_itself(floor: SeaFloor, task: TrainingTask) -> None:
     parameters = default_model().parameters
     remaining, error = task.run(floor, 5, parameters)
     assert (np.diff(remaining) <= 0).all()
@@ -65,7 +68,7 @@ def test_a_flight_never_loses_what_it_knows_and_repeats_itself(floor, task):
     assert task.cost(remaining, error) == pytest.approx((error[:-1].sum() + 10.0 * remaining[-1]) / 12)
 
 
-def test_the_tries_are_judged_by_the_objective(floor):
+def test_the_tries_are_judged_by_the_objective(floor: SeaFloor) -> None:
     """J1, J2 and J3 of the compiled yardsticks are those of app.exploration.core.objective."""
     rng = np.random.default_rng(2)
     m, n = 50, 3
@@ -88,14 +91,14 @@ def test_the_tries_are_judged_by_the_objective(floor):
     assert J3.sum() == pytest.approx(expected.J3)
 
 
-def test_real_tries_cost_what_the_paper_says():
+def test_real_tries_cost_what_the_paper_says() -> None:
     steps = 500
     assert [steps * (1 + tries_per_step(SE, c, 3)) for c in (0, 5, 50, 500)] == [500, 3000, 25500, 250500]
     assert steps * (1 + tries_per_step(SPSA, 0, 3)) == 1500
     assert steps * (1 + tries_per_step(FDSA, 0, 3)) == 9500
 
 
-def test_more_tries_and_the_trained_controller_do_better(floor):
+def test_more_tries_and_the_trained_controller_do_better(floor: SeaFloor) -> None:
     landmarks, start, headings = floor.draw(0, 3, 200)
     left = [
         fly_tried(floor.raster, floor.physics, landmarks, start, headings, SE, c, 150, np.random.default_rng(0))[0][-1]
@@ -109,7 +112,7 @@ def test_more_tries_and_the_trained_controller_do_better(floor):
     assert not unknown(3).accurate.any()
 
 
-def test_the_step_of_algorithm_1_decays_as_it_must():
+def test_the_step_of_algorithm_1_decays_as_it_must() -> None:
     a = np.array([step_size(k) for k in range(100_000)])
     assert (np.diff(a) < 0).all()
     assert a[-1] < 0.01
@@ -119,7 +122,7 @@ def test_the_step_of_algorithm_1_decays_as_it_must():
 
 
 @pytest.mark.parametrize("method", sorted(METHODS))
-def test_a_killed_training_goes_on_to_the_same_end(method, task, tmp_path):
+def test_a_killed_training_goes_on_to_the_same_end(method: str, task: TrainingTask, tmp_path: Path) -> None:
     scorer, rounds = LocalScorer(task, 1), 3
     count = rounds * len(make_optimiser(method, 1).ask())
     whole = make_optimiser(method, 1)
@@ -128,7 +131,7 @@ def test_a_killed_training_goes_on_to_the_same_end(method, task, tmp_path):
     class KilledError(Exception):
         pass
 
-    def die(curve):
+    def die(curve: Any) -> None:
         if len(curve.scores) >= count // rounds:
             raise KilledError
 
@@ -139,7 +142,7 @@ def test_a_killed_training_goes_on_to_the_same_end(method, task, tmp_path):
     resumed, scored = make_optimiser(method, 1), []
 
     class Counting:
-        def score(self, controllers):
+        def score(self, controllers: Any) -> Any:
             scored.extend(controllers)
             return scorer.score(controllers)
 
@@ -149,13 +152,13 @@ def test_a_killed_training_goes_on_to_the_same_end(method, task, tmp_path):
     assert len(scored) == count - count // rounds
 
 
-def test_a_checkpoint_of_another_training_is_refused(tmp_path):
+def test_a_checkpoint_of_another_training_is_refused(tmp_path: Path) -> None:
     Checkpoint(tmp_path / "c", {"seed": 1, "steps": 5})
     with pytest.raises(CheckpointError, match="seed is 1 there, 2 here"):
         Checkpoint(tmp_path / "c", {"seed": 2, "steps": 5})
 
 
-def best_after(method, count):
+def best_after(method: Any, count: Any) -> Any:
     """Look for given gains: a score without noise that every optimiser is asked to lower."""
     wanted = np.concatenate([part.ravel() for part in gains(default_model().parameters)])
     optimiser = make_optimiser(method, 0)
@@ -167,27 +170,27 @@ def best_after(method, count):
     return optimiser.best_score
 
 
-def test_algorithm_1_and_cma_es_learn_where_random_search_does_not():
+def test_algorithm_1_and_cma_es_learn_where_random_search_does_not() -> None:
     random, pcao, cma = (best_after(method, 200) for method in ("random", "pcao", "cma"))
     assert pcao < 0.8 * random
     assert cma < 0.8 * random
 
 
-def test_regressors_hold_the_gains_and_their_squares():
+def test_regressors_hold_the_gains_and_their_squares() -> None:
     parameters = default_model().parameters
     horizontal, vertical = gains(parameters)
     g = np.concatenate([horizontal.ravel(), vertical.ravel()]) / 10.0
     np.testing.assert_allclose(regressors(parameters[None])[0], [1.0, *g, *g**2])
 
 
-def test_sea_floors_are_named_by_file_folder_or_family(tmp_path):
+def test_sea_floors_are_named_by_file_folder_or_family(tmp_path: Path) -> None:
     np.savez(tmp_path / "one.npz", z=np.full((4, 4), 5.0), cell_m=1.0)
     assert [t.name for t in sea_floors_of(["ridge:2,smooth:1", str(tmp_path)])] == ["ridge:2", "smooth:1", "one"]
     with pytest.raises(TerrainError, match="neither a file nor FAMILY:SEED"):
         sea_floor("nowhere")
 
 
-def test_the_train_command_writes_a_model_that_evaluations_fly_with(tmp_path):
+def test_the_train_command_writes_a_model_that_evaluations_fly_with(tmp_path: Path) -> None:
     out = tmp_path / "model.json"
     command = ["train", "--out", str(out), "--terrains", "smooth:1", "ridge:1", "--iterations", "3", "--runs", "1"]
     command += ["--method", "pcao", "--robots", "2", "--landmarks", "40", "--steps", "8", "--jobs", "2"]
@@ -210,7 +213,7 @@ def test_the_train_command_writes_a_model_that_evaluations_fly_with(tmp_path):
     assert orjson.loads(flown.stdout)["planner"] == "pcao"
 
 
-def test_what_is_no_model_is_refused_with_the_reason(tmp_path):
+def test_what_is_no_model_is_refused_with_the_reason(tmp_path: Path) -> None:
     (tmp_path / "m.json").write_text('{"format": "bathyfleet-pcao", "version": 1}')
     np.savez(tmp_path / "flat.npz", z=np.full((20, 20), 5.0), cell_m=1.0)
     explore = ["evaluate", "explore", "--terrain", str(tmp_path / "flat.npz"), "--planner", "pcao"]

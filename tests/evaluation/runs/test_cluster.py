@@ -2,6 +2,9 @@
 
 import os
 import signal
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -21,7 +24,7 @@ TASK = TrainingTask((SeaFloor(sea_floor("ridge:3")),), (0, 1, 2, 3), robots=2, l
 
 
 @pytest.fixture(scope="module")
-def workers():
+def workers() -> Iterator[Any]:
     with LocalCluster(
         n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs=50
     ) as cluster:
@@ -29,11 +32,11 @@ def workers():
 
 
 @pytest.mark.filterwarnings("ignore")  # a dying worker leaves sockets behind
-def test_a_worker_killed_in_training_costs_nothing(workers, tmp_path):
+def test_a_worker_killed_in_training_costs_nothing(workers: Any, tmp_path: Path) -> None:
     cluster = Cluster(workers.scheduler_address)
-    killed = []
+    killed: list[Any] = []
 
-    def kill_one(curve):
+    def kill_one(curve: Any) -> None:
         if len(curve.scores) >= 2 and not killed:
             killed.append(workers.workers[0].process.pid)
             os.kill(killed[0], signal.SIGKILL)
@@ -50,7 +53,7 @@ def test_a_worker_killed_in_training_costs_nothing(workers, tmp_path):
 
 
 @pytest.mark.filterwarnings("ignore")
-def test_evaluations_on_a_cluster_are_those_made_here(workers):
+def test_evaluations_on_a_cluster_are_those_made_here(workers: Any) -> None:
     jobs = [
         FlightJob(sea_floor("ridge:3"), "pcao", seed, default_model().parameters, 2, 60, 12) for seed in (100, 101, 102)
     ]
@@ -60,7 +63,7 @@ def test_evaluations_on_a_cluster_are_those_made_here(workers):
     assert [run["seed"] for run in there] == [100, 101, 102]
 
 
-def test_a_scheduler_that_is_not_there_is_named(unused_tcp_port, monkeypatch):
+def test_a_scheduler_that_is_not_there_is_named(unused_tcp_port: int, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("app.evaluation.runs.cluster.CONNECT_S", 0.3)
     with pytest.raises(ClusterError, match=rf"no Dask cluster answers at 'tcp://127.0.0.1:{unused_tcp_port}'"):
         Cluster(f"tcp://127.0.0.1:{unused_tcp_port}")

@@ -1,4 +1,6 @@
 from itertools import pairwise
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,11 +19,11 @@ QUICK = PlannerOptions(search=40)
 
 
 @pytest.fixture(scope="module")
-def harbour():
+def harbour() -> Any:
     return generate("harbour", 1, width_m=60.0, height_m=60.0)
 
 
-def test_continuous_soundings_cover_the_leg_and_steps_only_its_end():
+def test_continuous_soundings_cover_the_leg_and_steps_only_its_end() -> None:
     start, end = np.array([0.0, 0.0, 2.0]), np.array([3.0, 4.0, 2.0])
     points, since = along(start, end, "step")
     assert (points.tolist(), since) == ([end.tolist()], 0.0)
@@ -33,7 +35,7 @@ def test_continuous_soundings_cover_the_leg_and_steps_only_its_end():
 
 
 @given(legs=st.lists(st.floats(0.0, 3.0), min_size=1, max_size=20))
-def test_a_sounder_does_not_begin_anew_with_each_leg(legs):
+def test_a_sounder_does_not_begin_anew_with_each_leg(legs: Any) -> None:
     ends = np.cumsum([0.0, *legs])
     since, found = 0.0, []
     for start, end in pairwise(ends):
@@ -43,7 +45,7 @@ def test_a_sounder_does_not_begin_anew_with_each_leg(legs):
     assert found == pytest.approx(0.26 * np.arange(1, len(found) + 1), abs=1e-6)
 
 
-def test_a_run_is_reproducible_and_obeys_its_constraints(harbour):
+def test_a_run_is_reproducible_and_obeys_its_constraints(harbour: Any) -> None:
     scenario = SurveyScenario(harbour, steps=12, seed=3)
     first, second = (fly_planner(scenario, "cao", QUICK) for _ in range(2))
     np.testing.assert_array_equal(first.positions_m, second.positions_m)
@@ -52,7 +54,7 @@ def test_a_run_is_reproducible_and_obeys_its_constraints(harbour):
         assert scenario.constraints.feasible(before, after[None])[0]
 
 
-def test_a_survey_run_reports_the_planner_beside_its_yardsticks(harbour):
+def test_a_survey_run_reports_the_planner_beside_its_yardsticks(harbour: Any) -> None:
     run = run_survey(SurveyScenario(harbour, steps=30, seed=0), "cao", QUICK)
     relief = float(np.std(harbour.z_m))
     for result in (run, run.usual_practice, run.coverage, run.oracle):
@@ -65,7 +67,7 @@ def test_a_survey_run_reports_the_planner_beside_its_yardsticks(harbour):
     assert run.recorded_track is None
 
 
-def test_baselines_travel_as_far_and_sound_as_often(harbour):
+def test_baselines_travel_as_far_and_sound_as_often(harbour: Any) -> None:
     scenario = SurveyScenario(harbour)
     pair = lawnmower_baselines(harbour, scenario.constraints, scenario.starts_m, 300.0, 4000, scenario.grid)
     assert 400.0 < pair.same_distance.distance_m <= 600.0
@@ -73,7 +75,7 @@ def test_baselines_travel_as_far_and_sound_as_often(harbour):
     assert pair.same_soundings.rmse_m < pair.same_distance.rmse_m
 
 
-def test_a_flown_lawnmower_finishes_its_lines_within_the_distance_that_it_is_given(harbour):
+def test_a_flown_lawnmower_finishes_its_lines_within_the_distance_that_it_is_given(harbour: Any) -> None:
     scenario = SurveyScenario(harbour)
     soundings, flown_m = fly_lawnmower(
         harbour, scenario.constraints, scenario.starts_m, 250.0, relative_noise=0.01, seed=0
@@ -87,7 +89,7 @@ def test_a_flown_lawnmower_finishes_its_lines_within_the_distance_that_it_is_giv
     assert np.abs(deviation).mean() < 1.5
 
 
-def test_the_default_planner_beats_the_lawnmower_where_detail_is_concentrated():
+def test_the_default_planner_beats_the_lawnmower_where_detail_is_concentrated() -> None:
     ratios = []
     for seed in (1, 2):
         scenario = SurveyScenario(generate("harbour", seed, width_m=70.0, height_m=70.0), steps=40, seed=seed)
@@ -105,8 +107,10 @@ def test_the_default_planner_beats_the_lawnmower_where_detail_is_concentrated():
 
 
 @pytest.mark.terrains
-def test_recorded_track_is_compared_where_the_terrain_has_one(terrains):
+def test_recorded_track_is_compared_where_the_terrain_has_one(terrains: Path) -> None:
     from app.evaluation.survey.recorded import recorded_soundings
 
-    assert len(recorded_soundings(terrains / "leixoes_sharp.npz")) == 2560
+    recorded = recorded_soundings(terrains / "leixoes_sharp.npz")
+    assert recorded is not None
+    assert len(recorded) == 2560
     assert recorded_soundings(terrains / "leixoes_slope.npz") is None

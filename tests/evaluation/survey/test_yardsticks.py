@@ -1,3 +1,5 @@
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -10,12 +12,12 @@ from simulator.terrain import Terrain
 
 
 @pytest.fixture(scope="module")
-def reef():
+def reef() -> Any:
     return generate("reef", 2, width_m=40.0, height_m=40.0)
 
 
 @pytest.mark.parametrize("symmetry", range(SYMMETRIES))
-def test_soundings_turn_with_their_sea_floor(symmetry):
+def test_soundings_turn_with_their_sea_floor(symmetry: Any) -> None:
     terrain = generate("rugged", 1, width_m=30.0, height_m=20.0)
     rng = np.random.default_rng(symmetry)
     east, north = rng.uniform(1.0, 29.0, 50), rng.uniform(1.0, 19.0, 50)
@@ -24,12 +26,12 @@ def test_soundings_turn_with_their_sea_floor(symmetry):
     np.testing.assert_allclose(floor.depth_at(there.east_m, there.north_m), soundings.depth_m, atol=1e-9)
 
 
-def test_the_symmetries_are_eight_different_ones():
+def test_the_symmetries_are_eight_different_ones() -> None:
     terrain = generate("rugged", 1, width_m=8.0, height_m=8.0)
     assert len({turned(terrain, k).z_m.tobytes() for k in range(SYMMETRIES)}) == SYMMETRIES
 
 
-def test_an_oracle_does_better_than_the_same_number_of_random_soundings(reef):
+def test_an_oracle_does_better_than_the_same_number_of_random_soundings(reef: Any) -> None:
     scenario = SurveyScenario(reef)
     placed = oracle_soundings(scenario.log(3), reef, 150, 2.0)
     assert len(placed) == 150
@@ -40,7 +42,7 @@ def test_an_oracle_does_better_than_the_same_number_of_random_soundings(reef):
 
 
 @pytest.mark.parametrize(("sounder", "beams", "aside_m"), [("single", 1, 0.0), ("dvl", 3, 3.3), ("swath", 5, 8.0)])
-def test_sounders_hear_so_many_beams_across_the_way(sounder, beams, aside_m):
+def test_sounders_hear_so_many_beams_across_the_way(sounder: Any, beams: Any, aside_m: Any) -> None:
     flat = Terrain(np.full((60, 60), 10.0), 1.0)
     scenario = SurveyScenario(flat, sounder=sounder, relative_noise=1e-6)
     log = scenario.log(1)

@@ -1,9 +1,12 @@
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely import LineString, Point, Polygon
 
+from app.arrays import FloatArray
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.constraints import Constraints, Limit, inside_area
 
@@ -13,7 +16,7 @@ coordinate = st.floats(-20.0, 120.0)
 point = st.tuples(coordinate, coordinate)
 
 
-def limits_broken(constraints, origin, target, bottom=None):
+def limits_broken(constraints: Any, origin: Any, target: Any, bottom: Any = None) -> Any:
     names = tuple("abcdef"[: len(origin)])
     found = constraints.violations(names, np.array(origin, float), np.array(target, float), bottom)
     return {(v.vehicle, v.limit) for v in found}
@@ -21,7 +24,7 @@ def limits_broken(constraints, origin, target, bottom=None):
 
 @given(start=point, end=point)
 @settings(max_examples=200, deadline=None)
-def test_area_and_keep_out_agree_with_shapely(start, end):
+def test_area_and_keep_out_agree_with_shapely(start: Any, end: Any) -> None:
     area, zone = Polygon(L_SHAPE), Polygon(ZONE)
     leg = LineString([start, end])
     free = area.difference(zone)
@@ -50,7 +53,7 @@ def test_area_and_keep_out_agree_with_shapely(start, end):
     ],
     ids=lambda x: x.name if isinstance(x, Limit) else "",
 )
-def test_each_limit_is_named_with_the_vehicle(target, limit, square):
+def test_each_limit_is_named_with_the_vehicle(target: Any, limit: Any, square: FloatArray) -> None:
     bottom = Bottom(0.0, 0.0, 10.0, np.full((10, 10), 8.0))
     constraints = Constraints(square, max_step_m=20.0, min_depth_m=1.0, max_depth_m=8.5, min_altitude_m=1.0)
     origin = np.array([[15.0, 20.0, 3.0]])
@@ -59,19 +62,19 @@ def test_each_limit_is_named_with_the_vehicle(target, limit, square):
     assert not constraints.feasible(origin, np.array([[target]]), bottom)[0]
 
 
-def test_reasons_tell_value_and_limit(square):
+def test_reasons_tell_value_and_limit(square: FloatArray) -> None:
     constraints = Constraints(square, max_step_m=5.0)
     violation = constraints.violations(("lauv-1",), np.array([[50.0, 50, 2]]), np.array([[62.0, 50, 2]]))[0]
     assert str(violation) == "lauv-1: step of 12.00 m is longer than 5 m"
     assert violation.value_m == pytest.approx(12.0)
 
 
-def test_a_single_vehicle_needs_no_communication(square):
+def test_a_single_vehicle_needs_no_communication(square: FloatArray) -> None:
     constraints = Constraints(square, com_range_m=1.0)
     assert constraints.feasible(np.array([[50.0, 50, 2]]), np.array([[[51.0, 50, 2]]]))[0]
 
 
-def test_every_vehicle_needs_another_in_range(square):
+def test_every_vehicle_needs_another_in_range(square: FloatArray) -> None:
     constraints = Constraints(square, com_range_m=8.0, max_step_m=50.0)
     origin = np.array([[50.0, 50, 2], [55.0, 50, 2], [60.0, 50, 2]])
     chain, torn = origin.copy(), origin.copy()
@@ -80,7 +83,7 @@ def test_every_vehicle_needs_another_in_range(square):
     assert limits_broken(constraints, origin, torn) == {("c", Limit.COM_RANGE)}
 
 
-def test_vehicles_may_not_pass_each_other_too_closely(square):
+def test_vehicles_may_not_pass_each_other_too_closely(square: FloatArray) -> None:
     constraints = Constraints(square, max_step_m=30.0, min_separation_m=4.0, min_vertical_separation_m=3.0)
     origin = np.array([[40.0, 50, 2], [60.0, 50, 2]])
     swapped = origin[::-1]
@@ -89,14 +92,14 @@ def test_vehicles_may_not_pass_each_other_too_closely(square):
     assert limits_broken(constraints, apart, apart[::-1] * [1, 1, 0] + apart * [0, 0, 1]) == set()
 
 
-def test_a_broken_limit_may_only_get_better(square):
+def test_a_broken_limit_may_only_get_better(square: FloatArray) -> None:
     constraints = Constraints(square, max_step_m=10.0)
     outside = np.array([[-30.0, 50.0, 2.0]])
     back, further = np.array([[-21.0, 50.0, 2.0]]), np.array([[-31.0, 50.0, 2.0]])
     assert constraints.feasible(outside, np.stack([back, further, outside])).tolist() == [True, False, False]
 
 
-def test_the_bottom_is_watched_along_the_whole_leg(square):
+def test_the_bottom_is_watched_along_the_whole_leg(square: FloatArray) -> None:
     depth = np.full((10, 10), 10.0)
     depth[5, 5] = 2.5
     ridge = Bottom(0.0, 0.0, 10.0, depth)
@@ -106,7 +109,7 @@ def test_the_bottom_is_watched_along_the_whole_leg(square):
     assert limits_broken(constraints, origin, over, Bottom.unknown()) == set()
 
 
-def test_bottom_from_landmarks_is_the_closest_known_depth():
+def test_bottom_from_landmarks_is_the_closest_known_depth() -> None:
     axis = np.arange(0.5, 20.0)
     east, north = np.meshgrid(axis, axis)
     xy = np.column_stack([east.ravel(), north.ravel()])
@@ -117,7 +120,7 @@ def test_bottom_from_landmarks_is_the_closest_known_depth():
     assert np.isnan(bottom.at(np.array([500.0, 0.0])))
 
 
-def test_points_inside_area_match_shapely():
+def test_points_inside_area_match_shapely() -> None:
     points = np.random.default_rng(0).uniform(-10, 110, (400, 2))
     free = Polygon(L_SHAPE).difference(Polygon(ZONE))
     expected = [free.contains(Point(p)) for p in points]

@@ -1,6 +1,8 @@
 """What takes vehicles out of the plan: targets that are about to be lost, and localization that fades."""
 
+from collections.abc import Iterator
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -21,19 +23,21 @@ LIMITS = Constraints(SQUARE, max_step_m=10.0, max_depth_m=20.0)
 SENSOR = RangeSensor(visibility_m=25.0)
 
 
-def targets(sd=(4.0,), at=((80.0, 60.0, 5.0),), accuracy=2.0):
+def targets(sd: tuple[Any, ...] = (4.0,), at: tuple[Any, ...] = ((80.0, 60.0, 5.0),), accuracy: float = 2.0) -> Any:
     n = len(at)
     state = np.hstack([np.array(at, dtype=float), np.zeros((n, 3))])
     covariance = np.array([np.diag([s * s] * 3 + [0.01] * 3) for s in sd])
     return Targets(state, covariance, np.array(sd) < accuracy, accuracy, 0.1)
 
 
-def localization(sd=(1.0, 1.0, 1.0), foretold=None, shared=True, threshold=2.0):
+def localization(
+    sd: tuple[Any, ...] = (1.0, 1.0, 1.0), foretold: Any = None, shared: bool = True, threshold: float = 2.0
+) -> Any:
     values = np.array(sd)
     return Localization(values, values if foretold is None else np.array(foretold), threshold, 0.0, shared)
 
 
-def fly(planner, steps, *, limits=LIMITS, start=START, **dynamic):
+def fly(planner: Any, steps: Any, *, limits: Any = LIMITS, start: Any = START, **dynamic: Any) -> Iterator[Any]:
     """Fly in closed loop with a belief that does not change; yields positions."""
     at = start
     for step in range(1, steps + 1):
@@ -44,12 +48,12 @@ def fly(planner, steps, *, limits=LIMITS, start=START, **dynamic):
         yield situation, at
 
 
-def make(name):
+def make(name: Any) -> Any:
     return create_planner(name, PlannerOptions(rollouts=10, candidates=8), SENSOR)
 
 
 @pytest.mark.parametrize("name", sorted(set(PLANNERS) - {"random"}))
-def test_a_lost_target_draws_one_vehicle_and_only_one(name):
+def test_a_lost_target_draws_one_vehicle_and_only_one(name: Any) -> None:
     lost = targets()
     before = np.linalg.norm(START - lost.state[0, :3], axis=1)
     *_, (_, after) = fly(make(name), 5, targets=lost)
@@ -59,14 +63,14 @@ def test_a_lost_target_draws_one_vehicle_and_only_one(name):
 
 
 @pytest.mark.parametrize("name", sorted(set(PLANNERS) - {"random"}))
-def test_fading_localization_brings_up_the_shallowest_vehicle(name):
+def test_fading_localization_brings_up_the_shallowest_vehicle(name: Any) -> None:
     start = START + np.array([0.0, 0.0, 8.0])
     low = Constraints(SQUARE, max_step_m=4.0, max_depth_m=20.0, min_altitude_m=0.5)
     flown = [at for _, at in fly(make(name), 3, limits=low, start=start, localization=localization((2.5, 1.0, 1.0)))]
     assert flown[-1][1, 2] == pytest.approx(0.0)
 
 
-def test_it_rises_early_enough_and_not_before():
+def test_it_rises_early_enough_and_not_before() -> None:
     planner = make("lawnmower")
     in_time = localization((1.0, 1.0, 1.0), (1.9, 1.9, 1.9))
     late = localization((1.0, 1.0, 1.0), (1.9, 2.1, 1.9))
@@ -78,12 +82,12 @@ def test_it_rises_early_enough_and_not_before():
     assert planner._errands.assign(NAMES, other, None, in_time) == []
 
 
-def test_each_for_itself_where_fixes_are_not_shared():
+def test_each_for_itself_where_fixes_are_not_shared() -> None:
     own = localization((2.5, 1.0, 2.5), shared=False)
     assert [e.vehicle for e in make("cao")._errands.assign(NAMES, START, None, own)] == ["a", "c"]
 
 
-def test_one_vehicle_goes_from_target_to_target():
+def test_one_vehicle_goes_from_target_to_target() -> None:
     errands = make("cao")._errands
     near = [e.vehicle for e in errands.assign(NAMES, START, targets((4.0, 5.0), ((80, 60, 5), (20, 30, 5))), None)]
     assert near == ["a"]
@@ -92,7 +96,7 @@ def test_one_vehicle_goes_from_target_to_target():
 
 
 @pytest.mark.parametrize("name", sorted(PLANNERS))
-def test_errands_break_no_limit(name):
+def test_errands_break_no_limit(name: Any) -> None:
     zone = np.array([[50.0, 10.0], [60.0, 10.0], [60.0, 60.0], [50.0, 60.0]])
     for com_range in (np.inf, 25.0):
         limits = replace(LIMITS, keep_out=(zone,), com_range_m=com_range, min_separation_m=2.0)
@@ -103,7 +107,7 @@ def test_errands_break_no_limit(name):
             assert limits.violations(NAMES, situation.positions, at, bottom) == ()
 
 
-def test_errands_are_remembered():
+def test_errands_are_remembered() -> None:
     planner, memory = make("rollout"), b""
     for step, (situation, at) in enumerate(fly(planner, 4, targets=targets(), localization=localization())):
         if step:
@@ -114,7 +118,7 @@ def test_errands_are_remembered():
         memory = planner.snapshot()
 
 
-def test_med13_cost_counts_targets_and_the_fictitious_one():
+def test_med13_cost_counts_targets_and_the_fictitious_one() -> None:
     open_, known = targets(), targets(sd=(0.5,))
     nearest = float(((START - open_.state[0, :3]) ** 2).sum(axis=1).min())
     assert dynamic_cost(START, open_, None, 7.0) == pytest.approx(nearest)
@@ -124,7 +128,7 @@ def test_med13_cost_counts_targets_and_the_fictitious_one():
     assert dynamic_cost(START, known, poor, 7.0) == pytest.approx(FICTITIOUS_WEIGHT * 3.0**2)
 
 
-def test_what_is_lacking_follows_the_axes_of_the_error():
+def test_what_is_lacking_follows_the_axes_of_the_error() -> None:
     n = 4
     covariance = np.repeat(np.diag([0.2**2, 0.05**2, 0.3**2])[None], n, axis=0)
     covariance[2] = np.inf
@@ -140,7 +144,7 @@ def test_what_is_lacking_follows_the_axes_of_the_error():
     np.testing.assert_allclose(left.need[left.row == 2], 150.0)
 
 
-def test_where_only_depths_are_estimated_one_figure_is_lacking():
+def test_where_only_depths_are_estimated_one_figure_is_lacking() -> None:
     belief = make_belief()
     left = lacking(belief, 0.1)
     np.testing.assert_array_equal(left.row, np.flatnonzero(~belief.accurate))

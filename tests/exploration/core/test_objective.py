@@ -1,5 +1,7 @@
 """The terms against a slow, literal transcription of AURO15 eq. (8)-(15) with the errata."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -16,7 +18,7 @@ from app.exploration.core.objective import (
 )
 
 
-def draw(seed, n=3, m=40):
+def draw(seed: Any, n: int = 3, m: int = 40) -> Any:
     rng = np.random.default_rng(seed)
     positions, landmarks = rng.uniform(-1, 1, (n, 3)), rng.uniform(-1, 1, (m, 3))
     accurate, visible = rng.random(m) < 0.3, rng.random((n, m)) < 0.3
@@ -25,7 +27,7 @@ def draw(seed, n=3, m=40):
     return positions, landmarks, sets
 
 
-def slow_terms(positions, landmarks, sets, before, s1, s2, s3):
+def slow_terms(positions: Any, landmarks: Any, sets: Any, before: Any, s1: Any, s2: Any, s3: Any) -> Any:
     n = len(positions)
     J = sum(bool(x) for x in sets.accurate) - before
     J1 = J2 = J3 = 0.0
@@ -49,7 +51,7 @@ def slow_terms(positions, landmarks, sets, before, s1, s2, s3):
 
 @given(seed=st.integers(0, 10_000))
 @settings(max_examples=60, deadline=None)
-def test_terms_match_the_slow_reference(seed):
+def test_terms_match_the_slow_reference(seed: Any) -> None:
     positions, landmarks, sets = draw(seed)
     rng = np.random.default_rng(seed + 1)
     earlier, before = (
@@ -59,16 +61,19 @@ def test_terms_match_the_slow_reference(seed):
     weights = ObjectiveWeights(K1=2.0, K2=3.0, K3=5.0)
     result = objective(positions, landmarks, sets, 7, earlier, before, weights)
     s = switches(earlier, before, weights)
+    assert s is not None
     expected = slow_terms(positions, landmarks, sets, 7, *s)
     assert pytest.approx(expected) == (result.J, result.J1, result.J2, result.J3)
     assert result.total == pytest.approx(sum(expected))
 
 
-def test_switches_are_closed_while_a_vehicle_gains_and_open_in_a_deadlock():
+def test_switches_are_closed_while_a_vehicle_gains_and_open_in_a_deadlock() -> None:
     weights = ObjectiveWeights(K1=1.0, K2=2.0, K3=3.0)
     earlier = VehicleProgress(np.array([5.0, 5, 5]), np.array([1.0, 1, 1]), np.array([-1.0, -1, -1]))
     before = VehicleProgress(np.array([6.0, 5, 5]), np.array([1.0, 2, 1]), np.array([-1.0, -1, -1]))
-    s1, s2, s3 = switches(earlier, before, weights)
+    opened = switches(earlier, before, weights)
+    assert opened is not None
+    s1, s2, s3 = opened
     assert s1.tolist() == [0, 1, 1]
     assert s2.tolist() == [0, 2, 2]
     assert s3.tolist() == [0, 0, 3]
@@ -76,7 +81,7 @@ def test_switches_are_closed_while_a_vehicle_gains_and_open_in_a_deadlock():
 
 @given(seed=st.integers(0, 10_000))
 @settings(max_examples=60, deadline=None)
-def test_no_configuration_is_worth_more_than_the_one_that_finishes_the_map(seed):
+def test_no_configuration_is_worth_more_than_the_one_that_finishes_the_map(seed: Any) -> None:
     # J1 rewards landmarks that are seen but not finished, so the maximum is the finished map as long as K1 is below the
     # worth of finishing them: what one more vehicle sees of a landmark counts no more than making it accurate.
     positions, landmarks, sets = draw(seed)
@@ -94,7 +99,7 @@ def test_no_configuration_is_worth_more_than_the_one_that_finishes_the_map(seed)
 
 @given(seed=st.integers(0, 10_000), K=st.floats(0.1, 5.0))
 @settings(max_examples=40, deadline=None)
-def test_the_cost_of_med13_matches_the_slow_reference(seed, K):
+def test_the_cost_of_med13_matches_the_slow_reference(seed: Any, K: Any) -> None:
     positions, landmarks, sets = draw(seed)
     cost = 0.0
     for q in range(len(landmarks)):
@@ -107,14 +112,14 @@ def test_the_cost_of_med13_matches_the_slow_reference(seed, K):
 
 
 @pytest.mark.parametrize(("terms", "kept"), [("J", 0), ("J+J1", 1), ("J+J1+J2", 2), ("full", 3)])
-def test_each_term_can_be_left_out(terms, kept):
+def test_each_term_can_be_left_out(terms: Any, kept: Any) -> None:
     positions, landmarks, sets = draw(5)
     weights = ObjectiveWeights.of(terms)
     result = objective(positions, landmarks, sets, 0, weights=weights)
     assert [value != 0.0 for value in (result.J1, result.J2, result.J3)] == [kept > k for k in range(3)]
 
 
-def test_open_switches_stay_open_whatever_the_vehicles_gain():
+def test_open_switches_stay_open_whatever_the_vehicles_gain() -> None:
     earlier = VehicleProgress(np.array([5.0]), np.array([1.0]), np.array([-1.0]))
     before = VehicleProgress(np.array([9.0]), np.array([7.0]), np.array([-3.0]))
     assert [s.tolist() for s in switches(earlier, before, ObjectiveWeights.of("full"))] == [[0], [0], [0]]
@@ -122,7 +127,7 @@ def test_open_switches_stay_open_whatever_the_vehicles_gain():
     assert [s.tolist() for s in opened] == [[1], [1], [1]]
 
 
-def test_landmarks_of_unknown_depth_count_at_the_mean_depth():
+def test_landmarks_of_unknown_depth_count_at_the_mean_depth() -> None:
     positions = np.zeros((1, 3))
     landmarks = np.array([[1.0, 0.0, 2.0], [0.0, 1.0, np.nan]])
     sets = LandmarkSets(np.zeros(2, bool), np.zeros(1, np.int64), np.zeros((1, 2), bool), np.ones(2, bool))

@@ -1,3 +1,5 @@
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -11,33 +13,33 @@ AREA = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 START = np.array([-0.8, -0.8, 0.1])
 
 
-def box(west, south, east, north):
+def box(west: Any, south: Any, east: Any, north: Any) -> Any:
     return np.array([[west, south], [east, south], [east, north], [west, north]])
 
 
-def space(*zones, n=3, direction=np.pi / 2):
+def space(*zones: Any, n: int = 3, direction: Any = np.pi / 2) -> Any:
     return RowSpace(Constraints(AREA, zones), direction, n, 0.1, 0.004)
 
 
-def places(*zones):
+def places(*zones: Any) -> Any:
     axis = np.linspace(-0.98, 0.98, 40)
     points = np.stack(np.meshgrid(axis, axis), axis=-1).reshape(-1, 2)
     return points[[not any(Polygon(z).buffer(1e-9).covers(LineString([p, p])) for z in zones) for p in points]]
 
 
-def tracks(rows, route):
+def tracks(rows: Any, route: Any) -> Any:
     """The line that each vehicle flies, when the row follows the route."""
     return [LineString(line) for line in np.swapaxes(rows.slots(np.vstack([START, route])), 0, 1)]
 
 
-def farthest(points, lines):
+def farthest(points: Any, lines: Any) -> Any:
     x = np.array([min(line.distance(LineString([p, p])) for line in lines) for p in points])
     return float(x.max())
 
 
 @pytest.mark.parametrize("direction", [0.0, np.pi / 2])
 @pytest.mark.parametrize("n", [1, 2, 3, 5])
-def test_lines_come_close_to_every_place_of_an_open_area(n, direction):
+def test_lines_come_close_to_every_place_of_an_open_area(n: Any, direction: Any) -> None:
     rows = space(n=n, direction=direction)
     route = lines_over(rows, START, places(), 0.24, 0.15)
     assert farthest(places(), tracks(rows, route)) <= np.hypot(0.12, 0.17) + 0.02
@@ -52,7 +54,7 @@ ZONES = [
 
 @pytest.mark.parametrize("zones", ZONES, ids=["one", "borders", "three"])
 @pytest.mark.parametrize("direction", [0.0, np.pi / 2])
-def test_no_vehicle_of_a_row_enters_a_zone_or_leaves_the_area(zones, direction):
+def test_no_vehicle_of_a_row_enters_a_zone_or_leaves_the_area(zones: Any, direction: Any) -> None:
     rows = space(*zones, direction=direction)
     route = lines_over(rows, START, places(*zones), 0.24, 0.15)
     for track in tracks(rows, route):
@@ -68,7 +70,7 @@ def test_no_vehicle_of_a_row_enters_a_zone_or_leaves_the_area(zones, direction):
     seed=st.integers(0, 100),
 )
 @settings(max_examples=30, deadline=None)
-def test_following_a_route_piece_by_piece_is_following_it_at_once(distances, seed):
+def test_following_a_route_piece_by_piece_is_following_it_at_once(distances: Any, seed: Any) -> None:
     rows, rng = space(), np.random.default_rng(seed)
     route = np.column_stack([rng.uniform(-0.8, 0.8, (5, 2)), rng.uniform(0.0, 0.2, 5)])
     here, rest = START, route
@@ -81,7 +83,7 @@ def test_following_a_route_piece_by_piece_is_following_it_at_once(distances, see
     np.testing.assert_allclose(here, at_once, atol=1e-9)
 
 
-def test_only_what_is_unfinished_is_swept():
+def test_only_what_is_unfinished_is_swept() -> None:
     rows = space()
     corner = places()[(places() > 0.3).all(axis=1)]
     route = lines_over(rows, START, corner, 0.24, 0.15)

@@ -1,6 +1,7 @@
 """The PCAO controller: the paper's equations, its symmetries, its bounds, its model file."""
 
 import json
+from typing import Any
 
 import numpy as np
 import pytest
@@ -35,7 +36,7 @@ from tests.support.situations import SQUARE, make_belief, make_situation
 UNIT = 0.1
 
 
-def world(rng, vehicles=3, landmarks=80):
+def world(rng: Any, vehicles: int = 3, landmarks: int = 80) -> Any:
     positions = np.column_stack([rng.uniform(-0.8, 0.8, (vehicles, 2)), rng.uniform(0.1, 0.4, vehicles)])
     angle = rng.uniform(0, 2 * np.pi, vehicles)
     moves = np.column_stack([np.sin(angle), np.cos(angle)])
@@ -44,11 +45,11 @@ def world(rng, vehicles=3, landmarks=80):
     return positions, moves, rng.uniform(0.05, 0.4, vehicles), rng.uniform(-1, 1, (landmarks, 2)), depth, left
 
 
-def state(positions, moves, heights, xy, depth, left):
+def state(positions: Any, moves: Any, heights: Any, xy: Any, depth: Any, left: Any) -> Any:
     return reduced_state(positions, moves, heights, np.ascontiguousarray(xy), depth, left, len(xy) / 4.0, UNIT)
 
 
-def literal(vectors, figures, schedule, parameters):
+def literal(vectors: Any, figures: Any, schedule: Any, parameters: Any) -> Any:
     """Return u of one vehicle by eq. (13) to (16) as they stand: z, its Jacobian M_z, block-diagonal P, B."""
     x = np.concatenate([vectors[:, 0], vectors[:, 1], figures])
     n = len(x)
@@ -72,7 +73,7 @@ def literal(vectors, figures, schedule, parameters):
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_the_controller_is_the_papers(seed):
+def test_the_controller_is_the_papers(seed: Any) -> None:
     rng = np.random.default_rng(seed)
     parameters = random_parameters(rng)[0]
     vectors, figures, schedule = state(*world(rng))
@@ -82,7 +83,7 @@ def test_the_controller_is_the_papers(seed):
 
 
 @given(st.floats(0, 1), st.floats(0, 1))
-def test_mixing_signals_share_the_whole(here, left):
+def test_mixing_signals_share_the_whole(here: Any, left: Any) -> None:
     beta = np.array(mixing(here, left))
     assert (beta >= 0).all()
     assert beta.sum() == pytest.approx(1.0)
@@ -90,7 +91,7 @@ def test_mixing_signals_share_the_whole(here, left):
 
 @settings(max_examples=25)
 @given(st.integers(0, 10_000), st.floats(0.1, 50))
-def test_every_p_is_brought_within_its_bounds_and_stays_there(seed, size):
+def test_every_p_is_brought_within_its_bounds_and_stays_there(seed: Any, size: Any) -> None:
     parameters = size * np.random.default_rng(seed).standard_normal(SIZE)
     bounded = within_bounds(parameters)
     for block in blocks(bounded):
@@ -101,7 +102,7 @@ def test_every_p_is_brought_within_its_bounds_and_stays_there(seed, size):
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_permuted_vehicles_have_permuted_states(seed):
+def test_permuted_vehicles_have_permuted_states(seed: Any) -> None:
     rng = np.random.default_rng(seed)
     positions, moves, heights, xy, depth, left = world(rng, vehicles=5)
     order = rng.permutation(5)
@@ -112,7 +113,7 @@ def test_permuted_vehicles_have_permuted_states(seed):
 
 
 @pytest.mark.parametrize("turn", [np.array([[0.0, -1.0], [1.0, 0.0]]), np.array([[-1.0, 0.0], [0.0, 1.0]])])
-def test_a_turned_or_mirrored_world_turns_or_mirrors_the_moves(turn):
+def test_a_turned_or_mirrored_world_turns_or_mirrors_the_moves(turn: Any) -> None:
     rng = np.random.default_rng(1)
     positions, moves, heights, xy, depth, left = world(rng, landmarks=300)
     there = np.column_stack([positions[:, :2] @ turn.T, positions[:, 2]])
@@ -123,7 +124,7 @@ def test_a_turned_or_mirrored_world_turns_or_mirrors_the_moves(turn):
     np.testing.assert_allclose(turned[2], schedule, atol=1e-12)
 
 
-def test_moves_keep_the_limit_of_each_direction_or_of_the_whole():
+def test_moves_keep_the_limit_of_each_direction_or_of_the_whole() -> None:
     u = np.random.default_rng(0).normal(0, 3, (50, 3))
     each = within_step(u, 0.05, True)
     whole = within_step(u, 0.05, False)
@@ -132,7 +133,7 @@ def test_moves_keep_the_limit_of_each_direction_or_of_the_whole():
     np.testing.assert_allclose(np.arctan2(each[:, 0], each[:, 1]), np.arctan2(u[:, 0], u[:, 1]))
 
 
-def test_a_model_comes_back_from_its_file_as_it_was():
+def test_a_model_comes_back_from_its_file_as_it_was() -> None:
     parameters = random_parameters(np.random.default_rng(3))[0]
     model = PcaoModel.of(parameters, Training(command="bathyfleet train", terrains=("a",), seeds=(0, 1)))
     again = PcaoModel.model_validate_json(model.model_dump_json())
@@ -140,7 +141,7 @@ def test_a_model_comes_back_from_its_file_as_it_was():
     np.testing.assert_array_equal(again.parameters, parameters)
 
 
-def spoil(path, value):
+def spoil(path: Any, value: Any) -> Any:
     document = json.loads(default_model().model_dump_json())
     part = document
     for key in path[:-1]:
@@ -159,12 +160,12 @@ def spoil(path, value):
         (("state", "vectors"), ["nearest"], "train it anew"),
     ],
 )
-def test_a_model_that_cannot_fly_is_refused_with_the_reason(path, value, says):
+def test_a_model_that_cannot_fly_is_refused_with_the_reason(path: Any, value: Any, says: Any) -> None:
     with pytest.raises(ValidationError, match=says):
         PcaoModel.model_validate_json(spoil(path, value))
 
 
-def test_the_shipped_model_names_the_command_that_made_it():
+def test_the_shipped_model_names_the_command_that_made_it() -> None:
     model = default_model()
     assert model.training.command.startswith("bathyfleet train --out FILE --terrains ")
     assert model.training.robots == 3
@@ -172,7 +173,7 @@ def test_the_shipped_model_names_the_command_that_made_it():
     assert len(model.state.figures) == N_FIGURES
 
 
-def test_a_mission_flies_with_the_model_that_it_names():
+def test_a_mission_flies_with_the_model_that_it_names() -> None:
     other = PcaoModel.of(entries([np.eye(size) for size in BLOCKS]), Training())
     situation = make_situation(vehicles=("a", "b"), constraints=Constraints(SQUARE, max_step_m=5.0, max_depth_m=20.0))
     moves = [
@@ -186,7 +187,7 @@ def test_a_mission_flies_with_the_model_that_it_names():
 
 
 @pytest.mark.parametrize("sensor", [SingleBeam(), RangeSensor(25.0)])
-def test_a_zone_across_the_way_is_flown_round(sensor):
+def test_a_zone_across_the_way_is_flown_round(sensor: Any) -> None:
     zone = np.array([[40.0, 0.0], [60.0, 0.0], [60.0, 70.0], [40.0, 70.0]])
     limits = Constraints(SQUARE, (zone,), max_step_m=8.0, max_depth_m=20.0, min_altitude_m=1.0)
     planner, belief = create_planner("pcao", sensor=sensor), make_belief()
@@ -204,7 +205,7 @@ def test_a_zone_across_the_way_is_flown_round(sensor):
     assert at[0, 0] > 55.0
 
 
-def test_linked_wishes_follow_the_leader_within_range():
+def test_linked_wishes_follow_the_leader_within_range() -> None:
     here = np.array([[0.0, 0.0, 0.0], [0.2, 0.0, 0.0], [0.4, 0.0, 0.0]])
     wish = here + np.array([[-0.05, 0, 0], [0.05, 0, 0], [0.05, 0, 0]])
     out = linked(here, wish, 0.22, 0.05, leader=0)

@@ -1,5 +1,7 @@
 """What CAO measures after a step, against the objective evaluated once per vehicle left behind."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -14,7 +16,7 @@ SENSOR = RangeSensor()
 AREA = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 
 
-def situation(positions, accurate, names=("a", "b")):
+def situation(positions: Any, accurate: Any, names: tuple[Any, ...] = ("a", "b")) -> Any:
     rng = np.random.default_rng(0)
     xy = rng.uniform(-1, 1, (200, 2))
     depth = np.where(rng.random(200) < 0.7, 0.6, np.nan)
@@ -22,7 +24,7 @@ def situation(positions, accurate, names=("a", "b")):
     return Situation(1, 9, names, positions, np.full(2, np.nan), belief, np.zeros((0, 2)), Constraints(AREA))
 
 
-def value(team, positions, gained, terms):
+def value(team: Any, positions: Any, gained: Any, terms: Any) -> Any:
     belief = team.belief
     points = np.column_stack([belief.xy_m, np.where(np.isnan(belief.depth_m), 0.6, belief.depth_m)])
     seen = SENSOR.visible(positions, points) & np.isfinite(belief.depth_m)
@@ -36,7 +38,7 @@ def value(team, positions, gained, terms):
 
 
 @pytest.mark.parametrize("terms", ["J", "full", "med13"])
-def test_a_contribution_is_the_difference_that_the_last_move_made(terms):
+def test_a_contribution_is_the_difference_that_the_last_move_made(terms: Any) -> None:
     measured = MeasuredObjective(SENSOR, PlannerOptions(objective=terms, contribution="vehicle"))
     before = np.array([[-0.3, 0.0, 0.3], [0.3, 0.0, 0.3]])
     nothing = np.zeros(200, dtype=bool)
@@ -54,7 +56,7 @@ def test_a_contribution_is_the_difference_that_the_last_move_made(terms):
         assert result[j] == pytest.approx(together - value(team, left_behind, gained - own, terms))
 
 
-def test_a_team_that_changed_has_no_contributions():
+def test_a_team_that_changed_has_no_contributions() -> None:
     measured = MeasuredObjective(SENSOR, PlannerOptions(contribution="vehicle"))
     positions, nothing = np.array([[-0.3, 0.0, 0.3], [0.3, 0.0, 0.3]]), np.zeros(200, dtype=bool)
     measured.update(situation(positions, nothing))

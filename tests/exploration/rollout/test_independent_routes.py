@@ -1,6 +1,7 @@
 """Routes of vehicles that need no links, over landmarks whose whole position is unknown."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -28,6 +29,7 @@ from app.exploration.rollout.independent_routes import (
     trace,
 )
 from app.exploration.rollout.local_search import DRAWS
+from app.exploration.rollout.planner import RolloutPlanner
 from app.exploration.rollout.points import SURELY, look_whole, make_points
 from app.exploration.rollout.sectors import sectors
 
@@ -40,7 +42,7 @@ START = np.array([[-0.8, -0.8, 0.2], [-0.7, -0.8, 0.2], [-0.8, -0.7, 0.2]])
 LIMITS = Constraints(CUBE, max_step_m=0.05, min_depth_m=-1.0, max_depth_m=1.0, min_altitude_m=0.2, held_altitude_m=HELD)
 
 
-def hilly(seed, n=120):
+def hilly(seed: Any, n: int = 120) -> Any:
     """Landmarks on gentle hills; half of them were seen, with errors of any shape."""
     rng = np.random.default_rng(seed)
     xy = rng.uniform(-1.0, 1.0, (n, 2))
@@ -53,7 +55,7 @@ def hilly(seed, n=120):
     return Belief(xy, depth, sd, np.zeros(n, dtype=bool), np.ones(n), 0.2, covariance)
 
 
-def make_case(seed, stops=4):
+def make_case(seed: Any, stops: int = 4) -> Any:
     """Three vehicles with random routes over what is left."""
     rng = np.random.default_rng(seed)
     belief = hilly(seed)
@@ -67,7 +69,7 @@ def make_case(seed, stops=4):
     return belief, points, floor, routes
 
 
-def flown(routes, points, floor):
+def flown(routes: Any, points: Any, floor: Any) -> Any:
     """Fly routes to their ends; return score, paths and what is left."""
     paths, left = no_paths(3, 300), np.empty(points.information.shape[1])
     for i in range(3):
@@ -75,7 +77,7 @@ def flown(routes, points, floor):
     return judge(paths, FREE, int(routes.counts.sum()), points, RULES, np.inf, left), paths, left
 
 
-def open_landmarks(information):
+def open_landmarks(information: Any) -> Any:
     """Return which of the information matrices, six numbers each, leave a landmark inaccurate."""
     a, b, c, d, e, f = information
     matrices = np.array([[a, b, c], [b, d, e], [c, e, f]]).transpose(2, 0, 1)
@@ -84,12 +86,12 @@ def open_landmarks(information):
 
 @given(seed=st.integers(0, 1000), at=st.tuples(*[st.floats(-1.1, 1.1)] * 2, st.floats(0.0, 0.5)))
 @settings(max_examples=30, deadline=None)
-def test_a_look_adds_what_the_fisher_information_of_a_range_is(seed, at):
+def test_a_look_adds_what_the_fisher_information_of_a_range_is(seed: Any, at: Any) -> None:
     _, points, _, _ = make_case(seed)
     information = points.information.copy()
     done = open_landmarks(information) == 0
     already = done.copy()
-    completed = look_whole(*at, points, 0.4, 0.1, information, done)
+    completed = look_whole(at[0], at[1], at[2], points, 0.4, 0.1, information, done)
     away = points.work.xyz.T - np.array(at)
     r = np.linalg.norm(away, axis=1)
     u = away / r[:, None]
@@ -101,7 +103,7 @@ def test_a_look_adds_what_the_fisher_information_of_a_range_is(seed, at):
     assert completed == done.sum() - already.sum()
 
 
-def test_one_straight_line_does_not_tell_where_a_landmark_is_and_a_second_one_does():
+def test_one_straight_line_does_not_tell_where_a_landmark_is_and_a_second_one_does() -> None:
     n = 1
     belief = Belief(
         np.array([[0.12, 0.0]]), np.array([0.5]), np.full(n, np.inf), np.zeros(n, dtype=bool), np.ones(n), 0.2,
@@ -118,7 +120,7 @@ def test_one_straight_line_does_not_tell_where_a_landmark_is_and_a_second_one_do
 
 @given(seed=st.integers(0, 1000))
 @settings(max_examples=20, deadline=None)
-def test_a_vehicle_alone_keeps_its_step_its_depths_and_comes_to_the_end(seed):
+def test_a_vehicle_alone_keeps_its_step_its_depths_and_comes_to_the_end(seed: Any) -> None:
     _, _, floor, routes = make_case(seed)
     at, after, k = START[:1].copy(), np.empty((1, 3)), 0
     for _ in range(400):
@@ -133,7 +135,7 @@ def test_a_vehicle_alone_keeps_its_step_its_depths_and_comes_to_the_end(seed):
 
 @given(seed=st.integers(0, 1000), zones=st.booleans())
 @settings(max_examples=10, deadline=None)
-def test_the_search_never_worsens_routes_and_reports_their_true_score(seed, zones):
+def test_the_search_never_worsens_routes_and_reports_their_true_score(seed: Any, zones: Any) -> None:
     _, points, floor, routes = make_case(seed)
     zone = np.array([[-0.2, -0.2], [0.2, -0.2], [0.2, 0.2], [-0.2, 0.2]])
     free = free_space(Constraints(CUBE, (zone,) if zones else ()))
@@ -152,14 +154,14 @@ def test_the_search_never_worsens_routes_and_reports_their_true_score(seed, zone
 
 @given(seed=st.integers(0, 1000))
 @settings(max_examples=10, deadline=None)
-def test_a_vehicle_that_is_away_half_of_the_time_is_not_relied_upon(seed):
+def test_a_vehicle_that_is_away_half_of_the_time_is_not_relied_upon(seed: Any) -> None:
     _, points, floor, routes = make_case(seed)
     whole, paths, _ = flown(routes, points, floor)
     half = judge(paths, np.array([0.5, 1.0, 1.0]), 12, points, RULES, np.inf, np.empty(points.information.shape[1]))
     assert half >= whole
 
 
-def test_first_routes_give_each_vehicle_a_strip_of_its_own():
+def test_first_routes_give_each_vehicle_a_strip_of_its_own() -> None:
     left = np.random.default_rng(0).uniform(-1.0, 1.0, (300, 2))
     routes = list(sectors(left, START[:, :2], CUBE, 0.4))
     kept = 0
@@ -174,7 +176,7 @@ def test_first_routes_give_each_vehicle_a_strip_of_its_own():
     assert any(len(team[0]) > 10 for team in routes), "lines across the first ones follow"
 
 
-def test_nobody_climbs_because_an_estimate_calls_it_too_low():
+def test_nobody_climbs_because_an_estimate_calls_it_too_low() -> None:
     _, _, floor, _ = make_case(1)
     low = np.array([[0.3, 0.1, sample(floor.deepest_m, floor.west_m, floor.south_m, floor.cell_m, 0.3, 0.1) + 0.1]])
     let_stay(floor, low, HELD, 0.1)
@@ -183,7 +185,7 @@ def test_nobody_climbs_because_an_estimate_calls_it_too_low():
 
 @given(seed=st.integers(0, 1000))
 @settings(max_examples=20, deadline=None)
-def test_every_step_that_a_vehicle_may_try_is_short_enough_and_leads_somewhere(seed):
+def test_every_step_that_a_vehicle_may_try_is_short_enough_and_leads_somewhere(seed: Any) -> None:
     team = replace(situation(1, START), belief=hilly(seed))
     bottom = Bottom.from_landmarks(team.belief.xy_m, team.belief.depth_m)
     mission = apart_mission(
@@ -201,7 +203,7 @@ def test_every_step_that_a_vehicle_may_try_is_short_enough_and_leads_somewhere(s
         assert passed[-1] == 0
 
 
-def test_no_vehicle_stands_before_a_step_that_only_the_estimate_of_the_floor_has():
+def test_no_vehicle_stands_before_a_step_that_only_the_estimate_of_the_floor_has() -> None:
     rng = np.random.default_rng(3)
     xy = np.vstack([rng.uniform([-1.0, 0.25], [1.0, 1.0], (60, 2)), rng.uniform([-1.0, -1.0], [1.0, 0.2], (200, 2))])
     known = np.arange(260) >= 60
@@ -221,21 +223,22 @@ def test_no_vehicle_stands_before_a_step_that_only_the_estimate_of_the_floor_has
     assert np.linalg.norm(way[6:] - way[:-6], axis=2).min() > 0.5 * LIMITS.max_step_m
 
 
-def situation(step, positions, targets=None):
+def situation(step: Any, positions: Any, targets: Any = None) -> Any:
     belief = hilly(2)
     return Situation(
         step, 100, NAMES, positions, np.full(3, np.nan), belief, np.zeros((0, 2)), LIMITS, targets
     )  # fmt: skip
 
 
-def lost_target():
+def lost_target() -> Any:
     state = np.array([[0.5, 0.5, -0.2, 0.0, 0.0, 0.0]])
     return Targets(state, np.diag([0.04] * 3 + [1e-6] * 3)[None], np.array([False]), ACCURACY, 0.1)
 
 
-def test_a_vehicle_on_an_errand_keeps_its_route_and_memory_continues_it():
+def test_a_vehicle_on_an_errand_keeps_its_route_and_memory_continues_it() -> None:
     planner = create_planner("rollout", PlannerOptions(rollouts=5, accuracy_sd_m=ACCURACY), RangeSensor(0.4))
     first = planner.propose(situation(1, START), np.random.default_rng(0))
+    assert isinstance(planner, RolloutPlanner)
     routes = {name: len(at) for name, at in planner._routes.items()}
     assert set(routes) == set(NAMES)
     memory = planner.snapshot()
@@ -248,7 +251,7 @@ def test_a_vehicle_on_an_errand_keeps_its_route_and_memory_continues_it():
     np.testing.assert_array_equal(again.propose(away, np.random.default_rng(1)).positions, second.positions)
 
 
-def test_routes_break_no_limit_beside_zones_and_each_other():
+def test_routes_break_no_limit_beside_zones_and_each_other() -> None:
     zone = np.array([[-0.5, -0.9], [-0.3, -0.9], [-0.3, 0.2], [-0.5, 0.2]])
     limits = replace(LIMITS, keep_out=(zone,), min_separation_m=0.06)
     planner = create_planner("rollout", PlannerOptions(rollouts=5, accuracy_sd_m=ACCURACY), RangeSensor(0.4))

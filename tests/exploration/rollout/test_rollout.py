@@ -1,5 +1,7 @@
 """Whole-mission rollouts, against slow references and by properties."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import example, given, settings
@@ -23,7 +25,7 @@ ROOM = 12
 CLEARANCE = 0.05
 
 
-def hilly(seed, n=250):
+def hilly(seed: Any, n: int = 250) -> Any:
     """Landmarks all over the cube, on gentle hills; a third of them was seen."""
     rng = np.random.default_rng(seed)
     xy = rng.uniform(-1.0, 1.0, (n, 2))
@@ -35,12 +37,12 @@ def hilly(seed, n=250):
     return belief, depth
 
 
-def floor_of(belief, felt=None):
+def floor_of(belief: Any, felt: Any = None) -> Any:
     bottom = Bottom.from_landmarks(belief.xy_m, belief.depth_m)
     return estimate_floor(belief, bottom, np.zeros((0, 3)) if felt is None else felt, CUBE, 0.4, CLEARANCE, 0.6)
 
 
-def make_case(seed, vehicles=3, waypoints=5):
+def make_case(seed: Any, vehicles: int = 3, waypoints: int = 5) -> Any:
     """A team in a row, a random plan that keeps its links, and the landmarks to be done."""
     rng = np.random.default_rng(seed)
     belief, depth = hilly(seed)
@@ -59,7 +61,17 @@ def make_case(seed, vehicles=3, waypoints=5):
     return start, plan, waypoints, work, floor
 
 
-def flown(start, plan, count, work, floor, course=None, origin=0, bound=np.inf, save=None):
+def flown(
+    start: Any,
+    plan: Any,
+    count: Any,
+    work: Any,
+    floor: Any,
+    course: Any = None,
+    origin: int = 0,
+    bound: Any = np.inf,
+    save: Any = None,
+) -> Any:
     if course is None:
         course = new_course(ROOM, len(start), len(work.need))
         begin(course, start, work)
@@ -68,16 +80,16 @@ def flown(start, plan, count, work, floor, course=None, origin=0, bound=np.inf, 
     return score, left, course
 
 
-def copied(plan):
+def copied(plan: Any) -> Any:
     return Plan(plan.at_m.copy(), plan.height_m.copy(), plan.chain)
 
 
 @given(seed=st.integers(0, 1000), at=st.tuples(*[st.floats(-1.2, 1.2)] * 2, st.floats(-0.2, 0.9)))
 @settings(max_examples=40, deadline=None)
-def test_a_look_gives_what_eq_5_says_to_every_landmark_in_sight(seed, at):
+def test_a_look_gives_what_eq_5_says_to_every_landmark_in_sight(seed: Any, at: Any) -> None:
     _, _, _, work, _ = make_case(seed)
     need = work.need.copy()
-    done = look(*at, work, RULES, need)
+    done = look(at[0], at[1], at[2], work, RULES, need)
     offset = work.xyz.T - np.array(at)
     r2 = (offset**2).sum(axis=1)
     gained = np.where(r2 < 0.4**2, offset[:, 2] ** 2 / (0.1**2 * r2**2), 0.0)
@@ -87,7 +99,7 @@ def test_a_look_gives_what_eq_5_says_to_every_landmark_in_sight(seed, at):
 
 @given(seed=st.integers(0, 1000))
 @settings(max_examples=30, deadline=None)
-def test_flying_obeys_step_links_depths_and_the_estimated_floor(seed):
+def test_flying_obeys_step_links_depths_and_the_estimated_floor(seed: Any) -> None:
     start, plan, count, _, floor = make_case(seed)
     at, k, after = start, 0, np.empty_like(start)
     for _ in range(200):
@@ -109,7 +121,7 @@ def test_flying_obeys_step_links_depths_and_the_estimated_floor(seed):
 @example(seed=458, changed=4)
 @example(seed=153, changed=1)
 @settings(max_examples=40, deadline=None)
-def test_a_changed_plan_flown_from_the_change_on_scores_as_if_flown_from_the_start(seed, changed):
+def test_a_changed_plan_flown_from_the_change_on_scores_as_if_flown_from_the_start(seed: Any, changed: Any) -> None:
     start, plan, count, work, floor = make_case(seed)
     _, _, course = flown(start, plan, count, work, floor)
     other = copied(plan)
@@ -123,7 +135,7 @@ def test_a_changed_plan_flown_from_the_change_on_scores_as_if_flown_from_the_sta
 
 @given(seed=st.integers(0, 1000))
 @settings(max_examples=20, deadline=None)
-def test_a_flight_is_given_up_only_when_it_cannot_beat_the_bound(seed):
+def test_a_flight_is_given_up_only_when_it_cannot_beat_the_bound(seed: Any) -> None:
     start, plan, count, work, floor = make_case(seed)
     score, _, _ = flown(start, plan, count, work, floor)
     assert flown(start, plan, count, work, floor, bound=score * 1.001)[0] == score
@@ -132,7 +144,7 @@ def test_a_flight_is_given_up_only_when_it_cannot_beat_the_bound(seed):
 
 @given(seed=st.integers(0, 1000), zones=st.booleans())
 @settings(max_examples=15, deadline=None)
-def test_the_search_never_worsens_a_plan_and_reports_its_true_score(seed, zones):
+def test_the_search_never_worsens_a_plan_and_reports_its_true_score(seed: Any, zones: Any) -> None:
     start, plan, count, work, floor = make_case(seed)
     zone = np.array([[-0.2, -0.2], [0.2, -0.2], [0.2, 0.2], [-0.2, 0.2]])
     free = free_space(Constraints(CUBE, (zone,) if zones else ()))
@@ -150,7 +162,7 @@ def test_the_search_never_worsens_a_plan_and_reports_its_true_score(seed, zones)
 
 @given(seed=st.integers(0, 1000))
 @settings(max_examples=30, deadline=None)
-def test_ways_lead_round_zones_with_the_team_together(seed):
+def test_ways_lead_round_zones_with_the_team_together(seed: Any) -> None:
     rng = np.random.default_rng(seed)
     low = rng.uniform(-0.5, 0.1, 2)
     high = low + rng.uniform(0.2, 0.4, 2)
@@ -173,7 +185,7 @@ def test_ways_lead_round_zones_with_the_team_together(seed):
         here = plan.at_m[k]
 
 
-def test_the_envelope_lets_every_rise_be_climbed():
+def test_the_envelope_lets_every_rise_be_climbed() -> None:
     belief, depth = hilly(3)
     known = Belief(belief.xy_m, depth, np.full(len(depth), 0.01), belief.accurate, belief.weight, 0.2)
     floor = floor_of(known)
@@ -182,18 +194,17 @@ def test_the_envelope_lets_every_rise_be_climbed():
     assert (floor.deepest_m <= floor.depth_m - CLEARANCE).all()
 
 
-def test_a_wall_that_was_felt_is_kept_clear_of():
+def test_a_wall_that_was_felt_is_kept_clear_of() -> None:
     belief, _ = hilly(3)
     wall = np.array([[0.1, 0.2, 0.3]])
     felt = floor_of(belief, wall)
     here = sample(felt.deepest_m, felt.west_m, felt.south_m, felt.cell_m, 0.1, 0.2)
     assert here <= 0.3 - CLEARANCE + ENVELOPE_SLOPE * felt.cell_m
-    assert here < sample(
-        *[getattr(floor_of(belief), k) for k in ("deepest_m", "west_m", "south_m", "cell_m")], 0.1, 0.2
-    )
+    before = floor_of(belief)
+    assert here < sample(before.deepest_m, before.west_m, before.south_m, before.cell_m, 0.1, 0.2)
 
 
-def test_altimeters_tell_where_the_bottom_is():
+def test_altimeters_tell_where_the_bottom_is() -> None:
     felt = FeltBottom()
     team = make_situation(constraints=Constraints(SQUARE, max_step_m=10.0, min_altitude_m=1.5))
     felt.ask(team.vehicles, team.positions + np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 1.0]]))
@@ -201,7 +212,7 @@ def test_altimeters_tell_where_the_bottom_is():
     np.testing.assert_allclose(felt.points_m, [team.positions[1] + np.array([0.0, 0.0, 1.5])])
 
 
-def test_sweeps_cover_what_is_left_from_every_corner():
+def test_sweeps_cover_what_is_left_from_every_corner() -> None:
     rng = np.random.default_rng(0)
     left = rng.uniform(-1.0, 1.0, (300, 2))
     here = np.array([[-0.9, -0.9], [-0.8, -0.9], [-0.9, -0.8]])
@@ -213,7 +224,7 @@ def test_sweeps_cover_what_is_left_from_every_corner():
         assert (gaps <= LINK + 1e-9).all()
 
 
-def test_a_plan_outlives_a_change_of_the_team():
+def test_a_plan_outlives_a_change_of_the_team() -> None:
     at = np.stack([np.column_stack([np.full(3, x), [0.0, 0.2, 0.4]]) for x in (0.0, 0.5)])
     plan = Backbone(at, np.array([0, 1, 2]))
     fewer = with_team(plan, ("a", "b", "c"), ("a", "c"))

@@ -1,6 +1,7 @@
 """Search missions: where one may go, what a view shows, the criteria, and what every planner keeps."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -68,7 +69,7 @@ def explored(seed: int, looks: int = 6) -> tuple[ObstacleWorld, SearchTask]:
 
 @given(st.integers(0, 5000))
 @settings(max_examples=5, deadline=None)
-def test_distances_are_those_of_dijkstra(seed):
+def test_distances_are_those_of_dijkstra(seed: Any) -> None:
     _, task = explored(seed)
     ground = Ground.of(task)
     ok = ground.passable
@@ -81,17 +82,17 @@ def test_distances_are_those_of_dijkstra(seed):
                     rows.append(index[r, c])
                     cols.append(index[r + dr, c + dc])
                     costs.append(cost)
-    graph = coo_array((costs, (rows, cols)), shape=(ok.size, ok.size)).tocsr()
-    truth = dijkstra(graph, directed=False, indices=int(index[4, 4])).reshape(ok.shape)
+    graph = coo_array((np.array(costs, float), (np.array(rows), np.array(cols))), shape=(ok.size, ok.size)).tocsr()
+    truth = dijkstra(graph, directed=False, indices=np.array([index[4, 4]])).reshape(ok.shape)
     mine = ground.distances(np.array([[4, 4]])).astype(float)
     mine[mine >= UNREACHED] = np.inf
     assert np.array_equal(mine, truth)
-    assert ground.metres(np.int32(STRAIGHT)) == pytest.approx(1.0)
+    assert ground.metres(np.array(STRAIGHT, np.int32)) == pytest.approx(1.0)
 
 
 @given(st.integers(0, 5000))
 @settings(max_examples=10, deadline=None)
-def test_clear_legs_and_ways_home_keep_the_safety_distance(seed):
+def test_clear_legs_and_ways_home_keep_the_safety_distance(seed: Any) -> None:
     world, task = explored(seed)
     ground, rng = Ground.of(task), np.random.default_rng([seed, 2])
     ends = rng.uniform(0.0, SIDE, (200, 2))
@@ -116,7 +117,7 @@ def test_clear_legs_and_ways_home_keep_the_safety_distance(seed):
 
 @given(st.integers(0, 5000))
 @settings(max_examples=10, deadline=None)
-def test_a_view_shows_what_was_foretold_where_all_obstacles_are_known(seed):
+def test_a_view_shows_what_was_foretold_where_all_obstacles_are_known(seed: Any) -> None:
     world, task = explored(seed)
     blueprint_only = replace(task, grid=OccupancyGrid.from_blueprint(world.solid, 1.0))
     free = np.argwhere(~world.solid)
@@ -129,7 +130,7 @@ def test_a_view_shows_what_was_foretold_where_all_obstacles_are_known(seed):
 
 @given(st.integers(0, 5000))
 @settings(max_examples=5, deadline=None)
-def test_gains_that_are_kept_are_those_worked_out_anew(seed):
+def test_gains_that_are_kept_are_those_worked_out_anew(seed: Any) -> None:
     world, task = explored(seed, looks=1)
     rng, kept = np.random.default_rng([seed, 4]), Gains()
     for _ in range(6):
@@ -143,7 +144,7 @@ def test_gains_that_are_kept_are_those_worked_out_anew(seed):
 
 @given(st.integers(0, 5000))
 @settings(max_examples=5, deadline=None)
-def test_distances_that_end_at_some_cells_are_right_up_to_there(seed):
+def test_distances_that_end_at_some_cells_are_right_up_to_there(seed: Any) -> None:
     _, task = explored(seed)
     ground, rng = Ground.of(task), np.random.default_rng([seed, 5])
     start, until = CORNER[None].astype(np.int64), rng.integers(0, SIDE, (3, 2))
@@ -152,7 +153,7 @@ def test_distances_that_end_at_some_cells_are_right_up_to_there(seed):
     np.testing.assert_array_equal(part[whole <= up_to], whole[whole <= up_to])
 
 
-def test_the_criteria_are_those_of_the_paper():
+def test_the_criteria_are_those_of_the_paper() -> None:
     world = site(1)
     task = task_of(world, look(OccupancyGrid.from_blueprint(world.known, 1.0), world, CORNER))
     states, goal = task.states, task.in_goal
@@ -171,7 +172,7 @@ def test_the_criteria_are_those_of_the_paper():
     assert early[2] == 0.0 < near[2]
 
 
-def test_a_standstill_is_noticed_only_once_the_window_is_full_and_growth_ends_it():
+def test_a_standstill_is_noticed_only_once_the_window_is_full_and_growth_ends_it() -> None:
     still = Standstill(3, 1.0)
     assert [still.now(x) for x in (0.0, 0.5, 0.5, 0.5, 0.5, 0.5, 0.6)] == [False] * 4 + [True, True, False]
     supervisor = Supervisor()
@@ -185,7 +186,7 @@ def test_a_standstill_is_noticed_only_once_the_window_is_full_and_growth_ends_it
 @pytest.mark.parametrize("name", sorted(SEARCHERS))
 @given(seed=st.integers(0, 5000), robots=st.integers(1, 3))
 @settings(max_examples=2, deadline=None)
-def test_no_planner_hits_anything_and_all_are_back_in_time(name, seed, robots):
+def test_no_planner_hits_anything_and_all_are_back_in_time(name: Any, seed: Any, robots: Any) -> None:
     world = site(seed)
     positions = np.column_stack(
         [CORNER[0] + 2.0 * (np.arange(robots) - (robots - 1) / 2), np.full(robots, CORNER[1]), np.zeros(robots)]
@@ -212,7 +213,7 @@ def test_no_planner_hits_anything_and_all_are_back_in_time(name, seed, robots):
 
 
 @pytest.mark.parametrize("name", sorted(SEARCHERS))
-def test_a_restored_planner_goes_on_as_if_nothing_had_happened(name):
+def test_a_restored_planner_goes_on_as_if_nothing_had_happened(name: Any) -> None:
     world, task = explored(7, looks=0)
     positions = np.array([[4.5, 4.5, 0.0], [6.5, 4.5, 0.0]])
     first = create_planner(name, PlannerOptions(), SCANNER)
@@ -233,7 +234,7 @@ def test_a_restored_planner_goes_on_as_if_nothing_had_happened(name):
     assert np.array_equal(one.positions, other.positions[::-1])
 
 
-def test_planners_say_when_there_is_nothing_to_search():
+def test_planners_say_when_there_is_nothing_to_search() -> None:
     empty = replace(situation(explored(1)[1], np.array([[4.5, 4.5, 0.0]])), search=None)
     with pytest.raises(ValueError, match="the situation holds no search task"):
         create_planner("rollout", sensor=SCANNER).propose(empty, np.random.default_rng(0))

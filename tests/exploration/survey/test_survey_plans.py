@@ -1,4 +1,5 @@
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -22,12 +23,12 @@ SQUARE = np.array([[0.0, 0.0], [100.0, 0.0], [100.0, 100.0], [0.0, 100.0]])
 coordinate = st.floats(0.0, 100.0)
 
 
-def nodes_of(seed=0, n=400):
+def nodes_of(seed: int = 0, n: int = 400) -> Any:
     rng = np.random.default_rng(seed)
     return make_nodes(rng.uniform(0.0, 100.0, (n, 2)), rng.gamma(1.0, 1.0, n))
 
 
-def distance_to_segment(points, a, b):
+def distance_to_segment(points: Any, a: Any, b: Any) -> Any:
     along = b - a
     t = np.clip((points - a) @ along / max(along @ along, 1e-12), 0.0, 1.0)
     return np.hypot(*(points - a - t[:, None] * along).T)
@@ -35,7 +36,7 @@ def distance_to_segment(points, a, b):
 
 @settings(max_examples=50, deadline=None)
 @given(coordinate, coordinate, coordinate, coordinate, st.floats(1.0, 150.0))
-def test_nodes_within_reach_of_a_leg_get_their_distance_to_it(ax, ay, bx, by, reach):
+def test_nodes_within_reach_of_a_leg_get_their_distance_to_it(ax: Any, ay: Any, bx: Any, by: Any, reach: Any) -> None:
     nodes = nodes_of()
     d2 = np.full(len(nodes.x), np.inf)
     lower_to_segment(d2, nodes, ax, ay, bx, by, reach)
@@ -58,7 +59,7 @@ class WithZone(SurveyScenario):
 
 @settings(max_examples=50, deadline=None)
 @given(st.integers(0, 10**6), st.integers(1, 6), st.integers(1, 80))
-def test_a_route_is_flown_leg_by_leg_however_many_are_taken_at_once(seed, corners, steps):
+def test_a_route_is_flown_leg_by_leg_however_many_are_taken_at_once(seed: Any, corners: Any, steps: Any) -> None:
     # Drawn at random, so that no corner lies a whole number of steps away: there rounding decides.
     rng = np.random.default_rng(seed)
     route, step = rng.uniform(0.0, 100.0, (corners, 2)), rng.uniform(0.5, 12.0)
@@ -74,7 +75,7 @@ def test_a_route_is_flown_leg_by_leg_however_many_are_taken_at_once(seed, corner
     np.testing.assert_allclose(vertices[n - 1], [x, y], atol=1e-6)
 
 
-def test_vertices_close_together_are_flown_in_one_leg():
+def test_vertices_close_together_are_flown_in_one_leg() -> None:
     arc = np.array([[0.0, 8.0], [0.02, 8.05], [0.06, 8.1], [0.12, 8.14], [0.2, 8.16], [30.0, 8.16]])
     x, y, first = next_waypoint(0.0, 0.0, arc, 0, len(arc), 10.0, CORNER_TOLERANCE)
     assert (x, y, first) == pytest.approx((0.2, 8.16, 5))
@@ -83,7 +84,7 @@ def test_vertices_close_together_are_flown_in_one_leg():
 
 
 @pytest.mark.parametrize("planner", ["cao", "lawnmower"])
-def test_vehicles_do_not_linger_at_the_corners_of_a_keep_out_zone(planner):
+def test_vehicles_do_not_linger_at_the_corners_of_a_keep_out_zone(planner: Any) -> None:
     zone = np.array([[40.0, 30.0], [70.0, 30.0], [70.0, 60.0], [40.0, 60.0]])
     terrain = generate("flat", 1)
     scenario = WithZone(terrain, 2, 100, 10.0, "step", zones=(zone,))
@@ -96,7 +97,7 @@ def test_vehicles_do_not_linger_at_the_corners_of_a_keep_out_zone(planner):
     assert np.median(legs) > 9.0
 
 
-def test_searching_never_worsens_a_plan_and_says_truly_what_it_is_worth():
+def test_searching_never_worsens_a_plan_and_says_truly_what_it_is_worth() -> None:
     nodes = nodes_of(1)
     starts, headings = np.array([[2.0, 2.0], [7.0, 2.0]]), np.full(2, np.nan)
     objective = Objective(5.0, 60, 15.0, 2.0, 0.002, 60.0)
@@ -118,7 +119,7 @@ def test_searching_never_worsens_a_plan_and_says_truly_what_it_is_worth():
         assert ((route >= 0.5 - 1e-9) & (route <= 99.5 + 1e-9)).all()
 
 
-def test_doubted_soundings_raise_the_weight_around_them_unless_they_are_many():
+def test_doubted_soundings_raise_the_weight_around_them_unless_they_are_many() -> None:
     situation = make_situation(soundings=np.random.default_rng(0).uniform(0.0, 100.0, (1000, 2)))
     even = np.ones(len(situation.belief.xy_m))
     few, many = (np.random.default_rng(1).uniform(0.0, 100.0, (n, 2)) for n in (3, int(3000 * MOST_DOUBTS)))
@@ -153,7 +154,7 @@ def closest_m(place: np.ndarray, *, doubted: bool) -> float:
     return closest
 
 
-def test_a_doubted_sounding_is_looked_at_again():
+def test_a_doubted_sounding_is_looked_at_again() -> None:
     place = np.array([29.0, 50.0])  # between two lines
     assert closest_m(place, doubted=False) > 2.5
     assert closest_m(place, doubted=True) < 1.5

@@ -2,6 +2,8 @@
 
 import asyncio
 import math
+from pathlib import Path
+from typing import Any
 
 import imcpy
 import pytest
@@ -29,7 +31,7 @@ SENT = imcpy.TransmissionStatus.StatusEnum.SENT
 
 
 @pytest.fixture(scope="module")
-def recorded(captures):
+def recorded(captures: Path) -> Any:
     messages = []
     for record in read_capture(captures / "acoustic_session.jsonl.gz"):
         try:
@@ -39,7 +41,9 @@ def recorded(captures):
     return messages
 
 
-def test_requests_are_those_of_the_recorded_console_field_by_field(recorded):
+def test_requests_are_those_of_the_recorded_console_field_by_field(
+    recorded: list[imcpy.Message | imcpy.Message],
+) -> None:
     theirs = {m.req_id: m for m in recorded if isinstance(m, imcpy.TransmissionRequest) and m.src == 0x3F01}
     with_message = [m for m in theirs.values() if m.msg_data is not None]
     assert len(with_message) >= 3
@@ -53,14 +57,14 @@ def test_requests_are_those_of_the_recorded_console_field_by_field(recorded):
     assert report_request(GATEWAY).serialize_fields() == report.serialize_fields()
 
 
-def test_frames_are_as_long_as_the_recorded_modem_made_them(recorded):
+def test_frames_are_as_long_as_the_recorded_modem_made_them(recorded: list[imcpy.Message | imcpy.Message]) -> None:
     sent = [m.msg_data for m in recorded if isinstance(m, imcpy.TransmissionRequest) and m.msg_data is not None]
     frames = {len(m.data) for m in recorded if isinstance(m, imcpy.UamTxFrame) and m.src == GATEWAY_ID}
     assert {frame_bytes(m) for m in sent if m.msg_name in ("PlanControl", "Reference", "ReportControl")} <= frames
     assert frame_bytes(imcpy.Abort()) in frames
 
 
-def test_what_has_to_get_through_at_once_is_an_instant_message():
+def test_what_has_to_get_through_at_once_is_an_instant_message() -> None:
     settings = BridgeSettings()
     leg = goto_maneuver(WAYPOINT, 3.0)
     up = leg_plan(settings, WAYPOINT, 3.0, descend=False, aim=(WAYPOINT.lat_deg, WAYPOINT.lon_deg))
@@ -81,8 +85,8 @@ def test_what_has_to_get_through_at_once_is_an_instant_message():
     assert max(sizes[kind] for kind in ("abort", "stop", "report")) <= INSTANT_BYTES
 
 
-def test_the_recorded_gateways_answers_are_understood(recorded):
-    sent = []
+def test_the_recorded_gateways_answers_are_understood(recorded: list[imcpy.Message | imcpy.Message]) -> None:
+    sent: list[Any] = []
     numbers = iter(range(1, 10))
     path = SoundPath("lauv-xplore-1", GATEWAY, sent.append, lambda: next(numbers), lambda: 1e9)
     answers = [m for m in recorded if isinstance(m, imcpy.TransmissionStatus) and m.src == GATEWAY_ID]
@@ -94,8 +98,8 @@ def test_the_recorded_gateways_answers_are_understood(recorded):
     assert (round(place.lat_deg, 3), round(place.lon_deg, 3), place.depth_m) == (41.185, -8.706, 3.0)
 
 
-def test_one_message_is_under_way_at_a_time_and_commands_go_before_reports():
-    sent = []
+def test_one_message_is_under_way_at_a_time_and_commands_go_before_reports() -> None:
+    sent: list[Any] = []
     numbers = iter(range(1, 99))
     path = SoundPath("a", GATEWAY, sent.append, lambda: next(numbers), lambda: 0.0)
     path.ask(0.0)
@@ -122,7 +126,6 @@ class Modem(Peer):
 
     @property
     def node(self) -> FakeDune:
-        assert self.sea.fleet is not None
         return self.sea.fleet.nodes[0]
 
     async def serve(self) -> None:
@@ -157,7 +160,7 @@ class Modem(Peer):
             self.sock.sendto(imcpy.Packet.serialize(report), ("127.0.0.1", self.settings.port))
 
 
-async def test_legs_go_on_by_sound_where_radio_does_not_reach():
+async def test_legs_go_on_by_sound_where_radio_does_not_reach() -> None:
     async with open_sea(radio_range_m=RADIO_M, bridge={"unknown_bottom_depth_m": 3.0}) as sea:
         modem = Modem(sea)
         serving = asyncio.create_task(modem.serve())
@@ -184,7 +187,7 @@ async def test_legs_go_on_by_sound_where_radio_does_not_reach():
             modem.sock.close()
 
 
-async def test_a_gateway_that_nobody_heard_of_is_refused():
+async def test_a_gateway_that_nobody_heard_of_is_refused() -> None:
     async with open_sea() as sea:
         [name] = await sea.ready()
         with pytest.raises(RefusedError, match="gateway 'manta-9' was never heard of"):

@@ -4,14 +4,14 @@ import imcpy
 import pytest
 
 from imc_bridge import Guidance, WaypointChange, WaypointStatus
+from simulator.dune.plan import PlanEngine
 from tests.support.imc.sea import Sea, open_sea
 from tests.support.waiting import until
 
 ACKNOWLEDGED, REACHED, REFUSED = WaypointStatus.ACKNOWLEDGED, WaypointStatus.REACHED, WaypointStatus.REFUSED
 
 
-def plan_of(sea: Sea):
-    assert sea.fleet is not None
+def plan_of(sea: Sea) -> PlanEngine:
     return sea.fleet.nodes[0].plan
 
 
@@ -20,7 +20,7 @@ def plan_state(sea: Sea, name: str) -> str | None:
 
 
 @pytest.mark.parametrize("guidance", [Guidance.FOLLOW, Guidance.LEGS])
-async def test_a_late_vehicle_state_is_nobodys_abort(guidance):
+async def test_a_late_vehicle_state_is_nobodys_abort(guidance: Guidance) -> None:
     async with open_sea() as sea:
         [name] = await sea.ready()
         await sea.bridge.engage(name, guidance)
@@ -36,7 +36,7 @@ async def test_a_late_vehicle_state_is_nobodys_abort(guidance):
         assert (await sea.bridge.stop(name)).acknowledged
 
 
-async def test_a_plan_by_references_is_brought_back_while_its_vehicle_goes_on():
+async def test_a_plan_by_references_is_brought_back_while_its_vehicle_goes_on() -> None:
     async with open_sea() as sea:
         [name] = await sea.ready()
         await sea.bridge.engage(name)
@@ -48,7 +48,7 @@ async def test_a_plan_by_references_is_brought_back_while_its_vehicle_goes_on():
         assert REACHED not in sea.statuses(name, 0), "it did not have to end for that"
 
 
-async def test_a_vehicle_that_takes_no_stop_is_stopped_by_an_abort(monkeypatch):
+async def test_a_vehicle_that_takes_no_stop_is_stopped_by_an_abort(monkeypatch: pytest.MonkeyPatch) -> None:
     # As if it could not be brought back before the stop.
     monkeypatch.setattr("imc_bridge.control.follow.BLOCKED_S", 1e9)
     async with open_sea() as sea:
@@ -64,12 +64,11 @@ async def test_a_vehicle_that_takes_no_stop_is_stopped_by_an_abort(monkeypatch):
         assert int(plan_of(sea).vehicle_state().op_mode) != int(imcpy.VehicleState.OperationModeEnum.MANEUVER)
 
 
-async def test_an_abort_by_another_console_is_still_one():
+async def test_an_abort_by_another_console_is_still_one() -> None:
     async with open_sea() as sea:
         [name] = await sea.ready()
         await sea.bridge.engage(name)
         sea.bridge.goto(name, sea.waypoint(0, 50.0, 90.0, 1.0))
         await until(lambda: ACKNOWLEDGED in sea.statuses(name, 0), "it is under way")
-        assert sea.fleet is not None
         plan_of(sea).on_abort("someone else", sea.fleet.nodes[0].vehicle.time_s)
         await until(lambda: bool(sea.bridge.intervention(name)), "the abort is noticed")

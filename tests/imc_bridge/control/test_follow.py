@@ -2,6 +2,8 @@
 
 import itertools
 import math
+from collections.abc import Callable
+from typing import Any
 
 import imcpy
 import pytest
@@ -21,19 +23,27 @@ WAYPOINT = Waypoint("m", 0, 41.186, -8.705, 1.5)
 class Script:
     """A vehicle whose every message is written by the test; one tick is 0.2 s."""
 
-    def __init__(self, kind=Follower, **settings):
+    def __init__(self, kind: type[Any] = Follower, **settings: Any) -> None:
         self.settings = BridgeSettings(**settings)
         self.now = 100.0
         self.time_s = 1.7e9
-        self.sent = []
-        self.changes = []
+        self.sent: list[Any] = []
+        self.changes: list[Any] = []
         self.node = Node(0x1E, "v", self.settings, self.now)
         self.node.announced(Announcement(0x1E, "v", 2, (ADDRESS,)), (ADDRESS,), self.now)
         self.follower = kind(self.node, self.settings, self.sent.append, self.changes.append, itertools.count(7))
         self.mode, self.plan = OperationMode.SERVICE, PlanState.READY
         self.alive = True
 
-    def report(self, *, mode=None, plan=None, plan_id=None, error="", time_s=0.0):
+    def report(
+        self,
+        *,
+        mode: OperationMode | None = None,
+        plan: PlanState | None = None,
+        plan_id: str | None = None,
+        error: str = "",
+        time_s: float = 0.0,
+    ) -> None:
         self.mode = self.mode if mode is None else mode
         self.plan = self.plan if plan is None else plan
         vehicle, control = imcpy.VehicleState(), imcpy.PlanControlState()
@@ -48,7 +58,7 @@ class Script:
         self.node.take_plan_state(control, self.now)
         self.follower.plan_state_changed(self.now)
 
-    def move(self, lat_deg=41.185, lon_deg=-8.705, depth_m=0.0):
+    def move(self, lat_deg: float = 41.185, lon_deg: float = -8.705, depth_m: float = 0.0) -> None:
         self.time_s += 0.1
         state = imcpy.EstimatedState()
         state.timestamp = self.time_s
@@ -56,7 +66,7 @@ class Script:
         self.node.places.clear()  # the script puts it where it wants
         self.follower.moved(self.node.take_state(state), self.now)
 
-    def echo(self, state=2, reference=None):
+    def echo(self, state: int = 2, reference: imcpy.Message | None = None) -> None:
         message = imcpy.FollowRefState()
         message.control_src = self.settings.imc_id
         message.state = imcpy.FollowRefState.StateEnum(state)
@@ -65,7 +75,9 @@ class Script:
             message.reference = reference or sent[-1]
         self.follower.follow_state(message, self.now)
 
-    def reply(self, *, ok, info, operation=0, request_id=None, time_s=0.0):
+    def reply(
+        self, *, ok: bool, info: str, operation: int = 0, request_id: int | None = None, time_s: float = 0.0
+    ) -> None:
         message = imcpy.PlanControl()
         kinds = imcpy.PlanControl.TypeEnum
         message.type = kinds.SUCCESS if ok else kinds.FAILURE
@@ -75,7 +87,7 @@ class Script:
         message.timestamp = time_s
         self.follower.plan_control_reply(message, self.now)
 
-    def run(self, seconds, echoing=True):
+    def run(self, seconds: float, echoing: bool = True) -> None:
         for _ in range(round(seconds / 0.2)):
             self.now += 0.2
             before = len(self.of("Reference"))
@@ -85,16 +97,16 @@ class Script:
             if self.alive and echoing and len(self.of("Reference")) > before:
                 self.echo()
 
-    def of(self, kind):
+    def of(self, kind: str) -> list[imcpy.Message]:
         return [message for message in self.sent if type(message).__name__ == kind]
 
-    def operations(self):
+    def operations(self) -> list[int]:
         return [int(message.op) for message in self.of("PlanControl")]
 
-    def statuses(self):
+    def statuses(self) -> list[WaypointStatus]:
         return [change.status for change in self.changes]
 
-    def follow(self, waypoint=WAYPOINT):
+    def follow(self, waypoint: Waypoint | None = WAYPOINT) -> "Script":
         """Bring it to following a waypoint."""
         self.report()
         self.move()
@@ -107,7 +119,7 @@ class Script:
         return self
 
 
-def test_plan_is_sent_only_when_the_vehicle_is_in_service_and_ready():
+def test_plan_is_sent_only_when_the_vehicle_is_in_service_and_ready() -> None:
     script = Script()
     script.report(mode=OperationMode.BOOT, plan=PlanState.BLOCKED)
     assert script.follower.engage(script.now)
@@ -118,7 +130,7 @@ def test_plan_is_sent_only_when_the_vehicle_is_in_service_and_ready():
     assert script.operations() == [0]
 
 
-def test_start_is_repeated_with_the_same_request_until_answered():
+def test_start_is_repeated_with_the_same_request_until_answered() -> None:
     script = Script()
     script.report()
     script.follower.engage(script.now)
@@ -128,7 +140,7 @@ def test_start_is_repeated_with_the_same_request_until_answered():
     assert len({start.request_id for start in starts}) == 1
 
 
-def test_vehicle_that_never_answers_is_refused():
+def test_vehicle_that_never_answers_is_refused() -> None:
     script = Script()
     script.report()
     script.follower.engage(script.now)
@@ -137,7 +149,7 @@ def test_vehicle_that_never_answers_is_refused():
     assert "no answer to the plan within 10 s" in script.follower.refusal.reason
 
 
-def test_vehicle_that_never_gets_ready_is_refused_with_its_error():
+def test_vehicle_that_never_gets_ready_is_refused_with_its_error() -> None:
     script = Script()
     script.report(mode=OperationMode.ERROR, plan=PlanState.BLOCKED, error="leak detected")
     script.follower.engage(script.now)
@@ -147,7 +159,7 @@ def test_vehicle_that_never_gets_ready_is_refused_with_its_error():
     assert "leak detected" in script.follower.refusal.reason
 
 
-def test_refused_plan_is_reported_with_the_vehicles_words():
+def test_refused_plan_is_reported_with_the_vehicles_words() -> None:
     script = Script()
     script.report()
     script.follower.engage(script.now)
@@ -159,7 +171,7 @@ def test_refused_plan_is_reported_with_the_vehicles_words():
     assert "DVL error" in script.follower.refusal.reason
 
 
-def test_vehicle_holds_its_place_at_the_surface_until_the_first_waypoint():
+def test_vehicle_holds_its_place_at_the_surface_until_the_first_waypoint() -> None:
     script = Script().follow(waypoint=None)
     script.run(5.0)
     references = script.of("Reference")
@@ -167,7 +179,7 @@ def test_vehicle_holds_its_place_at_the_surface_until_the_first_waypoint():
     assert {(round(math.degrees(r.lat), 6), r.z.value) for r in references} == {(41.185, 0.0)}
 
 
-def test_references_go_on_every_second_and_only_their_echo_acknowledges():
+def test_references_go_on_every_second_and_only_their_echo_acknowledges() -> None:
     script = Script().follow()
     assert script.statuses() == [WaypointStatus.SENT, WaypointStatus.ACKNOWLEDGED]
     other = Waypoint("m", 1, 41.187, -8.705, 1.5)
@@ -181,7 +193,7 @@ def test_references_go_on_every_second_and_only_their_echo_acknowledges():
     assert len(script.of("Reference")) - count == pytest.approx(10, abs=1)
 
 
-def test_echo_of_another_controller_is_no_acknowledgement():
+def test_echo_of_another_controller_is_no_acknowledgement() -> None:
     script = Script()
     script.report()
     script.move()
@@ -196,7 +208,7 @@ def test_echo_of_another_controller_is_no_acknowledgement():
     assert script.statuses() == [WaypointStatus.SENT]
 
 
-def test_arrival_needs_both_the_place_and_the_depth():
+def test_arrival_needs_both_the_place_and_the_depth() -> None:
     script = Script().follow()
     script.move(41.186, -8.705, depth_m=0.0)
     assert WaypointStatus.REACHED not in script.statuses()
@@ -209,7 +221,7 @@ def test_arrival_needs_both_the_place_and_the_depth():
 
 
 @pytest.mark.parametrize("cause", ["timeout", "failure", "starved", "reboot"])
-def test_plan_that_fails_in_mid_way_is_started_again_with_the_same_waypoint(cause):
+def test_plan_that_fails_in_mid_way_is_started_again_with_the_same_waypoint(cause: str) -> None:
     script = Script().follow()
     match cause:
         case "timeout":
@@ -231,7 +243,7 @@ def test_plan_that_fails_in_mid_way_is_started_again_with_the_same_waypoint(caus
     assert WaypointStatus.REFUSED not in script.statuses()
 
 
-def test_plan_that_fails_again_and_again_is_given_up():
+def test_plan_that_fails_again_and_again_is_given_up() -> None:
     script = Script(max_restarts=2).follow()
     for _ in range(3):
         script.reply(ok=False, info="thruster fault")
@@ -253,7 +265,7 @@ def test_plan_that_fails_again_and_again_is_given_up():
     ],
     ids=["abort", "error", "stop", "take-over"],
 )
-def test_vehicle_that_somebody_else_takes_is_let_go(end, words):
+def test_vehicle_that_somebody_else_takes_is_let_go(end: Callable[..., Any], words: str) -> None:
     script = Script().follow()
     end(script)
     if "took over" not in words:
@@ -270,7 +282,7 @@ def test_vehicle_that_somebody_else_takes_is_let_go(end, words):
     assert script.operations() == [0]
 
 
-def test_plan_state_that_comes_late_does_not_end_a_running_plan():
+def test_plan_state_that_comes_late_does_not_end_a_running_plan() -> None:
     script = Script().follow()
     script.report(plan=PlanState.READY)
     script.report(plan=PlanState.EXECUTING)
@@ -280,7 +292,7 @@ def test_plan_state_that_comes_late_does_not_end_a_running_plan():
 
 
 @pytest.mark.parametrize("kind", [Follower, LegFollower])
-def test_plan_state_from_before_the_plan_that_was_held_up_on_its_way_ends_nothing(kind):
+def test_plan_state_from_before_the_plan_that_was_held_up_on_its_way_ends_nothing(kind: type[Any]) -> None:
     script = Script(kind)
     script.report()
     script.move()
@@ -300,14 +312,14 @@ def test_plan_state_from_before_the_plan_that_was_held_up_on_its_way_ends_nothin
     assert script.operations() == [0], "it is neither stopped nor started again"
 
 
-def test_unanswered_references_of_a_live_vehicle_restart_its_plan():
+def test_unanswered_references_of_a_live_vehicle_restart_its_plan() -> None:
     script = Script().follow()
     script.run(13.0, echoing=False)
     assert script.follower.phase is Phase.WAITING
     assert script.operations()[-1] == 1
 
 
-def test_stop_is_repeated_and_ends_in_abort():
+def test_stop_is_repeated_and_ends_in_abort() -> None:
     script = Script().follow()
     script.alive = False
     script.follower.begin_stop(script.now)
@@ -324,7 +336,7 @@ def test_stop_is_repeated_and_ends_in_abort():
     assert len(script.of("Reference")) == references
 
 
-def test_vehicle_that_comes_back_following_after_an_unheard_stop_is_stopped():
+def test_vehicle_that_comes_back_following_after_an_unheard_stop_is_stopped() -> None:
     script = Script().follow()
     script.alive = False
     script.follower.begin_stop(script.now)
@@ -337,7 +349,7 @@ def test_vehicle_that_comes_back_following_after_an_unheard_stop_is_stopped():
     assert script.operations()[-1] == 1
 
 
-def test_stop_is_acknowledged_only_by_its_own_reply_or_the_end_of_the_plan():
+def test_stop_is_acknowledged_only_by_its_own_reply_or_the_end_of_the_plan() -> None:
     script = Script().follow()
     script.follower.begin_stop(script.now)
     script.reply(ok=True, info="plan stopped", operation=1, request_id=1)
@@ -349,7 +361,7 @@ def test_stop_is_acknowledged_only_by_its_own_reply_or_the_end_of_the_plan():
     assert script.follower.stop_detail == "plan stopped"
 
 
-def test_guarded_depth_is_raised_at_once_when_the_bottom_rises():
+def test_guarded_depth_is_raised_at_once_when_the_bottom_rises() -> None:
     script = Script().follow(Waypoint("m", 0, 41.186, -8.705, 10.0, min_altitude_m=3.0))
     for _ in range(20):
         script.follower.guard.add(script.time_s, 41.185, -8.705, 20.0)

@@ -10,7 +10,7 @@ from tests.support.waiting import until
 RANGE_M = 5000.0
 
 
-async def test_waypoints_are_reached_though_every_dive_breaks_the_link():
+async def test_waypoints_are_reached_though_every_dive_breaks_the_link() -> None:
     async with open_sea(radio_range_m=RANGE_M) as sea:
         (name,) = await sea.ready()
         await sea.bridge.engage(name)
@@ -33,13 +33,13 @@ async def test_waypoints_are_reached_though_every_dive_breaks_the_link():
         assert (await sea.bridge.stop(name)).acknowledged
 
 
-async def test_console_that_announces_no_place_is_out_of_range_for_good():
+async def test_console_that_announces_no_place_is_out_of_range_for_good() -> None:
     # Why the first announce waits for a place: DUNE's simulation keeps the first one.
     async with open_sea(radio_range_m=RANGE_M, bridge={"position_deg": (0.0, 0.0)}) as sea:
         await until(lambda: any("another port" in node.reason for node in sea.bridge.nodes()), "it stays mute")
 
 
-async def test_vehicle_that_stays_away_longer_than_it_can_is_lost():
+async def test_vehicle_that_stays_away_longer_than_it_can_is_lost() -> None:
     async with open_sea(radio_range_m=RANGE_M) as sea:
         (name,) = await sea.ready()
         await sea.bridge.engage(name)
@@ -51,7 +51,7 @@ async def test_vehicle_that_stays_away_longer_than_it_can_is_lost():
 
 
 @pytest.mark.parametrize("depth_m", [0.0, 0.3])
-async def test_at_the_surface_nothing_is_out_of_reach(depth_m):
+async def test_at_the_surface_nothing_is_out_of_reach(depth_m: float) -> None:
     async with open_sea(radio_range_m=RANGE_M) as sea:
         (name,) = await sea.ready()
         await sea.bridge.engage(name)

@@ -20,11 +20,10 @@ def circle(sea: Sea, step: int, east_m: float, north_m: float) -> dict[str, floa
     return {"circle_lat_deg": lat, "circle_lon_deg": lon}
 
 
-async def test_legs_of_10_m_are_reached_at_their_depth_without_a_loss_or_a_refusal():
+async def test_legs_of_10_m_are_reached_at_their_depth_without_a_loss_or_a_refusal() -> None:
     async with open_sea(radio_range_m=RADIO_M, speed=SPEED, bridge=REAL_TIME, family="flat") as sea:
         [name] = await sea.ready()
         await sea.bridge.engage(name, Guidance.LEGS)
-        assert sea.fleet is not None
         vehicle = sea.fleet.nodes[0].vehicle
         for step in range(5):
             place = 50.0, 20.0 + 10.0 * step
@@ -48,7 +47,7 @@ async def test_legs_of_10_m_are_reached_at_their_depth_without_a_loss_or_a_refus
         assert not any("not at its depth" in reason for reason in reasons)
 
 
-async def test_a_leg_without_room_to_descend_says_that_its_depth_was_not_reached():
+async def test_a_leg_without_room_to_descend_says_that_its_depth_was_not_reached() -> None:
     async with open_sea(radio_range_m=RADIO_M, speed=SPEED, bridge=REAL_TIME, family="flat") as sea:
         [name] = await sea.ready()
         await sea.bridge.engage(name, Guidance.LEGS)
@@ -59,7 +58,7 @@ async def test_a_leg_without_room_to_descend_says_that_its_depth_was_not_reached
         assert "too short" in reason
 
 
-async def test_an_order_to_a_vehicle_that_is_under_water_waits_until_it_is_heard():
+async def test_an_order_to_a_vehicle_that_is_under_water_waits_until_it_is_heard() -> None:
     async with open_sea(radio_range_m=RADIO_M, speed=SPEED, bridge=REAL_TIME, family="flat") as sea:
         [name] = await sea.ready()
         await sea.bridge.engage(name, Guidance.LEGS)

@@ -3,16 +3,19 @@
 import asyncio
 import socket
 from dataclasses import replace
+from pathlib import Path
 
 import imcpy
 import pytest
 
+from imc_bridge.bridge import Bridge
+from imc_bridge.doctor.diagnosis import Diagnosis
 from imc_bridge.doctor.doctor import Cause, diagnose, diagnose_recording, judge
 from imc_bridge.doctor.replay import RecordingError
 from imc_bridge.settings import BridgeSettings
 from simulator.dune import DuneFleet, DuneOptions, VehicleSpec
 from simulator.network import NetworkFaults
-from tests.support.imc.sea import open_sea
+from tests.support.imc.sea import Peer, Sea, open_sea
 from tests.support.ports import free_ports
 from tests.support.waiting import until
 
@@ -20,13 +23,13 @@ LISTEN_S = 1.2
 """24 s of vehicles that live 20 times faster."""
 
 
-async def examine(sea):
+async def examine(sea: Sea) -> Diagnosis:
     """What the doctor says of the sea to someone who has nothing running."""
     await sea.bridge.close()
     return await diagnose(sea.settings, LISTEN_S)
 
 
-async def test_healthy_vehicles_pass():
+async def test_healthy_vehicles_pass() -> None:
     async with open_sea(vehicles=2) as sea:
         await sea.ready()
         await until(lambda: judge(sea.bridge, 1.0).healthy, "nothing is wrong with them")
@@ -37,7 +40,7 @@ async def test_healthy_vehicles_pass():
         assert diagnosis.nodes[0].history[0].state == "announced"
 
 
-async def test_nothing_heard_is_a_problem_with_ports_to_check():
+async def test_nothing_heard_is_a_problem_with_ports_to_check() -> None:
     *announce_ports, port = free_ports(3)
     async with open_sea() as sea:
         settings = replace(sea.settings, port=port, announce_ports=tuple(announce_ports))
@@ -46,7 +49,7 @@ async def test_nothing_heard_is_a_problem_with_ports_to_check():
     assert str(port) in diagnosis.text()
 
 
-async def test_packets_without_an_announce():
+async def test_packets_without_an_announce() -> None:
     async with open_sea(connected=False) as sea:
         # The vehicle sends to us whether it knows us or not; a switch drops what it announces.
         heard_on = sea.settings.announce_ports[1]
@@ -58,11 +61,11 @@ async def test_packets_without_an_announce():
         assert "drops multicast" in diagnosis.text()
 
 
-async def test_announce_without_traffic(harbour):
+async def test_announce_without_traffic(harbour: tuple[Bridge, Peer]) -> None:
     bridge, peer = harbour
     await bridge.close()
 
-    async def announce_on():
+    async def announce_on() -> None:
         while True:
             peer.announce(bridge.settings.announce_ports[0])
             await asyncio.sleep(0.05)
@@ -76,7 +79,7 @@ async def test_announce_without_traffic(harbour):
     assert "firewalls on both sides" in diagnosis.text()
 
 
-async def test_address_where_nothing_listens():
+async def test_address_where_nothing_listens() -> None:
     async with open_sea(connected=False) as sea:
         await sea.launch()
         # Its transport has died, its announcer has not.
@@ -86,14 +89,14 @@ async def test_address_where_nothing_listens():
         assert "Connection refused" in diagnosis.text()
 
 
-async def test_wrong_imc_version():
+async def test_wrong_imc_version() -> None:
     async with open_sea(imc_version="5.0.9") as sea:
         await sea.ready()
         await until(lambda: judge(sea.bridge, 1.0).causes == (Cause.WRONG_VERSION,), "nothing else is wrong with it")
         assert "IMC 5.0.9 where we speak" in judge(sea.bridge, 1.0).text()
 
 
-async def test_version_whose_packets_cannot_even_be_read(harbour):
+async def test_version_whose_packets_cannot_even_be_read(harbour: tuple[Bridge, Peer]) -> None:
     bridge, peer = harbour
     packet = bytearray(imcpy.Packet.serialize(imcpy.Heartbeat()))
     packet[0] = 0x41
@@ -106,7 +109,7 @@ async def test_version_whose_packets_cannot_even_be_read(harbour):
     assert "from 127.0.0.1 are of IMC 4.1" in diagnosis.text()
 
 
-async def test_port_that_a_firewall_blocks():
+async def test_port_that_a_firewall_blocks() -> None:
     async with open_sea(connected=False) as sea:
         sea.faults = NetworkFaults(blocked_ports=frozenset({sea.settings.port}))
         await sea.launch()
@@ -115,7 +118,7 @@ async def test_port_that_a_firewall_blocks():
         assert f"allow UDP {sea.settings.port}" in diagnosis.text()
 
 
-async def test_port_that_another_program_holds():
+async def test_port_that_another_program_holds() -> None:
     async with open_sea(connected=False) as sea:
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
             other.bind(("127.0.0.1", sea.settings.port))
@@ -124,7 +127,7 @@ async def test_port_that_another_program_holds():
         assert "is held by" in diagnosis.text()
 
 
-async def test_port_that_changed_under_the_same_id():
+async def test_port_that_changed_under_the_same_id() -> None:
     async with open_sea() as sea:
         await sea.ready()
         sea.settings = replace(sea.settings, port=free_ports(1)[0])
@@ -133,7 +136,7 @@ async def test_port_that_changed_under_the_same_id():
         assert "restart DUNE" in diagnosis.text()
 
 
-async def test_service_that_cannot_ask_under_other_ids_names_both_causes_of_silence():
+async def test_service_that_cannot_ask_under_other_ids_names_both_causes_of_silence() -> None:
     async with open_sea() as sea:
         await sea.ready()
         await sea.bridge.close()
@@ -142,7 +145,7 @@ async def test_service_that_cannot_ask_under_other_ids_names_both_causes_of_sile
         assert judge(bridge, 1.0).causes == (Cause.NO_TRAFFIC,)
 
 
-async def test_vehicle_that_comes_back_on_another_port_is_followed_there():
+async def test_vehicle_that_comes_back_on_another_port_is_followed_there() -> None:
     async with open_sea() as sea:
         await sea.ready()
         await sea.vanish()
@@ -157,7 +160,7 @@ async def test_vehicle_that_comes_back_on_another_port_is_followed_there():
 
 
 @pytest.mark.parametrize("name", ["lauv-sim-1", "lauv-twin"])
-async def test_same_id_twice(name):
+async def test_same_id_twice(name: str) -> None:
     async with open_sea() as sea:
         await sea.ready()
         spec = VehicleSpec(name, sea.fleet.nodes[0].imc_id, free_ports(1)[0], (20.0, 20.0, 0.0))
@@ -169,7 +172,7 @@ async def test_same_id_twice(name):
             assert ("give one another id" if name == "lauv-twin" else "stop one of them") in diagnosis.text()
 
 
-async def test_vehicle_of_a_doubtful_id_is_not_engaged(harbour):
+async def test_vehicle_of_a_doubtful_id_is_not_engaged(harbour: tuple[Bridge, Peer]) -> None:
     bridge, peer = harbour
     peer.announce(bridge.transport.announce_port)
     await until(lambda: bool(bridge.nodes()), "it is known")
@@ -179,7 +182,7 @@ async def test_vehicle_of_a_doubtful_id_is_not_engaged(harbour):
         await bridge.engage("lauv-noptilus-1")
 
 
-async def test_our_own_id_in_use_elsewhere(harbour):
+async def test_our_own_id_in_use_elsewhere(harbour: tuple[Bridge, Peer]) -> None:
     bridge, peer = harbour
     peer.imc_id = bridge.settings.imc_id
     peer.announce(bridge.transport.announce_port, sys_name="ccu-other")
@@ -188,7 +191,7 @@ async def test_our_own_id_in_use_elsewhere(harbour):
     assert "'ccu-other'" in judge(bridge, 1.0).text()
 
 
-async def test_clock_that_is_off_by_hours():
+async def test_clock_that_is_off_by_hours() -> None:
     async with open_sea(
         speed=1.0, clock_offset_s=3 * 3600.0, boot_s=0.1, bridge={"position_deg": (41.18, -8.7)}
     ) as sea:
@@ -199,7 +202,7 @@ async def test_clock_that_is_off_by_hours():
         assert "its clock is 3.0 h ahead of ours" in diagnosis.text()
 
 
-async def test_packets_from_an_address_that_was_not_announced(harbour):
+async def test_packets_from_an_address_that_was_not_announced(harbour: tuple[Bridge, Peer]) -> None:
     bridge, peer = harbour
     peer.announce(bridge.transport.announce_port, services=f"imc+udp://127.0.0.1:{free_ports(1)[0]}/")
     peer.send(imcpy.Heartbeat())
@@ -207,14 +210,14 @@ async def test_packets_from_an_address_that_was_not_announced(harbour):
     assert judge(bridge, 1.0).causes == (Cause.FOREIGN_ADDRESS,)
 
 
-async def test_named_vehicle_that_is_absent_is_told():
+async def test_named_vehicle_that_is_absent_is_told() -> None:
     async with open_sea() as sea:
         await sea.ready()
         sea.bridge.settings = replace(sea.bridge.settings, vehicles=("lauv-sim-1", "lauv-seacon-9"))
         assert "lauv-seacon-9 was not heard" in judge(sea.bridge, 1.0).text()
 
 
-async def test_diagnosing_commands_nothing():
+async def test_diagnosing_commands_nothing() -> None:
     async with open_sea() as sea:
         await sea.ready()
         diagnosis = await examine(sea)
@@ -222,7 +225,7 @@ async def test_diagnosing_commands_nothing():
         assert sea.fleet.nodes[0].plan.maneuver is None
 
 
-async def test_silence_after_telemetry_is_told(harbour):
+async def test_silence_after_telemetry_is_told(harbour: tuple[Bridge, Peer]) -> None:
     bridge, peer = harbour
     peer.announce(bridge.transport.announce_port)
     await until(lambda: bool(bridge.nodes()), "it is known")
@@ -232,7 +235,7 @@ async def test_silence_after_telemetry_is_told(harbour):
 
 
 @pytest.mark.parametrize("session", ["udp_session", "acoustic_session", "wifi_gap_x5"])
-def test_recorded_sessions_of_real_vehicles_are_judged(captures, session):
+def test_recorded_sessions_of_real_vehicles_are_judged(captures: Path, session: str) -> None:
     diagnosis = diagnose_recording(str(captures / f"{session}.jsonl.gz"), BridgeSettings())
     assert diagnosis.causes == ()
     assert [node.name for node in diagnosis.nodes] == ["lauv-xplore-1", "lauv-xplore-2"]
@@ -251,14 +254,16 @@ def test_recorded_sessions_of_real_vehicles_are_judged(captures, session):
     ],
     ids=["empty", "no JSON", "missing", "no hex"],
 )
-def test_file_that_is_no_recording_is_refused_with_its_line(tmp_path, content, words):
+def test_file_that_is_no_recording_is_refused_with_its_line(tmp_path: Path, content: str, words: str) -> None:
     path = tmp_path / "session.jsonl"
     path.write_text(content)
     with pytest.raises(RecordingError, match=words):
         diagnose_recording(str(path), BridgeSettings())
 
 
-async def test_a_machine_without_a_network_is_well_when_its_vehicles_live_on_it(monkeypatch):
+async def test_a_machine_without_a_network_is_well_when_its_vehicles_live_on_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     monkeypatch.setattr("imc_bridge.network.transport.list_interfaces", list)
     async with open_sea(bridge={"loopback_only": False}) as sea:
         await sea.ready()
@@ -267,14 +272,16 @@ async def test_a_machine_without_a_network_is_well_when_its_vehicles_live_on_it(
         await sea.vanish()
 
 
-async def test_a_machine_without_a_network_that_hears_nobody_is_told_to_connect(monkeypatch):
+async def test_a_machine_without_a_network_that_hears_nobody_is_told_to_connect(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     monkeypatch.setattr("imc_bridge.network.transport.list_interfaces", list)
     *announce_ports, port = free_ports(3)
     diagnosis = await diagnose(BridgeSettings(port=port, announce_ports=tuple(announce_ports)), 0.1)
     assert Cause.NO_INTERFACE in diagnosis.causes
 
 
-async def test_an_honest_vehicle_that_sends_much_is_not_called_a_stranger():
+async def test_an_honest_vehicle_that_sends_much_is_not_called_a_stranger() -> None:
     async with open_sea(bridge={"max_packets_per_s": 100}) as sea:
         await sea.ready()
         node = sea.fleet.nodes[0]

@@ -4,6 +4,8 @@ import math
 import statistics
 from collections import Counter
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
 import imcpy
 import pytest
@@ -27,22 +29,22 @@ class Replay:
     taken: int
     events: list[BridgeEvent]
 
-    def of(self, kind):
+    def of(self, kind: type[Any]) -> list[Any]:
         return [event for event in self.events if isinstance(event, kind)]
 
 
-def replayed(path, **settings) -> Replay:
-    events = []
+def replayed(path: Path, **settings: Any) -> Replay:
+    events: list[Any] = []
     session = replay(path, BridgeSettings(**settings), events.append)
     return Replay(session.bridge, session.taken, events)
 
 
 @pytest.fixture(scope="module")
-def udp(captures):
+def udp(captures: Path) -> Any:
     return replayed(captures / "udp_session.jsonl.gz")
 
 
-def test_both_vehicles_are_known_by_name_id_and_address(udp):
+def test_both_vehicles_are_known_by_name_id_and_address(udp: Replay) -> None:
     nodes = {node.name: node for node in udp.bridge.nodes()}
     assert {name: (node.imc_id, node.address) for name, node in nodes.items()} == {
         "lauv-xplore-1": (0x1E, "127.0.0.1:6002"),
@@ -52,7 +54,7 @@ def test_both_vehicles_are_known_by_name_id_and_address(udp):
 
 
 @pytest.mark.parametrize("session", ["udp_session", "acoustic_session", "wifi_gap_x5"])
-def test_every_packet_is_classified(captures, session):
+def test_every_packet_is_classified(captures: Path, session: str) -> None:
     result = replayed(captures / f"{session}.jsonl.gz")
     decoder, nodes = result.bridge.decoder, result.bridge.nodes()
     assert not decoder.faults
@@ -70,7 +72,7 @@ def test_every_packet_is_classified(captures, session):
     assert all(node.imc_version == "5.4.31" for node in nodes)
 
 
-def test_link_goes_through_its_states(udp):
+def test_link_goes_through_its_states(udp: Replay) -> None:
     states = [change.state for change in udp.of(LinkChange) if change.vehicle == "lauv-xplore-1"]
     assert list(dict.fromkeys(states)) == [
         NodeState.ANNOUNCED,
@@ -81,7 +83,7 @@ def test_link_goes_through_its_states(udp):
     assert states[-1] is NodeState.READY
 
 
-def test_soundings_agree_with_the_vehicles_own_altitude(udp):
+def test_soundings_agree_with_the_vehicles_own_altitude(udp: Replay) -> None:
     soundings = udp.of(Sounding)
     reports = udp.of(StateReport)
     assert len(soundings) > 60
@@ -98,18 +100,18 @@ def test_soundings_agree_with_the_vehicles_own_altitude(udp):
     assert {sounding.source for sounding in soundings} == {"Altimeter"}
 
 
-def test_position_uncertainty_is_carried_through(udp):
+def test_position_uncertainty_is_carried_through(udp: Replay) -> None:
     sds = [s.position_sd_m for s in udp.of(Sounding) if s.position_sd_m is not None]
     assert len(sds) > 60
     assert all(0.0 < sd < 5.0 for sd in sds)
 
 
-def test_positions_are_those_the_vehicle_announces(udp):
+def test_positions_are_those_the_vehicle_announces(udp: Replay) -> None:
     first = next(report for report in udp.of(StateReport) if report.vehicle == "lauv-xplore-1")
     assert (first.lat_deg, first.lon_deg) == pytest.approx((math.degrees(0.718814), math.degrees(-0.151952)), abs=1e-4)
 
 
-def test_reports_relayed_by_a_gateway_do_not_pass_for_telemetry(captures):
+def test_reports_relayed_by_a_gateway_do_not_pass_for_telemetry(captures: Path) -> None:
     result = replayed(captures / "acoustic_session.jsonl.gz")
     nodes = {node.name: node for node in result.bridge.nodes()}
     assert nodes["manta-1"].relayed > 0
@@ -119,7 +121,7 @@ def test_reports_relayed_by_a_gateway_do_not_pass_for_telemetry(captures):
     assert nodes["lauv-xplore-1"].report.battery_pct is None
 
 
-def test_vehicle_under_water_in_a_plan_of_its_own_is_expected_to_be_silent(captures):
+def test_vehicle_under_water_in_a_plan_of_its_own_is_expected_to_be_silent(captures: Path) -> None:
     # Simulated five times faster than the clock of the recording.
     result = replayed(captures / "wifi_gap_x5.jsonl.gz")
     assert result.bridge.settings.time_scale == pytest.approx(5.0, abs=0.2)
@@ -131,7 +133,7 @@ def test_vehicle_under_water_in_a_plan_of_its_own_is_expected_to_be_silent(captu
     assert states[-1] in (NodeState.READY, NodeState.IN_PLAN)
 
 
-def ours_to_send(message, settings):
+def ours_to_send(message: imcpy.Message, settings: BridgeSettings) -> imcpy.Message:
     """The message as our own code makes it."""
     match type(message).__name__:
         case "Heartbeat":
@@ -149,7 +151,7 @@ def ours_to_send(message, settings):
     return None
 
 
-def goto_plan_like(plan):
+def goto_plan_like(plan: imcpy.Message) -> imcpy.Message | None:
     """A plan of Gotos to the same places as our own code makes it, None for another one; its timeouts are free."""
     if not all(isinstance(item.data, imcpy.Goto) for item in plan.maneuvers):
         return None
@@ -164,7 +166,7 @@ def goto_plan_like(plan):
     return goto_plan(plan.plan_id, steps)
 
 
-def by_depth(reference):
+def by_depth(reference: imcpy.Message) -> bool:
     """Whether it is one that we would send: to a place at a depth, not to an altitude, nor the end of a maneuver."""
     return reference.flags == REFERENCE_FLAGS and reference.z.z_units == imcpy.ZUnits.DEPTH
 
@@ -178,11 +180,11 @@ OTHERS: dict[str, set[str]] = {
 
 
 @pytest.mark.parametrize("session", OTHERS)
-def test_what_we_send_equals_byte_for_byte_what_worked_with_real_vehicles(captures, session):
+def test_what_we_send_equals_byte_for_byte_what_worked_with_real_vehicles(captures: Path, session: str) -> None:
     # The recording asked for an interval above the bottom, which DUNE does not keep.
     plan_id = "two" if session == "wifi_gap_x5" else "cao"
     settings = BridgeSettings(plan_id=plan_id, name="ccu-cao", altitude_interval_m=1.0)
-    sent = Counter()
+    sent: Counter[Any] = Counter()
     for record in read_recording(captures / f"{session}.jsonl.gz"):
         if record.src != CONSOLE:
             continue
@@ -200,7 +202,7 @@ def test_what_we_send_equals_byte_for_byte_what_worked_with_real_vehicles(captur
     assert sum(sent.values()) > 50
 
 
-def test_forged_packets_do_not_fill_the_memory():
+def test_forged_packets_do_not_fill_the_memory() -> None:
     bridge = Bridge(BridgeSettings(), commanding=False, clock=lambda: 0.0)
     for imc_id in range(1, 5000):
         heartbeat = imcpy.Heartbeat()

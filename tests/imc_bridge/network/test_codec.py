@@ -25,7 +25,7 @@ from tests.support.imc.sea import read_capture
 SESSIONS = ["udp_session", "acoustic_session", "wifi_gap_x5"]
 
 
-def packet_of(message, src=0x1E, dst=0xFFFF, time_s=1.5):
+def packet_of(message: imcpy.Message, src: int = 0x1E, dst: int = 0xFFFF, time_s: float = 1.5) -> bytes:
     return encode(message, src=src, dst=dst, time_s=time_s)
 
 
@@ -36,7 +36,7 @@ def swapped(packet: bytes) -> bytes:
 
 
 @pytest.mark.parametrize("session", SESSIONS)
-def test_every_recorded_packet_is_decoded_and_serialises_to_the_same_bytes(captures: Path, session: str):
+def test_every_recorded_packet_is_decoded_and_serialises_to_the_same_bytes(captures: Path, session: str) -> None:
     decoder = Decoder(WANTED)
     seen = 0
     for record in read_capture(captures / f"{session}.jsonl.gz"):
@@ -56,7 +56,7 @@ def test_every_recorded_packet_is_decoded_and_serialises_to_the_same_bytes(captu
     assert decoder.decoded.total() == seen
 
 
-def test_header_is_read_in_either_byte_order():
+def test_header_is_read_in_either_byte_order() -> None:
     packet = packet_of(imcpy.Heartbeat(), src=0x1234, dst=0x4321)
     assert peek(packet) == peek(swapped(packet)) == Header(150, 0, 1.5, 0x1234, 0, 0x4321, 0xFF)
 
@@ -72,13 +72,13 @@ def test_header_is_read_in_either_byte_order():
     ],
     ids=["empty", "stump", "other protocol", "truncated", "over-long"],
 )
-def test_what_is_no_packet_is_counted_by_its_fault(packet: bytes, fault: PacketFault):
+def test_what_is_no_packet_is_counted_by_its_fault(packet: bytes, fault: PacketFault) -> None:
     decoder = Decoder(WANTED)
     assert decoder.header(packet) is None
     assert decoder.faults == Counter({fault: 1})
 
 
-def test_wrong_checksum_is_counted():
+def test_wrong_checksum_is_counted() -> None:
     packet = bytearray(packet_of(imcpy.VehicleState()))
     packet[25] ^= 0x10
     decoder = Decoder(WANTED)
@@ -86,7 +86,7 @@ def test_wrong_checksum_is_counted():
     assert decoder.faults == Counter({PacketFault.CHECKSUM: 1})
 
 
-def test_unknown_ids_are_counted_and_skipped():
+def test_unknown_ids_are_counted_and_skipped() -> None:
     packet = bytearray(packet_of(imcpy.Heartbeat()))
     packet[2:4] = (9999).to_bytes(2, "little")
     decoder = Decoder(WANTED)
@@ -97,7 +97,7 @@ def test_unknown_ids_are_counted_and_skipped():
     assert message_name(9999) is None
 
 
-def test_unwanted_messages_are_counted_without_being_decoded():
+def test_unwanted_messages_are_counted_without_being_decoded() -> None:
     packet = bytearray(packet_of(imcpy.ServoPosition()))
     packet[-1] ^= 0xFF
     decoder = Decoder(WANTED)
@@ -108,14 +108,14 @@ def test_unwanted_messages_are_counted_without_being_decoded():
     assert not decoder.faults
 
 
-def test_time_that_is_no_number_is_refused():
+def test_time_that_is_no_number_is_refused() -> None:
     decoder = Decoder(WANTED)
     assert decoder.message(packet_of(imcpy.VehicleState(), time_s=float("nan"))) is None
     assert decoder.faults == Counter({PacketFault.CHECKSUM: 1})
 
 
 @given(st.binary(max_size=200), st.integers(0, 60), st.integers(0, 255))
-def test_no_packet_whatever_raises(noise: bytes, place: int, value: int):
+def test_no_packet_whatever_raises(noise: bytes, place: int, value: int) -> None:
     decoder = Decoder(WANTED)
     state = imcpy.EstimatedState()
     mutated = bytearray(packet_of(state))
@@ -127,12 +127,12 @@ def test_no_packet_whatever_raises(noise: bytes, place: int, value: int):
     assert decoder.faults.total() + decoder.decoded.total() + decoder.unwanted.total() == 3
 
 
-def test_the_checksum_is_that_of_the_packets(captures: Path):
+def test_the_checksum_is_that_of_the_packets(captures: Path) -> None:
     for record in list(read_capture(captures / "udp_session.jsonl.gz"))[:300]:
         assert checksum(record.packet[:-2]) == int.from_bytes(record.packet[-2:], "little")
 
 
-def plan_control(argument=None):
+def plan_control(argument: imcpy.Message | None = None) -> imcpy.Message:
     message = imcpy.PlanControl()
     message.type, message.op, message.request_id, message.flags = 1, 2, 777, 3
     message.plan_id, message.info = "survey-7", "said the vehicle"
@@ -141,27 +141,27 @@ def plan_control(argument=None):
     return message
 
 
-def statistics():
+def statistics() -> imcpy.Message:
     carried = imcpy.PlanStatistics()
     carried.plan_id, carried.durations, carried.fuel = "survey-7", "Total=12", "Total=1.5"
     return carried
 
 
-def test_sound_statistics_and_the_text_after_them_stay():
+def test_sound_statistics_and_the_text_after_them_stay() -> None:
     packet = packet_of(plan_control(statistics()))
     assert without_argument(packet) == packet
     assert imcpy.Packet.deserialize(packet).info == "said the vehicle"
 
 
 @pytest.mark.parametrize("session", SESSIONS)
-def test_what_recorded_vehicles_answer_stays_as_it_is(captures: Path, session: str):
+def test_what_recorded_vehicles_answer_stays_as_it_is(captures: Path, session: str) -> None:
     for record in read_capture(captures / f"{session}.jsonl.gz"):
         message = Decoder(WANTED).message(record.packet)
         if isinstance(message, imcpy.PlanControl | imcpy.PlanDB) and int(message.type) != 0:
             assert without_argument(record.packet) == record.packet
 
 
-def test_what_else_a_plan_message_carries_is_left_out_and_the_rest_stays():
+def test_what_else_a_plan_message_carries_is_left_out_and_the_rest_stays() -> None:
     plan = imcpy.PlanSpecification()
     plan.plan_id = "survey-7"
     bare = imcpy.Packet.deserialize(without_argument(packet_of(plan_control(plan))))
@@ -170,7 +170,7 @@ def test_what_else_a_plan_message_carries_is_left_out_and_the_rest_stays():
 
 
 @given(cut=st.integers(1, 60))
-def test_statistics_that_end_too_early_are_left_out(cut: int):
+def test_statistics_that_end_too_early_are_left_out(cut: int) -> None:
     packet = bytearray(packet_of(plan_control(statistics())))
     packet = packet[: max(22, len(packet) - cut)]
     packet[4:6] = (len(packet) - 22).to_bytes(2, "little")
@@ -181,12 +181,12 @@ def test_statistics_that_end_too_early_are_left_out(cut: int):
 
 
 @pytest.mark.parametrize("message", [plan_control(), imcpy.PlanDB(), imcpy.Heartbeat(), imcpy.VehicleState()])
-def test_packets_that_carry_nothing_stay_as_they_are(message):
+def test_packets_that_carry_nothing_stay_as_they_are(message: imcpy.Message) -> None:
     assert without_argument(packet_of(message)) == packet_of(message)
 
 
 @given(st.binary(max_size=40), st.integers(0, 30), st.booleans())
-def test_whatever_is_carried_imcpy_never_reads_it(rubbish: bytes, cut: int, right: bool):
+def test_whatever_is_carried_imcpy_never_reads_it(rubbish: bytes, cut: int, right: bool) -> None:
     """What imcpy cannot read inside costs it memory for good; a wrong checksum it notices before."""
     packet = bytearray(packet_of(plan_control()))
     at = 20 + 4 + 2 + len("survey-7") + 2

@@ -11,7 +11,7 @@ from tests.support.imc.sea import Peer, open_sea
 from tests.support.waiting import until
 
 
-def test_marks_are_shown_again_and_again_until_they_are_taken_down():
+def test_marks_are_shown_again_and_again_until_they_are_taken_down() -> None:
     board = Board("bathyfleet")
     assert board.due(0.0) == []
     board.show("waypoint of a", Mark("Waypoint", 41.185, -8.705, 3.0))
@@ -25,14 +25,14 @@ def test_marks_are_shown_again_and_again_until_they_are_taken_down():
     assert board.due(3 * SHOW_PERIOD_S) == []
 
 
-def test_there_are_never_more_marks_than_a_console_can_show():
+def test_there_are_never_more_marks_than_a_console_can_show() -> None:
     board = Board("x")
     for index in range(3 * MAX_MARKS):
         board.show(str(index), Mark("Area", 0.0, 0.0))
     assert len(board.due(0.0)) == MAX_MARKS
 
 
-async def test_another_console_hears_our_announce_and_where_vehicles_are_sent():
+async def test_another_console_hears_our_announce_and_where_vehicles_are_sent() -> None:
     async with open_sea() as sea:
         neptus = Peer(sea.settings, 0x4001, "neptus")
         try:

@@ -24,7 +24,7 @@ def flood(port: int, count: int = 20_000) -> None:
             sender.sendto(packet, ("127.0.0.1", port))
 
 
-def test_the_meter_knows_the_total_and_the_last_minute():
+def test_the_meter_knows_the_total_and_the_last_minute() -> None:
     count = 0
     meter = DropMeter(lambda: count)
     assert meter.look(0.0) == 0
@@ -38,7 +38,7 @@ def test_the_meter_knows_the_total_and_the_last_minute():
     assert (meter.total, meter.recent) == (9, 0)
 
 
-async def test_what_our_socket_could_not_hold_is_told_counted_and_no_vehicles_fault():
+async def test_what_our_socket_could_not_hold_is_told_counted_and_no_vehicles_fault() -> None:
     async with open_sea() as sea:
         [name] = await sea.ready()
         flood(sea.settings.port)
@@ -55,7 +55,7 @@ async def test_what_our_socket_could_not_hold_is_told_counted_and_no_vehicles_fa
         assert Cause.LOW_RATE not in judged.causes, f"{name} is not blamed"
 
 
-async def test_a_mission_and_the_metrics_hear_of_it():
+async def test_a_mission_and_the_metrics_hear_of_it() -> None:
     *announce_ports, port = free_ports(6)
     link = ImcFleetLink(BridgeSettings(port=port, loopback_only=True, announce_ports=tuple(announce_ports)))
     before = metrics.PACKETS_DROPPED._value.get()
@@ -67,11 +67,10 @@ async def test_a_mission_and_the_metrics_hear_of_it():
         await link.close()
 
 
-async def test_every_engaged_vehicle_is_asked_to_send_seldom_what_is_loud():
+async def test_every_engaged_vehicle_is_asked_to_send_seldom_what_is_loud() -> None:
     async with open_sea(chatter=True, speed=5.0) as sea:
         [name] = await sea.ready()
         await sea.bridge.engage(name)
-        assert sea.fleet is not None
         limiter = sea.fleet.nodes[0]
         await until(lambda: "ServoPosition:0.1" in limiter._rate_text, "it was asked")
         assert "Distance:5" in limiter._rate_text
@@ -80,7 +79,7 @@ async def test_every_engaged_vehicle_is_asked_to_send_seldom_what_is_loud():
         await until(lambda: "ServoPosition" not in limiter._rate_text, "it has its own rates back")
 
 
-async def test_what_nobody_needs_is_neither_read_nor_a_loss():
+async def test_what_nobody_needs_is_neither_read_nor_a_loss() -> None:
     async with open_sea() as sea:
         await sea.ready()
         read, loud = sea.bridge.decoder.unwanted["Rpm"], [getattr(imcpy, name)() for name in LOUD]
@@ -96,7 +95,7 @@ async def test_what_nobody_needs_is_neither_read_nor_a_loss():
         assert sea.bridge.drops.total == 0
 
 
-async def test_the_port_is_nobody_elses_all_the_same():
+async def test_the_port_is_nobody_elses_all_the_same() -> None:
     async with open_sea() as sea:
         with pytest.raises(PortInUseError):
             await Bridge(sea.settings).start(lambda _event: None)

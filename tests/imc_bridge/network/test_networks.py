@@ -2,7 +2,9 @@
 
 import asyncio
 import socket
+from collections.abc import AsyncIterator
 from dataclasses import replace
+from typing import Any
 
 import imcpy
 import pytest
@@ -21,13 +23,13 @@ LOOPBACK = Interface("127.0.0.1", "127.255.255.255")
 SECOND = Interface("127.0.0.2", "127.255.255.255")
 
 
-def settings_on(**changes):
+def settings_on(**changes: Any) -> BridgeSettings:
     *announce_ports, port = free_ports(4)
     return BridgeSettings(port=port, announce_ports=tuple(announce_ports), time_scale=20.0, **changes)
 
 
 @pytest.fixture
-async def two_interfaces(monkeypatch):
+async def two_interfaces(monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[Any]:
     """A bridge on a machine that seems to have two interfaces; both lie on the loopback device."""
     present = [LOOPBACK, SECOND]
     monkeypatch.setattr("imc_bridge.network.transport.list_interfaces", lambda: list(present))
@@ -37,7 +39,7 @@ async def two_interfaces(monkeypatch):
     await bridge.close()
 
 
-def hears(port, address=""):
+def hears(port: int, address: str = "") -> socket.socket:
     """A socket of another system that listens for announces, by multicast too."""
     sock = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -52,8 +54,8 @@ def hears(port, address=""):
     return sock
 
 
-def drained(sock):
-    found = []
+def drained(sock: socket.socket) -> list[tuple[imcpy.Message, tuple[str, int]]]:
+    found: list[Any] = []
     while True:
         try:
             packet, address = sock.recvfrom(65536)
@@ -62,13 +64,15 @@ def drained(sock):
         found.append((imcpy.Packet.deserialize(packet), address))
 
 
-async def test_announces_leave_on_every_interface_and_to_this_host(two_interfaces):
+async def test_announces_leave_on_every_interface_and_to_this_host(
+    two_interfaces: tuple[Bridge, list[Interface]],
+) -> None:
     bridge, _ = two_interfaces
     sock = hears(bridge.settings.announce_ports[-1])
     heard = []
     try:
 
-        def complete():
+        def complete() -> Any:
             heard.extend(drained(sock))
             offers = [message.services for message, _ in heard]
             firsts = {offer.partition(";")[0] for offer in offers}
@@ -85,7 +89,7 @@ async def test_announces_leave_on_every_interface_and_to_this_host(two_interface
 
 
 @pytest.mark.parametrize("way", ["multicast", "broadcast", "unicast"])
-async def test_vehicles_are_heard_by(two_interfaces, way):
+async def test_vehicles_are_heard_by(two_interfaces: tuple[Bridge, list[Interface]], way: str) -> None:
     bridge, _ = two_interfaces
     peer = Peer(bridge.settings)
     message = imcpy.Announce()
@@ -101,7 +105,9 @@ async def test_vehicles_are_heard_by(two_interfaces, way):
     peer.close()
 
 
-async def test_interface_that_comes_later_is_taken_up_and_one_that_goes_is_left(two_interfaces):
+async def test_interface_that_comes_later_is_taken_up_and_one_that_goes_is_left(
+    two_interfaces: tuple[Bridge, list[Interface]],
+) -> None:
     bridge, present = two_interfaces
     third = Interface("127.0.0.3", "127.255.255.255")
     present.append(third)
@@ -112,7 +118,7 @@ async def test_interface_that_comes_later_is_taken_up_and_one_that_goes_is_left(
     assert not bridge.handler_errors
 
 
-async def test_only_the_chosen_interfaces_are_used(monkeypatch):
+async def test_only_the_chosen_interfaces_are_used(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("imc_bridge.network.transport.list_interfaces", lambda: [LOOPBACK, SECOND])
     bridge = Bridge(settings_on(interfaces=("127.0.0.2",)))
     await bridge.start(lambda event: None)
@@ -122,13 +128,15 @@ async def test_only_the_chosen_interfaces_are_used(monkeypatch):
         await bridge.close()
 
 
-def test_interfaces_of_this_machine_have_their_networks_broadcast_address():
+def test_interfaces_of_this_machine_have_their_networks_broadcast_address() -> None:
     for interface in list_interfaces():
         assert socket.inet_aton(interface.address)
         assert socket.inet_aton(interface.broadcast)
 
 
-async def test_vehicle_that_announces_two_addresses_is_reached_at_the_one_that_works(harbour):
+async def test_vehicle_that_announces_two_addresses_is_reached_at_the_one_that_works(
+    harbour: tuple[Bridge, Peer],
+) -> None:
     bridge, peer = harbour
     dead = free_ports(1)[0]
     port = peer.sock.getsockname()[1]
@@ -138,7 +146,7 @@ async def test_vehicle_that_announces_two_addresses_is_reached_at_the_one_that_w
     await until(lambda: bridge.nodes()[0].address == f"127.0.0.1:{port}", "commands go to where it answers from")
 
 
-async def test_packets_that_nobody_takes_are_noticed(harbour):
+async def test_packets_that_nobody_takes_are_noticed(harbour: tuple[Bridge, Peer]) -> None:
     bridge, peer = harbour
     dead = ("127.0.0.1", free_ports(1)[0])
     peer.announce(bridge.transport.announce_port, services=f"imc+udp://127.0.0.1:{dead[1]}/")
@@ -146,7 +154,7 @@ async def test_packets_that_nobody_takes_are_noticed(harbour):
     assert bridge.transport.unreachable[dead] == "Connection refused"
 
 
-async def test_every_refusal_is_noticed(harbour):
+async def test_every_refusal_is_noticed(harbour: tuple[Bridge, Peer]) -> None:
     # Two sockets share the bridge's port, and the system returns errors to either, by a hash of both addresses.
     bridge, _ = harbour
     dead = {("127.0.0.1", port) for port in free_ports(16)}
@@ -155,7 +163,7 @@ async def test_every_refusal_is_noticed(harbour):
     await until(lambda: dead <= bridge.transport.unreachable.keys(), "all refusals came back")
 
 
-async def test_a_mission_by_tcp():
+async def test_a_mission_by_tcp() -> None:
     async with open_sea(tcp=True, bridge={"transport": "tcp"}) as sea:
         (name,) = await sea.ready()
         (node,) = sea.bridge.nodes()
@@ -167,7 +175,7 @@ async def test_a_mission_by_tcp():
         assert sea.fleet.nodes[0].contacts.destinations == []
 
 
-async def test_broken_stream_is_made_again():
+async def test_broken_stream_is_made_again() -> None:
     async with open_sea(tcp=True, bridge={"transport": "tcp"}) as sea:
         (name,) = await sea.ready()
         await sea.vanish()
@@ -176,7 +184,7 @@ async def test_broken_stream_is_made_again():
         await until(lambda: sea.state(name) is NodeState.READY, "it is ready again")
 
 
-async def test_vehicle_without_tcp_is_spoken_to_by_udp():
+async def test_vehicle_without_tcp_is_spoken_to_by_udp() -> None:
     async with open_sea(bridge={"transport": "tcp"}) as sea:
         (name,) = await sea.ready()
         await sea.bridge.engage(name)
@@ -184,7 +192,7 @@ async def test_vehicle_without_tcp_is_spoken_to_by_udp():
         await until(lambda: WaypointStatus.ACKNOWLEDGED in sea.statuses(name, 0), "it was acknowledged")
 
 
-def packet_of(size):
+def packet_of(size: int) -> bytes:
     message = imcpy.LogBookEntry()
     message.text = "x" * size
     return bytes(imcpy.Packet.serialize(message))
@@ -195,10 +203,11 @@ def packet_of(size):
     st.lists(st.integers(1, 90), min_size=1, max_size=30),
     st.binary(max_size=20),
 )
-def test_stream_is_cut_into_its_packets_however_it_arrives(sizes, cuts, rubbish):
+def test_stream_is_cut_into_its_packets_however_it_arrives(sizes: Any, cuts: Any, rubbish: Any) -> None:
     packets = [packet_of(size) for size in sizes]
     stream = rubbish.replace(b"\x54", b"").replace(b"\xfe", b"") + b"".join(packets)
-    splitter, found, start = PacketSplitter(), [], 0
+    splitter, start = PacketSplitter(), 0
+    found: list[bytes] = []
     while start < len(stream):
         for cut in cuts:
             found += splitter.feed(stream[start : start + cut])
@@ -206,7 +215,7 @@ def test_stream_is_cut_into_its_packets_however_it_arrives(sizes, cuts, rubbish)
     assert found == packets
 
 
-async def test_interface_settings_are_checked_when_the_bridge_starts():
+async def test_interface_settings_are_checked_when_the_bridge_starts() -> None:
     settings = replace(settings_on(), interfaces=("203.0.113.9",))
     with pytest.raises(ValueError, match="this machine has no address 203"):
         await Bridge(settings).start(lambda event: None)

@@ -3,6 +3,7 @@
 import asyncio
 import socket
 from dataclasses import replace
+from typing import Any
 
 import imcpy
 import pytest
@@ -13,14 +14,14 @@ from tests.support.ports import free_ports
 from tests.support.waiting import until
 
 
-async def test_taken_port_is_told_with_a_remedy():
+async def test_taken_port_is_told_with_a_remedy() -> None:
     async with open_sea() as sea:
         second = Bridge(sea.settings)
         with pytest.raises(PortInUseError, match=rf"port {sea.settings.port} .*stop it or set another"):
             await second.start(print)
 
 
-async def test_first_free_announce_port_is_taken_and_all_taken_is_told():
+async def test_first_free_announce_port_is_taken_and_all_taken_is_told() -> None:
     *announce_ports, port = free_ports(4)
     settings = BridgeSettings(port=port, loopback_only=True, announce_ports=tuple(announce_ports))
     listeners = [socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in announce_ports]
@@ -39,13 +40,13 @@ async def test_first_free_announce_port_is_taken_and_all_taken_is_told():
             listener.close()
 
 
-async def test_interface_that_this_machine_lacks_is_refused():
+async def test_interface_that_this_machine_lacks_is_refused() -> None:
     bridge = Bridge(BridgeSettings(port=free_ports(1)[0], interfaces=("203.0.113.77",)))
     with pytest.raises(ValueError, match=r"interfaces: this machine has no address 203\.0\.113\.77; it has"):
         await bridge.start(print)
 
 
-async def test_newcomer_is_answered_by_an_announce_and_heartbeats(harbour):
+async def test_newcomer_is_answered_by_an_announce_and_heartbeats(harbour: tuple[Bridge, Peer]) -> None:
     bridge, peer = harbour
     peer.announce(bridge.transport.announce_port)
     await until(lambda: len(peer.take("Heartbeat")) >= 3, "three heartbeats came")
@@ -54,10 +55,10 @@ async def test_newcomer_is_answered_by_an_announce_and_heartbeats(harbour):
     assert (node.name, node.state) == ("lauv-noptilus-1", NodeState.ANNOUNCED)
 
 
-async def test_announced_but_mute_node_is_explained_after_a_while(harbour):
+async def test_announced_but_mute_node_is_explained_after_a_while(harbour: tuple[Bridge, Peer]) -> None:
     bridge, peer = harbour
 
-    def reason():
+    def reason() -> Any:
         peer.announce(bridge.transport.announce_port)
         return bridge.nodes()[0].reason if bridge.nodes() else ""
 
@@ -65,7 +66,7 @@ async def test_announced_but_mute_node_is_explained_after_a_while(harbour):
     assert "firewall" in reason()
 
 
-async def test_packets_without_announce_are_heard_and_explained(harbour):
+async def test_packets_without_announce_are_heard_and_explained(harbour: tuple[Bridge, Peer]) -> None:
     bridge, peer = harbour
     peer.send(imcpy.Heartbeat())
     await until(lambda: bool(bridge.nodes()), "the packet was heard")
@@ -76,7 +77,7 @@ async def test_packets_without_announce_are_heard_and_explained(harbour):
     await until(lambda: bridge.nodes()[0].name == "lauv-noptilus-1", "its name was learnt")
 
 
-async def test_telemetry_counts_only_from_the_announced_address(harbour):
+async def test_telemetry_counts_only_from_the_announced_address(harbour: tuple[Bridge, Peer]) -> None:
     bridge, peer = harbour
     peer.announce(bridge.transport.announce_port)
     stranger = Peer(peer.settings)
@@ -96,7 +97,7 @@ async def test_telemetry_counts_only_from_the_announced_address(harbour):
     relay.close()
 
 
-async def test_entity_names_are_asked_for_until_they_come(harbour):
+async def test_entity_names_are_asked_for_until_they_come(harbour: tuple[Bridge, Peer]) -> None:
     bridge, peer = harbour
     peer.announce(bridge.transport.announce_port)
     await until(lambda: bool(bridge.nodes()), "it is known")
@@ -108,16 +109,16 @@ async def test_entity_names_are_asked_for_until_they_come(harbour):
     await until(lambda: bridge.nodes()[0].entities == 2, "the names were taken in")
 
 
-async def test_same_id_under_two_names_is_a_conflict(harbour):
+async def test_same_id_under_two_names_is_a_conflict(harbour: tuple[Bridge, Peer]) -> None:
     bridge, peer = harbour
     peer.announce(bridge.transport.announce_port)
     await until(lambda: bool(bridge.nodes()), "it is known")
     peer.announce(bridge.transport.announce_port, sys_name="lauv-seacon-2")
     await until(lambda: bridge.nodes()[0].conflict is not None, "the conflict was noticed")
-    assert "'lauv-noptilus-1' and by 'lauv-seacon-2'" in bridge.nodes()[0].conflict
+    assert "'lauv-noptilus-1' and by 'lauv-seacon-2'" in (bridge.nodes()[0].conflict or "")
 
 
-async def test_rubbish_leaves_the_bridge_alive(harbour):
+async def test_rubbish_leaves_the_bridge_alive(harbour: tuple[Bridge, Peer]) -> None:
     bridge, peer = harbour
     for rubbish in (b"", b"\x54\xfe", bytes(300), b"\x54\xfe" + bytes(40)):
         for port in (peer.settings.port, bridge.transport.announce_port):
@@ -129,7 +130,7 @@ async def test_rubbish_leaves_the_bridge_alive(harbour):
     assert not bridge.handler_errors
 
 
-async def test_closing_twice_and_starting_twice():
+async def test_closing_twice_and_starting_twice() -> None:
     *announce_ports, port = free_ports(3)
     settings = BridgeSettings(port=port, loopback_only=True, announce_ports=tuple(announce_ports))
     bridge = Bridge(settings)

@@ -7,13 +7,18 @@ the vehicle's own.
 import asyncio
 import dataclasses
 import tracemalloc
+from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
+from typing import Any
 
 import imcpy
 import pytest
 
 from imc_bridge import Bridge, BridgeSettings, NodeState
+from imc_bridge.doctor.diagnosis import Diagnosis
 from imc_bridge.doctor.doctor import Cause, judge
+from imc_bridge.events import NodeView
+from imc_bridge.network.discovery import Announcement
 from imc_bridge.nodes.capacity import MAX_NODES, MAX_UNANNOUNCED, MAX_UNANNOUNCED_OF_HOST, MAX_UNHEARD_OF_HOST
 from imc_bridge.nodes.newcomers import MAX_NEWCOMERS, MAX_NEWCOMERS_OF_HOST, Newcomers
 from imc_bridge.nodes.refusals import Refused
@@ -30,7 +35,7 @@ HOSTS = tuple(f"127.0.0.{last}" for last in range(2, 12))
 
 
 @asynccontextmanager
-async def listening(**changes):
+async def listening(**changes: Any) -> AsyncIterator[Any]:
     *announce_ports, port = free_ports(4)
     settings = BridgeSettings(port=port, loopback_only=True, announce_ports=tuple(announce_ports), **changes)
     bridge = Bridge(settings)
@@ -45,40 +50,40 @@ async def listening(**changes):
 class Forger:
     """Sends under any number of ids from one socket."""
 
-    def __init__(self, bridge, host="127.0.0.2"):
+    def __init__(self, bridge: Bridge, host: str = "127.0.0.2") -> None:
         self.speaker = Speaker(bridge, host=host)
         self.sent = 0
 
-    async def _pause(self):
+    async def _pause(self) -> None:
         self.sent += 1
         if self.sent % 50 == 0:
             await asyncio.sleep(0)  # the bridge reads meanwhile, so that its socket's buffer does not overflow
 
-    async def heartbeats(self, count, first=FIRST_FORGED):
+    async def heartbeats(self, count: int, first: int = FIRST_FORGED) -> None:
         for number in range(count):
             self.speaker.imc_id = first + number
             self.speaker.send(imcpy.Heartbeat())
             await self._pause()
 
-    async def announces(self, count, first=FIRST_FORGED, name="forged"):
+    async def announces(self, count: int, first: int = FIRST_FORGED, name: str = "forged") -> None:
         for number in range(count):
             self.speaker.imc_id, self.speaker.name = first + number, f"{name}-{first + number:x}"
             self.speaker.announce()
             await self._pause()
 
-    def close(self):
+    def close(self) -> None:
         self.speaker.close()
 
 
-def judged(bridge):
+def judged(bridge: Bridge) -> Diagnosis:
     return judge(bridge, 1.0)
 
 
-def node_of(bridge, imc_id):
+def node_of(bridge: Bridge, imc_id: int) -> NodeView | None:
     return next((node for node in bridge.nodes() if node.imc_id == imc_id), None)
 
 
-async def read(bridge):
+async def read(bridge: Bridge) -> None:
     """Wait until every packet that was sent has been read: ours, sent last, is among them."""
     last = Speaker(bridge, host="127.0.0.99", imc_id=0x7777)
     seen = sum(bridge.announces.decoded.values())
@@ -87,7 +92,7 @@ async def read(bridge):
     last.close()
 
 
-async def test_heartbeats_of_strangers_take_no_place_of_a_vehicle_that_comes_later():
+async def test_heartbeats_of_strangers_take_no_place_of_a_vehicle_that_comes_later() -> None:
     async with listening() as bridge:
         forger = Forger(bridge)
         await forger.heartbeats(400)
@@ -105,7 +110,7 @@ async def test_heartbeats_of_strangers_take_no_place_of_a_vehicle_that_comes_lat
         vehicle.close()
 
 
-async def test_one_host_does_not_hide_the_unannounced_vehicles_of_another():
+async def test_one_host_does_not_hide_the_unannounced_vehicles_of_another() -> None:
     async with listening() as bridge:
         forger, vehicle = Forger(bridge), Speaker(bridge, host="127.0.0.3", imc_id=0x1E)
         await forger.heartbeats(100)
@@ -118,7 +123,7 @@ async def test_one_host_does_not_hide_the_unannounced_vehicles_of_another():
         vehicle.close()
 
 
-async def test_forged_announces_from_many_hosts_do_not_displace_a_vehicle_that_is_heard():
+async def test_forged_announces_from_many_hosts_do_not_displace_a_vehicle_that_is_heard() -> None:
     async with listening() as bridge:
         vehicle = Speaker(bridge)
         vehicle.announce()
@@ -141,7 +146,7 @@ async def test_forged_announces_from_many_hosts_do_not_displace_a_vehicle_that_i
 
 
 @pytest.mark.parametrize("host", ["127.0.0.1", "127.0.0.50"])
-async def test_vehicle_that_comes_after_forged_announces_has_a_place_once_it_is_heard(host):
+async def test_vehicle_that_comes_after_forged_announces_has_a_place_once_it_is_heard(host: str) -> None:
     """Also from a forger's own address: who is heard has precedence over who only announces."""
     async with listening() as bridge:
         forgers = [Forger(bridge, name) for name in ("127.0.0.1", *HOSTS)]
@@ -156,7 +161,7 @@ async def test_vehicle_that_comes_after_forged_announces_has_a_place_once_it_is_
         assert imcpy.Packet.deserialize(heartbeat).dst == vehicle.imc_id
         vehicle.swim()
 
-        def heard():
+        def heard() -> Any:
             node = node_of(bridge, vehicle.imc_id)
             return node is not None and node.report is not None
 
@@ -167,7 +172,7 @@ async def test_vehicle_that_comes_after_forged_announces_has_a_place_once_it_is_
         vehicle.close()
 
 
-async def test_forgers_that_also_speak_get_no_more_places_than_a_host_may_have():
+async def test_forgers_that_also_speak_get_no_more_places_than_a_host_may_have() -> None:
     async with listening() as bridge:
         forger = Forger(bridge)
         for number in range(MAX_NODES + 20):
@@ -185,7 +190,7 @@ async def test_forgers_that_also_speak_get_no_more_places_than_a_host_may_have()
         vehicle.close()
 
 
-async def test_a_vehicle_that_a_mission_wants_has_a_place_whoever_has_the_others():
+async def test_a_vehicle_that_a_mission_wants_has_a_place_whoever_has_the_others() -> None:
     async with listening() as bridge:
         bridge.want("lauv-noptilus-1")
         vehicle = Speaker(bridge)
@@ -211,7 +216,7 @@ async def test_a_vehicle_that_a_mission_wants_has_a_place_whoever_has_the_others
         vehicle.close()
 
 
-async def test_the_name_of_a_vehicle_goes_to_who_is_heard_under_it():
+async def test_the_name_of_a_vehicle_goes_to_who_is_heard_under_it() -> None:
     async with listening() as bridge:
         bridge.want("lauv-noptilus-1")
         forger, vehicle = Forger(bridge), Speaker(bridge)
@@ -231,7 +236,7 @@ async def test_the_name_of_a_vehicle_goes_to_who_is_heard_under_it():
         vehicle.close()
 
 
-async def test_real_vehicle_among_forgers_becomes_ready():
+async def test_real_vehicle_among_forgers_becomes_ready() -> None:
     async with open_sea(connected=False) as sea:
         await sea.connect()
         forgers = [Forger(sea.bridge, host) for host in ("127.0.0.1", "127.0.0.2")]
@@ -242,7 +247,7 @@ async def test_real_vehicle_among_forgers_becomes_ready():
         floor = seafloors.generate("harbour", 0, width_m=100.0, height_m=100.0)
         (spec,) = default_specs(1, floor, base_port=sea.base_port)
 
-        def ready():
+        def ready() -> Any:
             return sea.state(spec.name) is NodeState.READY
 
         await until(ready, "the vehicle is ready")
@@ -251,11 +256,11 @@ async def test_real_vehicle_among_forgers_becomes_ready():
             forger.close()
 
 
-async def test_strangers_who_fell_silent_are_forgotten_and_the_doctor_is_content_again():
+async def test_strangers_who_fell_silent_are_forgotten_and_the_doctor_is_content_again() -> None:
     now = [0.0]
     bridge = Bridge(BridgeSettings(loopback_only=True), clock=lambda: now[0])
 
-    def packet(message, imc_id):
+    def packet(message: Any, imc_id: Any) -> Any:
         message.src, message.timestamp = imc_id, 1.7e9
         return imcpy.Packet.serialize(message)
 
@@ -274,7 +279,7 @@ async def test_strangers_who_fell_silent_are_forgotten_and_the_doctor_is_content
     assert Cause.CROWDED not in judged(bridge).causes
 
 
-def test_newcomers_are_kept_in_bounded_memory_and_share_it_by_host():
+def test_newcomers_are_kept_in_bounded_memory_and_share_it_by_host() -> None:
     newcomers = Newcomers()
     announcement = _announcement()
     newcomers.note(announcement, "127.0.0.1")
@@ -290,7 +295,7 @@ def test_newcomers_are_kept_in_bounded_memory_and_share_it_by_host():
     assert newcomers.answered(announcement.imc_id, ("127.0.0.1", 6002)) is None, "it is no newcomer any more"
 
 
-def test_a_newcomer_answers_from_the_address_that_it_announced():
+def test_a_newcomer_answers_from_the_address_that_it_announced() -> None:
     newcomers = Newcomers()
     newcomers.note(_announcement(), "127.0.0.1")
     assert newcomers.answered(0x1E, ("127.0.0.1", 6003)) is None
@@ -301,13 +306,13 @@ def test_a_newcomer_answers_from_the_address_that_it_announced():
     assert newcomers.answered(0x1E, ("127.0.0.1", 6002)) is None, "the first of too many has gone"
 
 
-def _announcement():
+def _announcement() -> Announcement:
     from imc_bridge.network.discovery import Announcement
 
     return Announcement(0x1E, "lauv-noptilus-1", 2, (("127.0.0.1", 6002),))
 
 
-def test_names_that_nobody_could_read_are_made_readable():
+def test_names_that_nobody_could_read_are_made_readable() -> None:
     now = 0.0
     roster = Roster(BridgeSettings(loopback_only=True))
     message = imcpy.Announce()

@@ -91,7 +91,8 @@ def write_grid(path: Path, cell_m: float, crs: pyproj.CRS | None, *, up: bool = 
     n = int(100 / cell_m)
     x = west + (np.arange(n) + 0.5) * cell_m
     y = south + (np.arange(n) + 0.5) * cell_m
-    east, north = to_utm.transform(*np.meshgrid(x, y[::-1]), direction="INVERSE")
+    utm_east, utm_north = np.meshgrid(x, y[::-1])
+    east, north = to_utm.transform(utm_east, utm_north, direction="INVERSE")
     z = depth_at(east, north) * (-1.0 if up else 1.0)
     layers = [z] if sd is None else [z, np.full(z.shape, sd)]
     transform = Affine(cell_m, 0, west, 0, -cell_m, south + n * cell_m)

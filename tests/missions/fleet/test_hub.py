@@ -1,5 +1,8 @@
 """Links together: commands go to the right one, events to the mission that claimed the vehicle."""
 
+from collections.abc import AsyncIterator
+from typing import Any
+
 import pytest
 
 from app.missions.errors import ConflictError
@@ -32,7 +35,7 @@ async def rest() -> RestFleetLink:
 
 
 @pytest.fixture
-async def hub(rest: RestFleetLink):  # type: ignore[no-untyped-def]
+async def hub(rest: RestFleetLink) -> AsyncIterator[Any]:
     hub = FleetHub([rest, SimFleetLink(SimulationSettings(), 10.0)])
     await hub.start()
     yield hub

@@ -4,7 +4,7 @@ import asyncio
 import contextlib
 import math
 from abc import ABC, abstractmethod
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 
 import numpy as np
 import pytest
@@ -143,7 +143,7 @@ class SimBench(Bench):
         """It went with the link."""
 
     def follows(self) -> bool:
-        return self.link._swimmers[self.name].order is not None  # type: ignore[attr-defined, no-any-return]
+        return self.link._swimmers[self.name].order is not None  # type: ignore[attr-defined]
 
 
 class RestBench(Bench):
@@ -199,7 +199,7 @@ class RestBench(Bench):
             self.rest.has_waypoint(self.name, self._goal.step)
 
 
-BENCHES = {"imc": ImcBench, "rest": RestBench, "sim": SimBench}
+BENCHES: dict[str, Callable[[], Bench]] = {"imc": ImcBench, "rest": RestBench, "sim": SimBench}
 
 
 @contextlib.asynccontextmanager

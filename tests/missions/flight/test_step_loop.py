@@ -1,6 +1,7 @@
 """What nobody flies is no step, and what was decided while a link was away is sent all the same."""
 
 from dataclasses import replace
+from typing import Any
 
 import pytest
 
@@ -8,9 +9,10 @@ from app.missions.fleet.hub import FleetHub
 from app.missions.fleet.interface import LinkState, VehicleRefusedError
 from app.missions.flight import step_loop
 from app.missions.flight.commit import StepCommit
-from app.missions.flight.decision import Decision
+from app.missions.flight.decision import Decision, decide
 from app.missions.service import MissionService
 from app.missions.states import MissionState
+from app.storage import missions as mission_queries
 from tests.support.missions.harbour import sim_spec, until_state
 from tests.support.waiting import until
 
@@ -20,9 +22,9 @@ REASON = "leaves no safe depth"
 async def test_a_step_in_which_every_order_is_refused_does_not_count(
     service: MissionService, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    decide, spoilt, asked = step_loop.decide, True, 0
+    spoilt, asked = True, 0
 
-    def refusing(*arguments: object, **more: object) -> Decision:
+    def refusing(*arguments: Any, **more: Any) -> Decision:
         nonlocal asked
         asked += 1
         decision = decide(*arguments, **more)
@@ -49,7 +51,7 @@ async def test_a_step_that_every_vehicle_turns_down_is_sent_again(
 ) -> None:
     order, refused = FleetHub.order, 0
 
-    async def refusing(hub: FleetHub, key, waypoint) -> None:
+    async def refusing(hub: FleetHub, key: Any, waypoint: Any) -> None:
         nonlocal refused
         if refused < 4:
             refused += 1
@@ -62,7 +64,7 @@ async def test_a_step_that_every_vehicle_turns_down_is_sent_again(
     view = await until_state(service, mission, MissionState.FINISHED)
     assert refused == 4
     async with service._database.reading() as session:
-        steps = [await step_loop.mission_queries.waypoints_of_step(session, mission, number) for number in (1, 2)]
+        steps = [await mission_queries.waypoints_of_step(session, mission, number) for number in (1, 2)]
     assert view.progress.step == 2
     assert {row.status for rows in steps for row in rows} == {"reached"}
 
@@ -82,6 +84,6 @@ async def test_a_waypoint_that_is_committed_while_the_link_is_away_is_sent(
     await service.act(mission, "start", actor="Ana")
     await until_state(service, mission, MissionState.FINISHED)
     async with service._database.reading() as session:
-        steps = [await step_loop.mission_queries.waypoints_of_step(session, mission, number) for number in (1, 2)]
+        steps = [await mission_queries.waypoints_of_step(session, mission, number) for number in (1, 2)]
     assert all(row.status in ("sent", "acknowledged", "reached") for rows in steps for row in rows)
     assert all(row.status == "reached" for row in steps[0]) or any(row.status != "planned" for row in steps[1])

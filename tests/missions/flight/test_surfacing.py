@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -18,10 +19,10 @@ from tests.support.missions.decisions import decide_for, place
 from tests.support.missions.harbour import Harbour, sim_spec, until_state
 from tests.support.missions.specs import make_spec
 
-POLICY = {"surface_policy": {"max_position_sd_m": 3.0, "good_position_sd_m": 0.5}}
+POLICY: dict[str, Any] = {"surface_policy": {"max_position_sd_m": 3.0, "good_position_sd_m": 0.5}}
 
 
-def decided(places: list[Place], wishes: list[list[float]], **changes: object) -> Decision:
+def decided(places: list[Place], wishes: list[list[float]], **changes: Any) -> Decision:
     return decide_for(places, wishes, **(POLICY | changes))[0]
 
 

@@ -2,6 +2,7 @@
 
 import asyncio
 import threading
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from app.missions.forecast.simulate import Flown, Forecast, forecast
 from app.missions.service import MissionService
 from app.missions.spec.mission import MissionSpec
 from app.missions.states import MissionState
+from app.missions.team import Team
 from tests.support.missions.harbour import sim_spec, until_state
 from tests.support.missions.specs import make_spec
 from tests.support.waiting import until
@@ -20,7 +22,7 @@ from tests.support.waiting import until
 NONE = np.zeros((0, 4))
 
 
-def lines(**changes: object) -> MissionSpec:
+def lines(**changes: Any) -> MissionSpec:
     return sim_spec(steps=8, planner={"name": "lawnmower"}, **changes)
 
 
@@ -84,7 +86,7 @@ async def test_one_who_leaves_ends_the_simulation(service: MissionService, monke
 
 def test_time_that_is_up_leaves_a_forecast_that_says_so() -> None:
     spec = lines()
-    team = request.Team()
+    team = Team()
     members = [team.join(vehicle, slot) for slot, vehicle in enumerate(spec.vehicles)]
     starts, _ = request.starts_of(spec, members)
     found = forecast(spec, members, starts, NONE, budget_s=0.0)
@@ -100,7 +102,7 @@ def test_time_that_is_up_leaves_a_forecast_that_says_so() -> None:
 
 def test_without_patience_one_floor_is_flown_and_that_is_said() -> None:
     spec = lines()
-    team = request.Team()
+    team = Team()
     members = [team.join(vehicle, slot) for slot, vehicle in enumerate(spec.vehicles)]
     starts, _ = request.starts_of(spec, members)
     found = forecast(spec, members, starts, NONE, budget_s=0.0, patience_s=0.0)

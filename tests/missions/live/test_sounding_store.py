@@ -8,6 +8,7 @@ import pytest
 from app.missions.live import sounding_store
 from app.missions.maps.builder import MapBuilder
 from app.missions.maps.codec import pack, unpack
+from app.missions.maps.queue import MapQueue, Replacement
 from app.missions.service import MissionService
 from app.missions.views.soundings import Ruling, SoundingState
 from app.storage.database import Database
@@ -23,7 +24,7 @@ async def stored(database: Database, mission: str) -> StoredMapRow | None:
         return await session.get(StoredMapRow, mission)
 
 
-def arrivals(service: MissionService, mission: str):  # type: ignore[no-untyped-def]
+def arrivals(service: MissionService, mission: str) -> MapQueue:
     return service._registry._live[mission].builder.arrivals
 
 
@@ -67,7 +68,7 @@ def test_while_soundings_are_read_the_map_stays_and_those_that_come_meanwhile_co
     given_up = builder.arrivals.expect()
     coming = builder.arrivals.expect()
     builder.add(later)
-    everything = sounding_store.Replacement(first, np.zeros((0, 4)), np.zeros(60, dtype=bool))
+    everything = Replacement(first, np.zeros((0, 4)), np.zeros(60, dtype=bool))
     builder.arrivals.arrived(given_up, everything)
     assert builder.build() is shown
     builder.arrivals.arrived(coming, everything)

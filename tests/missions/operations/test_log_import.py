@@ -5,7 +5,7 @@ import json
 import signal
 import subprocess
 import time
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +26,7 @@ from tests.support.missions.specs import make_spec, rectangle
 PINGS = 300
 """90 m of track, of which the area with its margin holds the first 46 m."""
 
-Rows = list[tuple[Any, ...]]
+Rows = Sequence[tuple[Any, ...]]
 
 
 def stored(url: str, columns: str = "time_s, beam, verdict, depth_m") -> Rows:

@@ -1,5 +1,8 @@
 """Soundings that are kept out of the map, and an operator's word on them."""
 
+from collections.abc import AsyncIterator
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -38,7 +41,7 @@ async def test_what_is_not_in_the_map_is_listed_with_the_reason_page_by_page(ser
     assert (await service.review(mission, NOT_USED, vehicle="b")).total == 0
 
 
-async def _all_pages(service: MissionService, mission: str, state: SoundingState):  # type: ignore[no-untyped-def]
+async def _all_pages(service: MissionService, mission: str, state: SoundingState) -> AsyncIterator[Any]:
     after: int | None = 0
     while after is not None:
         page = await service.review(mission, [state], after=after, limit=30)
@@ -129,7 +132,7 @@ async def test_a_mission_that_is_taken_up_has_its_map_without_being_asked_for_it
     assert progress.coverage_pct == pytest.approx(shown.coverage_pct, abs=2)
     async with service.subscribe(mission) as messages:
         snapshot = await anext(messages)
-    assert snapshot.map_version > 0  # type: ignore[union-attr]
+    assert snapshot.map_version > 0
 
 
 async def test_missions_that_left_memory_are_listed_as_they_were(harbour: Harbour) -> None:

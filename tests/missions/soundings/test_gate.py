@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import pytest
 from hypothesis import given, settings
@@ -24,10 +25,10 @@ def make_gate() -> Gate:
     return Gate(corrections, AREA, margin_m=MARGIN_M, noise=0.01)
 
 
-def sounding(east_m: float = 50.0, north_m: float = 50.0, time_s: float = 1000.0, **changes: object) -> SoundingReport:
+def sounding(east_m: float = 50.0, north_m: float = 50.0, time_s: float = 1000.0, **changes: Any) -> SoundingReport:
     lon, lat = lon_lat(east_m, north_m)
     report = SoundingReport("a", time_s, Position(lat, lon, 12.0), vehicle_depth_m=2.0, range_m=10.0, source="test")
-    return replace(report, **changes)  # type: ignore[arg-type]
+    return replace(report, **changes)
 
 
 def at(lat: float | None = None, lon: float | None = None, depth: float = 12.0) -> Position:
@@ -77,7 +78,7 @@ def test_the_vehicles_own_accuracy_counts_where_it_states_one() -> None:
         ({"footprint": at(lon=0.0)}, "position: "),
     ],
 )
-def test_every_implausible_value_is_refused_by_field_and_value(changes: dict[str, object], reason: str) -> None:
+def test_every_implausible_value_is_refused_by_field_and_value(changes: dict[str, Any], reason: str) -> None:
     gate = make_gate()
     (result,) = gate.check([sounding(**changes)])
     assert not result.accepted

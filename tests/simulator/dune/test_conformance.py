@@ -7,7 +7,9 @@ and what comes back is compared with what came back then.
 import gzip
 import json
 from collections import Counter
+from collections.abc import Callable, Iterator
 from itertools import pairwise
+from typing import Any
 
 import imcpy
 import pytest
@@ -24,7 +26,7 @@ REAL = "127.0.0.1:6002"
 pytestmark = pytest.mark.skipif(not CAPTURE.is_file(), reason=f"no recorded session at {CAPTURE}")
 
 
-def recording():
+def recording() -> Iterator[Any]:
     with gzip.open(CAPTURE, "rt") as lines:
         for line in lines:
             row = json.loads(line)
@@ -32,7 +34,7 @@ def recording():
 
 
 @pytest.fixture(scope="module")
-def sessions():
+def sessions() -> Any:
     """What the console got from the real and from the fake vehicle: lists of (seconds, message)."""
     rows = list(recording())
     begin = rows[0][0]
@@ -66,37 +68,47 @@ def sessions():
     return real, fake, announced
 
 
-def own(session, kind):
+def own(session: list[Any], kind: type[Any]) -> list[tuple[float, imcpy.Message]]:
     return [(t, m) for t, m in session if isinstance(m, kind) and m.src == REAL_ID]
 
 
-def changes(values):
+def changes(values: Iterator[Any] | list[tuple[int, int]]) -> list[Any]:
     values = list(values)
     return values[:1] + [b for a, b in pairwise(values) if a != b]
 
 
-def both(sessions, kind, describe):
+def both(
+    sessions: tuple[list[Any], list[Any], tuple[list[imcpy.Message], list[imcpy.Message]]],
+    kind: type[Any],
+    describe: Callable[..., Any],
+) -> tuple[Any, ...]:
     real, fake, _ = sessions
     return tuple([describe(m) for _, m in own(session, kind)] for session in (real, fake))
 
 
-def test_the_announce_has_the_same_form(sessions):
+def test_the_announce_has_the_same_form(
+    sessions: tuple[list[Any], list[Any], tuple[list[imcpy.Message], list[imcpy.Message]]],
+) -> None:
     real, fake = (messages[0] for messages in sessions[2])
     assert (fake.dst, fake.dst_ent, fake.src_ent) == (real.dst, real.dst_ent, real.src_ent)
     assert (fake.sys_type, fake.owner) == (real.sys_type, real.owner)
 
-    def form(message):
+    def form(message: Any) -> Any:
         return [service.partition("uid")[0] for service in message.services.split(";")]
 
     assert form(fake) == form(real)
 
 
-def test_the_entities_are_the_same(sessions):
+def test_the_entities_are_the_same(
+    sessions: tuple[list[Any], list[Any], tuple[list[imcpy.Message], list[imcpy.Message]]],
+) -> None:
     real, fake = both(sessions, imcpy.EntityList, lambda m: (m.dst, m.src_ent, m.list) if m.dst == CONSOLE_ID else None)
     assert [r for r in fake if r] == [r for r in real if r]
 
 
-def test_plan_control_answers_are_the_same(sessions):
+def test_plan_control_answers_are_the_same(
+    sessions: tuple[list[Any], list[Any], tuple[list[imcpy.Message], list[imcpy.Message]]],
+) -> None:
     real, fake = both(
         sessions,
         imcpy.PlanControl,
@@ -105,7 +117,9 @@ def test_plan_control_answers_are_the_same(sessions):
     assert fake == real
 
 
-def test_vehicle_commands_are_the_same(sessions):
+def test_vehicle_commands_are_the_same(
+    sessions: tuple[list[Any], list[Any], tuple[list[imcpy.Message], list[imcpy.Message]]],
+) -> None:
     real, fake = both(
         sessions,
         imcpy.VehicleCommand,
@@ -122,8 +136,12 @@ def test_vehicle_commands_are_the_same(sessions):
     ],
     ids=["plan", "vehicle"],
 )
-def test_states_change_in_the_same_order(sessions, kind, fields):
-    def seen(session):
+def test_states_change_in_the_same_order(
+    sessions: tuple[list[Any], list[Any], tuple[list[imcpy.Message], list[imcpy.Message]]],
+    kind: type[Any],
+    fields: tuple[str, ...],
+) -> None:
+    def seen(session: Any) -> Any:
         states = changes(tuple(getattr(m, f) for f in fields) for _, m in own(session, kind))
         at_rest = imcpy.PlanControlState.StateEnum.READY, imcpy.VehicleState.OperationModeEnum.SERVICE
         return states[1:] if states[0][0] in at_rest else states
@@ -132,13 +150,17 @@ def test_states_change_in_the_same_order(sessions, kind, fields):
     assert seen(fake) == seen(real)
 
 
-def test_the_route_is_followed_through_the_same_states(sessions):
+def test_the_route_is_followed_through_the_same_states(
+    sessions: tuple[list[Any], list[Any], tuple[list[imcpy.Message], list[imcpy.Message]]],
+) -> None:
     real, fake = both(sessions, imcpy.FollowRefState, lambda m: (int(m.state), m.proximity))
     assert changes(fake) == changes(real)
 
 
-def test_references_are_echoed_the_same(sessions):
-    def echo(m):
+def test_references_are_echoed_the_same(
+    sessions: tuple[list[Any], list[Any], tuple[list[imcpy.Message], list[imcpy.Message]]],
+) -> None:
+    def echo(m: Any) -> Any:
         r = m.reference
         return None if r is None else (m.control_src, m.control_ent, r.flags, r.lat, r.lon, r.z.value, r.speed.value)
 
@@ -161,20 +183,26 @@ KINDS = (
 
 
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.__name__)
-def test_telemetry_comes_from_and_goes_to_the_same_entities(sessions, kind):
+def test_telemetry_comes_from_and_goes_to_the_same_entities(
+    sessions: tuple[list[Any], list[Any], tuple[list[imcpy.Message], list[imcpy.Message]]], kind: type[Any]
+) -> None:
     real, fake = both(sessions, kind, lambda m: (m.src_ent, m.dst, m.dst_ent))
     assert set(fake) == set(real)
 
 
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.__name__)
-def test_telemetry_comes_as_often(sessions, kind):
+def test_telemetry_comes_as_often(
+    sessions: tuple[list[Any], list[Any], tuple[list[imcpy.Message], list[imcpy.Message]]], kind: type[Any]
+) -> None:
     real, fake, _ = sessions
     counts = [sum(20.0 < t < 200.0 for t, _ in own(session, kind)) for session in (real, fake)]
     assert counts[1] == pytest.approx(counts[0], rel=0.08)
 
 
-def test_the_same_of_what_the_console_says_comes_back(sessions):
-    def relayed(session):
+def test_the_same_of_what_the_console_says_comes_back(
+    sessions: tuple[list[Any], list[Any], tuple[list[imcpy.Message], list[imcpy.Message]]],
+) -> None:
+    def relayed(session: Any) -> Any:
         return Counter(type(m).__name__ for t, m in session if m.src == CONSOLE_ID and t > 13.85)
 
     real, fake, _ = sessions
@@ -183,10 +211,12 @@ def test_the_same_of_what_the_console_says_comes_back(sessions):
     assert found == expected
 
 
-def test_the_vehicle_moves_alike(sessions):
+def test_the_vehicle_moves_alike(
+    sessions: tuple[list[Any], list[Any], tuple[list[imcpy.Message], list[imcpy.Message]]],
+) -> None:
     real, fake, _ = sessions
 
-    def at(session, when):
+    def at(session: Any, when: Any) -> Any:
         return min(own(session, imcpy.EstimatedState), key=lambda item: abs(item[0] - when))[1]
 
     for when, tolerance in ((30.0, 8.0), (45.0, 8.0), (100.0, 15.0)):
@@ -195,8 +225,10 @@ def test_the_vehicle_moves_alike(sessions):
         assert b.depth == pytest.approx(a.depth, abs=2.5)
 
 
-def test_the_uncertainty_grows_and_ends_alike(sessions):
-    def outline(session):
+def test_the_uncertainty_grows_and_ends_alike(
+    sessions: tuple[list[Any], list[Any], tuple[list[imcpy.Message], list[imcpy.Message]]],
+) -> None:
+    def outline(session: Any) -> Any:
         series = own(session, imcpy.GpsFix)
         return changes((m.validity, m.satellites, m.type) for _, m in series)
 

@@ -7,7 +7,9 @@ fake one in its place, in simulated time, and what comes back is compared messag
 import gzip
 import json
 import math
+from collections.abc import Callable
 from itertools import pairwise
+from typing import Any
 
 import imcpy
 import pytest
@@ -30,7 +32,7 @@ pytestmark = pytest.mark.skipif(not CAPTURE.is_file(), reason=f"no recorded sess
 
 
 @pytest.fixture(scope="module")
-def sessions():
+def sessions() -> Any:
     """What the console got from the real and from the fake vehicle: lists of (seconds of the vehicle, message)."""
     with gzip.open(CAPTURE, "rt") as lines:
         rows = [json.loads(line) for line in lines]
@@ -65,20 +67,20 @@ def sessions():
     return real, fake
 
 
-def own(session, kind):
+def own(session: list[Any], kind: type[Any]) -> list[tuple[float, imcpy.Message]]:
     return [(t, m) for t, m in session if isinstance(m, kind) and m.src == REAL_ID]
 
 
-def changes(values):
+def changes(values: list[tuple[imcpy.Message | int | str, ...]]) -> list[tuple[imcpy.Message | int | str, ...]]:
     values = list(values)
     return values[:1] + [b for a, b in pairwise(values) if a != b]
 
 
-def described(sessions, kind, describe):
+def described(sessions: tuple[list[Any], list[Any]], kind: type[Any], describe: Callable[..., Any]) -> tuple[Any, ...]:
     return tuple([describe(m) for _, m in own(session, kind)] for session in sessions)
 
 
-def test_plan_control_answers_are_the_same(sessions):
+def test_plan_control_answers_are_the_same(sessions: tuple[list[Any], list[Any]]) -> None:
     real, fake = described(
         sessions,
         imcpy.PlanControl,
@@ -97,27 +99,29 @@ def test_plan_control_answers_are_the_same(sessions):
     ],
     ids=["plan", "vehicle"],
 )
-def test_states_change_in_the_same_order(sessions, kind, fields):
+def test_states_change_in_the_same_order(
+    sessions: tuple[list[Any], list[Any]], kind: type[Any], fields: tuple[str, ...]
+) -> None:
     real, fake = described(sessions, kind, lambda m: tuple(getattr(m, field) for field in fields))
     idle = imcpy.PlanControlState.StateEnum.READY, imcpy.VehicleState.OperationModeEnum.SERVICE
     real, fake = ([state for k, state in enumerate(changes(s)) if k or state[0] not in idle] for s in (real, fake))
     assert fake == real
 
 
-def silences(session):
+def silences(session: list[Any]) -> list[tuple[float, float]]:
     """Gaps of more than 5 s in what the vehicle says of itself by radio: when they begin and how long they last."""
     heard = [t for t, m in session if m.src == REAL_ID and m.msg_name not in ALWAYS]
     return [(a, b - a) for a, b in pairwise(heard) if b - a > 5.0]
 
 
-def test_it_is_silent_once_and_about_as_long(sessions):
+def test_it_is_silent_once_and_about_as_long(sessions: tuple[list[Any], list[Any]]) -> None:
     [(real_begin, real_s)], [(fake_begin, fake_s)] = map(silences, sessions)
     assert fake_begin == pytest.approx(real_begin, abs=8.0)
     assert fake_s == pytest.approx(real_s, rel=0.3)
 
 
-def test_the_plan_takes_about_as_long(sessions):
-    def took(session):
+def test_the_plan_takes_about_as_long(sessions: tuple[list[Any], list[Any]]) -> None:
+    def took(session: Any) -> Any:
         answers = own(session, imcpy.PlanControl)
         return answers[-1][0] - answers[0][0]
 
@@ -130,8 +134,8 @@ def test_the_plan_takes_about_as_long(sessions):
     "kind",
     [imcpy.EstimatedState, imcpy.PlanControlState, imcpy.GpsFix, imcpy.Heartbeat],
 )
-def test_telemetry_comes_as_often_while_radio_reaches(sessions, kind):
-    def rate(session):
+def test_telemetry_comes_as_often_while_radio_reaches(sessions: tuple[list[Any], list[Any]], kind: type[Any]) -> None:
+    def rate(session: Any) -> Any:
         times = [t for t, _ in own(session, kind)]
         steps = [b - a for a, b in pairwise(times) if b - a <= 5.0]
         return len(steps) / sum(steps)
@@ -140,16 +144,16 @@ def test_telemetry_comes_as_often_while_radio_reaches(sessions, kind):
     assert fake_hz == pytest.approx(real_hz, rel=0.15)
 
 
-def test_the_command_comes_back_to_its_console(sessions):
-    def echoed(session):
+def test_the_command_comes_back_to_its_console(sessions: tuple[list[Any], list[Any]]) -> None:
+    def echoed(session: Any) -> Any:
         return [m.serialize_fields() for _, m in session if isinstance(m, imcpy.PlanControl) and m.src == CONSOLE_ID]
 
     real, fake = map(echoed, sessions)
     assert fake == real
 
 
-def test_it_ends_at_the_surface_where_it_was_sent(sessions):
-    def end(session):
+def test_it_ends_at_the_surface_where_it_was_sent(sessions: tuple[list[Any], list[Any]]) -> None:
+    def end(session: Any) -> Any:
         state = own(session, imcpy.EstimatedState)[-1][1]
         return state.x, state.y, state.depth
 

@@ -2,6 +2,7 @@
 
 import math
 import struct
+from typing import Any
 
 import imcpy
 import numpy as np
@@ -16,7 +17,7 @@ OTHER = ("127.0.0.1", 6199)
 
 
 class TestDiscovery:
-    def test_it_announces_itself_every_ten_seconds_to_five_ports(self):
+    def test_it_announces_itself_every_ten_seconds_to_five_ports(self) -> None:
         bench = Bench()
         bench.run(29.0)
         to = [address for _, address in bench.announced.sent]
@@ -27,31 +28,31 @@ class TestDiscovery:
         assert message.sys_type == imcpy.SystemType.UUV
         assert "imc+udp://127.0.0.1:6002/" in message.services.split(";")
 
-    def test_it_is_silent_before_anyone_is_known(self):
+    def test_it_is_silent_before_anyone_is_known(self) -> None:
         bench = Bench()
         bench.run(20.0)
         assert bench.wire.sent == []
 
-    def test_an_announce_alone_is_not_enough(self):
+    def test_an_announce_alone_is_not_enough(self) -> None:
         bench = Bench()
         bench.node.on_announce(announce().serialize(), CONSOLE)
         bench.run(20.0)
         assert bench.wire.sent == []
 
-    def test_a_packet_without_an_announce_is_not_enough(self):
+    def test_a_packet_without_an_announce_is_not_enough(self) -> None:
         bench = Bench()
         bench.run(20.0, bench.beat)
         assert bench.wire.sent == []
         assert bench.node.counts.strangers == 20
 
-    def test_announced_and_heard_it_sends_within_five_seconds(self):
+    def test_announced_and_heard_it_sends_within_five_seconds(self) -> None:
         bench = Bench()
         bench.introduce()
         bench.run(5.1, bench.beat)
         assert {to for _, to in bench.wire.sent} == {CONSOLE}
         assert bench.all(imcpy.LogBookEntry)[0].text == "activating transmission to node 'ccu-cao'"
 
-    def test_after_thirty_seconds_of_silence_it_stops_and_the_next_packet_resumes(self, bench):
+    def test_after_thirty_seconds_of_silence_it_stops_and_the_next_packet_resumes(self, bench: Bench) -> None:
         bench.run(29.0)
         assert bench.all(imcpy.EstimatedState)
         bench.run(10.0)
@@ -62,18 +63,18 @@ class TestDiscovery:
         bench.run(5.0)
         assert bench.all(imcpy.EstimatedState)
 
-    def test_a_system_that_comes_back_at_another_port_stays_ignored(self, bench):
+    def test_a_system_that_comes_back_at_another_port_stays_ignored(self, bench: Bench) -> None:
         bench.introduce(address=OTHER)
         bench.run(40.0, lambda: bench.say(imcpy.Heartbeat(), address=OTHER))
         assert OTHER not in {to for _, to in bench.wire.sent}
         assert bench.node.contacts.destinations == []
 
-    def test_several_systems_are_served(self, bench):
+    def test_several_systems_are_served(self, bench: Bench) -> None:
         bench.introduce(0x3F02, OTHER)
         bench.run(6.0, bench.beat)
         assert {to for _, to in bench.wire.sent} == {CONSOLE, OTHER}
 
-    def test_commands_of_strangers_are_dropped(self, bench):
+    def test_commands_of_strangers_are_dropped(self, bench: Bench) -> None:
         bench.say(start_request(), src=0x3F77, address=OTHER)
         assert bench.states() == (0, 1)
 
@@ -87,12 +88,12 @@ class TestDiscovery:
             ("", set()),
         ],
     )
-    def test_services_are_read(self, services, expected):
+    def test_services_are_read(self, services: str, expected: set[Any] | set[tuple[str, int]]) -> None:
         assert service_addresses(services) == expected
 
 
 class TestRelay:
-    def test_what_is_heard_is_passed_on_to_everyone(self, bench):
+    def test_what_is_heard_is_passed_on_to_everyone(self, bench: Bench) -> None:
         bench.introduce(0x3F02, OTHER)
         bench.run(6.0, bench.beat)
         bench.wire.sent.clear()
@@ -101,23 +102,23 @@ class TestRelay:
         assert {type(m) for m, _ in relayed} == {imcpy.Heartbeat}
         assert {to for _, to in relayed} == {CONSOLE, OTHER}
 
-    def test_references_are_not(self, bench):
+    def test_references_are_not(self, bench: Bench) -> None:
         bench.follow(80, 80)
         assert bench.wire.sent == []
 
 
 class TestTelemetry:
-    def rates(self, bench, seconds=100.0):
+    def rates(self, bench: Bench, seconds: float = 100.0) -> dict[tuple[str, int], float]:
         bench.wire.sent.clear()
         bench.run(seconds, bench.beat)
-        kinds = {}
+        kinds: dict[Any, Any] = {}
         for m, _ in bench.wire.sent:
             if m.src == bench.node.imc_id:
                 key = (type(m).__name__, m.src_ent)
                 kinds[key] = kinds.get(key, 0) + 1 / seconds
         return kinds
 
-    def test_the_default_rates_are_those_of_dune(self, bench):
+    def test_the_default_rates_are_those_of_dune(self, bench: Bench) -> None:
         rates = self.rates(bench)
         for key, rate in {
             ("EstimatedState", 49): 2.0,
@@ -133,25 +134,25 @@ class TestTelemetry:
         }.items():
             assert rates[key] == pytest.approx(rate, rel=0.06), key
 
-    def test_the_rates_can_be_raised(self, bench):
+    def test_the_rates_can_be_raised(self, bench: Bench) -> None:
         bench.say(rate_limiters("Distance:5, EstimatedState:10, SimulatedState:0.5"))
         rates = self.rates(bench)
         assert rates[("Distance", 58)] == pytest.approx(5.0, rel=0.02)
         assert rates[("EstimatedState", 49)] == pytest.approx(10.0, rel=0.02)
         assert rates[("SimulatedState", 71)] == pytest.approx(0.5, rel=0.06)
 
-    def test_a_wrong_rate_leaves_everything_as_it_was(self, bench):
+    def test_a_wrong_rate_leaves_everything_as_it_was(self, bench: Bench) -> None:
         bench.say(rate_limiters("Distance:fast"))
         assert self.rates(bench)[("Distance", 58)] == pytest.approx(0.2, rel=0.06)
 
-    def test_the_rates_can_be_asked_for(self, bench):
+    def test_the_rates_can_be_asked_for(self, bench: Bench) -> None:
         bench.say(rate_limiters("Distance:5"))
         query = imcpy.QueryEntityParameters()
         query.name = "UDP"
         bench.say(query)
         assert bench.last(imcpy.EntityParameters).params[0].value == "Distance:5"
 
-    def test_chatter_floods(self):
+    def test_chatter_floods(self) -> None:
         bench = Bench(chatter=True).ready()
         rates = self.rates(bench, 10.0)
         assert rates[("ServoPosition", 69)] == pytest.approx(376, rel=0.03)
@@ -160,7 +161,7 @@ class TestTelemetry:
         assert sum(rates.values()) == pytest.approx(710, rel=0.03)
         assert sum(rate for (name, _), rate in rates.items() if name in loud) > 0.9 * sum(rates.values())
 
-    def test_the_loud_messages_are_sent_as_seldom_as_asked(self):
+    def test_the_loud_messages_are_sent_as_seldom_as_asked(self) -> None:
         bench = Bench(chatter=True).ready()
         bench.say(
             rate_limiters("Distance:5, ServoPosition:0.1, EulerAngles:0.1, AngularVelocity:0.1, Acceleration:0.1")
@@ -171,7 +172,7 @@ class TestTelemetry:
         # A new list takes the place of the old one: what it leaves out is not limited.
         assert rates[("EstimatedState", 49)] == pytest.approx(10.0, rel=0.05)
 
-    def test_the_state_is_an_origin_and_offsets(self, bench):
+    def test_the_state_is_an_origin_and_offsets(self, bench: Bench) -> None:
         bench.run(1.0)
         state = bench.last(imcpy.EstimatedState)
         frame = bench.vehicle.terrain.frame
@@ -179,7 +180,7 @@ class TestTelemetry:
         assert (state.x, state.y) == pytest.approx((20.0, 50.0), abs=1e-3)
         assert state.alt == pytest.approx(bench.vehicle.terrain.max_depth_m, abs=1e-3)
 
-    def test_depth_plus_altimeter_is_the_bottom(self, bench):
+    def test_depth_plus_altimeter_is_the_bottom(self, bench: Bench) -> None:
         bench.say(start_request())
         bench.say(rate_limiters("Distance:5, EstimatedState:10"))
         bench.run(40.0, lambda: bench.follow(50, 150))
@@ -191,7 +192,7 @@ class TestTelemetry:
             assert bottom == pytest.approx(bench.vehicle.terrain.max_depth_m, abs=1e-3)
             assert m.location[0].theta == pytest.approx(-math.pi / 2)
 
-    def test_gps_goes_on_under_water_without_validity(self, bench):
+    def test_gps_goes_on_under_water_without_validity(self, bench: Bench) -> None:
         bench.run(2.0)
         assert bench.last(imcpy.GpsFix).validity == 511
         bench.say(start_request())
@@ -200,7 +201,7 @@ class TestTelemetry:
         assert (fix.validity, fix.satellites) == (0, 0)
         assert bench.last(imcpy.VehicleMedium).medium == imcpy.VehicleMedium.MediumEnum.UNDERWATER
 
-    def test_the_entities_are_told_on_request(self, bench):
+    def test_the_entities_are_told_on_request(self, bench: Bench) -> None:
         query = imcpy.EntityList()
         query.op = imcpy.EntityList.OperationEnum.QUERY
         bench.say(query)
@@ -210,7 +211,7 @@ class TestTelemetry:
         assert (names["Altimeter"], names["UDP"], names["Echo Sounder"]) == ("58", "80", "59")
         assert "DVL Beam 0" not in names
 
-    def test_a_dvl_tells_its_four_beams(self):
+    def test_a_dvl_tells_its_four_beams(self) -> None:
         floor = seafloors.generate("slope", 0)
         bench = Bench(floor, "dvl", (50.0, 50.0, 0.0)).ready()
         bench.say(rate_limiters("Distance:5"))
@@ -229,7 +230,7 @@ class TestTelemetry:
             depth = m.value * math.cos(tilt)
             assert float(floor.depth_at(*at)) == pytest.approx(depth, abs=0.01)
 
-    def test_a_multibeam_sends_swaths(self):
+    def test_a_multibeam_sends_swaths(self) -> None:
         bench = Bench(sensor="multibeam").ready()
         bench.run(1.0)
         m = bench.last(imcpy.SonarData)
@@ -241,7 +242,7 @@ class TestTelemetry:
 
 
 class TestRobustness:
-    def test_rubbish_is_counted_and_survived(self, bench):
+    def test_rubbish_is_counted_and_survived(self, bench: Bench) -> None:
         good = imcpy.Heartbeat()
         good.src = CONSOLE_ID
         data = good.serialize()
@@ -253,40 +254,40 @@ class TestRobustness:
         bench.run(1.0)
         assert bench.all(imcpy.EstimatedState)
 
-    def test_unknown_messages_are_skipped(self, bench):
+    def test_unknown_messages_are_skipped(self, bench: Bench) -> None:
         header = struct.pack("<HHHdHBHB", 0xFE54, 60000, 0, 1.0, CONSOLE_ID, 0, bench.node.imc_id, 255)
         bench.node.receive(header + b"\0\0", CONSOLE)
         bench.run(1.0)
         assert bench.all(imcpy.EstimatedState)
 
-    def test_the_id_must_be_possible(self):
+    def test_the_id_must_be_possible(self) -> None:
         with pytest.raises(ValueError, match="0xffff"):
             Bench(imc_id=0xFFFF)
 
 
 class TestRates:
     @pytest.mark.parametrize("rate", [0.2, 0.7, 2.0, 3.0, 5.0, 10.0])
-    def test_the_mean_rate_is_kept_on_a_coarse_clock(self, rate):
+    def test_the_mean_rate_is_kept_on_a_coarse_clock(self, rate: float) -> None:
         limiter = RateLimiter({"Distance": rate})
         passed = sum(limiter.passes("Distance", 1, 0.1 * k) for k in range(10_000))
         assert passed == pytest.approx(1000 * rate, rel=0.02)
 
-    def test_entities_are_limited_one_by_one(self):
+    def test_entities_are_limited_one_by_one(self) -> None:
         limiter = RateLimiter({"Distance": 1.0})
         assert limiter.passes("Distance", 1, 0.0)
         assert limiter.passes("Distance", 2, 0.0)
         assert not limiter.passes("Distance", 1, 0.1)
 
-    def test_there_is_no_burst_after_a_gap(self):
+    def test_there_is_no_burst_after_a_gap(self) -> None:
         limiter = RateLimiter({"Distance": 1.0})
         limiter.passes("Distance", 1, 0.0)
         passed = [limiter.passes("Distance", 1, 100.0 + 0.1 * k) for k in range(20)]
         assert sum(passed) <= 3
 
-    def test_limits_are_read(self):
+    def test_limits_are_read(self) -> None:
         assert parse_limits("Distance:5, EstimatedState:10,") == {"Distance": 5.0, "EstimatedState": 10.0}
 
     @pytest.mark.parametrize("text", ["Distance", "Distance:", "Distance:x", "Distance:0", ":5", "Distance:inf"])
-    def test_wrong_limits_are_refused_with_the_form(self, text):
+    def test_wrong_limits_are_refused_with_the_form(self, text: str) -> None:
         with pytest.raises(RateLimiterError, match="Message:frequency"):
             parse_limits(text)

@@ -30,9 +30,14 @@ class Service:
 
     @property
     def _environment(self) -> dict[str, str]:
-        database_url = f"sqlite+aiosqlite:///{self._folder / 'service.db'}"
+        database_url = f"sqlite+aiosqlite:///{self.database}"
         own = {"BATHYFLEET_DATABASE_URL": database_url, "BATHYFLEET_TIME_SCALE": "5"} | self._settings
         return environment(**own)
+
+    @property
+    def database(self) -> Path:
+        """Its SQLite file."""
+        return self._folder / "service.db"
 
     def make_token(self, name: str, role: str) -> str:
         """Make an access token on the command line; from then on the service asks for one."""

@@ -6,8 +6,9 @@ Environment: ``FAULTS_CLOCK`` names a file with the seconds that the wall clock 
 
 import os
 import time
-from datetime import datetime, timedelta, tzinfo
+from datetime import datetime, tzinfo
 from pathlib import Path
+from typing import Self
 
 _true_time = time.time
 
@@ -21,9 +22,9 @@ class Shifted(datetime):
     """A datetime whose present can be moved."""
 
     @classmethod
-    def now(cls, tz: tzinfo | None = None) -> datetime:
+    def now(cls, tz: tzinfo | None = None) -> Self:
         """The present by the wrong clock."""
-        return datetime.now(tz) + timedelta(seconds=off_s())
+        return cls.fromtimestamp(_true_time() + off_s(), tz)
 
 
 if __name__ == "__main__":
@@ -32,7 +33,8 @@ if __name__ == "__main__":
         from app.api import tokens
         from app.missions import clock
 
-        clock.datetime = tokens.datetime = Shifted
+        for module in (clock, tokens):
+            vars(module)["datetime"] = Shifted
     if "FAULTS_BUSY_MS" in os.environ:
         from app.storage import database
 

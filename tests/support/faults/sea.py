@@ -76,7 +76,7 @@ class Sea:
                 self.told[name].append(imcpy.Packet.deserialize(data))
             receive(data, sender)
 
-        node.receive = tapped  # type: ignore[method-assign]
+        node.receive = tapped
         await fleet.start()
         self._afloat[name] = fleet
 

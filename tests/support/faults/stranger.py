@@ -12,9 +12,10 @@ import os
 import socket
 import struct
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from io import BytesIO
 from pathlib import Path
+from typing import Any
 
 from websockets.exceptions import ConnectionClosed, InvalidHandshake
 from websockets.sync.client import connect
@@ -142,7 +143,14 @@ def hold(*paths: str) -> bool:
     return True
 
 
-TASKS = {"many": many, "ask": ask, "watch": watch, "panel": panel, "files": files, "hold": hold}
+TASKS: dict[str, Callable[..., Any]] = {
+    "many": many,
+    "ask": ask,
+    "watch": watch,
+    "panel": panel,
+    "files": files,
+    "hold": hold,
+}
 
 
 if __name__ == "__main__":

@@ -1,7 +1,9 @@
 """A console beside a fake DUNE node, in simulated time, and the messages that consoles send."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Any
 
 import imcpy
 import numpy as np
@@ -9,6 +11,7 @@ import numpy as np
 from simulator import seafloors
 from simulator.clock import SimulationClock
 from simulator.dune.node import DuneOptions, FakeDune
+from simulator.terrain import Terrain
 from simulator.vehicle import STEP_S
 from simulator.world import SimulatedVehicle
 
@@ -19,7 +22,7 @@ HOME = ("127.0.0.1", 6002)
 REQUEST = imcpy.PlanControl.TypeEnum.REQUEST
 
 
-def announce(imc_id=CONSOLE_ID, address=CONSOLE, name="ccu-cao"):
+def announce(imc_id: int = CONSOLE_ID, address: tuple[str, int] = CONSOLE, name: str = "ccu-cao") -> imcpy.Message:
     message = imcpy.Announce()
     message.sys_name = name
     message.services = f"imc+udp://{address[0]}:{address[1]}/"
@@ -27,7 +30,13 @@ def announce(imc_id=CONSOLE_ID, address=CONSOLE, name="ccu-cao"):
     return message
 
 
-def start_request(request_id=100, plan_id="cao", control_src=CONSOLE_ID, timeout=30, data=None):
+def start_request(
+    request_id: int = 100,
+    plan_id: str = "cao",
+    control_src: int = CONSOLE_ID,
+    timeout: int = 30,
+    data: imcpy.Message | None = None,
+) -> imcpy.Message:
     follow = imcpy.FollowReference()
     follow.control_src, follow.control_ent = control_src, 0xFF
     follow.timeout, follow.loiter_radius = timeout, 7.5
@@ -44,14 +53,23 @@ def start_request(request_id=100, plan_id="cao", control_src=CONSOLE_ID, timeout
     return message
 
 
-def stop_request(request_id=101):
+def stop_request(request_id: int = 101) -> imcpy.Message:
     message = imcpy.PlanControl()
     message.type, message.op = REQUEST, imcpy.PlanControl.OperationEnum.STOP
     message.request_id = request_id
     return message
 
 
-def reference(lat_deg, lon_deg, depth=3.0, *, flags=0x27, speed=1.2, radius=0.0, units=imcpy.ZUnits.DEPTH):
+def reference(
+    lat_deg: float,
+    lon_deg: float,
+    depth: float = 3.0,
+    *,
+    flags: int = 0x27,
+    speed: float = 1.2,
+    radius: float = 0.0,
+    units: imcpy.Message = imcpy.ZUnits.DEPTH,
+) -> imcpy.Message:
     message = imcpy.Reference()
     message.flags = flags
     message.lat, message.lon = math.radians(lat_deg), math.radians(lon_deg)
@@ -63,13 +81,13 @@ def reference(lat_deg, lon_deg, depth=3.0, *, flags=0x27, speed=1.2, radius=0.0,
     return message
 
 
-def done():
+def done() -> imcpy.Message:
     message = imcpy.Reference()
     message.flags = 0x80
     return message
 
 
-def rate_limiters(text):
+def rate_limiters(text: str) -> imcpy.Message:
     message = imcpy.SetEntityParameters()
     message.name = "UDP"
     parameter = imcpy.EntityParameter()
@@ -83,19 +101,26 @@ class Wire:
     """An endpoint in memory that keeps what a node sends."""
 
     address: tuple[str, int]
-    sent: list = field(default_factory=list)
+    sent: list[Any] = field(default_factory=list)
 
-    def send(self, data, to):
+    def send(self, data: bytes, to: tuple[str, int]) -> None:
         self.sent.append((imcpy.Packet.deserialize(data), to))
 
-    def close(self):
+    def close(self) -> None:
         pass
 
 
 class Bench:
     """A node with a console beside it; time passes only when told to."""
 
-    def __init__(self, terrain=None, sensor="single", start=(50.0, 20.0, 0.0), imc_id=VEHICLE_ID, **options):
+    def __init__(
+        self,
+        terrain: Terrain | None = None,
+        sensor: str = "single",
+        start: tuple[float, float, float] = (50.0, 20.0, 0.0),
+        imc_id: int = VEHICLE_ID,
+        **options: Any,
+    ) -> None:
         self.wall_s = 0.0
         self.clock = SimulationClock(start_s=1_000_000.0, monotonic=lambda: self.wall_s)
         terrain = terrain or seafloors.generate("flat", 3, width_m=200, height_m=200)
@@ -116,10 +141,10 @@ class Bench:
         self._steps = 0
 
     @property
-    def now_s(self):
+    def now_s(self) -> Any:
         return self.wall_s
 
-    def run(self, seconds, every_second=None):
+    def run(self, seconds: float, every_second: Callable[..., Any] | None = None) -> None:
         """Let time pass; ``every_second`` is called at each full second."""
         for _ in range(round(seconds / STEP_S)):
             self._steps += 1
@@ -128,36 +153,43 @@ class Bench:
             if every_second is not None and self._steps % round(1 / STEP_S) == 0:
                 every_second()
 
-    def say(self, message, *, src=CONSOLE_ID, dst=None, address=CONSOLE):
+    def say(
+        self,
+        message: imcpy.Message,
+        *,
+        src: int = CONSOLE_ID,
+        dst: int | None = None,
+        address: tuple[str, int] = CONSOLE,
+    ) -> None:
         message.src, message.src_ent = src, 0
         message.dst = self.node.imc_id if dst is None else dst
         message.timestamp = self.clock.now()
         self.node.receive(message.serialize(), address)
 
-    def introduce(self, imc_id=CONSOLE_ID, address=CONSOLE):
+    def introduce(self, imc_id: int = CONSOLE_ID, address: tuple[str, int] = CONSOLE) -> None:
         self.node.on_announce(announce(imc_id, address).serialize(), ("127.0.0.1", 55555))
         self.say(imcpy.Heartbeat(), src=imc_id, address=address)
 
-    def beat(self):
+    def beat(self) -> None:
         self.say(imcpy.Heartbeat())
 
-    def ready(self):
+    def ready(self) -> "Bench":
         """Introduce the console and wait until the vehicle is in service and talks."""
         self.introduce()
         self.run(6.0, self.beat)
         self.wire.sent.clear()
         return self
 
-    def follow(self, east, north, depth=3.0, **kwargs):
+    def follow(self, east: float, north: float, depth: float = 3.0, **kwargs: Any) -> None:
         lat, lon = self.vehicle.terrain.frame.to_geodetic(east, north)
         self.say(reference(lat, lon, depth, **kwargs))
 
-    def all(self, kind):
+    def all(self, kind: type[Any]) -> list[imcpy.Message]:
         return [m for m, _ in self.wire.sent if isinstance(m, kind) and m.src == self.node.imc_id]
 
-    def last(self, kind):
+    def last(self, kind: type[Any]) -> imcpy.Message:
         return self.all(kind)[-1]
 
-    def states(self):
+    def states(self) -> tuple[int, int]:
         """op_mode and plan state now."""
         return (int(self.node.plan.op_mode), int(self.node.plan.plan_state))

@@ -36,14 +36,14 @@ class Sea:
     options: dict[str, Any] = field(default_factory=dict)
     clock_offset_s: float = 0.0
     bridge: Bridge = field(init=False)
-    fleet: DuneFleet | None = None
+    running: DuneFleet | None = None
     events: list[BridgeEvent] = field(default_factory=list)
 
     async def launch(self) -> None:
         """Start (or restart) the vehicles' DUNEs."""
         specs = default_specs(self.vehicles, self.floor, base_port=self.base_port)
         options = DuneOptions(announce_ports=self.settings.announce_ports, faults=self.faults, **self.options)
-        self.fleet = DuneFleet(
+        self.running = DuneFleet(
             self.floor,
             specs,
             speed=self.settings.time_scale,
@@ -51,13 +51,19 @@ class Sea:
             sensor=self.sensor,
             clock_offset_s=self.clock_offset_s,
         )
-        await self.fleet.start()
+        await self.running.start()
+
+    @property
+    def fleet(self) -> DuneFleet:
+        """The vehicles' DUNEs, which run."""
+        assert self.running is not None
+        return self.running
 
     async def vanish(self) -> None:
         """Kill the vehicles' DUNEs."""
-        if self.fleet is not None:
-            await self.fleet.stop()
-            self.fleet = None
+        if self.running is not None:
+            await self.running.stop()
+            self.running = None
 
     async def connect(self, **changes: Any) -> Bridge:
         """Start a bridge; the former one must be closed."""
@@ -146,14 +152,14 @@ class Peer:
             f"dune://0.0.0.0/uid/1;imc+info://0.0.0.0/version/5.4.31;imc+udp://127.0.0.1:{self.sock.getsockname()[1]}/"
         )
 
-    def announce(self, port: int | None, **changes) -> None:
+    def announce(self, port: int | None, **changes: Any) -> None:
         message = imcpy.Announce()
         message.sys_name, message.sys_type, message.services = self.name, imcpy.SystemType.UUV, self.services
         for attribute, value in changes.items():
             setattr(message, attribute, value)
         self.send(message, port)
 
-    def send(self, message, port=None) -> None:
+    def send(self, message: imcpy.Message, port: int | None = None) -> None:
         message.src, message.dst, message.timestamp = self.imc_id, 0xFFFF, 1.7e9
         self.sock.sendto(imcpy.Packet.serialize(message), ("127.0.0.1", port or self.settings.port))
 

@@ -27,7 +27,7 @@ class Harbour:
         self._make_settings = make_settings
         self._open = False
 
-    async def open(self, **changes: object) -> MissionService:
+    async def open(self, **changes: Any) -> MissionService:
         settings = self._make_settings(**changes)
         self.database = Database(settings.database_url)
         self.service = MissionService(settings, self.database)
@@ -41,7 +41,7 @@ class Harbour:
             await self.service.shutdown()
             await self.database.close()
 
-    async def reopen(self, **changes: object) -> MissionService:
+    async def reopen(self, **changes: Any) -> MissionService:
         await self.close()
         return await self.open(**changes)
 

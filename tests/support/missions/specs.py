@@ -7,7 +7,7 @@ from app.missions.spec.mission import MissionSpec
 
 LAT, LON = 41.185, -8.705
 FRAME = LocalFrame(LAT, LON)
-AREA = {
+AREA: dict[str, Any] = {
     "type": "Polygon",
     "coordinates": [[[-8.705, 41.185], [-8.7043, 41.185], [-8.7043, 41.1855], [-8.705, 41.1855], [-8.705, 41.185]]],
 }

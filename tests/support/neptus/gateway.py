@@ -58,7 +58,8 @@ class Gateway:
     def real(self, floor: Floor, auvs: list[Auv], **changes: Any) -> RealPanel:
         """A panel that behaves as the real one, with its vehicles."""
         settings = self.settings.neptus
-        return RealPanel(*self.ports, floor, settings.rows, settings.cols, auvs, **changes)
+        ftp_port, http_port = self.ports
+        return RealPanel(ftp_port, http_port, floor, settings.rows, settings.cols, auvs, **changes)
 
     async def mission(self, name: str = SESSION) -> MissionView:
         found = [summary for summary in await self.service.missions() if summary.name == name]

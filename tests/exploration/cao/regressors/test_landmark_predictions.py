@@ -1,6 +1,9 @@
 """The compiled predictions against every landmark looked at for every candidate."""
 
+from typing import Any
+
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -10,7 +13,7 @@ from app.exploration.cao.regressors.landmark_predictions import predict, within_
 VISIBILITY, NOISE, STEP = 0.4, 0.1, 0.05
 
 
-def slow(candidates, points, needed, goals):
+def slow(candidates: Any, points: Any, needed: Any, goals: Any) -> Any:
     out = []
     for team in candidates:
         information = np.zeros(len(points))
@@ -27,7 +30,7 @@ def slow(candidates, points, needed, goals):
 
 @given(seed=st.integers(0, 10_000), vehicles=st.integers(1, 4), landmarks=st.integers(1, 300), far=st.booleans())
 @settings(max_examples=60, deadline=None)
-def test_short_lists_change_nothing(seed, vehicles, landmarks, far):
+def test_short_lists_change_nothing(seed: Any, vehicles: Any, landmarks: Any, far: Any) -> None:
     rng = np.random.default_rng(seed)
     points = np.column_stack([rng.uniform(-1, 1, (landmarks, 2)), rng.uniform(0.4, 1.0, landmarks)])
     now = np.column_stack([rng.uniform(-1, 1, (vehicles, 2)) + 3.0 * far, rng.uniform(0.0, 0.35, vehicles)])
@@ -40,7 +43,7 @@ def test_short_lists_change_nothing(seed, vehicles, landmarks, far):
         np.testing.assert_allclose(result, slow(candidates, points, needed, goals), rtol=1e-4, atol=1e-4)
 
 
-def test_threads_that_share_the_candidates_return_the_same(monkeypatch):
+def test_threads_that_share_the_candidates_return_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
     rng = np.random.default_rng(0)
     points = np.column_stack([rng.uniform(-1, 1, (500, 2)), rng.uniform(0.4, 1.0, 500)])
     now = np.array([[0.0, 0.0, 0.2], [0.2, 0.0, 0.2]])

@@ -1,5 +1,7 @@
 """The adapter speaks the mission loop's language."""
 
+from typing import Any
+
 import pytest
 
 from app.missions.fleet.interface import (
@@ -20,7 +22,7 @@ from tests.support.ports import free_ports
 from tests.support.waiting import until
 
 
-async def test_one_waypoint_from_engaging_to_stopping():
+async def test_one_waypoint_from_engaging_to_stopping() -> None:
     async with open_sea() as sea:
         await sea.bridge.close()
         link = make_imc_link(
@@ -31,7 +33,7 @@ async def test_one_waypoint_from_engaging_to_stopping():
         )
         assert isinstance(link, ImcFleetLink)
         assert link.kind == "imc"
-        events = []
+        events: list[Any] = []
         await link.start(events.append)
         try:
             await until(lambda: [v.state for v in link.vehicles()] == [LinkState.READY], "it is ready")
@@ -44,7 +46,10 @@ async def test_one_waypoint_from_engaging_to_stopping():
             await link.engage(info.name)
             assert link.vehicles()[0].state is LinkState.ENGAGED
             await link.order(order)
-            reports = lambda: [e for e in events if isinstance(e, WaypointReport)]  # noqa: E731
+
+            def reports() -> list[WaypointReport]:
+                return [event for event in events if isinstance(event, WaypointReport)]
+
             await until(lambda: len(reports()) == 3, "it has arrived")
             assert [(r.mission_id, r.step, r.status) for r in reports()] == [
                 ("m1", 3, WaypointStatus.SENT),
@@ -63,7 +68,7 @@ async def test_one_waypoint_from_engaging_to_stopping():
         assert sounding.footprint.depth_m == pytest.approx(sounding.vehicle_depth_m + sounding.range_m)
 
 
-async def test_unknown_vehicle_is_refused():
+async def test_unknown_vehicle_is_refused() -> None:
     async with open_sea() as sea:
         await sea.bridge.close()
         link = ImcFleetLink(sea.settings)

@@ -143,7 +143,8 @@ class Panel:
 
 
 def panel_of(gateway: Gateway, **changes: Any) -> Panel:
-    return Panel(*gateway.ports, **changes)
+    ftp_port, http_port = gateway.ports
+    return Panel(ftp_port, http_port, **changes)
 
 
 async def test_an_unmodified_panel_maps_an_area_step_by_step(gateway: Gateway) -> None:
@@ -230,7 +231,7 @@ async def _settled(gateway: Gateway, mission_id: str, step: int) -> set[str]:
     return found
 
 
-BAD = {
+BAD: dict[str, Any] = {
     "no JSON": b"{",
     "other session": {"SessionID": "Neptus_User_1"},
     "a vehicle too few": {"Location": [[10.0, 10.0, 48.0]]},
@@ -253,7 +254,7 @@ async def test_bad_uploads_move_no_vehicle_and_say_why(gateway: Gateway) -> None
         if isinstance(change, bytes):
             reply = await asyncio.to_thread(panel.upload, "/NEPTUS", f"{SESSION}_Data.txt", change)
         else:
-            reply = await asyncio.to_thread(lambda change=change: panel.send(**change))
+            reply = await asyncio.to_thread(panel.send, **change)
         assert reply.startswith("550 "), (what, reply)
         assert await asyncio.to_thread(panel.read) == answer, what
     view = await gateway.mission()
