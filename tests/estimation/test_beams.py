@@ -53,7 +53,7 @@ def test_nose_up_looks_ahead_and_starboard_down_looks_to_port() -> None:
 
 
 @given(heading=st.floats(0.0, 2 * np.pi), pitch=angles, roll=angles)
-def test_beams_end_on_the_sea_floor_whatever_the_attitude(heading: Any, pitch: Any, roll: Any) -> None:
+def test_beams_end_on_the_sea_floor_whatever_the_attitude(heading: float, pitch: float, roll: float) -> None:
     attitude = Attitude(heading, pitch, roll)
     np.testing.assert_allclose(attitude.rotation @ attitude.rotation.T, np.eye(3), atol=1e-12)
     position = np.array([3.0, -2.0, 5.0])
@@ -67,7 +67,7 @@ def test_beams_end_on_the_sea_floor_whatever_the_attitude(heading: Any, pitch: A
 
 
 def test_no_echo_from_too_far_away_or_from_unknown_ground() -> None:
-    def half_known(xy: Any) -> Any:
+    def half_known(xy: FloatArray) -> Any:
         return np.where(xy[..., 0] < 0.0, 10.0, np.nan)
 
     echoes = Dvl().sound(np.zeros(3), LEVEL, half_known, 0.5, np.random.default_rng(0))
@@ -77,7 +77,7 @@ def test_no_echo_from_too_far_away_or_from_unknown_ground() -> None:
 
 
 def test_a_ridge_hides_what_lies_behind_it() -> None:
-    def ridge(xy: Any) -> Any:
+    def ridge(xy: FloatArray) -> Any:
         return np.where(np.abs(xy[..., 0] - 5.0) < 0.5, 4.0, 10.0)
 
     ranges = Multibeam(relative_noise=0.0, count=3, swath_rad=2 * np.arctan(0.9)).ranges(np.zeros(3), LEVEL, ridge, 0.2)

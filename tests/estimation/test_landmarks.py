@@ -45,7 +45,7 @@ def test_matches_a_batch_least_squares_solution() -> None:
     for p, y in zip(positions, ranges, strict=True):
         state = estimator.update(state, 0, p, np.array([0]), np.array([y]))
 
-    def residual(depth: Any) -> Any:
+    def residual(depth: FloatArray) -> Any:
         r = np.sqrt(((positions[:, :2] - xy) ** 2).sum(axis=1) + (depth[0] - positions[:, 2]) ** 2)
         return (ranges - r) / (0.1 * r)
 
@@ -55,7 +55,7 @@ def test_matches_a_batch_least_squares_solution() -> None:
 
 @given(seed=st.integers(0, 1000))
 @settings(max_examples=25, deadline=None)
-def test_accurate_landmarks_stay_accurate_and_variance_never_grows(seed: Any) -> None:
+def test_accurate_landmarks_stay_accurate_and_variance_never_grows(seed: int) -> None:
     rng = np.random.default_rng(seed)
     truth = np.column_stack([rng.uniform(-0.3, 0.3, (20, 2)), rng.uniform(0.4, 0.8, 20)])
     state, estimator = Landmarks.unknown(truth[:, :2]), LandmarkEstimator(SENSOR, visit_cap=30)
@@ -125,7 +125,7 @@ def kalman(
 
 @given(seed=st.integers(0, 10_000))
 @settings(max_examples=30, deadline=None)
-def test_agrees_with_an_iterated_kalman_filter_landmark_by_landmark(seed: Any) -> None:
+def test_agrees_with_an_iterated_kalman_filter_landmark_by_landmark(seed: int) -> None:
     rng = np.random.default_rng(seed)
     truth = np.column_stack([rng.uniform(-0.15, 0.15, (8, 2)), rng.uniform(0.55, 0.7, 8)])
     state, estimator = Landmarks.unknown(truth[:, :2]), LandmarkEstimator(SENSOR)

@@ -14,7 +14,7 @@ from app.estimation import Landmark3DEstimator, Landmarks3D, RangeSensor
 SENSOR = RangeSensor(visibility_m=0.4, relative_noise=0.1)
 
 
-def patrol(seed: Any, steps: Any, n: Any, vehicles: int = 3) -> Iterator[Any]:
+def patrol(seed: int, steps: int, n: int, vehicles: int = 3) -> Iterator[Any]:
     """Three vehicles wander over landmarks; yields truth and knowledge after every step."""
     rng = np.random.default_rng(seed)
     truth = np.column_stack([rng.uniform(-0.3, 0.3, (n, 2)), rng.uniform(0.5, 0.7, n)])
@@ -67,7 +67,7 @@ def test_matches_a_batch_solution_of_all_ranges() -> None:
     for m, point in enumerate(truth):
         true_ranges = np.linalg.norm(positions - point, axis=1)
 
-        def residual(x: Any, m: Any = m, true_ranges: Any = true_ranges) -> Any:
+        def residual(x: FloatArray, m: Any = m, true_ranges: Any = true_ranges) -> Any:
             return (np.array(ranges)[:, m] - np.linalg.norm(positions - x, axis=1)) / (0.1 * true_ranges)
 
         batch = least_squares(residual, point)
@@ -80,7 +80,7 @@ def test_matches_a_batch_solution_of_all_ranges() -> None:
 
 @given(seed=st.integers(0, 500))
 @settings(max_examples=10, deadline=None)
-def test_what_is_known_accurately_stays_so_and_single_filters_only_narrow(seed: Any) -> None:
+def test_what_is_known_accurately_stays_so_and_single_filters_only_narrow(seed: int) -> None:
     last = None
     for _, known in patrol(seed, 25, 10):
         seen = known.looks > 0

@@ -1,5 +1,3 @@
-from typing import Any
-
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -23,7 +21,7 @@ def deepest_below_floor(terrain: Terrain, a: FloatArray, b: FloatArray, samples:
 
 @given(seed=st.integers(0, 1000))
 @settings(max_examples=15, deadline=None)
-def test_sight_agrees_with_a_close_look_at_every_ray(seed: Any) -> None:
+def test_sight_agrees_with_a_close_look_at_every_ray(seed: int) -> None:
     rng = np.random.default_rng(seed)
     terrain = Terrain(rng.uniform(5.0, 12.0, (9, 13)), 2.0)
     vehicles, landmarks = place(terrain, rng, 4, 1.0), place(terrain, rng, 25, 0.0)
@@ -37,7 +35,7 @@ def test_sight_agrees_with_a_close_look_at_every_ray(seed: Any) -> None:
 
 @given(seed=st.integers(0, 1000))
 @settings(max_examples=20, deadline=None)
-def test_a_plane_hides_nothing(seed: Any) -> None:
+def test_a_plane_hides_nothing(seed: int) -> None:
     rng = np.random.default_rng(seed)
     east, north = np.meshgrid(np.arange(8) + 0.5, np.arange(8) + 0.5)
     a, b = rng.uniform(-1, 1, 2)

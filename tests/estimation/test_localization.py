@@ -13,7 +13,7 @@ from app.estimation.localization import TeamPosition, radius
 START = np.array([[0.0, 0.0, 0.5], [0.3, 0.0, 0.5], [0.0, 0.3, 0.4]])
 
 
-def dive(seed: Any, steps: Any, fading: Any, *, ranges: bool = False, surface: Any = None) -> Iterator[Any]:
+def dive(seed: int, steps: int, fading: Any, *, ranges: bool = False, surface: Any = None) -> Iterator[Any]:
     """Three vehicles wander as their own dead reckoning says; yields the truth and what the filter says."""
     rng = np.random.default_rng(seed)
     localizer = CooperativeLocalizer(fading)

@@ -1,7 +1,5 @@
 """What scans make of a partly known site."""
 
-from typing import Any
-
 import numpy as np
 import pytest
 from hypothesis import example, given, settings
@@ -41,7 +39,7 @@ def first_hit(world: ObstacleWorld, start: np.ndarray, bearing: float, reach: fl
 
 @given(st.integers(0, 10_000))
 @settings(max_examples=8, deadline=None)
-def test_a_scan_hears_the_first_obstacle(seed: Any) -> None:
+def test_a_scan_hears_the_first_obstacle(seed: int) -> None:
     site = world(seed)
     place = free_place(site, seed)
     bearings = np.random.default_rng([seed, 2]).uniform(0.0, 2.0 * np.pi, 8)
@@ -55,7 +53,7 @@ def test_a_scan_hears_the_first_obstacle(seed: Any) -> None:
 @given(st.integers(0, 10_000))
 @example(1147)  # a beam that touches an obstacle by a hundred-thousandth of a cell
 @settings(max_examples=20, deadline=None)
-def test_what_was_seen_is_true(seed: Any) -> None:
+def test_what_was_seen_is_true(seed: int) -> None:
     site, scanner = world(seed), Scanner(6.0, 1.0)
     grid = OccupancyGrid.from_blueprint(site.known, 1.0)
     for k in range(5):

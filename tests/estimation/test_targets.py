@@ -14,7 +14,7 @@ from app.estimation.targets import foretold_sd, transition
 HEARING = RangeSensor(np.inf, 0.1)
 
 
-def pursuit(seed: Any, steps: Any, estimator: Any, vehicles: int = 3, *, found: bool = False) -> Iterator[Any]:
+def pursuit(seed: int, steps: int, estimator: Any, vehicles: int = 3, *, found: bool = False) -> Iterator[Any]:
     """Vehicles circle a target that keeps its course but for the model's noise; yields truth, track and places.
 
     ``found``: the filter knows to begin with where the target is, as well as it says.
@@ -125,7 +125,7 @@ def test_what_is_foretold_is_what_the_filter_then_says() -> None:
     st.lists(st.floats(-2, 2), min_size=3, max_size=3), st.floats(1e-6, 3.0), st.floats(1e-3, 0.5), st.integers(0, 99)
 )
 @settings(max_examples=60, deadline=None)
-def test_a_covariance_stays_symmetric_and_positive(place: Any, y: Any, noise: Any, seed: Any) -> None:
+def test_a_covariance_stays_symmetric_and_positive(place: Any, y: Any, noise: Any, seed: int) -> None:
     rng = np.random.default_rng(seed)
     A = rng.standard_normal((6, 6)) * 10.0 ** rng.uniform(-6, 0, 6)
     mean, P = rng.uniform(-1, 1, 6), A @ A.T + 1e-14 * np.eye(6)

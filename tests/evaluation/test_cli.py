@@ -6,6 +6,7 @@ from typer.testing import CliRunner
 
 from app.evaluation.commands import evaluate_app
 from simulator.seafloors import generate
+from simulator.terrain import Terrain
 from simulator.terrain_files import save_npz
 
 EXPLORE = {
@@ -27,7 +28,7 @@ def call(*arguments: Any) -> Any:
     return CliRunner().invoke(evaluate_app, list(arguments))
 
 
-def test_one_run_prints_one_object(terrain: Any) -> None:
+def test_one_run_prints_one_object(terrain: Terrain) -> None:
     result = call("explore", "--terrain", terrain, "--landmarks", "80", "--steps", "5", "--json")
     assert result.exit_code == 0
     document = json.loads(result.stdout)
@@ -35,7 +36,7 @@ def test_one_run_prints_one_object(terrain: Any) -> None:
     assert len(document["history"]) == 5
 
 
-def test_several_runs_print_runs_and_a_summary(terrain: Any) -> None:
+def test_several_runs_print_runs_and_a_summary(terrain: Terrain) -> None:
     result = call(
         "explore", "--terrain", terrain, "--landmarks", "80", "--steps", "4",
         "--planner", "cao,random", "--seeds", "0:2",
@@ -53,7 +54,7 @@ def test_several_runs_print_runs_and_a_summary(terrain: Any) -> None:
     assert spread["min"] <= spread["mean"] <= spread["max"]
 
 
-def test_any_number_of_processes_gives_the_same_runs_in_the_same_order(terrain: Any) -> None:
+def test_any_number_of_processes_gives_the_same_runs_in_the_same_order(terrain: Terrain) -> None:
     arguments = ("explore", "--terrain", terrain, "--landmarks", "60", "--steps", "3", "--planner", "random,lawnmower",
                  "--seeds", "0:2", "--json")  # fmt: skip
     one, two = (json.loads(call(*arguments, "--jobs", str(n)).stdout)["runs"] for n in (1, 2))
@@ -63,14 +64,14 @@ def test_any_number_of_processes_gives_the_same_runs_in_the_same_order(terrain: 
     assert one == two
 
 
-def test_every_cell_can_be_a_landmark(terrain: Any) -> None:
+def test_every_cell_can_be_a_landmark(terrain: Terrain) -> None:
     result = call(
         "explore", "--terrain", terrain, "--landmarks", "all", "--steps", "1", "--planner", "random", "--json"
     )
     assert json.loads(result.stdout)["landmarks"] == 1600
 
 
-def test_the_team_may_change_and_zones_be_kept_out(terrain: Any) -> None:
+def test_the_team_may_change_and_zones_be_kept_out(terrain: Terrain) -> None:
     result = call(
         "explore", "--terrain", terrain, "--landmarks", "80", "--steps", "6", "--planner", "lawnmower",
         "--keep-out", "0.1", "--lose", "1@2,3@4", "--join", "2@5", "--line-of-sight", "--json",
@@ -80,14 +81,14 @@ def test_the_team_may_change_and_zones_be_kept_out(terrain: Any) -> None:
     assert document["robots"] == 3
 
 
-def test_explore_under_limited_communication(terrain: Any) -> None:
+def test_explore_under_limited_communication(terrain: Terrain) -> None:
     result = call("explore", "--terrain", terrain, "--landmarks", "60", "--steps", "6", "--capacity", "10", "--json")
     document = json.loads(result.stdout)
     assert document["capacity"] == 10
     assert 0 < document["message_bytes"] <= 6 * 3 * (64 + 64 + 20)
 
 
-def test_survey_prints_the_planner_beside_its_yardsticks(terrain: Any) -> None:
+def test_survey_prints_the_planner_beside_its_yardsticks(terrain: Terrain) -> None:
     result = call(
         "survey", "--terrain", terrain, "--steps", "12", "--max-step", "8", "--sampling", "continuous", "--json"
     )
@@ -97,7 +98,7 @@ def test_survey_prints_the_planner_beside_its_yardsticks(terrain: Any) -> None:
     assert "recorded_track" not in document
 
 
-def test_without_json_a_table_is_printed(terrain: Any) -> None:
+def test_without_json_a_table_is_printed(terrain: Terrain) -> None:
     result = call("explore", "--terrain", terrain, "--landmarks", "50", "--steps", "3", "--planner", "random")
     assert "remaining_pct" in result.stdout
 
@@ -121,7 +122,7 @@ def test_without_json_a_table_is_printed(terrain: Any) -> None:
         (["--terrain", "/nowhere/at-all.npz"], ["at-all.npz"]),
     ],
 )
-def test_wrong_input_is_refused_in_words(terrain: Any, arguments: Any, words: Any) -> None:
+def test_wrong_input_is_refused_in_words(terrain: Terrain, arguments: Any, words: Any) -> None:
     result = call("explore", "--terrain", terrain, *arguments)
     assert result.exit_code == 2
     for word in words:

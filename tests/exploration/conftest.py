@@ -1,10 +1,9 @@
-from typing import Any
-
 import pytest
 
+from app.arrays import FloatArray
 from tests.support.situations import SQUARE
 
 
 @pytest.fixture
-def square() -> Any:
+def square() -> FloatArray:
     return SQUARE

@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from app.estimation import RangeSensor, SingleBeam
+from app.arrays import FloatArray
+from app.estimation import RangeSensor, Sensor, SingleBeam
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.constraints import Constraints
 from app.exploration.core.problem import Belief, Situation
@@ -34,13 +35,13 @@ SENSORS = [SingleBeam(), RangeSensor(visibility_m=25.0)]
 BEAM = SingleBeam()
 
 
-def make(name: str, regressors: str = "map", *, sensor: Any = BEAM) -> PlannerBase:
+def make(name: str, regressors: str = "map", *, sensor: Sensor = BEAM) -> PlannerBase:
     return create_planner(name, PlannerOptions(regressors=regressors, **QUICK), sensor)
 
 
 def fly(
-    planner: Any,
-    steps: Any,
+    planner: PlannerBase,
+    steps: int,
     *,
     total: int = 60,
     seed: int = 0,
@@ -83,7 +84,7 @@ limits = st.fixed_dictionaries(
 @pytest.mark.parametrize("kind", KINDS, ids="-".join)
 @given(limits=limits, seed=st.integers(0, 100))
 @settings(max_examples=5, deadline=None)
-def test_no_proposal_breaks_a_constraint(kind: Any, sensor: Any, limits: Any, seed: Any) -> None:
+def test_no_proposal_breaks_a_constraint(kind: str, sensor: Sensor, limits: Any, seed: int) -> None:
     constraints = Constraints(SQUARE, max_depth_m=20.0, **limits)
     belief = make_belief(seed)
     bottom = Bottom.from_landmarks(belief.xy_m, belief.depth_m)
@@ -95,14 +96,14 @@ def test_no_proposal_breaks_a_constraint(kind: Any, sensor: Any, limits: Any, se
 
 @pytest.mark.parametrize("sensor", SENSORS, ids=["bathymeter", "landmarks"])
 @pytest.mark.parametrize("kind", KINDS, ids="-".join)
-def test_same_seed_same_answers(kind: Any, sensor: Any) -> None:
+def test_same_seed_same_answers(kind: str, sensor: Sensor) -> None:
     first, second = ([p.positions for _, p in fly(make(*kind, sensor=sensor), 5)] for _ in range(2))
     np.testing.assert_array_equal(first, second)
 
 
 @pytest.mark.parametrize("sensor", SENSORS, ids=["bathymeter", "landmarks"])
 @pytest.mark.parametrize("kind", KINDS, ids="-".join)
-def test_permuting_vehicles_permutes_the_answer(kind: Any, sensor: Any) -> None:
+def test_permuting_vehicles_permutes_the_answer(kind: str, sensor: Sensor) -> None:
     names, start = ("a", "b", "c"), np.array([[3.0, 3, 2], [9.0, 3, 2], [15.0, 3, 2]])
     straight = [p.positions for _, p in fly(make(*kind, sensor=sensor), 4, names=names, start=start)]
     order = [2, 0, 1]
@@ -113,7 +114,7 @@ def test_permuting_vehicles_permutes_the_answer(kind: Any, sensor: Any) -> None:
 
 @pytest.mark.parametrize("sensor", SENSORS, ids=["bathymeter", "landmarks"])
 @pytest.mark.parametrize("kind", KINDS, ids="-".join)
-def test_a_restored_planner_continues_as_if_nothing_had_happened(kind: Any, sensor: Any) -> None:
+def test_a_restored_planner_continues_as_if_nothing_had_happened(kind: str, sensor: Sensor) -> None:
     planner, memory = make(*kind, sensor=sensor), b""
     for situation, proposal in fly(planner, 8):
         if situation.step >= 4:
@@ -127,7 +128,7 @@ def test_a_restored_planner_continues_as_if_nothing_had_happened(kind: Any, sens
 
 @pytest.mark.parametrize("memory", [b"", b"{}", b"[1]", b"\xff", b'{"kind":"cao","version":1,"memory":{}}'])
 @pytest.mark.parametrize("name", sorted(PLANNERS))
-def test_a_foreign_memory_is_refused(name: Any, memory: Any) -> None:
+def test_a_foreign_memory_is_refused(name: str, memory: Any) -> None:
     with pytest.raises(ValueError, match="planner memory"):
         make(name).restore(memory)
 
@@ -143,7 +144,7 @@ def test_a_yardstick_that_really_tries_its_moves_is_refused_with_the_reason() ->
 
 
 @pytest.mark.parametrize("kind", KINDS, ids="-".join)
-def test_vehicles_may_leave_and_join_between_steps(kind: Any) -> None:
+def test_vehicles_may_leave_and_join_between_steps(kind: str) -> None:
     planner = make(*kind)
     teams = [("a", "b"), ("a", "b"), ("b",), ("b",), ("b", "c"), ("a", "b", "c"), ()]
     places = {"a": [3.0, 3.0, 2.0], "b": [9.0, 3.0, 2.0], "c": [50.0, 50.0, 2.0]}
@@ -164,13 +165,13 @@ def test_a_vehicle_outside_the_area_comes_back() -> None:
     assert last.positions[0, 0] >= 0.0
 
 
-def track(planner: Any, steps: Any, **kwargs: Any) -> Any:
+def track(planner: PlannerBase, steps: int, **kwargs: Any) -> Any:
     flown = [p.positions for _, p in fly(planner, steps, total=steps, **kwargs)]
     start = make_situation(vehicles=kwargs.get("names", ("a", "b"))).positions
     return np.stack([start, *flown])
 
 
-def distances_to_track(positions: Any, spacing: float = 0.5) -> Any:
+def distances_to_track(positions: FloatArray, spacing: float = 0.5) -> Any:
     points = [
         start + f * (end - start)
         for j in range(positions.shape[1])
@@ -183,7 +184,7 @@ def distances_to_track(positions: Any, spacing: float = 0.5) -> Any:
 
 
 @pytest.mark.parametrize("name", ["lawnmower", "cao"])
-def test_surveys_leave_no_large_gap_where_nothing_is_known(name: Any) -> None:
+def test_surveys_leave_no_large_gap_where_nothing_is_known(name: str) -> None:
     positions = track(make(name), 60, belief=make_belief(known=False))
     # 1200 m in 10 000 m2: lines 8.3 m apart at best.
     assert distances_to_track(positions).max() < 10.0

@@ -33,12 +33,12 @@ inside = {"east": st.floats(0, RANDOM.width_m), "north": st.floats(0, RANDOM.hei
 
 
 @given(**inside)
-def test_depth_is_the_bilinear_interpolation(east: Any, north: Any) -> None:
+def test_depth_is_the_bilinear_interpolation(east: float, north: float) -> None:
     assert RANDOM.depth_at(east, north) == pytest.approx(slow_depth(RANDOM, east, north))
 
 
 @given(east=st.floats(-10, 30), north=st.floats(-10, 30))
-def test_one_point_and_many_agree(east: Any, north: Any) -> None:
+def test_one_point_and_many_agree(east: float, north: float) -> None:
     many = float(RANDOM.depth_at(east, north))
     assert RANDOM.depth_at_point(east, north) == pytest.approx(many, nan_ok=True)
 
@@ -127,7 +127,7 @@ def test_impossible_families_are_refused_with_the_choices(kwargs: dict[str, Any]
 
 
 @given(east=st.floats(-5000, 5000), north=st.floats(-5000, 5000))
-def test_the_local_frame_goes_there_and_back(east: Any, north: Any) -> None:
+def test_the_local_frame_goes_there_and_back(east: float, north: float) -> None:
     frame = LocalFrame()
     assert frame.to_local(*frame.to_geodetic(east, north)) == pytest.approx((east, north), abs=1e-6)
 

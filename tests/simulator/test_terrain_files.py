@@ -160,7 +160,7 @@ class Evil:
         return (os.system, ("touch owned",))
 
 
-def pickled(path: Any) -> None:
+def pickled(path: Path) -> None:
     np.savez(path, z=np.array([Evil()], dtype=object), cell_m=1.0)
 
 

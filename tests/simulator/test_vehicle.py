@@ -35,7 +35,9 @@ def distance(vehicle: Vehicle, target: Target) -> float:
     heading=st.floats(-math.pi, math.pi),
     loiter=st.booleans(),
 )
-def test_the_limits_are_never_exceeded(east: Any, north: Any, z: Any, speed: Any, heading: Any, loiter: Any) -> None:
+def test_the_limits_are_never_exceeded(
+    east: float, north: float, z: Any, speed: float, heading: float, loiter: bool
+) -> None:
     limits = VehicleLimits()
     vehicle = Vehicle(Motion(heading_rad=heading), limits)
     vehicle.goto(Target(east, north, z, speed))
@@ -59,7 +61,7 @@ def test_the_limits_are_never_exceeded(east: Any, north: Any, z: Any, speed: Any
     heading=st.floats(-math.pi, math.pi),
     current=st.tuples(st.floats(-0.3, 0.3), st.floats(-0.3, 0.3)),
 )
-def test_every_target_is_passed_closely(east: Any, north: Any, heading: Any, current: Any) -> None:
+def test_every_target_is_passed_closely(east: float, north: float, heading: float, current: Any) -> None:
     vehicle = Vehicle(Motion(heading_rad=heading), current=current)
     target = Target(east, north, 3.0)
     vehicle.goto(target)
@@ -155,7 +157,7 @@ def test_a_new_vehicle_is_idle() -> None:
 
 
 @given(st.floats(-100, 100))
-def test_wrapped_angles_are_the_same_angle(angle: Any) -> None:
+def test_wrapped_angles_are_the_same_angle(angle: float) -> None:
     wrapped = wrap(angle)
     assert -math.pi < wrapped <= math.pi
     assert math.cos(wrapped) == pytest.approx(math.cos(angle), abs=1e-9)

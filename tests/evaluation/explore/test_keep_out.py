@@ -15,7 +15,7 @@ START = np.array([[-0.9, -0.9], [-0.7, -0.7]])
 
 @given(seed=st.integers(0, 10_000), fraction=st.floats(0.01, 0.2))
 @settings(max_examples=60, deadline=None)
-def test_zones_cover_the_fraction_and_leave_passages_everywhere(seed: Any, fraction: Any) -> None:
+def test_zones_cover_the_fraction_and_leave_passages_everywhere(seed: int, fraction: Any) -> None:
     half = np.ones(2)
     zones = [Polygon(z) for z in draw_keep_out(half, fraction, START, np.random.default_rng(seed))]
     area, start = box(-1, -1, 1, 1), box(*START.ravel())

@@ -15,7 +15,7 @@ NO_CHANGES = TeamChanges()
 
 
 @pytest.fixture(scope="module")
-def smooth() -> Any:
+def smooth() -> Terrain:
     return generate("smooth", 2, width_m=80.0, height_m=60.0)
 
 

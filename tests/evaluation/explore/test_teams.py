@@ -13,7 +13,7 @@ from simulator.terrain import Terrain
 
 
 @pytest.fixture(scope="module")
-def smooth() -> Any:
+def smooth() -> Terrain:
     return generate("smooth", 2, width_m=80.0, height_m=60.0)
 
 

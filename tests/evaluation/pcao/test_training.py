@@ -158,7 +158,7 @@ def test_a_checkpoint_of_another_training_is_refused(tmp_path: Path) -> None:
         Checkpoint(tmp_path / "c", {"seed": 2, "steps": 5})
 
 
-def best_after(method: Any, count: Any) -> Any:
+def best_after(method: Any, count: int) -> Any:
     """Look for given gains: a score without noise that every optimiser is asked to lower."""
     wanted = np.concatenate([part.ravel() for part in gains(default_model().parameters)])
     optimiser = make_optimiser(method, 0)

@@ -50,7 +50,7 @@ def test_planners_are_compared_under_either_clock() -> None:
         (["--only", "default"], "goes with --write only"),
     ],
 )
-def test_what_makes_no_sense_is_refused(arguments: Any, said: Any) -> None:
+def test_what_makes_no_sense_is_refused(arguments: Any, said: str) -> None:
     result = RUNNER.invoke(evaluate_app, ["rescue", *arguments])
     assert result.exit_code == 2
     assert said in result.output

@@ -14,12 +14,13 @@ from app.evaluation.survey.run import run_survey
 from app.evaluation.survey.world import SurveyScenario, along, default_map, fly_planner, rmse_m
 from app.exploration.planner.options import PlannerOptions
 from simulator.seafloors import generate
+from simulator.terrain import Terrain
 
 QUICK = PlannerOptions(search=40)
 
 
 @pytest.fixture(scope="module")
-def harbour() -> Any:
+def harbour() -> Terrain:
     return generate("harbour", 1, width_m=60.0, height_m=60.0)
 
 
@@ -45,7 +46,7 @@ def test_a_sounder_does_not_begin_anew_with_each_leg(legs: Any) -> None:
     assert found == pytest.approx(0.26 * np.arange(1, len(found) + 1), abs=1e-6)
 
 
-def test_a_run_is_reproducible_and_obeys_its_constraints(harbour: Any) -> None:
+def test_a_run_is_reproducible_and_obeys_its_constraints(harbour: Terrain) -> None:
     scenario = SurveyScenario(harbour, steps=12, seed=3)
     first, second = (fly_planner(scenario, "cao", QUICK) for _ in range(2))
     np.testing.assert_array_equal(first.positions_m, second.positions_m)
@@ -54,7 +55,7 @@ def test_a_run_is_reproducible_and_obeys_its_constraints(harbour: Any) -> None:
         assert scenario.constraints.feasible(before, after[None])[0]
 
 
-def test_a_survey_run_reports_the_planner_beside_its_yardsticks(harbour: Any) -> None:
+def test_a_survey_run_reports_the_planner_beside_its_yardsticks(harbour: Terrain) -> None:
     run = run_survey(SurveyScenario(harbour, steps=30, seed=0), "cao", QUICK)
     relief = float(np.std(harbour.z_m))
     for result in (run, run.usual_practice, run.coverage, run.oracle):
@@ -67,7 +68,7 @@ def test_a_survey_run_reports_the_planner_beside_its_yardsticks(harbour: Any) ->
     assert run.recorded_track is None
 
 
-def test_baselines_travel_as_far_and_sound_as_often(harbour: Any) -> None:
+def test_baselines_travel_as_far_and_sound_as_often(harbour: Terrain) -> None:
     scenario = SurveyScenario(harbour)
     pair = lawnmower_baselines(harbour, scenario.constraints, scenario.starts_m, 300.0, 4000, scenario.grid)
     assert 400.0 < pair.same_distance.distance_m <= 600.0
@@ -75,7 +76,7 @@ def test_baselines_travel_as_far_and_sound_as_often(harbour: Any) -> None:
     assert pair.same_soundings.rmse_m < pair.same_distance.rmse_m
 
 
-def test_a_flown_lawnmower_finishes_its_lines_within_the_distance_that_it_is_given(harbour: Any) -> None:
+def test_a_flown_lawnmower_finishes_its_lines_within_the_distance_that_it_is_given(harbour: Terrain) -> None:
     scenario = SurveyScenario(harbour)
     soundings, flown_m = fly_lawnmower(
         harbour, scenario.constraints, scenario.starts_m, 250.0, relative_noise=0.01, seed=0

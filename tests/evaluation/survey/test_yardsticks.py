@@ -12,7 +12,7 @@ from simulator.terrain import Terrain
 
 
 @pytest.fixture(scope="module")
-def reef() -> Any:
+def reef() -> Terrain:
     return generate("reef", 2, width_m=40.0, height_m=40.0)
 
 
@@ -31,7 +31,7 @@ def test_the_symmetries_are_eight_different_ones() -> None:
     assert len({turned(terrain, k).z_m.tobytes() for k in range(SYMMETRIES)}) == SYMMETRIES
 
 
-def test_an_oracle_does_better_than_the_same_number_of_random_soundings(reef: Any) -> None:
+def test_an_oracle_does_better_than_the_same_number_of_random_soundings(reef: Terrain) -> None:
     scenario = SurveyScenario(reef)
     placed = oracle_soundings(scenario.log(3), reef, 150, 2.0)
     assert len(placed) == 150

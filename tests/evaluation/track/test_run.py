@@ -166,7 +166,7 @@ def test_a_report_is_made_taken_up_again_and_counts_what_is_missing(
     ],
 )
 def test_what_cannot_be_is_refused_with_what_would_be_right(
-    arguments: Any, said: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    arguments: Any, said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
     result = call(*arguments)

@@ -21,7 +21,7 @@ STEP = 0.05
 class Fleet:
     """A small team over 60 landmarks; ``central`` is what one would know if everything were transmitted."""
 
-    def __init__(self, seed: Any, vehicles: int = 3, capacity: int = 10, n: int = 60) -> None:
+    def __init__(self, seed: int, vehicles: int = 3, capacity: int = 10, n: int = 60) -> None:
         self.rng = np.random.default_rng(seed)
         self.truth = np.column_stack([self.rng.uniform(-0.4, 0.4, (n, 2)), self.rng.uniform(0.5, 0.6, n)])
         self.xy = self.truth[:, :2]
@@ -88,7 +88,7 @@ def test_with_room_enough_everybody_knows_what_a_central_filter_would() -> None:
 
 @given(seed=st.integers(0, 1000), capacity=st.integers(1, 12), loss=st.floats(0.0, 0.6))
 @settings(max_examples=20, deadline=None)
-def test_nobody_ever_claims_to_know_more_than_was_measured(seed: Any, capacity: Any, loss: Any) -> None:
+def test_nobody_ever_claims_to_know_more_than_was_measured(seed: int, capacity: int, loss: float) -> None:
     fleet = Fleet(seed, capacity=capacity)
     radio = np.random.default_rng(seed)
     known = fleet.station.known_accurate.copy()
@@ -109,7 +109,7 @@ def test_nobody_ever_claims_to_know_more_than_was_measured(seed: Any, capacity: 
 
 @given(seed=st.integers(0, 1000), loss=st.floats(0.0, 0.7))
 @settings(max_examples=10, deadline=None)
-def test_lost_messages_delay_but_nothing_is_lost_for_good(seed: Any, loss: Any) -> None:
+def test_lost_messages_delay_but_nothing_is_lost_for_good(seed: int, loss: float) -> None:
     fleet = Fleet(seed, capacity=5)
     radio = np.random.default_rng(seed)
     for _ in range(10):

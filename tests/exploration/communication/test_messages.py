@@ -1,5 +1,6 @@
 from typing import Any
 
+import imcpy
 import numpy as np
 import pytest
 from hypothesis import given
@@ -84,7 +85,7 @@ def test_orders_come_out_as_they_went_in(order: Any) -> None:
 
 
 @given(message=st.binary(max_size=120))
-def test_garbage_is_refused_or_read_but_never_crashes(message: Any) -> None:
+def test_garbage_is_refused_or_read_but_never_crashes(message: imcpy.Message) -> None:
     for decode in (WIRE.decode_report, WIRE.decode_order):
         try:
             read = decode(message)
@@ -121,7 +122,7 @@ def test_a_deviation_too_large_to_send_arrives_as_infinite() -> None:
 @pytest.mark.parametrize(
     ("vehicle", "index", "count", "named"), [(256, 0, 1, "vehicle"), (0, 65536, 1, "index"), (0, 0, 256, "256 entries")]
 )
-def test_what_does_not_fit_is_named(vehicle: Any, index: Any, count: Any, named: Any) -> None:
+def test_what_does_not_fit_is_named(vehicle: Any, index: Any, count: int, named: Any) -> None:
     sent = Entries(np.full(count, index), np.zeros(count), np.ones(count), np.zeros(count, dtype=np.bool_))
     with pytest.raises(MessageError, match=named):
         WIRE.encode_report(Report(1, vehicle, np.zeros(3), False, sent))

@@ -10,7 +10,7 @@ from app.exploration.communication.selection import fill
 
 @given(seed=st.integers(0, 10_000))
 @settings(max_examples=50, deadline=None)
-def test_the_reachable_exploration_area_is_as_the_paper_words_it(seed: Any) -> None:
+def test_the_reachable_exploration_area_is_as_the_paper_words_it(seed: int) -> None:
     rng = np.random.default_rng(seed)
     positions, xy = rng.uniform(-1, 1, (4, 3)), rng.uniform(-1, 1, (15, 2))
     visible_by = rng.random((4, 15)) < 0.3
@@ -24,7 +24,7 @@ def test_the_reachable_exploration_area_is_as_the_paper_words_it(seed: Any) -> N
 
 @given(seed=st.integers(0, 10_000), capacity=st.integers(0, 12))
 @settings(max_examples=50, deadline=None)
-def test_a_message_holds_the_most_wanted_that_are_no_near_duplicates(seed: Any, capacity: Any) -> None:
+def test_a_message_holds_the_most_wanted_that_are_no_near_duplicates(seed: int, capacity: int) -> None:
     rng = np.random.default_rng(seed)
     xy = rng.uniform(0, 1, (20, 2))
     order = rng.permutation(20)[:15]

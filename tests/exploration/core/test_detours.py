@@ -13,6 +13,7 @@ from app.exploration.core.constraints import Constraints
 from app.exploration.core.dynamic import FICTITIOUS_WEIGHT, Localization, Targets, dynamic_cost
 from app.exploration.core.information_need import lacking
 from app.exploration.core.problem import Belief
+from app.exploration.planner.base import PlannerBase
 from app.exploration.planner.options import PlannerOptions
 from app.exploration.planners import PLANNERS, create_planner
 from tests.support.situations import SQUARE, make_belief, make_situation
@@ -37,7 +38,7 @@ def localization(
     return Localization(values, values if foretold is None else np.array(foretold), threshold, 0.0, shared)
 
 
-def fly(planner: Any, steps: Any, *, limits: Any = LIMITS, start: Any = START, **dynamic: Any) -> Iterator[Any]:
+def fly(planner: PlannerBase, steps: int, *, limits: Any = LIMITS, start: Any = START, **dynamic: Any) -> Iterator[Any]:
     """Fly in closed loop with a belief that does not change; yields positions."""
     at = start
     for step in range(1, steps + 1):
@@ -48,12 +49,12 @@ def fly(planner: Any, steps: Any, *, limits: Any = LIMITS, start: Any = START, *
         yield situation, at
 
 
-def make(name: Any) -> Any:
+def make(name: str) -> Any:
     return create_planner(name, PlannerOptions(rollouts=10, candidates=8), SENSOR)
 
 
 @pytest.mark.parametrize("name", sorted(set(PLANNERS) - {"random"}))
-def test_a_lost_target_draws_one_vehicle_and_only_one(name: Any) -> None:
+def test_a_lost_target_draws_one_vehicle_and_only_one(name: str) -> None:
     lost = targets()
     before = np.linalg.norm(START - lost.state[0, :3], axis=1)
     *_, (_, after) = fly(make(name), 5, targets=lost)
@@ -63,7 +64,7 @@ def test_a_lost_target_draws_one_vehicle_and_only_one(name: Any) -> None:
 
 
 @pytest.mark.parametrize("name", sorted(set(PLANNERS) - {"random"}))
-def test_fading_localization_brings_up_the_shallowest_vehicle(name: Any) -> None:
+def test_fading_localization_brings_up_the_shallowest_vehicle(name: str) -> None:
     start = START + np.array([0.0, 0.0, 8.0])
     low = Constraints(SQUARE, max_step_m=4.0, max_depth_m=20.0, min_altitude_m=0.5)
     flown = [at for _, at in fly(make(name), 3, limits=low, start=start, localization=localization((2.5, 1.0, 1.0)))]
@@ -96,7 +97,7 @@ def test_one_vehicle_goes_from_target_to_target() -> None:
 
 
 @pytest.mark.parametrize("name", sorted(PLANNERS))
-def test_errands_break_no_limit(name: Any) -> None:
+def test_errands_break_no_limit(name: str) -> None:
     zone = np.array([[50.0, 10.0], [60.0, 10.0], [60.0, 60.0], [50.0, 60.0]])
     for com_range in (np.inf, 25.0):
         limits = replace(LIMITS, keep_out=(zone,), com_range_m=com_range, min_separation_m=2.0)

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from app.arrays import FloatArray
 from app.estimation import LandmarkSets
 from app.exploration.core.objective import (
     ObjectiveWeights,
@@ -18,7 +19,7 @@ from app.exploration.core.objective import (
 )
 
 
-def draw(seed: Any, n: int = 3, m: int = 40) -> Any:
+def draw(seed: int, n: int = 3, m: int = 40) -> Any:
     rng = np.random.default_rng(seed)
     positions, landmarks = rng.uniform(-1, 1, (n, 3)), rng.uniform(-1, 1, (m, 3))
     accurate, visible = rng.random(m) < 0.3, rng.random((n, m)) < 0.3
@@ -27,7 +28,7 @@ def draw(seed: Any, n: int = 3, m: int = 40) -> Any:
     return positions, landmarks, sets
 
 
-def slow_terms(positions: Any, landmarks: Any, sets: Any, before: Any, s1: Any, s2: Any, s3: Any) -> Any:
+def slow_terms(positions: FloatArray, landmarks: FloatArray, sets: Any, before: Any, s1: Any, s2: Any, s3: Any) -> Any:
     n = len(positions)
     J = sum(bool(x) for x in sets.accurate) - before
     J1 = J2 = J3 = 0.0
@@ -51,7 +52,7 @@ def slow_terms(positions: Any, landmarks: Any, sets: Any, before: Any, s1: Any, 
 
 @given(seed=st.integers(0, 10_000))
 @settings(max_examples=60, deadline=None)
-def test_terms_match_the_slow_reference(seed: Any) -> None:
+def test_terms_match_the_slow_reference(seed: int) -> None:
     positions, landmarks, sets = draw(seed)
     rng = np.random.default_rng(seed + 1)
     earlier, before = (
@@ -81,7 +82,7 @@ def test_switches_are_closed_while_a_vehicle_gains_and_open_in_a_deadlock() -> N
 
 @given(seed=st.integers(0, 10_000))
 @settings(max_examples=60, deadline=None)
-def test_no_configuration_is_worth_more_than_the_one_that_finishes_the_map(seed: Any) -> None:
+def test_no_configuration_is_worth_more_than_the_one_that_finishes_the_map(seed: int) -> None:
     # J1 rewards landmarks that are seen but not finished, so the maximum is the finished map as long as K1 is below the
     # worth of finishing them: what one more vehicle sees of a landmark counts no more than making it accurate.
     positions, landmarks, sets = draw(seed)
@@ -99,7 +100,7 @@ def test_no_configuration_is_worth_more_than_the_one_that_finishes_the_map(seed:
 
 @given(seed=st.integers(0, 10_000), K=st.floats(0.1, 5.0))
 @settings(max_examples=40, deadline=None)
-def test_the_cost_of_med13_matches_the_slow_reference(seed: Any, K: Any) -> None:
+def test_the_cost_of_med13_matches_the_slow_reference(seed: int, K: Any) -> None:
     positions, landmarks, sets = draw(seed)
     cost = 0.0
     for q in range(len(landmarks)):

@@ -6,6 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely import LineString, Polygon
 
+from app.arrays import FloatArray
 from app.exploration.core.constraints import Constraints
 from app.exploration.lines.formation_lines import RowSpace, lines_over
 
@@ -13,7 +14,7 @@ AREA = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 START = np.array([-0.8, -0.8, 0.1])
 
 
-def box(west: Any, south: Any, east: Any, north: Any) -> Any:
+def box(west: float, south: float, east: float, north: float) -> Any:
     return np.array([[west, south], [east, south], [east, north], [west, north]])
 
 
@@ -32,14 +33,14 @@ def tracks(rows: Any, route: Any) -> Any:
     return [LineString(line) for line in np.swapaxes(rows.slots(np.vstack([START, route])), 0, 1)]
 
 
-def farthest(points: Any, lines: Any) -> Any:
+def farthest(points: FloatArray, lines: Any) -> Any:
     x = np.array([min(line.distance(LineString([p, p])) for line in lines) for p in points])
     return float(x.max())
 
 
 @pytest.mark.parametrize("direction", [0.0, np.pi / 2])
 @pytest.mark.parametrize("n", [1, 2, 3, 5])
-def test_lines_come_close_to_every_place_of_an_open_area(n: Any, direction: Any) -> None:
+def test_lines_come_close_to_every_place_of_an_open_area(n: int, direction: Any) -> None:
     rows = space(n=n, direction=direction)
     route = lines_over(rows, START, places(), 0.24, 0.15)
     assert farthest(places(), tracks(rows, route)) <= np.hypot(0.12, 0.17) + 0.02
@@ -70,7 +71,7 @@ def test_no_vehicle_of_a_row_enters_a_zone_or_leaves_the_area(zones: Any, direct
     seed=st.integers(0, 100),
 )
 @settings(max_examples=30, deadline=None)
-def test_following_a_route_piece_by_piece_is_following_it_at_once(distances: Any, seed: Any) -> None:
+def test_following_a_route_piece_by_piece_is_following_it_at_once(distances: Any, seed: int) -> None:
     rows, rng = space(), np.random.default_rng(seed)
     route = np.column_stack([rng.uniform(-0.8, 0.8, (5, 2)), rng.uniform(0.0, 0.2, 5)])
     here, rest = START, route

@@ -1,6 +1,7 @@
 """The PCAO controller: the paper's equations, its symmetries, its bounds, its model file."""
 
 import json
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from app.estimation import RangeSensor, SingleBeam
+from app.arrays import FloatArray
+from app.estimation import RangeSensor, Sensor, SingleBeam
 from app.exploration.core.constraints import Constraints
 from app.exploration.pcao.controller import (
     BLOCKS,
@@ -36,7 +38,7 @@ from tests.support.situations import SQUARE, make_belief, make_situation
 UNIT = 0.1
 
 
-def world(rng: Any, vehicles: int = 3, landmarks: int = 80) -> Any:
+def world(rng: np.random.Generator, vehicles: int = 3, landmarks: int = 80) -> Any:
     positions = np.column_stack([rng.uniform(-0.8, 0.8, (vehicles, 2)), rng.uniform(0.1, 0.4, vehicles)])
     angle = rng.uniform(0, 2 * np.pi, vehicles)
     moves = np.column_stack([np.sin(angle), np.cos(angle)])
@@ -45,11 +47,13 @@ def world(rng: Any, vehicles: int = 3, landmarks: int = 80) -> Any:
     return positions, moves, rng.uniform(0.05, 0.4, vehicles), rng.uniform(-1, 1, (landmarks, 2)), depth, left
 
 
-def state(positions: Any, moves: Any, heights: Any, xy: Any, depth: Any, left: Any) -> Any:
+def state(
+    positions: FloatArray, moves: FloatArray, heights: FloatArray, xy: FloatArray, depth: FloatArray, left: FloatArray
+) -> Any:
     return reduced_state(positions, moves, heights, np.ascontiguousarray(xy), depth, left, len(xy) / 4.0, UNIT)
 
 
-def literal(vectors: Any, figures: Any, schedule: Any, parameters: Any) -> Any:
+def literal(vectors: FloatArray, figures: FloatArray, schedule: Any, parameters: Any) -> Any:
     """Return u of one vehicle by eq. (13) to (16) as they stand: z, its Jacobian M_z, block-diagonal P, B."""
     x = np.concatenate([vectors[:, 0], vectors[:, 1], figures])
     n = len(x)
@@ -73,7 +77,7 @@ def literal(vectors: Any, figures: Any, schedule: Any, parameters: Any) -> Any:
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_the_controller_is_the_papers(seed: Any) -> None:
+def test_the_controller_is_the_papers(seed: int) -> None:
     rng = np.random.default_rng(seed)
     parameters = random_parameters(rng)[0]
     vectors, figures, schedule = state(*world(rng))
@@ -91,7 +95,7 @@ def test_mixing_signals_share_the_whole(here: Any, left: Any) -> None:
 
 @settings(max_examples=25)
 @given(st.integers(0, 10_000), st.floats(0.1, 50))
-def test_every_p_is_brought_within_its_bounds_and_stays_there(seed: Any, size: Any) -> None:
+def test_every_p_is_brought_within_its_bounds_and_stays_there(seed: int, size: Any) -> None:
     parameters = size * np.random.default_rng(seed).standard_normal(SIZE)
     bounded = within_bounds(parameters)
     for block in blocks(bounded):
@@ -102,7 +106,7 @@ def test_every_p_is_brought_within_its_bounds_and_stays_there(seed: Any, size: A
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_permuted_vehicles_have_permuted_states(seed: Any) -> None:
+def test_permuted_vehicles_have_permuted_states(seed: int) -> None:
     rng = np.random.default_rng(seed)
     positions, moves, heights, xy, depth, left = world(rng, vehicles=5)
     order = rng.permutation(5)
@@ -160,7 +164,7 @@ def spoil(path: Any, value: Any) -> Any:
         (("state", "vectors"), ["nearest"], "train it anew"),
     ],
 )
-def test_a_model_that_cannot_fly_is_refused_with_the_reason(path: Any, value: Any, says: Any) -> None:
+def test_a_model_that_cannot_fly_is_refused_with_the_reason(path: Path, value: Any, says: Any) -> None:
     with pytest.raises(ValidationError, match=says):
         PcaoModel.model_validate_json(spoil(path, value))
 
@@ -187,7 +191,7 @@ def test_a_mission_flies_with_the_model_that_it_names() -> None:
 
 
 @pytest.mark.parametrize("sensor", [SingleBeam(), RangeSensor(25.0)])
-def test_a_zone_across_the_way_is_flown_round(sensor: Any) -> None:
+def test_a_zone_across_the_way_is_flown_round(sensor: Sensor) -> None:
     zone = np.array([[40.0, 0.0], [60.0, 0.0], [60.0, 70.0], [40.0, 70.0]])
     limits = Constraints(SQUARE, (zone,), max_step_m=8.0, max_depth_m=20.0, min_altitude_m=1.0)
     planner, belief = create_planner("pcao", sensor=sensor), make_belief()

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from app.arrays import FloatArray
 from app.estimation import LandmarkSets, RangeSensor
 from app.exploration.core.constraints import Constraints
 from app.exploration.core.objective import ObjectiveWeights, med13_objective, objective
@@ -16,7 +17,7 @@ SENSOR = RangeSensor()
 AREA = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 
 
-def situation(positions: Any, accurate: Any, names: tuple[Any, ...] = ("a", "b")) -> Any:
+def situation(positions: FloatArray, accurate: Any, names: tuple[Any, ...] = ("a", "b")) -> Any:
     rng = np.random.default_rng(0)
     xy = rng.uniform(-1, 1, (200, 2))
     depth = np.where(rng.random(200) < 0.7, 0.6, np.nan)
@@ -24,7 +25,7 @@ def situation(positions: Any, accurate: Any, names: tuple[Any, ...] = ("a", "b")
     return Situation(1, 9, names, positions, np.full(2, np.nan), belief, np.zeros((0, 2)), Constraints(AREA))
 
 
-def value(team: Any, positions: Any, gained: Any, terms: Any) -> Any:
+def value(team: Any, positions: FloatArray, gained: Any, terms: Any) -> Any:
     belief = team.belief
     points = np.column_stack([belief.xy_m, np.where(np.isnan(belief.depth_m), 0.6, belief.depth_m)])
     seen = SENSOR.visible(positions, points) & np.isfinite(belief.depth_m)

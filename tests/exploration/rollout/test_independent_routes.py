@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from app.arrays import FloatArray
 from app.estimation import RangeSensor
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.constraints import Constraints
@@ -42,7 +43,7 @@ START = np.array([[-0.8, -0.8, 0.2], [-0.7, -0.8, 0.2], [-0.8, -0.7, 0.2]])
 LIMITS = Constraints(CUBE, max_step_m=0.05, min_depth_m=-1.0, max_depth_m=1.0, min_altitude_m=0.2, held_altitude_m=HELD)
 
 
-def hilly(seed: Any, n: int = 120) -> Any:
+def hilly(seed: int, n: int = 120) -> Any:
     """Landmarks on gentle hills; half of them were seen, with errors of any shape."""
     rng = np.random.default_rng(seed)
     xy = rng.uniform(-1.0, 1.0, (n, 2))
@@ -55,7 +56,7 @@ def hilly(seed: Any, n: int = 120) -> Any:
     return Belief(xy, depth, sd, np.zeros(n, dtype=bool), np.ones(n), 0.2, covariance)
 
 
-def make_case(seed: Any, stops: int = 4) -> Any:
+def make_case(seed: int, stops: int = 4) -> Any:
     """Three vehicles with random routes over what is left."""
     rng = np.random.default_rng(seed)
     belief = hilly(seed)
@@ -77,7 +78,7 @@ def flown(routes: Any, points: Any, floor: Any) -> Any:
     return judge(paths, FREE, int(routes.counts.sum()), points, RULES, np.inf, left), paths, left
 
 
-def open_landmarks(information: Any) -> Any:
+def open_landmarks(information: FloatArray) -> Any:
     """Return which of the information matrices, six numbers each, leave a landmark inaccurate."""
     a, b, c, d, e, f = information
     matrices = np.array([[a, b, c], [b, d, e], [c, e, f]]).transpose(2, 0, 1)
@@ -86,7 +87,7 @@ def open_landmarks(information: Any) -> Any:
 
 @given(seed=st.integers(0, 1000), at=st.tuples(*[st.floats(-1.1, 1.1)] * 2, st.floats(0.0, 0.5)))
 @settings(max_examples=30, deadline=None)
-def test_a_look_adds_what_the_fisher_information_of_a_range_is(seed: Any, at: Any) -> None:
+def test_a_look_adds_what_the_fisher_information_of_a_range_is(seed: int, at: Any) -> None:
     _, points, _, _ = make_case(seed)
     information = points.information.copy()
     done = open_landmarks(information) == 0
@@ -120,7 +121,7 @@ def test_one_straight_line_does_not_tell_where_a_landmark_is_and_a_second_one_do
 
 @given(seed=st.integers(0, 1000))
 @settings(max_examples=20, deadline=None)
-def test_a_vehicle_alone_keeps_its_step_its_depths_and_comes_to_the_end(seed: Any) -> None:
+def test_a_vehicle_alone_keeps_its_step_its_depths_and_comes_to_the_end(seed: int) -> None:
     _, _, floor, routes = make_case(seed)
     at, after, k = START[:1].copy(), np.empty((1, 3)), 0
     for _ in range(400):
@@ -135,7 +136,7 @@ def test_a_vehicle_alone_keeps_its_step_its_depths_and_comes_to_the_end(seed: An
 
 @given(seed=st.integers(0, 1000), zones=st.booleans())
 @settings(max_examples=10, deadline=None)
-def test_the_search_never_worsens_routes_and_reports_their_true_score(seed: Any, zones: Any) -> None:
+def test_the_search_never_worsens_routes_and_reports_their_true_score(seed: int, zones: Any) -> None:
     _, points, floor, routes = make_case(seed)
     zone = np.array([[-0.2, -0.2], [0.2, -0.2], [0.2, 0.2], [-0.2, 0.2]])
     free = free_space(Constraints(CUBE, (zone,) if zones else ()))
@@ -154,7 +155,7 @@ def test_the_search_never_worsens_routes_and_reports_their_true_score(seed: Any,
 
 @given(seed=st.integers(0, 1000))
 @settings(max_examples=10, deadline=None)
-def test_a_vehicle_that_is_away_half_of_the_time_is_not_relied_upon(seed: Any) -> None:
+def test_a_vehicle_that_is_away_half_of_the_time_is_not_relied_upon(seed: int) -> None:
     _, points, floor, routes = make_case(seed)
     whole, paths, _ = flown(routes, points, floor)
     half = judge(paths, np.array([0.5, 1.0, 1.0]), 12, points, RULES, np.inf, np.empty(points.information.shape[1]))
@@ -185,7 +186,7 @@ def test_nobody_climbs_because_an_estimate_calls_it_too_low() -> None:
 
 @given(seed=st.integers(0, 1000))
 @settings(max_examples=20, deadline=None)
-def test_every_step_that_a_vehicle_may_try_is_short_enough_and_leads_somewhere(seed: Any) -> None:
+def test_every_step_that_a_vehicle_may_try_is_short_enough_and_leads_somewhere(seed: int) -> None:
     team = replace(situation(1, START), belief=hilly(seed))
     bottom = Bottom.from_landmarks(team.belief.xy_m, team.belief.depth_m)
     mission = apart_mission(
@@ -223,7 +224,7 @@ def test_no_vehicle_stands_before_a_step_that_only_the_estimate_of_the_floor_has
     assert np.linalg.norm(way[6:] - way[:-6], axis=2).min() > 0.5 * LIMITS.max_step_m
 
 
-def situation(step: Any, positions: Any, targets: Any = None) -> Any:
+def situation(step: Any, positions: FloatArray, targets: Any = None) -> Any:
     belief = hilly(2)
     return Situation(
         step, 100, NAMES, positions, np.full(3, np.nan), belief, np.zeros((0, 2)), LIMITS, targets

@@ -25,7 +25,7 @@ ROOM = 12
 CLEARANCE = 0.05
 
 
-def hilly(seed: Any, n: int = 250) -> Any:
+def hilly(seed: int, n: int = 250) -> Any:
     """Landmarks all over the cube, on gentle hills; a third of them was seen."""
     rng = np.random.default_rng(seed)
     xy = rng.uniform(-1.0, 1.0, (n, 2))
@@ -37,12 +37,12 @@ def hilly(seed: Any, n: int = 250) -> Any:
     return belief, depth
 
 
-def floor_of(belief: Any, felt: Any = None) -> Any:
+def floor_of(belief: Belief, felt: Any = None) -> Any:
     bottom = Bottom.from_landmarks(belief.xy_m, belief.depth_m)
     return estimate_floor(belief, bottom, np.zeros((0, 3)) if felt is None else felt, CUBE, 0.4, CLEARANCE, 0.6)
 
 
-def make_case(seed: Any, vehicles: int = 3, waypoints: int = 5) -> Any:
+def make_case(seed: int, vehicles: int = 3, waypoints: int = 5) -> Any:
     """A team in a row, a random plan that keeps its links, and the landmarks to be done."""
     rng = np.random.default_rng(seed)
     belief, depth = hilly(seed)
@@ -80,13 +80,13 @@ def flown(
     return score, left, course
 
 
-def copied(plan: Any) -> Any:
+def copied(plan: Plan) -> Any:
     return Plan(plan.at_m.copy(), plan.height_m.copy(), plan.chain)
 
 
 @given(seed=st.integers(0, 1000), at=st.tuples(*[st.floats(-1.2, 1.2)] * 2, st.floats(-0.2, 0.9)))
 @settings(max_examples=40, deadline=None)
-def test_a_look_gives_what_eq_5_says_to_every_landmark_in_sight(seed: Any, at: Any) -> None:
+def test_a_look_gives_what_eq_5_says_to_every_landmark_in_sight(seed: int, at: Any) -> None:
     _, _, _, work, _ = make_case(seed)
     need = work.need.copy()
     done = look(at[0], at[1], at[2], work, RULES, need)
@@ -99,7 +99,7 @@ def test_a_look_gives_what_eq_5_says_to_every_landmark_in_sight(seed: Any, at: A
 
 @given(seed=st.integers(0, 1000))
 @settings(max_examples=30, deadline=None)
-def test_flying_obeys_step_links_depths_and_the_estimated_floor(seed: Any) -> None:
+def test_flying_obeys_step_links_depths_and_the_estimated_floor(seed: int) -> None:
     start, plan, count, _, floor = make_case(seed)
     at, k, after = start, 0, np.empty_like(start)
     for _ in range(200):
@@ -121,7 +121,7 @@ def test_flying_obeys_step_links_depths_and_the_estimated_floor(seed: Any) -> No
 @example(seed=458, changed=4)
 @example(seed=153, changed=1)
 @settings(max_examples=40, deadline=None)
-def test_a_changed_plan_flown_from_the_change_on_scores_as_if_flown_from_the_start(seed: Any, changed: Any) -> None:
+def test_a_changed_plan_flown_from_the_change_on_scores_as_if_flown_from_the_start(seed: int, changed: Any) -> None:
     start, plan, count, work, floor = make_case(seed)
     _, _, course = flown(start, plan, count, work, floor)
     other = copied(plan)
@@ -135,7 +135,7 @@ def test_a_changed_plan_flown_from_the_change_on_scores_as_if_flown_from_the_sta
 
 @given(seed=st.integers(0, 1000))
 @settings(max_examples=20, deadline=None)
-def test_a_flight_is_given_up_only_when_it_cannot_beat_the_bound(seed: Any) -> None:
+def test_a_flight_is_given_up_only_when_it_cannot_beat_the_bound(seed: int) -> None:
     start, plan, count, work, floor = make_case(seed)
     score, _, _ = flown(start, plan, count, work, floor)
     assert flown(start, plan, count, work, floor, bound=score * 1.001)[0] == score
@@ -144,7 +144,7 @@ def test_a_flight_is_given_up_only_when_it_cannot_beat_the_bound(seed: Any) -> N
 
 @given(seed=st.integers(0, 1000), zones=st.booleans())
 @settings(max_examples=15, deadline=None)
-def test_the_search_never_worsens_a_plan_and_reports_its_true_score(seed: Any, zones: Any) -> None:
+def test_the_search_never_worsens_a_plan_and_reports_its_true_score(seed: int, zones: Any) -> None:
     start, plan, count, work, floor = make_case(seed)
     zone = np.array([[-0.2, -0.2], [0.2, -0.2], [0.2, 0.2], [-0.2, 0.2]])
     free = free_space(Constraints(CUBE, (zone,) if zones else ()))
@@ -162,7 +162,7 @@ def test_the_search_never_worsens_a_plan_and_reports_its_true_score(seed: Any, z
 
 @given(seed=st.integers(0, 1000))
 @settings(max_examples=30, deadline=None)
-def test_ways_lead_round_zones_with_the_team_together(seed: Any) -> None:
+def test_ways_lead_round_zones_with_the_team_together(seed: int) -> None:
     rng = np.random.default_rng(seed)
     low = rng.uniform(-0.5, 0.1, 2)
     high = low + rng.uniform(0.2, 0.4, 2)

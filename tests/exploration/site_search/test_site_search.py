@@ -69,7 +69,7 @@ def explored(seed: int, looks: int = 6) -> tuple[ObstacleWorld, SearchTask]:
 
 @given(st.integers(0, 5000))
 @settings(max_examples=5, deadline=None)
-def test_distances_are_those_of_dijkstra(seed: Any) -> None:
+def test_distances_are_those_of_dijkstra(seed: int) -> None:
     _, task = explored(seed)
     ground = Ground.of(task)
     ok = ground.passable
@@ -92,7 +92,7 @@ def test_distances_are_those_of_dijkstra(seed: Any) -> None:
 
 @given(st.integers(0, 5000))
 @settings(max_examples=10, deadline=None)
-def test_clear_legs_and_ways_home_keep_the_safety_distance(seed: Any) -> None:
+def test_clear_legs_and_ways_home_keep_the_safety_distance(seed: int) -> None:
     world, task = explored(seed)
     ground, rng = Ground.of(task), np.random.default_rng([seed, 2])
     ends = rng.uniform(0.0, SIDE, (200, 2))
@@ -117,7 +117,7 @@ def test_clear_legs_and_ways_home_keep_the_safety_distance(seed: Any) -> None:
 
 @given(st.integers(0, 5000))
 @settings(max_examples=10, deadline=None)
-def test_a_view_shows_what_was_foretold_where_all_obstacles_are_known(seed: Any) -> None:
+def test_a_view_shows_what_was_foretold_where_all_obstacles_are_known(seed: int) -> None:
     world, task = explored(seed)
     blueprint_only = replace(task, grid=OccupancyGrid.from_blueprint(world.solid, 1.0))
     free = np.argwhere(~world.solid)
@@ -130,7 +130,7 @@ def test_a_view_shows_what_was_foretold_where_all_obstacles_are_known(seed: Any)
 
 @given(st.integers(0, 5000))
 @settings(max_examples=5, deadline=None)
-def test_gains_that_are_kept_are_those_worked_out_anew(seed: Any) -> None:
+def test_gains_that_are_kept_are_those_worked_out_anew(seed: int) -> None:
     world, task = explored(seed, looks=1)
     rng, kept = np.random.default_rng([seed, 4]), Gains()
     for _ in range(6):
@@ -144,7 +144,7 @@ def test_gains_that_are_kept_are_those_worked_out_anew(seed: Any) -> None:
 
 @given(st.integers(0, 5000))
 @settings(max_examples=5, deadline=None)
-def test_distances_that_end_at_some_cells_are_right_up_to_there(seed: Any) -> None:
+def test_distances_that_end_at_some_cells_are_right_up_to_there(seed: int) -> None:
     _, task = explored(seed)
     ground, rng = Ground.of(task), np.random.default_rng([seed, 5])
     start, until = CORNER[None].astype(np.int64), rng.integers(0, SIDE, (3, 2))
@@ -186,7 +186,7 @@ def test_a_standstill_is_noticed_only_once_the_window_is_full_and_growth_ends_it
 @pytest.mark.parametrize("name", sorted(SEARCHERS))
 @given(seed=st.integers(0, 5000), robots=st.integers(1, 3))
 @settings(max_examples=2, deadline=None)
-def test_no_planner_hits_anything_and_all_are_back_in_time(name: Any, seed: Any, robots: Any) -> None:
+def test_no_planner_hits_anything_and_all_are_back_in_time(name: str, seed: int, robots: Any) -> None:
     world = site(seed)
     positions = np.column_stack(
         [CORNER[0] + 2.0 * (np.arange(robots) - (robots - 1) / 2), np.full(robots, CORNER[1]), np.zeros(robots)]
@@ -213,7 +213,7 @@ def test_no_planner_hits_anything_and_all_are_back_in_time(name: Any, seed: Any,
 
 
 @pytest.mark.parametrize("name", sorted(SEARCHERS))
-def test_a_restored_planner_goes_on_as_if_nothing_had_happened(name: Any) -> None:
+def test_a_restored_planner_goes_on_as_if_nothing_had_happened(name: str) -> None:
     world, task = explored(7, looks=0)
     positions = np.array([[4.5, 4.5, 0.0], [6.5, 4.5, 0.0]])
     first = create_planner(name, PlannerOptions(), SCANNER)

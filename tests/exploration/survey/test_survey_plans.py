@@ -7,6 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
+from app.arrays import FloatArray
 from app.estimation import SingleBeam
 from app.evaluation.survey.world import SurveyScenario, fly_planner
 from app.exploration.core.constraints import Constraints
@@ -28,7 +29,7 @@ def nodes_of(seed: int = 0, n: int = 400) -> Any:
     return make_nodes(rng.uniform(0.0, 100.0, (n, 2)), rng.gamma(1.0, 1.0, n))
 
 
-def distance_to_segment(points: Any, a: Any, b: Any) -> Any:
+def distance_to_segment(points: Any, a: Any, b: FloatArray) -> Any:
     along = b - a
     t = np.clip((points - a) @ along / max(along @ along, 1e-12), 0.0, 1.0)
     return np.hypot(*(points - a - t[:, None] * along).T)
@@ -59,7 +60,7 @@ class WithZone(SurveyScenario):
 
 @settings(max_examples=50, deadline=None)
 @given(st.integers(0, 10**6), st.integers(1, 6), st.integers(1, 80))
-def test_a_route_is_flown_leg_by_leg_however_many_are_taken_at_once(seed: Any, corners: Any, steps: Any) -> None:
+def test_a_route_is_flown_leg_by_leg_however_many_are_taken_at_once(seed: int, corners: Any, steps: int) -> None:
     # Drawn at random, so that no corner lies a whole number of steps away: there rounding decides.
     rng = np.random.default_rng(seed)
     route, step = rng.uniform(0.0, 100.0, (corners, 2)), rng.uniform(0.5, 12.0)

@@ -71,7 +71,7 @@ def test_water_shallower_than_the_clearance_means_the_surface() -> None:
 
 @given(st.lists(st.floats(0.5, 100.0), min_size=1, max_size=200), st.floats(-5.0, 100.0), st.floats(0.0, 20.0))
 def test_limit_is_never_deeper_than_asked_nor_than_the_shallowest_confirmed_bottom(
-    depths: Any, asked: Any, clearance: Any
+    depths: list[float], asked: float, clearance: float
 ) -> None:
     limited = limit(guard_over(*depths), asked, clearance)
     assert 0.0 <= limited.depth_m <= max(asked, 0.0)
@@ -142,7 +142,9 @@ def test_falling_bottom_gives_no_credit() -> None:
     st.floats(1.0, 120.0),
     st.floats(0.0, 60.0),
 )
-def test_no_reference_is_deeper_than_any_twice_measured_place_on_its_way(places: Any, length: Any, asked: Any) -> None:
+def test_no_reference_is_deeper_than_any_twice_measured_place_on_its_way(
+    places: Any, length: float, asked: float
+) -> None:
     seabed = Seabed()
     guard = AltitudeGuard(20.0, 30.0, 2.0, seabed)
     for x, y, depth in places:

@@ -158,7 +158,7 @@ def test_a_step_that_cannot_be_is_refused_with_field_value_and_what_would_be_rig
     st.binary(max_size=400)
     | st.recursive(st.none() | st.floats() | st.text(), st.lists).map(json.dumps).map(str.encode)
 )
-def test_whatever_is_uploaded_is_read_or_refused_never_worse(content: Any) -> None:
+def test_whatever_is_uploaded_is_read_or_refused_never_worse(content: bytes) -> None:
     for read in (lambda: step(content), lambda: read_session(content, SESSION), lambda: read_map(content)):
         try:
             read()
@@ -174,7 +174,7 @@ def test_numbers_beyond_all_measure_are_refused() -> None:
 
 
 @pytest.mark.parametrize("count", ["0", "21", "-1", "two", "", 1.5, True, None, "1e1"])
-def test_a_session_needs_a_sensible_number_of_vehicles(count: Any) -> None:
+def test_a_session_needs_a_sensible_number_of_vehicles(count: int) -> None:
     with pytest.raises(NeptusDataError, match="AUVs"):
         read_session(json.dumps({"SessionID": SESSION, "AUVs": count}).encode(), SESSION)
 

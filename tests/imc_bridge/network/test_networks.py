@@ -203,7 +203,7 @@ def packet_of(size: int) -> bytes:
     st.lists(st.integers(1, 90), min_size=1, max_size=30),
     st.binary(max_size=20),
 )
-def test_stream_is_cut_into_its_packets_however_it_arrives(sizes: Any, cuts: Any, rubbish: Any) -> None:
+def test_stream_is_cut_into_its_packets_however_it_arrives(sizes: Any, cuts: Any, rubbish: bytes) -> None:
     packets = [packet_of(size) for size in sizes]
     stream = rubbish.replace(b"\x54", b"").replace(b"\xfe", b"") + b"".join(packets)
     splitter, start = PacketSplitter(), 0

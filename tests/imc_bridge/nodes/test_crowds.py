@@ -260,7 +260,7 @@ async def test_strangers_who_fell_silent_are_forgotten_and_the_doctor_is_content
     now = [0.0]
     bridge = Bridge(BridgeSettings(loopback_only=True), clock=lambda: now[0])
 
-    def packet(message: Any, imc_id: Any) -> Any:
+    def packet(message: imcpy.Message, imc_id: Any) -> Any:
         message.src, message.timestamp = imc_id, 1.7e9
         return imcpy.Packet.serialize(message)
 

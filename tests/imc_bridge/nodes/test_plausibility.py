@@ -1,12 +1,12 @@
 """Positions that a vehicle can have reached, and those that it cannot."""
 
 import math
-from typing import Any
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from app.arrays import FloatArray
 from imc_bridge.nodes.plausibility import ALLOWANCE_M, CONFIRM_S, CONFIRMATIONS, EARTH_M, FASTEST_MPS, PlaceGate, Step
 from imc_bridge.telemetry.soundings import StateSample
 
@@ -18,7 +18,7 @@ def at(time_s: float, north_m: float, depth_m: float = 2.0, lon_rad: float = -0.
 
 
 @given(st.lists(st.tuples(st.floats(0.1, 5.0), st.floats(-1.0, 1.0)), max_size=50))
-def test_vehicle_that_swims_is_always_believed(moves: Any) -> None:
+def test_vehicle_that_swims_is_always_believed(moves: FloatArray) -> None:
     gate, time_s, north_m = PlaceGate(), 0.0, 0.0
     for seconds, part in moves:
         time_s += seconds

@@ -54,7 +54,7 @@ def rotation(roll: float, pitch: float, yaw: float) -> FloatArray:
 
 
 @given(angles, st.floats(-1.5, 1.5), angles, st.tuples(angles, angles, angles))
-def test_rotation_is_the_product_of_yaw_pitch_and_roll(roll: Any, pitch: Any, yaw: Any, vector: Any) -> None:
+def test_rotation_is_the_product_of_yaw_pitch_and_roll(roll: float, pitch: float, yaw: float, vector: Any) -> None:
     local = rotate_to_local(state(roll=roll, pitch=pitch, yaw=yaw), *vector)
     assert np.allclose(local, rotation(roll, pitch, yaw) @ vector, atol=1e-9)
 

@@ -93,7 +93,7 @@ def test_the_announce_has_the_same_form(
     assert (fake.dst, fake.dst_ent, fake.src_ent) == (real.dst, real.dst_ent, real.src_ent)
     assert (fake.sys_type, fake.owner) == (real.sys_type, real.owner)
 
-    def form(message: Any) -> Any:
+    def form(message: imcpy.Message) -> Any:
         return [service.partition("uid")[0] for service in message.services.split(";")]
 
     assert form(fake) == form(real)

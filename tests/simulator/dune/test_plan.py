@@ -26,7 +26,7 @@ def follow_states(bench: Bench) -> list[int]:
 
 
 @pytest.fixture
-def started(bench: Any) -> Any:
+def started(bench: Bench) -> Any:
     bench.say(start_request())
     return bench
 

@@ -87,7 +87,7 @@ class Sea:
         self._left_at[name] = (here.east_m, here.north_m, 0.0)
         await fleet.stop()
 
-    def say(self, name: str, message: Any, port: int | None = None) -> None:
+    def say(self, name: str, message: imcpy.Message, port: int | None = None) -> None:
         """Let a vehicle say something that is not so, from its own socket and by its own clock."""
         fleet = self._afloat[name]
         node = fleet.nodes[0]

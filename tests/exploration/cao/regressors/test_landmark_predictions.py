@@ -7,13 +7,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from app.arrays import FloatArray
 from app.exploration.cao.regressors import landmark_predictions
 from app.exploration.cao.regressors.landmark_predictions import predict, within_reach
 
 VISIBILITY, NOISE, STEP = 0.4, 0.1, 0.05
 
 
-def slow(candidates: Any, points: Any, needed: Any, goals: Any) -> Any:
+def slow(candidates: FloatArray, points: FloatArray, needed: Any, goals: Any) -> Any:
     out = []
     for team in candidates:
         information = np.zeros(len(points))
@@ -30,7 +31,7 @@ def slow(candidates: Any, points: Any, needed: Any, goals: Any) -> Any:
 
 @given(seed=st.integers(0, 10_000), vehicles=st.integers(1, 4), landmarks=st.integers(1, 300), far=st.booleans())
 @settings(max_examples=60, deadline=None)
-def test_short_lists_change_nothing(seed: Any, vehicles: Any, landmarks: Any, far: Any) -> None:
+def test_short_lists_change_nothing(seed: int, vehicles: Any, landmarks: FloatArray, far: Any) -> None:
     rng = np.random.default_rng(seed)
     points = np.column_stack([rng.uniform(-1, 1, (landmarks, 2)), rng.uniform(0.4, 1.0, landmarks)])
     now = np.column_stack([rng.uniform(-1, 1, (vehicles, 2)) + 3.0 * far, rng.uniform(0.0, 0.35, vehicles)])
