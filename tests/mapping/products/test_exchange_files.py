@@ -132,7 +132,7 @@ def test_bag_states_its_datum_and_holds_elevations(bathymetry: BathymetricMap, t
 
 def test_contours_in_kml_lie_at_their_depth(bathymetry: BathymetricMap) -> None:
     text = contours_kml(find_contours(bathymetry, FRAME, 1.0), title=TITLE, vertical_datum=LAT.statement)
-    document: Any = fastkml.KML.from_string(text.decode(), strict=True).features[0]
+    document: Any = fastkml.KML.from_string(text, strict=True).features[0]  # type: ignore[arg-type]
     assert document.name == TITLE
     assert [mark.name for mark in document.features] == ["7 m", "8 m", "9 m", "10 m"]
     for mark in document.features:
@@ -158,7 +158,8 @@ def test_tracks_come_back_from_every_format(tmp_path: Path) -> None:
     assert list(fields[list(meta["fields"]).index("vehicle")]) == ["lauv-1"]
     assert meta["geometry_type"] == "LineString"
 
-    document: Any = fastkml.KML.from_string(tracks_kml(TRACKS, title=TITLE).decode(), strict=True).features[0]
+    text = tracks_kml(TRACKS, title=TITLE)
+    document: Any = fastkml.KML.from_string(text, strict=True).features[0]  # type: ignore[arg-type]
     assert [mark.name for mark in document.features] == ["lauv-1"]
     np.testing.assert_allclose([point[:2] for point in document.features[0].geometry.coords], expected, atol=1e-8)
 
