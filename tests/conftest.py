@@ -1,4 +1,3 @@
-import os
 from collections.abc import Iterator
 from contextlib import ExitStack
 from pathlib import Path
@@ -6,10 +5,9 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
-from .databases import KINDS, Databases
-from .numba_cache import share
-
-PROJECT = Path(__file__).resolve().parents[1]
+from tests.support.databases import KINDS, Databases
+from tests.support.numba_cache import share
+from tests.support.paths import CAPTURES, TERRAINS
 
 share()
 # Nothing is said about how fast a machine is.
@@ -71,8 +69,14 @@ def no_process_is_left_behind() -> Iterator[None]:
 @pytest.fixture(scope="session")
 def terrains() -> Path:
     """Folder of real terrains: what BATHYFLEET_TERRAINS names, else ``../shared/terrains`` beside the project."""
-    named = os.environ.get("BATHYFLEET_TERRAINS")
-    folder = Path(named) if named else PROJECT.parent / "shared" / "terrains"
-    if not folder.is_dir():
-        pytest.skip(f"no real terrains in {folder}: set BATHYFLEET_TERRAINS to a folder of terrain files")
-    return folder
+    if not TERRAINS.is_dir():
+        pytest.skip(f"no real terrains in {TERRAINS}: set BATHYFLEET_TERRAINS to a folder of terrain files")
+    return TERRAINS
+
+
+@pytest.fixture(scope="session")
+def captures() -> Path:
+    """Folder of the recorded sessions of real DUNE nodes."""
+    if not CAPTURES.is_dir():
+        pytest.skip(f"no recorded sessions in {CAPTURES}: set BATHYFLEET_CAPTURES to a folder of recorded sessions")
+    return CAPTURES

@@ -1,6 +1,5 @@
 """The command line: what a user sees and which code a script gets."""
 
-import contextlib
 import json
 import os
 import re
@@ -8,7 +7,7 @@ import signal
 import socket
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,11 +17,11 @@ import pytest
 import rasterio
 
 from app.cli import main
-from tests.api.conftest import mission_spec, soundings
-from tests.imc_bridge import log_writer as writer
-
-ROOT = Path(__file__).resolve().parents[1]
-COMMAND = [sys.executable, "-c", "import sys; sys.argv[0] = 'bathyfleet'; from app.cli import main; main()"]
+from tests.support import commands
+from tests.support.commands import serving
+from tests.support.imc import log_writer as writer
+from tests.support.paths import PROJECT
+from tests.support.rest import mission_spec, soundings
 
 
 @dataclass
@@ -39,8 +38,7 @@ Run = Callable[..., Ended]
 
 @pytest.fixture
 def environment() -> dict[str, str]:
-    kept = {name: value for name, value in os.environ.items() if not name.startswith("BATHYFLEET_")}
-    return kept | {"PYTHONPATH": str(ROOT), "COLUMNS": "200", "NO_COLOR": "1", "BATHYFLEET_IMC__ENABLED": "false"}
+    return commands.environment(COLUMNS="200", NO_COLOR="1")
 
 
 @pytest.fixture
@@ -65,30 +63,6 @@ def bathyfleet(
     return run
 
 
-@contextlib.contextmanager
-def serving(folder: Path, environment: dict[str, str], *arguments: str) -> Iterator[tuple[subprocess.Popen[str], str]]:
-    """``bathyfleet serve`` on a free port, and its address."""
-    process = subprocess.Popen(
-        [*COMMAND, "serve", "--port", "0", *arguments],
-        cwd=folder,
-        env=environment,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-    assert process.stderr is not None
-    try:
-        seen = ""
-        for line in process.stderr:
-            seen += line
-            if found := re.search(r"bathyfleet answers at (\S+)", line):
-                yield process, found[1]
-                return
-        pytest.fail(f"it did not start: {seen}")
-    finally:
-        process.kill()
-        process.communicate()
-
-
 def test_help_lists_every_command_without_loading_the_service(bathyfleet: Run) -> None:
     shown = bathyfleet("--help")
     assert shown.code == 0
@@ -111,7 +85,7 @@ def test_help_lists_every_command_without_loading_the_service(bathyfleet: Run) -
         assert command in shown.stdout
     imported = subprocess.run(
         [sys.executable, "-X", "importtime", "-c", "import app.cli"],
-        cwd=ROOT,
+        cwd=PROJECT,
         capture_output=True,
         text=True,
         check=True,

@@ -8,8 +8,8 @@ from pathlib import Path
 
 from app import compiled
 from app.compiled import PARTS, compile_beside, wait_for_compiling
-from tests.conftest import PROJECT
-from tests.faults.other_users import SERVICE, as_user, needs_root
+from tests.support.faults.other_users import SERVICE, as_user, needs_root
+from tests.support.paths import PROJECT
 
 PROGRAM = """
 from app.compiled import keep_compiled

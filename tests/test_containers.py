@@ -6,19 +6,18 @@ import re
 import shlex
 import subprocess
 import sys
-from pathlib import Path
 from typing import Any
 
 import pytest
 import yaml
 
-from app.main import Server
+from app.missions.settings import ImcSettings
 from app.settings import PREFIX, Settings, _variable_names, load_settings
-from tests.api.conftest import shared_server  # noqa: F401 - a fixture
+from tests.support.paths import PROJECT
+from tests.support.rest import running_in_thread
 
-ROOT = Path(__file__).resolve().parents[1]
-IMAGE = (ROOT / "Dockerfile").read_text().replace("\\\n", " ")
-COMPOSE = yaml.safe_load((ROOT / "compose.yaml").read_text())
+IMAGE = (PROJECT / "Dockerfile").read_text().replace("\\\n", " ")
+COMPOSE = yaml.safe_load((PROJECT / "compose.yaml").read_text())
 KNOWN = _variable_names(Settings, PREFIX)
 
 
@@ -56,18 +55,20 @@ def test_ports_of_the_image_are_those_of_the_settings() -> None:
     assert line.split() == [f"{Settings().port}/tcp", f"{imc.port}/udp", announces]
 
 
-def test_the_health_check_asks_what_there_is(shared_server: Server) -> None:  # noqa: F811
+def test_the_health_check_asks_what_there_is(database_url: str) -> None:
     (line,) = re.findall(r"^HEALTHCHECK .* CMD (\[.*\])$", IMAGE, re.MULTILINE)
     command = [sys.executable, *json.loads(line)[1:]]
-    for port, code in ((shared_server.url.rpartition(":")[2], 0), ("9", 1)):
-        variables = {"BATHYFLEET_PORT": port, "PATH": os.environ["PATH"]}
-        assert subprocess.run(command, env=variables, capture_output=True, check=False).returncode == code
+    settings = Settings(port=0, database_url=database_url, imc=ImcSettings(enabled=False))
+    with running_in_thread(settings) as server:
+        for port, code in ((server.url.rpartition(":")[2], 0), ("9", 1)):
+            variables = {"BATHYFLEET_PORT": port, "PATH": os.environ["PATH"]}
+            assert subprocess.run(command, env=variables, capture_output=True, check=False).returncode == code
 
 
 def test_what_the_image_copies_is_what_the_package_is_made_of() -> None:
-    allowed = {line[1:] for line in (ROOT / ".dockerignore").read_text().splitlines() if line.startswith("!")}
+    allowed = {line[1:] for line in (PROJECT / ".dockerignore").read_text().splitlines() if line.startswith("!")}
     assert {"app", "imc_bridge", "simulator", "migrations", "hatch_build.py", "pyproject.toml"} <= allowed
-    assert all((ROOT / name).exists() for name in allowed)
+    assert all((PROJECT / name).exists() for name in allowed)
     assert "operator.token" not in allowed
 
 

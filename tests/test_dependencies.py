@@ -3,16 +3,16 @@
 import importlib.metadata
 import re
 import tomllib
-from pathlib import Path
 
 import pytest
 from packaging.requirements import Requirement
 from packaging.specifiers import SpecifierSet
 from packaging.utils import canonicalize_name
 
-ROOT = Path(__file__).resolve().parents[1]
-PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-ADVISORIES = tomllib.loads((ROOT / "tests" / "advisories.toml").read_text())["advisory"]
+from tests.support.paths import PROJECT
+
+DECLARED = tomllib.loads((PROJECT / "pyproject.toml").read_text())["project"]
+ADVISORIES = tomllib.loads((PROJECT / "tests" / "advisories.toml").read_text())["advisory"]
 
 COMPATIBLE = re.compile(r"MIT|BSD|Apache|ISC|Zlib|CC0|HPND|MPL.2|Mozilla|PSF|Python Software Foundation", re.IGNORECASE)
 RECIPROCAL = re.compile(
@@ -25,7 +25,7 @@ SAID_ELSEWHERE = {"cmocean": "MIT", "pyftpdlib": "MIT"}
 def needed() -> dict[str, list[Requirement]]:
     """Everything that is installed with the service, by name, with what is asked of it."""
     found: dict[str, list[Requirement]] = {}
-    pending = [Requirement(text) for text in PROJECT["dependencies"]]
+    pending = [Requirement(text) for text in DECLARED["dependencies"]]
     seen = set()
     while pending:
         requirement = pending.pop()
@@ -60,7 +60,7 @@ def test_no_version_with_a_known_weakness_is_installed_or_asked_for(advisory: di
     name, affected = canonicalize_name(advisory["library"]), SpecifierSet(advisory["versions"])
     assert name in NEEDED, f"{name} is not used any more: remove {advisory['id']}"
     assert not affected.contains(version(name), prereleases=True), advisory
-    for text in PROJECT["dependencies"]:
+    for text in DECLARED["dependencies"]:
         requirement = Requirement(text)
         if canonicalize_name(requirement.name) == name:
             lowest = [s.version for s in requirement.specifier if s.operator == ">="]
@@ -72,14 +72,19 @@ def test_no_version_with_a_known_weakness_is_installed_or_asked_for(advisory: di
 def test_licences_go_together_with_ours(name: str) -> None:
     about = importlib.metadata.metadata(name)
     classifiers = [text for text in about.get_all("Classifier", []) if text.startswith("License")]
-    said = [about.get("License-Expression"), (about.get("License") or "")[:200], *classifiers, SAID_ELSEWHERE.get(name)]
+    said = [
+        *about.get_all("License-Expression", []),
+        *(text[:200] for text in about.get_all("License", [])),
+        *classifiers,
+        SAID_ELSEWHERE.get(name),
+    ]
     words = " ".join(text for text in said if text)
     assert COMPATIBLE.search(words), f"{name}: {words or 'no licence'}"
     assert not RECIPROCAL.search(words), f"{name}: {words}"
 
 
 def test_every_direct_dependency_is_explained() -> None:
-    told = (ROOT / "docs" / "libraries.md").read_text().lower()
-    for text in PROJECT["dependencies"]:
+    told = (PROJECT / "docs" / "libraries.md").read_text().lower()
+    for text in DECLARED["dependencies"]:
         name = Requirement(text).name.lower()
         assert re.search(rf"\b{re.escape(name)}\b", told), name

@@ -1,7 +1,6 @@
 """The documentation says what is true: commands, options, paths, settings, examples and links exist as written."""
 
 import json
-import os
 import re
 import runpy
 import shlex
@@ -34,9 +33,10 @@ from app.main import create_app
 from app.missions.spec.mission import Limits, MissionSpec
 from app.settings import Settings
 from simulator.__main__ import app as simulator_app
-from tests.test_cli import ROOT, serving
+from tests.support.commands import environment, serving
+from tests.support.paths import PROJECT
 
-PAGES = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/*.md")])
+PAGES = sorted([*PROJECT.glob("*.md"), *PROJECT.glob("docs/*.md")])
 
 FENCE = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 INLINE = re.compile(r"`([^`\n]+)`")
@@ -53,7 +53,7 @@ UNLISTED = {
 }
 """Paths that exist beside the OpenAPI document: the same routes at the root, the WebSocket, the prefix itself."""
 
-by_page = pytest.mark.parametrize("page", PAGES, ids=[page.relative_to(ROOT).as_posix() for page in PAGES])
+by_page = pytest.mark.parametrize("page", PAGES, ids=[page.relative_to(PROJECT).as_posix() for page in PAGES])
 
 
 @dataclass(frozen=True)
@@ -148,7 +148,7 @@ def test_links_lead_somewhere(page: Path) -> None:
 def test_files_that_are_named_exist(page: Path) -> None:
     for span in INLINE.findall(FENCE.sub("", page.read_text())):
         if re.fullmatch(r"(app|imc_bridge|simulator|tests|migrations|benchmarks)/[\w/.-]+", span):
-            assert (ROOT / span).exists() or span.startswith("app/dashboard/static"), f"{span} does not exist"
+            assert (PROJECT / span).exists() or span.startswith("app/dashboard/static"), f"{span} does not exist"
 
 
 def anchors(page: Path) -> set[str]:
@@ -215,21 +215,19 @@ def values_of(schema: dict[str, Any]) -> str:
 
 
 def test_the_table_of_settings_is_complete_and_true() -> None:
-    rows = [line for line in (ROOT / "docs" / "settings.md").read_text().splitlines() if line.startswith("| `")]
+    rows = [line for line in (PROJECT / "docs" / "settings.md").read_text().splitlines() if line.startswith("| `")]
     assert rows == list(settings_rows())
 
 
 def test_the_polling_vehicle_of_the_guide_completes_a_mission(tmp_path: Path) -> None:
-    kept = {name: value for name, value in os.environ.items() if not name.startswith("BATHYFLEET_")}
-    environment = kept | {"PYTHONPATH": str(ROOT), "BATHYFLEET_IMC__ENABLED": "false"}
-    guide = ROOT / "docs" / "rest.md"
+    guide = PROJECT / "docs" / "rest.md"
     [program] = [block.text for block in blocks(guide, "python") if "def post(" in block.text]
     mission = next(json.loads(b.text) for b in blocks(guide, "json") if '"kind": "rest"' in b.text)
     script = tmp_path / "vehicle.py"
     script.write_text(program)
 
     with (
-        serving(tmp_path, environment, "--log-level", "warning") as (_, url),
+        serving(tmp_path, environment(), "--log-level", "warning") as (_, url),
         httpx.Client(base_url=f"{url}{API}", timeout=60.0) as api,
     ):
         mission_id = api.post("/missions", json=mission | {"steps": 4}).json()["id"]
@@ -237,7 +235,7 @@ def test_the_polling_vehicle_of_the_guide_completes_a_mission(tmp_path: Path) ->
 
         def swim(vehicle: dict[str, Any], lat: str) -> int:
             command = [sys.executable, str(script), f"{url}{API}", mission_id, vehicle["name"], lat, "-8.7048"]
-            return subprocess.run(command, env=environment, check=False).returncode
+            return subprocess.run(command, env=environment(), check=False).returncode
 
         with ThreadPoolExecutor() as pool:
             codes = list(pool.map(swim, mission["vehicles"], ["41.1851", "41.1852"]))
@@ -250,7 +248,7 @@ def test_the_polling_vehicle_of_the_guide_completes_a_mission(tmp_path: Path) ->
 
 
 def test_the_planner_of_the_guide_keeps_the_contract(tmp_path: Path) -> None:
-    [program] = [block.text for block in blocks(ROOT / "docs" / "adding-a-planner.md", "python")]
+    [program] = [block.text for block in blocks(PROJECT / "docs" / "adding-a-planner.md", "python")]
     (tmp_path / "greedy.py").write_text(program)
     kind = runpy.run_path(str(tmp_path / "greedy.py"))["GreedyPlanner"]
     planner, restored = (kind(PlannerOptions(), SingleBeam()) for _ in range(2))
@@ -275,9 +273,9 @@ def test_the_planner_of_the_guide_keeps_the_contract(tmp_path: Path) -> None:
 
 
 def test_the_guides_name_every_problem_limit_and_field() -> None:
-    rest = (ROOT / "docs" / "rest.md").read_text()
+    rest = (PROJECT / "docs" / "rest.md").read_text()
     assert set(re.findall(r"`([a-z-]+)`", rest.partition("Last part of `type`")[2].partition("\n\n")[0])) == set(TITLES)
-    guide = (ROOT / "docs" / "operating.md").read_text()
+    guide = (PROJECT / "docs" / "operating.md").read_text()
     named = set(re.findall(r"`(\w+)`", guide))
     assert set(Limits.model_fields) <= named
     assert set(re.findall(r"^\| `(\w+)` \|", guide.partition("## Describing")[2].partition("## Limits")[0], re.M)) <= (

@@ -18,7 +18,7 @@ from app.missions.settings import ImcSettings
 from app.missions.spec.mission import MissionSpec
 from app.settings import Settings, SettingsError, is_loopback, load_settings
 from imc_bridge.settings import BridgeSettings, ConsoleSettings
-from tests.test_cli import ROOT
+from tests.support.paths import PROJECT
 
 
 @pytest.fixture(autouse=True)
@@ -232,7 +232,7 @@ def test_the_help_of_serve_tells_the_defaults_and_choices_of_the_settings() -> N
 @pytest.fixture(scope="module")
 def attributes_read() -> set[str]:
     """Names of all attributes that the program reads."""
-    files = [file for package in ("app", "imc_bridge", "simulator") for file in (ROOT / package).rglob("*.py")]
+    files = [file for package in ("app", "imc_bridge", "simulator") for file in (PROJECT / package).rglob("*.py")]
     nodes = (node for file in files for node in ast.walk(ast.parse(file.read_text())))
     return {node.attr for node in nodes if isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Load)}
 

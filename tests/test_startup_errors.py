@@ -1,6 +1,5 @@
 """What keeps the service from starting is said in one line, with what to do about it."""
 
-import os
 import re
 import socket
 import sqlite3
@@ -10,17 +9,16 @@ from pathlib import Path
 
 import pytest
 
-from tests.faults.other_users import SERVICE, as_user, needs_root, open_folder
-from tests.ports import free_ports
-from tests.test_cli import COMMAND, ROOT
+from tests.support.commands import COMMAND, environment
+from tests.support.faults.other_users import SERVICE, as_user, needs_root, open_folder
+from tests.support.ports import free_ports
 
 
 def start(folder: Path, *words: str, **variables: str) -> tuple[int, str]:
     """How ``bathyfleet serve`` ends in a folder, and all that it says; log lines that are no errors left out."""
-    kept = {name: value for name, value in os.environ.items() if not name.startswith("BATHYFLEET_")}
-    environment = kept | {"PYTHONPATH": str(ROOT), "NO_COLOR": "1", "BATHYFLEET_IMC__ENABLED": "false"} | variables
     serve = [*words, *COMMAND, "serve", "--port", "0", "--log-level", "error"]
-    done = subprocess.run(serve, cwd=folder, env=environment, capture_output=True, text=True, check=False, timeout=200)
+    own = environment(NO_COLOR="1", **variables)
+    done = subprocess.run(serve, cwd=folder, env=own, capture_output=True, text=True, check=False, timeout=200)
     return done.returncode, done.stdout + done.stderr
 
 

@@ -1,92 +1,19 @@
-import asyncio
 import os
-import threading
 from collections.abc import AsyncIterator, Callable, Iterator
-from contextlib import asynccontextmanager, contextmanager
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
 import httpx
 import pytest
 
-from app.main import Server, serve
+from app.api.tokens import Role, TokenStore
+from app.main import Server
 from app.missions.settings import ImcSettings
 from app.settings import Settings
-from tests.databases import Databases
-
-# About 55 m by 55 m.
-AREA = {
-    "type": "Polygon",
-    "coordinates": [[[-8.705, 41.185], [-8.7043, 41.185], [-8.7043, 41.1855], [-8.705, 41.1855], [-8.705, 41.185]]],
-}
-
-
-def mission_spec(**changes: Any) -> dict[str, Any]:
-    return {
-        "name": "Harbour basin",
-        "area": AREA,
-        "steps": 3,
-        "cell_m": 2,
-        "vehicles": [{"name": "rover", "kind": "rest"}],
-        "planner": {"name": "random"},
-    } | changes
-
-
-def soundings(count: int = 12, vehicle: str = "rover", start_s: float = 1_795_225_140.0) -> list[dict[str, Any]]:
-    """Soundings along the area's diagonal, one a second, 2 m apart."""
-    return [
-        {
-            "vehicle": vehicle,
-            "time_s": start_s + i,
-            "lat_deg": 41.1851 + 0.00001 * i,
-            "lon_deg": -8.7049 + 0.00002 * i,
-            "depth_m": 2.0,
-            "range_m": 8.0 + 0.1 * i,
-        }
-        for i in range(count)
-    ]
-
-
-@asynccontextmanager
-async def running(settings: Settings) -> AsyncIterator[Server]:
-    """The real server on a free port, in this process."""
-    started: asyncio.Future[Server] = asyncio.get_running_loop().create_future()
-    task = asyncio.create_task(serve(settings, started=started.set_result))
-    await asyncio.wait({task, started}, return_when=asyncio.FIRST_COMPLETED)
-    if not started.done():
-        started.cancel()
-        await task
-    server = started.result()
-    try:
-        yield server
-    finally:
-        server.stop()
-        await task
-
-
-def make_client(server: Server) -> httpx.AsyncClient:
-    # Loading the certificates that plain HTTP does not need would take longer than most tests.
-    return httpx.AsyncClient(base_url=server.url + "/api/v1", timeout=20, verify=False)  # noqa: S501
-
-
-@contextmanager
-def running_in_thread(settings: Settings) -> Iterator[Server]:
-    """The real server in a thread of its own, for fixtures that outlive one event loop."""
-    started: dict[str, Server] = {}
-    answers = threading.Event()
-
-    def note(server: Server) -> None:
-        started["server"] = server
-        answers.set()
-
-    thread = threading.Thread(target=lambda: asyncio.run(serve(settings, started=note)))
-    thread.start()
-    assert answers.wait(120)
-    try:
-        yield started["server"]
-    finally:
-        started["server"].stop()
-        thread.join(30)
+from app.storage.database import Database
+from tests.support.databases import Databases
+from tests.support.rest import Guarded, make_client, make_tokens, mission_spec, new_mission, running, running_in_thread
 
 
 @pytest.fixture(scope="session")
@@ -139,3 +66,23 @@ async def mission(client: httpx.AsyncClient) -> dict[str, Any]:
     assert answer.status_code == 201, answer.text
     created: dict[str, Any] = answer.json()
     return created
+
+
+@pytest.fixture
+async def guarded(make_settings: Callable[..., Settings]) -> AsyncIterator[Guarded]:
+    settings = make_settings()
+    database = Database(settings.database_url)
+    store = TokenStore(database)
+    tokens = await make_tokens(store)
+    tokens["expired"] = (await store.create("old", Role.ADMIN, expires_at=datetime.now(UTC) - timedelta(seconds=1)))[1]
+    async with (
+        running(settings) as server,
+        make_client(server) as client,
+    ):
+        yield Guarded(server=server, client=client, tokens=tokens, store=store)
+    await database.close()
+
+
+@pytest.fixture
+async def path(guarded: Guarded) -> str:
+    return await new_mission(guarded)

@@ -13,7 +13,7 @@ from app.api import audit_log
 from app.api.tokens import Role, TokenStore
 from app.settings import Settings
 from app.storage.database import Database
-from tests.api.conftest import make_client, mission_spec, running, soundings
+from tests.support.rest import make_client, mission_spec, running, soundings
 
 
 @pytest.fixture
@@ -108,7 +108,7 @@ async def test_no_secret_is_ever_logged(
                 (url, {"subprotocols": [websockets.Subprotocol(secret)]}),
             ):
                 try:
-                    async with websockets.connect(target, **more) as live:  # type: ignore[arg-type]
+                    async with websockets.connect(target, **more) as live:
                         await live.recv()
                 except websockets.WebSocketException:
                     pass

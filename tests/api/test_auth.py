@@ -1,8 +1,6 @@
 """Who may ask for what."""
 
-from collections.abc import AsyncIterator, Callable
-from dataclasses import dataclass
-from datetime import UTC, datetime, timedelta
+from collections.abc import Callable
 from typing import Any
 
 import httpx
@@ -14,48 +12,7 @@ from app.api.tokens import Role, TokenStore
 from app.main import Server, create_app
 from app.settings import Settings, StartupError
 from app.storage.database import Database
-from tests.api.conftest import make_client, mission_spec, running, soundings
-
-
-@dataclass
-class Guarded:
-    """A service with tokens, and one token of each role."""
-
-    server: Server
-    client: httpx.AsyncClient
-    tokens: dict[str, str]
-    store: TokenStore
-
-    def as_(self, name: str) -> dict[str, str]:
-        return {"Authorization": f"Bearer {self.tokens[name]}"}
-
-
-@pytest.fixture
-async def guarded(make_settings: Callable[..., Settings]) -> AsyncIterator[Guarded]:
-    settings = make_settings()
-    database = Database(settings.database_url)
-    store = TokenStore(database)
-    tokens = {role.value: (await store.create(f"the {role}", role))[1] for role in Role}
-    tokens["rover"] = (await store.create("rover", Role.VEHICLE, vehicle="rover"))[1]
-    tokens["expired"] = (await store.create("old", Role.ADMIN, expires_at=datetime.now(UTC) - timedelta(seconds=1)))[1]
-    async with (
-        running(settings) as server,
-        make_client(server) as client,
-    ):
-        yield Guarded(server, client, tokens, store)
-    await database.close()
-
-
-async def new_mission(guarded: Guarded) -> str:
-    """Path of a new mission."""
-    answer = await guarded.client.post("/missions", json=mission_spec(), headers=guarded.as_("operator"))
-    assert answer.status_code == 201, answer.text
-    return f"/missions/{answer.json()['id']}"
-
-
-@pytest.fixture
-async def path(guarded: Guarded) -> str:
-    return await new_mission(guarded)
+from tests.support.rest import Guarded, make_client, mission_spec, new_mission, running, soundings
 
 
 async def test_once_a_token_exists_requests_need_one(guarded: Guarded) -> None:

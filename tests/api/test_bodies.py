@@ -1,6 +1,7 @@
 """Who asks is settled before a body is read; nobody's bodies take all the room."""
 
 import asyncio
+import difflib
 import json
 import threading
 from collections.abc import AsyncIterator, Callable
@@ -10,14 +11,14 @@ import httpx
 import pytest
 from fastapi.routing import APIRoute
 
-from app.api import bodies, json_route, problems
+from app.api import bodies, json_route, json_text, problems
 from app.api.intake import BodyKind, Intakes
 from app.api.json_route import JsonRoute
 from app.api.tokens import Role, TokenStore
 from app.main import Server, create_app
 from app.settings import Settings
 from app.storage.database import Database
-from tests.api.conftest import make_client, mission_spec, running, soundings
+from tests.support.rest import make_client, mission_spec, running, soundings
 
 NOWHERE = "0197a3c8-6f2e-7c41-9d0f-5b2f6f0c1a2b"
 SIZE = 60_000_000
@@ -127,7 +128,8 @@ async def test_a_connection_is_kept_where_the_body_was_read(service: Tokens, mis
 def test_every_route_that_may_change_something_says_who_may_and_what_it_takes() -> None:
     app = create_app(Settings(database_url="sqlite+aiosqlite:///:memory:"))
     middleware = next(m for m in app.user_middleware if m.cls is bodies.BodyMiddleware)
-    intakes: Intakes = middleware.kwargs["intakes"]
+    intakes = middleware.kwargs["intakes"]
+    assert isinstance(intakes, Intakes)
     found = [one for method in ("POST", "PUT", "PATCH", "DELETE") for one in intakes._by_method.get(method, ())]
     assert len(found) >= 20
     for one in found:
@@ -187,13 +189,13 @@ async def test_nobody_takes_all_the_room_there_is_for_bodies(make_settings: Call
 def explained(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """The threads in which suggestions were looked for, one for each name that they were looked for."""
     found: list[str] = []
-    look = problems.difflib.get_close_matches
+    look = difflib.get_close_matches
 
     def counted(*arguments: Any, **options: Any) -> Any:
         found.append(threading.current_thread().name)
         return look(*arguments, **options)
 
-    monkeypatch.setattr(problems.difflib, "get_close_matches", counted)
+    monkeypatch.setattr(difflib, "get_close_matches", counted)
     return found
 
 
@@ -280,7 +282,7 @@ async def test_scans_are_looked_at_until_the_first_that_is_wrong(service: Tokens
 
 async def test_large_bodies_are_read_beside_the_loop(service: Tokens, monkeypatch: pytest.MonkeyPatch) -> None:
     threads: dict[bool, str] = {}
-    parse = json_route.parse
+    parse = json_text.parse
 
     def noted(body: bytes) -> Any:
         threads[len(body) > json_route.IN_THREAD_BYTES] = threading.current_thread().name
@@ -337,7 +339,7 @@ async def test_a_client_that_leaves_within_its_body_is_forgotten(
         assert (await client.get("/health/live")).status_code == 200
         middleware = server._app.middleware_stack
         while not isinstance(middleware, bodies.BodyMiddleware):
-            middleware = middleware.app  # type: ignore[union-attr]
+            middleware = middleware.app
         async with asyncio.timeout(ANSWER_S):
             while middleware.budget.held:
                 await client.get("/health/live")

@@ -12,12 +12,12 @@ from typing import Any
 import httpx
 import pytest
 
+from app.missions.errors import FileTooLargeError, ImportUnavailableError, InvalidRequestError
 from app.missions.operations import reading, uploads
-from tests.api.conftest import make_client, mission_spec, running
-from tests.api.test_imports import prior_text
-from tests.faults.leading_out import grids, told
+from tests.support.faults.leading_out import grids, told
+from tests.support.rest import make_client, mission_spec, prior_text, running
 
-GRID = {"crs": "EPSG:4326", "sd_m": 0.3, "positive": "down"}
+GRID: dict[str, Any] = {"crs": "EPSG:4326", "sd_m": 0.3, "positive": "down"}
 
 
 async def test_no_file_brings_another_one_back(
@@ -107,7 +107,7 @@ async def test_an_upload_ends_at_the_limit_and_gives_its_place_back() -> None:
                 came += 1000
                 yield bytes(1000)
 
-        with pytest.raises(uploads.FileTooLargeError):
+        with pytest.raises(FileTooLargeError):
             async with taken.receive(endless(), 10_000):
                 raise AssertionError("never there")
         assert came == 11_000
@@ -119,7 +119,7 @@ async def test_more_uploads_than_the_disk_is_meant_for_are_put_off() -> None:
     held = [taken.receive(pieces(b"1 2 3", 5), 100) for _ in range(uploads.MAX_AT_ONCE)]
     for one in held:
         await one.__aenter__()
-    with pytest.raises(uploads.ImportUnavailableError, match="as many as can be"):
+    with pytest.raises(ImportUnavailableError, match="as many as can be"):
         await taken.receive(pieces(b"1 2 3", 5), 100).__aenter__()
     await held.pop().__aexit__(None, None, None)
     async with taken.receive(pieces(b"1 2 3", 5), 100) as upload:
@@ -192,7 +192,7 @@ def test_what_the_reading_process_hands_back_is_checked(break_: str, tmp_path: P
             table[row, 1] = {"depth": 1e9, "nan": np.nan, "sd": -1.0}[break_]
             file.seek(0)
             file.write(table.tobytes())
-        with pytest.raises(reading.InvalidRequestError, match="broke off"):
+        with pytest.raises(InvalidRequestError, match="broke off"):
             reading._values(file, shape, None)
 
 

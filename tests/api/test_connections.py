@@ -2,7 +2,7 @@
 
 import asyncio
 import resource
-from collections.abc import Awaitable, Callable
+from collections.abc import Callable
 from contextlib import AsyncExitStack
 
 import httpx
@@ -15,7 +15,8 @@ from app.descriptors import allow_descriptors
 from app.main import Server
 from app.settings import Settings
 from app.storage.database import Database
-from tests.api.conftest import make_client, mission_spec, running
+from tests.support.rest import make_client, mission_spec, running
+from tests.support.waiting import until
 
 MOST = 40
 Connection = tuple[asyncio.StreamReader, asyncio.StreamWriter]
@@ -157,7 +158,7 @@ async def test_who_is_refused_is_told_why(fleet: Fleet) -> None:
         async def served() -> bool:
             return (await client.get("/missions", headers=bearer(fleet.tokens["viewer"]))).status_code == 200
 
-        await until(served)
+        await until(served, "the operator is served")
 
 
 async def test_an_abort_gets_through_while_strangers_wait_for_bodies(fleet: Fleet) -> None:
@@ -199,13 +200,7 @@ async def test_every_connection_is_given_back(fleet: Fleet) -> None:
         async def all_given_back() -> bool:
             return shares.held == 0 and len(server.sockets) == 0
 
-        await until(all_given_back)
-
-
-async def until(condition: Callable[[], Awaitable[bool]]) -> None:
-    async with asyncio.timeout(60):
-        while not await condition():  # noqa: ASYNC110 - the condition is the service's
-            await asyncio.sleep(0.01)
+        await until(all_given_back, "every connection is given back")
 
 
 def test_the_process_may_open_as_many_connections_as_are_set_up() -> None:

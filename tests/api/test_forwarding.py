@@ -11,7 +11,7 @@ from app.api import spool
 from app.api.spool import Spool
 from app.main import Server
 from app.settings import Settings
-from tests.api.conftest import make_client, mission_spec, running, soundings
+from tests.support.rest import make_client, mission_spec, running, soundings
 
 KIB = 1024
 
@@ -47,7 +47,8 @@ async def test_a_file_and_a_batch_reach_the_process_that_has_the_mission(
         async with asyncio.timeout(60):
             while (await at_second.get(mission)).status_code != httpx.codes.OK:  # noqa: ASYNC110 - as clients do
                 await asyncio.sleep(0.05)
-        file, options = xyz(20_000), {"filename": "old.xyz", "crs": "local", "sd_m": 0.1, "positive": "down"}
+        file = xyz(20_000)
+        options: dict[str, Any] = {"filename": "old.xyz", "crs": "local", "sd_m": 0.1, "positive": "down"}
         assert len(file) > spool.MEMORY_BYTES
         sent = await at_second.post(f"{mission}/imports", params=options, content=file)
         assert sent.status_code == httpx.codes.CREATED, sent.text

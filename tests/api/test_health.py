@@ -12,7 +12,7 @@ from app.main import Server, create_app
 from app.settings import Settings
 from app.storage import migrate
 from app.storage.prepare import DatabaseNotReadyError
-from tests.api.conftest import mission_spec, soundings
+from tests.support.rest import mission_spec, soundings
 
 
 @pytest.mark.parametrize("prefix", ["", "/api/v1"])
@@ -27,8 +27,8 @@ async def test_health_is_in_the_api_and_at_the_root(server: Server, prefix: str)
 
 
 async def test_a_lost_database_is_not_ready_but_alive(server: Server, client: httpx.AsyncClient) -> None:
-    await server.config.app.state.edge.service._database.close()  # type: ignore[union-attr]
-    server.config.app.state.edge.service._database.ping = _fail  # type: ignore[union-attr]
+    await server.config.app.state.edge.service._database.close()
+    server.config.app.state.edge.service._database.ping = _fail
     ready = await client.get("/health/ready")
     assert (ready.status_code, ready.json()["status"]) == (503, "failing")
     assert "disk is gone" in ready.json()["components"]["database"]

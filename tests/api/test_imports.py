@@ -13,16 +13,11 @@ from affine import Affine
 
 from app.mapping.georeference import LocalFrame
 from app.settings import Settings
-from tests.api.conftest import AREA, make_client, mission_spec, running, soundings
-from tests.faults.hostile import sparse_tif
+from tests.support.faults.hostile import sparse_tif
+from tests.support.missions.specs import AREA
+from tests.support.rest import make_client, mission_spec, prior_text, running, soundings
 
-FRAME = LocalFrame(AREA["coordinates"][0][0][1], AREA["coordinates"][0][0][0])  # type: ignore[index]
-
-
-def prior_text(n: int = 30, depth_m: float = 9.0) -> bytes:
-    rng = np.random.default_rng(1)
-    rows = np.column_stack([rng.uniform(0, 55, n), rng.uniform(0, 55, n), np.full(n, depth_m), np.full(n, 0.4)])
-    return b"east_m,north_m,depth_m,sd_m\n" + "\n".join(",".join(map(repr, map(float, row))) for row in rows).encode()
+FRAME = LocalFrame(AREA["coordinates"][0][0][1], AREA["coordinates"][0][0][0])
 
 
 def reference_tif(depth_m: float = 10.0) -> bytes:
@@ -82,7 +77,8 @@ async def test_the_same_file_counts_once_however_often_it_is_sent(client: httpx.
 
 
 async def test_an_import_survives_a_restart(make_settings: Any) -> None:
-    path, first = "", {}
+    path = ""
+    first: dict[str, Any] = {}
     for run in range(2):
         async with running(make_settings()) as server, make_client(server) as client:
             if run == 0:

@@ -17,7 +17,7 @@ from app.main import Server
 from app.settings import Settings
 from app.storage.database import Database
 from app.storage.prepare import prepare_database
-from tests.api.conftest import make_client, mission_spec, running
+from tests.support.rest import make_client, mission_spec, running
 
 
 def bearer(token: str) -> dict[str, str]:
@@ -45,7 +45,7 @@ def test_any_number_of_clients_is_remembered_in_bounded_memory(monkeypatch: pyte
     for number in range(400):
         held.wait_s(None, f"10.0.{number // 256}.{number % 256}")
         held.log_in(f"bf_{number}", f"10.0.{number // 256}.{number % 256}", good=number % 2 == 0)
-    kept = (held._requests._filled, held._failures._filled, held._known)  # type: ignore[union-attr]
+    kept = (held._requests._filled, held._failures._filled, held._known)
     assert all(len(what) <= 50 for what in kept)
 
 
@@ -149,7 +149,7 @@ async def test_however_many_guesses_wait_the_tokens_are_read_seldom(make_setting
         read += 1
         return await fetch()
 
-    store._read_digests = counted  # type: ignore[method-assign]
+    store._read_digests = counted
     begun = asyncio.get_running_loop().time()
     found = await asyncio.gather(*(store.exists(f"bf_{n}") for n in range(500)), store.exists(right))
     assert found == [False] * 500 + [True]

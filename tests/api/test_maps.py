@@ -13,7 +13,7 @@ from PIL import Image
 from app.missions.settings import ProviderSettings
 from app.missions.views.map import MapView
 from app.settings import Settings
-from tests.api.conftest import make_client, mission_spec, running, soundings
+from tests.support.rest import make_client, mission_spec, running, soundings
 
 
 @pytest.fixture

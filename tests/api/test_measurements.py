@@ -13,7 +13,7 @@ from app.main import Server
 from app.settings import Settings
 from app.storage.database import Database
 from app.storage.models import BatchRow
-from tests.api.conftest import make_client, mission_spec, running, soundings
+from tests.support.rest import make_client, mission_spec, running, soundings
 
 
 async def test_every_item_has_its_own_verdict(client: httpx.AsyncClient, mission: dict[str, Any]) -> None:
@@ -63,7 +63,8 @@ async def test_a_value_that_is_not_finite_spoils_its_item_only(
 
 async def test_a_batch_of_another_shape_is_refused_whole(client: httpx.AsyncClient, mission: dict[str, Any]) -> None:
     path = f"/missions/{mission['id']}/measurements"
-    for body in ([], {"items": []}, {"items": "x"}, soundings(2), {"items": soundings(1), "vessel": "x"}):
+    bodies: list[Any] = [[], {"items": []}, {"items": "x"}, soundings(2), {"items": soundings(1), "vessel": "x"}]
+    for body in bodies:
         answer = await client.post(path, json=body)
         assert (answer.status_code, answer.json()["type"]) == (422, "urn:bathyfleet:problem:invalid-request")
     too_many = await client.post(path, json={"items": [None] * 10_001})

@@ -7,6 +7,7 @@ import httpx
 import pytest
 
 from app.main import Server
+from tests.support.contract import CONTRACT
 
 
 @pytest.fixture
@@ -22,70 +23,6 @@ def operations(document: dict[str, Any]) -> dict[str, dict[str, Any]]:
         for path, methods in document["paths"].items()
         for method, operation in methods.items()
     }
-
-
-CONTRACT = {
-    "POST /missions": "createMission",
-    "GET /missions": "listMissions",
-    "GET /missions/{mission_id}": "getMission",
-    "POST /missions/{mission_id}/start": "startMission",
-    "GET /missions/{mission_id}/preflight": "checkMission",
-    "POST /missions/{mission_id}/forecast": "forecastMission",
-    "POST /forecast": "forecastDescription",
-    "GET /missions/{mission_id}/steps": "listSteps",
-    "GET /missions/{mission_id}/telemetry": "getTelemetry",
-    "POST /missions/{mission_id}/notes": "writeNote",
-    "POST /missions/{mission_id}/vehicles/{name}/abort": "abortVehicle",
-    "GET /missions/{mission_id}/soundings": "listSoundings",
-    "POST /missions/{mission_id}/soundings/{sounding_id}/restore": "restoreSounding",
-    "POST /missions/{mission_id}/soundings/{sounding_id}/reject": "rejectSounding",
-    "POST /missions/{mission_id}/scans": "postScans",
-    "GET /missions/{mission_id}/search": "getSearch",
-    "GET /missions/{mission_id}/search/obstacles.geojson": "getSearchObstacles",
-    "GET /missions/{mission_id}/targets": "listTargets",
-    "GET /missions/{mission_id}/targets/ranges": "listTargetRanges",
-    "GET /missions/{mission_id}/map/tiles": "getMapTiles",
-    "POST /missions/{mission_id}/pause": "pauseMission",
-    "POST /missions/{mission_id}/resume": "resumeMission",
-    "POST /missions/{mission_id}/abort": "abortMission",
-    "POST /missions/{mission_id}/finish": "finishMission",
-    "POST /missions/{mission_id}/vehicles": "addVehicle",
-    "DELETE /missions/{mission_id}/vehicles/{name}": "removeVehicle",
-    "POST /missions/{mission_id}/measurements": "postMeasurements",
-    "GET /missions/{mission_id}/vehicles/{name}/waypoint": "getWaypoint",
-    "GET /missions/{mission_id}/map": "getMap",
-    "GET /missions/{mission_id}/map.{format}": "getMapFile",
-    "GET /missions/{mission_id}/map.overlay.png": "getMapOverlay",
-    "GET /missions/{mission_id}/soundings.{format}": "getSoundingsFile",
-    "GET /missions/{mission_id}/tracks.{format}": "getTracksFile",
-    "GET /missions/{mission_id}/products": "listProducts",
-    "GET /missions/{mission_id}/quality": "getQuality",
-    "GET /missions/{mission_id}/corrections": "getCorrections",
-    "PUT /missions/{mission_id}/tide": "setTide",
-    "PUT /missions/{mission_id}/sound-speed": "setSoundSpeed",
-    "DELETE /missions/{mission_id}/sound-speed": "deleteSoundSpeed",
-    "POST /missions/{mission_id}/imports": "importSoundings",
-    "GET /missions/{mission_id}/imports": "listImports",
-    "DELETE /missions/{mission_id}/imports/{import_id}": "deleteImport",
-    "PUT /missions/{mission_id}/reference": "setReference",
-    "GET /missions/{mission_id}/reference": "getReference",
-    "DELETE /missions/{mission_id}/reference": "deleteReference",
-    "GET /missions/{mission_id}/events": "getEvents",
-    "GET /vehicles": "listVehicles",
-    "GET /doctor": "examineLinks",
-    "GET /audit": "listAudit",
-    "GET /session": "getSession",
-    "POST /session": "signIn",
-    "DELETE /session": "signOut",
-    "DELETE /missions/{mission_id}": "deleteMission",
-    "POST /missions/{mission_id}/vehicles/{name}/rejoin": "rejoinVehicle",
-    "GET /planners": "listPlanners",
-    "GET /layers": "listLayers",
-    "GET /health": "getHealth",
-    "GET /health/live": "getLiveness",
-    "GET /health/ready": "getReadiness",
-    "GET /metrics": "getMetrics",
-}
 
 
 async def test_every_operation_of_the_contract_has_its_stable_name(document: dict[str, Any]) -> None:

@@ -4,8 +4,8 @@ from typing import Any
 
 import httpx
 
-from tests.missions.builders import lon_lat
-from tests.missions.test_search_missions import search_json
+from tests.support.missions.searches import search_json
+from tests.support.missions.specs import lon_lat
 
 
 def scan(time_s: float, **changes: Any) -> dict[str, Any]:

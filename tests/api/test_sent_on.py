@@ -5,6 +5,7 @@ from collections.abc import AsyncIterator, Callable
 from contextlib import AsyncExitStack
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import httpx
 import pytest
@@ -12,29 +13,24 @@ import websockets
 from sqlalchemy import text
 
 from app.api import auth, forwarding
-from app.api.tokens import Role, TokenStore
+from app.api.tokens import TokenStore
 from app.main import Server
 from app.missions.clock import now
 from app.settings import Settings
 from app.storage.database import Database
 from app.storage.models import MissionOwnerRow, MissionRow, ProcessRow
 from app.storage.process_lock import ProcessLock
-from tests.api.conftest import make_client, mission_spec, running, soundings
+from tests.support.rest import Tokens, make_client, make_tokens, mission_spec, running, soundings
 
 
-@dataclass
-class Two:
+@dataclass(kw_only=True)
+class Two(Tokens):
     """The process that has a mission, and another one."""
 
     owner: Server
     other: Server
     at_other: httpx.AsyncClient
-    tokens: dict[str, str]
-    store: TokenStore
     path: str
-
-    def as_(self, name: str) -> dict[str, str]:
-        return {"Authorization": f"Bearer {self.tokens[name]}"}
 
 
 @pytest.fixture
@@ -42,15 +38,15 @@ async def two(make_settings: Callable[..., Settings]) -> AsyncIterator[Two]:
     settings = make_settings()
     database = Database(settings.database_url)
     store = TokenStore(database)
-    tokens = {role.value: (await store.create(f"the {role}", role))[1] for role in Role}
-    tokens["rover"] = (await store.create("rover", Role.VEHICLE, vehicle="rover"))[1]
+    tokens = await make_tokens(store)
     async with AsyncExitStack() as stack:
         owner, other = [await stack.enter_async_context(running(settings)) for _ in range(2)]
         at_owner, at_other = [await stack.enter_async_context(make_client(server)) for server in (owner, other)]
         headers = {"Authorization": f"Bearer {tokens['operator']}"}
         created = await at_owner.post("/missions", json=mission_spec(), headers=headers)
         assert created.status_code == 201, created.text
-        yield Two(owner, other, at_other, tokens, store, f"/missions/{created.json()['id']}")
+        path = f"/missions/{created.json()['id']}"
+        yield Two(owner=owner, other=other, at_other=at_other, tokens=tokens, store=store, path=path)
     store.close()
     await database.close()
 
@@ -60,7 +56,7 @@ async def test_everyone_has_there_the_role_that_he_has_here(two: Two) -> None:
     assert seen.status_code == 200, seen.text
     assert (await two.at_other.get(two.path)).status_code == 401
     assert (await two.at_other.post(f"{two.path}/start", headers=two.as_("viewer"))).status_code == 403
-    bound = {"json": {"items": soundings(2, vehicle="two")}, "headers": two.as_("rover")}
+    bound: dict[str, Any] = {"json": {"items": soundings(2, vehicle="two")}, "headers": two.as_("rover")}
     refused = await two.at_other.post(f"{two.path}/measurements", **bound)
     assert (refused.status_code, "belongs to vehicle 'rover'" in refused.json()["detail"]) == (403, True)
     assert (await two.at_other.get("/missions", headers=two.as_("viewer"))).json()[0]["id"] in two.path

@@ -5,13 +5,11 @@ from http.cookies import SimpleCookie
 import httpx
 import pytest
 import websockets
+from websockets.typing import Origin
 
 from app.api import auth
 from app.main import Server
-from tests.api.conftest import mission_spec
-from tests.api.test_auth import Guarded, guarded, new_mission, path
-
-__all__ = ["guarded", "path"]
+from tests.support.rest import Guarded, mission_spec, new_mission
 
 
 def own_page(guarded: Guarded) -> dict[str, str]:
@@ -97,10 +95,12 @@ async def test_without_tokens_the_user_of_the_machine_is_the_local_operator(clie
 async def test_the_socket_takes_a_session_from_the_own_page_only(guarded: Guarded, path: str) -> None:
     cookie = {"Cookie": await sign_in(guarded, "viewer")}
     url = socket_url(guarded.server, path)
-    async with websockets.connect(url, additional_headers=cookie, origin=guarded.server.url) as socket:
+    async with websockets.connect(url, additional_headers=cookie, origin=Origin(guarded.server.url)) as socket:
         assert "snapshot" in str(await socket.recv())
-    for headers, origin in ((cookie, None), (cookie, "https://evil.example")):
-        async with websockets.connect(url, additional_headers=headers, origin=origin) as socket:
+    for headers, origin in ((cookie, None), (cookie, Origin("https://evil.example"))):
+        async with websockets.connect(
+            url, additional_headers=headers, origin=None if origin is None else Origin(origin)
+        ) as socket:
             with pytest.raises(websockets.ConnectionClosedError) as closed:
                 await socket.recv()
         assert closed.value.rcvd is not None
@@ -113,7 +113,7 @@ async def test_a_live_view_ends_when_its_browser_signs_out(
     monkeypatch.setattr(auth, "RECHECK_S", 0.05)
     cookie = {"Cookie": await sign_in(guarded, "viewer")}
     url = socket_url(guarded.server, path)
-    async with websockets.connect(url, additional_headers=cookie, origin=guarded.server.url) as socket:
+    async with websockets.connect(url, additional_headers=cookie, origin=Origin(guarded.server.url)) as socket:
         await socket.recv()
         await guarded.client.delete("/session", headers=cookie | own_page(guarded))
         await socket.wait_closed()

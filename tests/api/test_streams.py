@@ -17,7 +17,7 @@ from app.main import Server
 from app.missions.views.messages import LiveMessage
 from app.settings import Settings
 from app.storage.database import Database
-from tests.api.conftest import make_client, mission_spec, running, soundings
+from tests.support.rest import make_client, mission_spec, running, soundings
 
 LIST = {"Accept": "application/json"}
 

@@ -5,20 +5,16 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser, ConsoleMessage, Page, Request, expect, sync_playwright
+from playwright.sync_api import Browser, Page, expect, sync_playwright
 
 from app.dashboard.serve import STATIC
-
-from .service import Service
+from tests.support.dashboard.browser import FONT, PATIENCE_MS, Watched
+from tests.support.dashboard.service import Service
 
 CHROMIUM = Path("/usr/bin/chromium")
 # WebGL by SwiftShader, the page itself put together by the processor: three times quicker than all by SwiftShader.
 FLAGS = ["--no-sandbox", "--disable-gpu", "--enable-unsafe-swiftshader", "--disable-background-networking"]
-FONT = "DejaVu Sans"
-"""The only one that the browser is shown, where it is installed: in others lines break elsewhere."""
 ALIASES = {"sans-serif": FONT, "system-ui": FONT, "monospace": f"{FONT} Mono"}
-PATIENCE_MS = 90_000
-"""Only how long a missing thing is waited for: the first map waits for numba to compile."""
 
 
 @pytest.fixture(scope="session")
@@ -82,26 +78,6 @@ def nothing_goes_on(request: pytest.FixtureRequest) -> Iterator[None]:
     for mission in service.get("/missions"):
         if mission["state"] in ("running", "paused"):
             service.act(mission["id"], "abort")
-
-
-class Watched:
-    """A page together with what it complained about and whom it asked."""
-
-    def __init__(self, page: Page) -> None:
-        self.page = page
-        self.complaints: list[str] = []
-        self.addresses: list[str] = []
-        page.on("console", self._note)
-        page.on("pageerror", lambda error: self.complaints.append(str(error)))
-        page.on("request", self._ask)
-
-    def _note(self, message: ConsoleMessage) -> None:
-        # What the driver says of software rendering is no fault of the page.
-        if message.type in ("error", "warning") and "GL Driver Message" not in message.text:
-            self.complaints.append(message.text)
-
-    def _ask(self, request: Request) -> None:
-        self.addresses.append(request.url)
 
 
 @pytest.fixture

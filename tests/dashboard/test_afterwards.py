@@ -6,9 +6,10 @@ import time
 import pytest
 from playwright.sync_api import Page, expect
 
-from .conftest import Watched
-from .service import ROOT, Service
-from .steps import by_id, show
+from tests.support.dashboard.browser import Watched
+from tests.support.dashboard.service import Service
+from tests.support.dashboard.steps import by_id, show
+from tests.support.paths import PROJECT
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(400)]
 
@@ -137,7 +138,7 @@ def test_a_rejected_sounding_is_found_on_the_map_restored_and_rejected_again(pag
 
 
 def test_no_serious_fault_for_people_who_see_or_steer_otherwise(page: Page, service: Service, flown: str) -> None:
-    axe = ROOT / "app" / "dashboard" / "web" / "node_modules" / "axe-core" / "axe.min.js"
+    axe = PROJECT / "app" / "dashboard" / "web" / "node_modules" / "axe-core" / "axe.min.js"
     if not axe.is_file():
         pytest.skip("axe-core is missing: npm ci in app/dashboard/web")
     show(page, flown)

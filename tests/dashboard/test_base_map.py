@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image
-from playwright.sync_api import Browser, Page
+from playwright.sync_api import Browser, FloatRect, Page
 
-from .pmtiles import plain_tile, tile_at, write_pmtiles
-from .service import Service
-from .steps import show
+from tests.support.dashboard.pmtiles import plain_tile, tile_at, write_pmtiles
+from tests.support.dashboard.service import Service
+from tests.support.dashboard.steps import show
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(400)]
 
@@ -32,8 +32,8 @@ def charted(built: None, tmp_path: Path) -> Iterator[Service]:
 
 def share_of_chart(page: Page) -> float:
     """How much of the window's middle has about the chart's colour."""
-    box = {"x": 420, "y": 150, "width": 600, "height": 500}
-    pixels = np.asarray(Image.open(io.BytesIO(page.screenshot(clip=box))).convert("RGB"), dtype=int)
+    box = FloatRect(x=420, y=150, width=600, height=500)
+    pixels = np.asarray(Image.open(io.BytesIO(page.screenshot(clip=box))).convert("RGB"), dtype=np.int64)
     return float((np.abs(pixels - CHART).max(axis=2) < 30).mean())
 
 

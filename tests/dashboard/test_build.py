@@ -16,14 +16,14 @@ from app.main import create_app
 from app.missions.spec.mission import MissionSpec
 from app.missions.spec.search import DEFAULTS
 from app.settings import Settings
+from tests.support.paths import PROJECT
 
-ROOT = Path(__file__).parents[2]
-WEB = ROOT / "app" / "dashboard" / "web"
+WEB = PROJECT / "app" / "dashboard" / "web"
 
 
 @pytest.fixture(scope="module")
 def hook_module() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("hatch_build", ROOT / "hatch_build.py")
+    spec = importlib.util.spec_from_file_location("hatch_build", PROJECT / "hatch_build.py")
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)

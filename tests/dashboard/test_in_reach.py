@@ -6,9 +6,10 @@ from collections.abc import Iterator
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
-from .conftest import PATIENCE_MS
-from .service import AREA, Service
-from .steps import by_id, expect_state, show, start
+from tests.support.dashboard.browser import PATIENCE_MS
+from tests.support.dashboard.service import Service
+from tests.support.dashboard.steps import by_id, expect_state, show, start
+from tests.support.missions.specs import AREA
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(600)]
 

@@ -3,8 +3,8 @@
 import pytest
 from playwright.sync_api import Page, Route, expect
 
-from .service import Service
-from .steps import by_id, show
+from tests.support.dashboard.service import Service
+from tests.support.dashboard.steps import by_id, show
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(600)]
 

@@ -9,9 +9,9 @@ import pytest
 from PIL import Image
 from playwright.sync_api import Page, expect
 
-from .conftest import FONT
-from .service import Service
-from .steps import by_id, show
+from tests.support.dashboard.browser import FONT
+from tests.support.dashboard.service import Service
+from tests.support.dashboard.steps import by_id, show
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(400)]
 

@@ -5,9 +5,9 @@ import re
 import pytest
 from playwright.sync_api import Page, expect
 
-from .conftest import Watched
-from .service import Service
-from .steps import by_id, colours_in_the_middle, expect_colours, expect_state, show, start
+from tests.support.dashboard.browser import Watched
+from tests.support.dashboard.service import Service
+from tests.support.dashboard.steps import by_id, colours_in_the_middle, expect_colours, expect_state, show, start
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(400)]
 

@@ -6,9 +6,8 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from app.missions.search.examples import example
-
-from .conftest import Watched
-from .service import Service
+from tests.support.dashboard.browser import Watched
+from tests.support.dashboard.service import Service
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(400)]
 

@@ -4,11 +4,11 @@ import json
 import re
 
 import pytest
-from playwright.sync_api import Page, expect
+from playwright.sync_api import FilePayload, Page, expect
 
-from .conftest import Watched
-from .service import Service
-from .steps import by_id, click_round, drag, show
+from tests.support.dashboard.browser import Watched
+from tests.support.dashboard.service import Service
+from tests.support.dashboard.steps import by_id, click_round, drag, show
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(400)]
 
@@ -79,7 +79,7 @@ def test_an_area_is_drawn_with_a_keep_out_zone_and_judged_at_once(page: Page, se
     assert len(spec["keep_out"]) == 1
     crossed = {"type": "Polygon", "coordinates": [[[0, 0], [1, 1], [1, 0], [0, 1], [0, 0]]]}
     by_id(page, "new-mission").click()
-    file = {"name": "crossed.geojson", "mimeType": "application/json", "buffer": json.dumps(crossed).encode()}
+    file = FilePayload(name="crossed.geojson", mimeType="application/json", buffer=json.dumps(crossed).encode())
     by_id(page, "area-file").set_input_files(file)
     expect(by_id(page, "fault-ring")).to_contain_text("crosses itself")
 
@@ -94,7 +94,7 @@ KML = """<?xml version="1.0"?><kml xmlns="http://www.opengis.net/kml/2.2"><Place
 def test_an_area_comes_from_a_kml_file(page: Page, service: Service) -> None:
     page.goto("/")
     by_id(page, "new-mission").click()
-    file = {"name": "basin.kml", "mimeType": "application/vnd.google-earth.kml+xml", "buffer": KML.encode()}
+    file = FilePayload(name="basin.kml", mimeType="application/vnd.google-earth.kml+xml", buffer=KML.encode())
     by_id(page, "area-file").set_input_files(file)
     expect(by_id(page, "area-note")).to_contain_text("basin.kml: area of 3 corners")
     expect(by_id(page, "estimate")).to_contain_text("At most")

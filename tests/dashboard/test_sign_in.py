@@ -4,8 +4,8 @@ from collections.abc import Iterator
 import pytest
 from playwright.sync_api import Page, expect
 
-from .conftest import Watched
-from .service import Service
+from tests.support.dashboard.browser import Watched
+from tests.support.dashboard.service import Service
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(400)]
 

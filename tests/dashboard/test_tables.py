@@ -6,8 +6,8 @@ import httpx
 import pytest
 from playwright.sync_api import Browser, expect
 
-from .service import Service
-from .steps import by_id, show
+from tests.support.dashboard.service import Service
+from tests.support.dashboard.steps import by_id, show
 
 ADDED = """
 from app.mapping.layers import LAYERS, LayerKind, Palette

@@ -5,8 +5,9 @@ import re
 import pytest
 from playwright.sync_api import expect
 
-from .conftest import Watched
-from .service import AREA, Service
+from tests.support.dashboard.browser import Watched
+from tests.support.dashboard.service import Service
+from tests.support.missions.specs import AREA
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(400)]
 

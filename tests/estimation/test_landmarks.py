@@ -1,22 +1,32 @@
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import least_squares
 
+from app.arrays import FloatArray
 from app.estimation import LandmarkEstimator, Landmarks, RangeSensor, SingleBeam, landmark_sets
 
 SENSOR = RangeSensor(visibility_m=0.4, relative_noise=0.1)
 
 
-def look(landmarks, truth, positions, rng, estimator, vehicle=0):
+def look(
+    landmarks: Landmarks,
+    truth: FloatArray,
+    positions: FloatArray,
+    rng: np.random.Generator,
+    estimator: LandmarkEstimator,
+    vehicle: int = 0,
+) -> Landmarks:
     for position in positions:
         index = np.arange(len(truth))
         landmarks = estimator.update(landmarks, vehicle, position, index, SENSOR.measure(position, truth[index], rng))
     return landmarks
 
 
-def test_estimates_converge_to_the_truth():
+def test_estimates_converge_to_the_truth() -> None:
     rng = np.random.default_rng(0)
     truth = np.column_stack([rng.uniform(-0.1, 0.1, (50, 2)), rng.uniform(0.5, 0.7, 50)])
     positions = np.column_stack([rng.uniform(-0.1, 0.1, (200, 2)), np.full(200, 0.35)])
@@ -26,7 +36,7 @@ def test_estimates_converge_to_the_truth():
     assert result.accurate.all()
 
 
-def test_matches_a_batch_least_squares_solution():
+def test_matches_a_batch_least_squares_solution() -> None:
     rng = np.random.default_rng(4)
     xy, z = np.array([[0.05, -0.02]]), 0.6
     positions = np.column_stack([rng.uniform(-0.1, 0.1, (40, 2)), rng.uniform(0.2, 0.35, 40)])
@@ -35,7 +45,7 @@ def test_matches_a_batch_least_squares_solution():
     for p, y in zip(positions, ranges, strict=True):
         state = estimator.update(state, 0, p, np.array([0]), np.array([y]))
 
-    def residual(depth):
+    def residual(depth: FloatArray) -> Any:
         r = np.sqrt(((positions[:, :2] - xy) ** 2).sum(axis=1) + (depth[0] - positions[:, 2]) ** 2)
         return (ranges - r) / (0.1 * r)
 
@@ -45,7 +55,7 @@ def test_matches_a_batch_least_squares_solution():
 
 @given(seed=st.integers(0, 1000))
 @settings(max_examples=25, deadline=None)
-def test_accurate_landmarks_stay_accurate_and_variance_never_grows(seed):
+def test_accurate_landmarks_stay_accurate_and_variance_never_grows(seed: int) -> None:
     rng = np.random.default_rng(seed)
     truth = np.column_stack([rng.uniform(-0.3, 0.3, (20, 2)), rng.uniform(0.4, 0.8, 20)])
     state, estimator = Landmarks.unknown(truth[:, :2]), LandmarkEstimator(SENSOR, visit_cap=30)
@@ -58,7 +68,7 @@ def test_accurate_landmarks_stay_accurate_and_variance_never_grows(seed):
         state = after
 
 
-def test_a_landmark_looked_at_too_often_counts_as_done():
+def test_a_landmark_looked_at_too_often_counts_as_done() -> None:
     rng = np.random.default_rng(0)
     truth = np.array([[0.0, 0.0, 0.5]])
     estimator = LandmarkEstimator(SENSOR, accuracy_sd_m=1e-9, visit_cap=5)
@@ -69,7 +79,7 @@ def test_a_landmark_looked_at_too_often_counts_as_done():
     assert state.credited[0] == 2
 
 
-def test_sets_follow_the_definitions():
+def test_sets_follow_the_definitions() -> None:
     state = Landmarks.unknown(np.zeros((4, 2)))
     state.accurate[0] = True
     state.credited[0] = 1
@@ -83,12 +93,12 @@ def test_sets_follow_the_definitions():
     assert landmark_sets(state, visible_by).pending.tolist() == [False, False, True, True]
 
 
-def test_what_is_too_far_or_unknown_is_not_visible():
+def test_what_is_too_far_or_unknown_is_not_visible() -> None:
     landmarks = np.array([[0.0, 0.0, 0.39], [0.0, 0.0, 0.41], [0.0, 0.0, np.nan]])
     assert SENSOR.visible(np.zeros((1, 3)), landmarks).tolist() == [[True, False, False]]
 
 
-def test_noise_grows_with_range():
+def test_noise_grows_with_range() -> None:
     rng = np.random.default_rng(0)
     beam = SingleBeam(0.01)
     vehicle, bottom = np.full(4000, 2.0), np.repeat([4.0, 22.0], 2000)
@@ -98,7 +108,9 @@ def test_noise_grows_with_range():
     assert beam.sd_m(vehicle, bottom)[[0, -1]].tolist() == pytest.approx([0.02, 0.2])
 
 
-def kalman(prior, variance, position, xy, y, noise):
+def kalman(
+    prior: float, variance: float, position: FloatArray, xy: FloatArray, y: float, noise: float
+) -> tuple[float, float]:
     """One range, one landmark, written out: an iterated extended Kalman filter with a scalar state."""
     h2 = float(((xy - position[:2]) ** 2).sum())
     z = prior
@@ -113,7 +125,7 @@ def kalman(prior, variance, position, xy, y, noise):
 
 @given(seed=st.integers(0, 10_000))
 @settings(max_examples=30, deadline=None)
-def test_agrees_with_an_iterated_kalman_filter_landmark_by_landmark(seed):
+def test_agrees_with_an_iterated_kalman_filter_landmark_by_landmark(seed: int) -> None:
     rng = np.random.default_rng(seed)
     truth = np.column_stack([rng.uniform(-0.15, 0.15, (8, 2)), rng.uniform(0.55, 0.7, 8)])
     state, estimator = Landmarks.unknown(truth[:, :2]), LandmarkEstimator(SENSOR)
@@ -128,7 +140,7 @@ def test_agrees_with_an_iterated_kalman_filter_landmark_by_landmark(seed):
         state = after
 
 
-def test_measuring_nothing_changes_nothing():
+def test_measuring_nothing_changes_nothing() -> None:
     state = Landmarks.unknown(np.zeros((3, 2)))
     after = LandmarkEstimator(SENSOR).update(state, 0, np.zeros(3), np.zeros(0, dtype=np.int64), np.zeros(0))
     assert not after.accurate.any()

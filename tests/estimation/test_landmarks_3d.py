@@ -1,3 +1,6 @@
+from collections.abc import Iterator
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -5,12 +8,13 @@ from hypothesis import strategies as st
 from scipy.optimize import least_squares
 from scipy.stats import chi2
 
+from app.arrays import FloatArray
 from app.estimation import Landmark3DEstimator, Landmarks3D, RangeSensor
 
 SENSOR = RangeSensor(visibility_m=0.4, relative_noise=0.1)
 
 
-def patrol(seed, steps, n, vehicles=3):
+def patrol(seed: int, steps: int, n: int, vehicles: int = 3) -> Iterator[Any]:
     """Three vehicles wander over landmarks; yields truth and knowledge after every step."""
     rng = np.random.default_rng(seed)
     truth = np.column_stack([rng.uniform(-0.3, 0.3, (n, 2)), rng.uniform(0.5, 0.7, n)])
@@ -27,23 +31,23 @@ def patrol(seed, steps, n, vehicles=3):
         yield truth, known
 
 
-def nees(truth, known):
+def nees(truth: FloatArray, known: Landmarks3D) -> FloatArray:
     seen = known.looks > 0
     error = known.position_m[seen] - truth[seen]
     return np.einsum("ki,kij,kj->k", error, np.linalg.inv(known.covariance_m2[seen]), error)
 
 
-def test_errors_are_as_large_as_the_filter_says():
+def test_errors_are_as_large_as_the_filter_says() -> None:
     """Normalised estimation error squared: chi-square with 3 degrees per landmark, independent between landmarks."""
     runs = [[nees(t, k) for t, k in patrol(seed, 25, 4)] for seed in range(50)]
     for step in (3, 6, 12, 24):
         errors = np.concatenate([run[step] for run in runs])
-        low, high = chi2.ppf([0.001, 0.999], 3 * len(errors)) / len(errors)
+        low, high = chi2.ppf(np.array([0.001, 0.999]), 3 * len(errors)) / len(errors)
         assert low < errors.mean() < high
         assert (errors < chi2.ppf(0.95, 3)).mean() > 0.91
 
 
-def test_estimates_close_in_on_the_truth():
+def test_estimates_close_in_on_the_truth() -> None:
     *_, (truth, known) = patrol(1, 120, 40)
     fixed = known.fixed
     assert fixed.mean() > 0.8
@@ -51,7 +55,7 @@ def test_estimates_close_in_on_the_truth():
     assert known.accurate.any()
 
 
-def test_matches_a_batch_solution_of_all_ranges():
+def test_matches_a_batch_solution_of_all_ranges() -> None:
     """Gauss-Newton over every range at once, from the truth, is the slow but exact reference."""
     rng = np.random.default_rng(3)
     truth = np.array([[0.05, -0.1, 0.6], [-0.1, 0.08, 0.55]])
@@ -63,11 +67,12 @@ def test_matches_a_batch_solution_of_all_ranges():
     for m, point in enumerate(truth):
         true_ranges = np.linalg.norm(positions - point, axis=1)
 
-        def residual(x, m=m, true_ranges=true_ranges):
+        def residual(x: FloatArray, m: Any = m, true_ranges: Any = true_ranges) -> Any:
             return (np.array(ranges)[:, m] - np.linalg.norm(positions - x, axis=1)) / (0.1 * true_ranges)
 
         batch = least_squares(residual, point)
-        covariance = np.linalg.inv(batch.jac.T @ batch.jac)
+        jac = np.asarray(batch.jac)
+        covariance = np.linalg.inv(jac.T @ jac)
         apart = known.position_m[m] - batch.x
         assert apart @ np.linalg.solve(covariance, apart) < 1.0
         np.testing.assert_allclose(np.sqrt(np.diag(known.covariance_m2[m])), np.sqrt(np.diag(covariance)), rtol=0.15)
@@ -75,7 +80,7 @@ def test_matches_a_batch_solution_of_all_ranges():
 
 @given(seed=st.integers(0, 500))
 @settings(max_examples=10, deadline=None)
-def test_what_is_known_accurately_stays_so_and_single_filters_only_narrow(seed):
+def test_what_is_known_accurately_stays_so_and_single_filters_only_narrow(seed: int) -> None:
     last = None
     for _, known in patrol(seed, 25, 10):
         seen = known.looks > 0
@@ -89,14 +94,14 @@ def test_what_is_known_accurately_stays_so_and_single_filters_only_narrow(seed):
         last = known
 
 
-def test_a_single_range_leaves_the_direction_open():
+def test_a_single_range_leaves_the_direction_open() -> None:
     known = Landmark3DEstimator(SENSOR).update(Landmarks3D.unknown(1), 0, np.zeros(3), np.array([0]), np.array([0.3]))
     assert not known.fixed[0]
     np.testing.assert_allclose(known.position_m[0], [0.0, 0.0, 0.15], atol=0.02)
     assert (known.sd_m[0] > 0.07).all()
 
 
-def test_looks_along_a_line_cannot_tell_its_sides_apart():
+def test_looks_along_a_line_cannot_tell_its_sides_apart() -> None:
     """A straight leg leaves two mirror images: the estimate must not settle on one of them."""
     rng = np.random.default_rng(0)
     truth = np.array([[0.0, 0.15, 0.5]])
@@ -108,7 +113,7 @@ def test_looks_along_a_line_cannot_tell_its_sides_apart():
     assert known.sd_m[0, 1] > 0.1
 
 
-def test_looked_at_too_often_counts_as_done_and_is_credited():
+def test_looked_at_too_often_counts_as_done_and_is_credited() -> None:
     estimator = Landmark3DEstimator(SENSOR, visit_cap=3)
     known = Landmarks3D.unknown(2)
     for _ in range(4):
@@ -118,7 +123,7 @@ def test_looked_at_too_often_counts_as_done_and_is_credited():
     assert known.credited.tolist() == [-1, 2]
 
 
-def test_the_order_of_landmarks_does_not_matter():
+def test_the_order_of_landmarks_does_not_matter() -> None:
     rng = np.random.default_rng(5)
     ranges = rng.uniform(0.2, 0.4, 6)
     index, shuffled = np.arange(6), rng.permutation(6)

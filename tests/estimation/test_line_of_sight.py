@@ -2,16 +2,17 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from app.arrays import FloatArray
 from app.estimation import in_sight
 from simulator.terrain import Terrain
 
 
-def place(terrain, rng, n, height):
+def place(terrain: Terrain, rng: np.random.Generator, n: int, height: float) -> FloatArray:
     en = rng.uniform(0.0, [terrain.width_m, terrain.height_m], (n, 2))
     return np.column_stack([en, terrain.depth_at(en[:, 0], en[:, 1]) - height])
 
 
-def deepest_below_floor(terrain, a, b, samples=4000):
+def deepest_below_floor(terrain: Terrain, a: FloatArray, b: FloatArray, samples: int = 4000) -> float:
     """How far the ray from a to b runs below the floor, looked at very closely."""
     t = np.linspace(0.0, 1.0, samples)[1:-1, None]
     ray = a + t * (b - a)
@@ -20,7 +21,7 @@ def deepest_below_floor(terrain, a, b, samples=4000):
 
 @given(seed=st.integers(0, 1000))
 @settings(max_examples=15, deadline=None)
-def test_sight_agrees_with_a_close_look_at_every_ray(seed):
+def test_sight_agrees_with_a_close_look_at_every_ray(seed: int) -> None:
     rng = np.random.default_rng(seed)
     terrain = Terrain(rng.uniform(5.0, 12.0, (9, 13)), 2.0)
     vehicles, landmarks = place(terrain, rng, 4, 1.0), place(terrain, rng, 25, 0.0)
@@ -34,7 +35,7 @@ def test_sight_agrees_with_a_close_look_at_every_ray(seed):
 
 @given(seed=st.integers(0, 1000))
 @settings(max_examples=20, deadline=None)
-def test_a_plane_hides_nothing(seed):
+def test_a_plane_hides_nothing(seed: int) -> None:
     rng = np.random.default_rng(seed)
     east, north = np.meshgrid(np.arange(8) + 0.5, np.arange(8) + 0.5)
     a, b = rng.uniform(-1, 1, 2)
@@ -45,7 +46,7 @@ def test_a_plane_hides_nothing(seed):
     assert in_sight(vehicles, landmarks, plane, 0.0, 0.0, 1.0).all()
 
 
-def test_a_wall_hides_what_lies_behind_until_the_vehicle_rises_above_it():
+def test_a_wall_hides_what_lies_behind_until_the_vehicle_rises_above_it() -> None:
     floor = np.full((5, 20), 10.0)
     floor[:, 10] = 4.0
     landmarks = np.array([[5.0, 2.5, 10.0], [15.0, 2.5, 10.0]])
@@ -54,7 +55,7 @@ def test_a_wall_hides_what_lies_behind_until_the_vehicle_rises_above_it():
     assert in_sight(high, landmarks, floor, 0.0, 0.0, 1.0).tolist() == [[True, True]]
 
 
-def test_an_unknown_floor_blocks_nothing_and_an_unknown_landmark_is_not_seen():
+def test_an_unknown_floor_blocks_nothing_and_an_unknown_landmark_is_not_seen() -> None:
     landmarks = np.array([[8.0, 2.0, 9.0], [9.0, 2.0, np.nan]])
     assert in_sight(np.array([[1.0, 2.0, 8.0]]), landmarks, np.full((4, 10), np.nan), 0.0, 0.0, 1.0).tolist() == [
         [True, False]

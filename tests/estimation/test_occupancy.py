@@ -39,7 +39,7 @@ def first_hit(world: ObstacleWorld, start: np.ndarray, bearing: float, reach: fl
 
 @given(st.integers(0, 10_000))
 @settings(max_examples=8, deadline=None)
-def test_a_scan_hears_the_first_obstacle(seed):
+def test_a_scan_hears_the_first_obstacle(seed: int) -> None:
     site = world(seed)
     place = free_place(site, seed)
     bearings = np.random.default_rng([seed, 2]).uniform(0.0, 2.0 * np.pi, 8)
@@ -53,7 +53,7 @@ def test_a_scan_hears_the_first_obstacle(seed):
 @given(st.integers(0, 10_000))
 @example(1147)  # a beam that touches an obstacle by a hundred-thousandth of a cell
 @settings(max_examples=20, deadline=None)
-def test_what_was_seen_is_true(seed):
+def test_what_was_seen_is_true(seed: int) -> None:
     site, scanner = world(seed), Scanner(6.0, 1.0)
     grid = OccupancyGrid.from_blueprint(site.known, 1.0)
     for k in range(5):
@@ -67,7 +67,7 @@ def test_what_was_seen_is_true(seed):
     assert (states[site.known] == Cell.KNOWN).all()
 
 
-def test_nothing_is_known_behind_an_obstacle_or_beyond_the_reach():
+def test_nothing_is_known_behind_an_obstacle_or_beyond_the_reach() -> None:
     solid = np.zeros((SIDE, SIDE), dtype=bool)
     solid[:, 12] = True
     corner = np.array([0.5, 0.5])
@@ -81,7 +81,7 @@ def test_nothing_is_known_behind_an_obstacle_or_beyond_the_reach():
     assert states[10, 0] == Cell.UNEXPLORED  # 8.5 m away
 
 
-def test_an_obstacle_that_left_is_unlearned_and_a_beam_without_a_value_says_nothing():
+def test_an_obstacle_that_left_is_unlearned_and_a_beam_without_a_value_says_nothing() -> None:
     nothing = OccupancyGrid.from_blueprint(np.zeros((5, 5), dtype=bool), 1.0)
     east = np.array([np.pi / 2])
     grid = nothing.seen_from(np.array([0.5, 2.5]), east, np.array([2.5]), 5.0)
@@ -93,7 +93,7 @@ def test_an_obstacle_that_left_is_unlearned_and_a_beam_without_a_value_says_noth
     assert (silent.states == Cell.UNEXPLORED).all()
 
 
-def test_an_echo_just_in_front_of_a_known_obstacle_is_that_obstacle():
+def test_an_echo_just_in_front_of_a_known_obstacle_is_that_obstacle() -> None:
     blueprint = np.zeros((SIDE, SIDE), dtype=np.bool_)
     blueprint[12] = True
     grid = OccupancyGrid.from_blueprint(blueprint, 1.0)

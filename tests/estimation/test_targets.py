@@ -1,3 +1,6 @@
+from collections.abc import Iterator
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -11,7 +14,7 @@ from app.estimation.targets import foretold_sd, transition
 HEARING = RangeSensor(np.inf, 0.1)
 
 
-def pursuit(seed, steps, estimator, vehicles=3, *, found=False):
+def pursuit(seed: int, steps: int, estimator: Any, vehicles: int = 3, *, found: bool = False) -> Iterator[Any]:
     """Vehicles circle a target that keeps its course but for the model's noise; yields truth, track and places.
 
     ``found``: the filter knows to begin with where the target is, as well as it says.
@@ -34,7 +37,7 @@ def pursuit(seed, steps, estimator, vehicles=3, *, found=False):
         yield truth, track, positions
 
 
-def test_a_single_range_update_is_that_of_a_slow_reference():
+def test_a_single_range_update_is_that_of_a_slow_reference() -> None:
     """Joseph form in plain numpy, mean and variance of the range by brute force over the prior."""
     rng = np.random.default_rng(4)
     for _ in range(5):
@@ -57,7 +60,7 @@ def test_a_single_range_update_is_that_of_a_slow_reference():
         np.testing.assert_allclose(after, mean + (K * innovation).ravel(), rtol=1e-9)
 
 
-def test_errors_are_as_large_as_the_filter_says():
+def test_errors_are_as_large_as_the_filter_says() -> None:
     """NEES and NIS over 100 runs within their 95 % bounds."""
     estimator, runs = TargetEstimator(), 100
     nees, surprise = [], []
@@ -67,11 +70,11 @@ def test_errors_are_as_large_as_the_filter_says():
         nees.append(error @ np.linalg.solve(track.covariance, error))
         surprise.append(3.0 * track.surprise)
     for values, dimensions in ((nees, 6), (surprise, 3)):
-        low, high = chi2.ppf([0.025, 0.975], dimensions * runs) / runs
+        low, high = chi2.ppf(np.array([0.025, 0.975]), dimensions * runs) / runs
         assert low < np.mean(values) < high
 
 
-def test_a_target_is_found_from_nothing():
+def test_a_target_is_found_from_nothing() -> None:
     """A mirror image may be taken for the target now and then, but seldom for long."""
     right = 0
     for seed in range(40):
@@ -80,7 +83,7 @@ def test_a_target_is_found_from_nothing():
     assert right >= 38
 
 
-def test_it_counts_as_accurate_only_while_it_is_heard():
+def test_it_counts_as_accurate_only_while_it_is_heard() -> None:
     estimator = TargetEstimator()
     *_, (_, track, _) = pursuit(0, 60, estimator)
     assert estimator.accurate(track)
@@ -92,7 +95,7 @@ def test_it_counts_as_accurate_only_while_it_is_heard():
     assert 3 < lost < 60
 
 
-def test_a_turn_is_noticed():
+def test_a_turn_is_noticed() -> None:
     """After a target went about, the filter must not go on straight for long."""
     estimator, rng = TargetEstimator(), np.random.default_rng(3)
     track, truth = TargetTrack.unknown(), np.array([-0.5, 0.0, 0.0, 0.02, 0.0, 0.0])
@@ -108,7 +111,7 @@ def test_a_turn_is_noticed():
     assert max(errors[75:]) < 0.15
 
 
-def test_what_is_foretold_is_what_the_filter_then_says():
+def test_what_is_foretold_is_what_the_filter_then_says() -> None:
     estimator = TargetEstimator()
     *_, (_, track, positions) = pursuit(1, 60, estimator)
     ahead = estimator.predict(track)
@@ -122,7 +125,7 @@ def test_what_is_foretold_is_what_the_filter_then_says():
     st.lists(st.floats(-2, 2), min_size=3, max_size=3), st.floats(1e-6, 3.0), st.floats(1e-3, 0.5), st.integers(0, 99)
 )
 @settings(max_examples=60, deadline=None)
-def test_a_covariance_stays_symmetric_and_positive(place, y, noise, seed):
+def test_a_covariance_stays_symmetric_and_positive(place: Any, y: Any, noise: Any, seed: int) -> None:
     rng = np.random.default_rng(seed)
     A = rng.standard_normal((6, 6)) * 10.0 ** rng.uniform(-6, 0, 6)
     mean, P = rng.uniform(-1, 1, 6), A @ A.T + 1e-14 * np.eye(6)

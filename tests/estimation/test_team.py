@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from app.arrays import FloatArray
 from app.estimation import Attitude, Dvl, LandmarkEstimator, Landmarks, Multibeam, RangeSensor, SensorTeam
 
 NAMES = ("a", "b", "c")
@@ -15,12 +16,12 @@ TEAM = SensorTeam(
 )
 
 
-def landmarks(n=60):
+def landmarks(n: int = 60) -> FloatArray:
     rng = np.random.default_rng(0)
     return np.column_stack([rng.uniform(-0.2, 0.3, (n, 2)), rng.uniform(0.5, 0.6, n)])
 
 
-def test_each_vehicle_sees_what_its_own_sensor_sees():
+def test_each_vehicle_sees_what_its_own_sensor_sees() -> None:
     truth = landmarks()
     visible_by = TEAM.visible(NAMES, POSITIONS, ATTITUDES, truth)
     assert visible_by.shape == (3, 60)
@@ -29,7 +30,7 @@ def test_each_vehicle_sees_what_its_own_sensor_sees():
     np.testing.assert_array_equal(visible_by[1], TEAM.sensors["b"].meets(POSITIONS[1], ATTITUDES[1], truth))
 
 
-def test_ranges_weigh_by_the_noise_of_the_sensor_that_took_them():
+def test_ranges_weigh_by_the_noise_of_the_sensor_that_took_them() -> None:
     truth = np.array([[0.1, 0.0, 0.5]])
     team = SensorTeam({"a": RangeSensor(0.4, 0.1), "b": Multibeam(0.02, 0.5, count=1)})
     known = Landmarks.unknown(truth[:, :2])
@@ -46,14 +47,17 @@ def test_ranges_weigh_by_the_noise_of_the_sensor_that_took_them():
     assert both.credited[0] in (0, 1)
 
 
-class Noiseless:
-    """Stands in for a generator: no error at all, so that the order of draws cannot matter."""
+class Noiseless(np.random.Generator):
+    """A generator without any error, so that the order of draws cannot matter."""
 
-    def standard_normal(self, n):
+    def __init__(self) -> None:
+        super().__init__(np.random.PCG64())
+
+    def standard_normal(self, n: int) -> FloatArray:  # type: ignore[override]
         return np.zeros(n)
 
 
-def test_the_order_of_vehicles_changes_no_depth():
+def test_the_order_of_vehicles_changes_no_depth() -> None:
     truth = landmarks()
     known = Landmarks.unknown(truth[:, :2])
     estimator = LandmarkEstimator()

@@ -1,7 +1,9 @@
 import pytest
-from situations import SQUARE
+
+from app.arrays import FloatArray
+from tests.support.situations import SQUARE
 
 
 @pytest.fixture
-def square():
+def square() -> FloatArray:
     return SQUARE

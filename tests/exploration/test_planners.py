@@ -1,18 +1,22 @@
 import itertools
+from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from situations import SQUARE, make_belief, make_situation
 
-from app.estimation import RangeSensor, SingleBeam
+from app.arrays import FloatArray
+from app.estimation import RangeSensor, Sensor, SingleBeam
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.constraints import Constraints
 from app.exploration.core.problem import Belief, Situation
+from app.exploration.planner.base import PlannerBase
 from app.exploration.planner.options import PlannerOptions
 from app.exploration.planners import PLANNERS, create_planner
 from app.exploration.survey.error import expected_roughness
+from tests.support.situations import SQUARE, make_belief, make_situation
 
 QUICK = {"search": 30, "candidates": 24, "rollouts": 20}
 KINDS = [
@@ -31,11 +35,21 @@ SENSORS = [SingleBeam(), RangeSensor(visibility_m=25.0)]
 BEAM = SingleBeam()
 
 
-def make(name, regressors="map", sensor=BEAM):
+def make(name: str, regressors: str = "map", *, sensor: Sensor = BEAM) -> PlannerBase:
     return create_planner(name, PlannerOptions(regressors=regressors, **QUICK), sensor)
 
 
-def fly(planner, steps, *, total=60, seed=0, start=None, names=("a", "b"), constraints=None, belief=None):
+def fly(
+    planner: PlannerBase,
+    steps: int,
+    *,
+    total: int = 60,
+    seed: int = 0,
+    start: Any = None,
+    names: tuple[Any, ...] = ("a", "b"),
+    constraints: Any = None,
+    belief: Any = None,
+) -> Iterator[Any]:
     """Fly a planner in closed loop; yields the situation and what was proposed."""
     situation = make_situation(vehicles=names, positions=start, constraints=constraints, belief=belief, steps=total)
     positions, soundings = situation.positions, situation.soundings_en_m
@@ -70,7 +84,7 @@ limits = st.fixed_dictionaries(
 @pytest.mark.parametrize("kind", KINDS, ids="-".join)
 @given(limits=limits, seed=st.integers(0, 100))
 @settings(max_examples=5, deadline=None)
-def test_no_proposal_breaks_a_constraint(kind, sensor, limits, seed):
+def test_no_proposal_breaks_a_constraint(kind: str, sensor: Sensor, limits: Any, seed: int) -> None:
     constraints = Constraints(SQUARE, max_depth_m=20.0, **limits)
     belief = make_belief(seed)
     bottom = Bottom.from_landmarks(belief.xy_m, belief.depth_m)
@@ -82,14 +96,14 @@ def test_no_proposal_breaks_a_constraint(kind, sensor, limits, seed):
 
 @pytest.mark.parametrize("sensor", SENSORS, ids=["bathymeter", "landmarks"])
 @pytest.mark.parametrize("kind", KINDS, ids="-".join)
-def test_same_seed_same_answers(kind, sensor):
+def test_same_seed_same_answers(kind: str, sensor: Sensor) -> None:
     first, second = ([p.positions for _, p in fly(make(*kind, sensor=sensor), 5)] for _ in range(2))
     np.testing.assert_array_equal(first, second)
 
 
 @pytest.mark.parametrize("sensor", SENSORS, ids=["bathymeter", "landmarks"])
 @pytest.mark.parametrize("kind", KINDS, ids="-".join)
-def test_permuting_vehicles_permutes_the_answer(kind, sensor):
+def test_permuting_vehicles_permutes_the_answer(kind: str, sensor: Sensor) -> None:
     names, start = ("a", "b", "c"), np.array([[3.0, 3, 2], [9.0, 3, 2], [15.0, 3, 2]])
     straight = [p.positions for _, p in fly(make(*kind, sensor=sensor), 4, names=names, start=start)]
     order = [2, 0, 1]
@@ -100,7 +114,7 @@ def test_permuting_vehicles_permutes_the_answer(kind, sensor):
 
 @pytest.mark.parametrize("sensor", SENSORS, ids=["bathymeter", "landmarks"])
 @pytest.mark.parametrize("kind", KINDS, ids="-".join)
-def test_a_restored_planner_continues_as_if_nothing_had_happened(kind, sensor):
+def test_a_restored_planner_continues_as_if_nothing_had_happened(kind: str, sensor: Sensor) -> None:
     planner, memory = make(*kind, sensor=sensor), b""
     for situation, proposal in fly(planner, 8):
         if situation.step >= 4:
@@ -114,23 +128,23 @@ def test_a_restored_planner_continues_as_if_nothing_had_happened(kind, sensor):
 
 @pytest.mark.parametrize("memory", [b"", b"{}", b"[1]", b"\xff", b'{"kind":"cao","version":1,"memory":{}}'])
 @pytest.mark.parametrize("name", sorted(PLANNERS))
-def test_a_foreign_memory_is_refused(name, memory):
+def test_a_foreign_memory_is_refused(name: str, memory: Any) -> None:
     with pytest.raises(ValueError, match="planner memory"):
         make(name).restore(memory)
 
 
-def test_an_unknown_planner_is_refused_with_the_known_ones():
+def test_an_unknown_planner_is_refused_with_the_known_ones() -> None:
     with pytest.raises(ValueError, match="choose one of cao, fdsa, lawnmower, pcao, random, rollout, spsa"):
         create_planner("magic")
 
 
-def test_a_yardstick_that_really_tries_its_moves_is_refused_with_the_reason():
+def test_a_yardstick_that_really_tries_its_moves_is_refused_with_the_reason() -> None:
     with pytest.raises(ValueError, match="osarses really tries its moves"):
         create_planner("osarses")
 
 
 @pytest.mark.parametrize("kind", KINDS, ids="-".join)
-def test_vehicles_may_leave_and_join_between_steps(kind):
+def test_vehicles_may_leave_and_join_between_steps(kind: str) -> None:
     planner = make(*kind)
     teams = [("a", "b"), ("a", "b"), ("b",), ("b",), ("b", "c"), ("a", "b", "c"), ()]
     places = {"a": [3.0, 3.0, 2.0], "b": [9.0, 3.0, 2.0], "c": [50.0, 50.0, 2.0]}
@@ -144,20 +158,20 @@ def test_vehicles_may_leave_and_join_between_steps(kind):
         places.update(zip(names, proposal.positions.tolist(), strict=True))
 
 
-def test_a_vehicle_outside_the_area_comes_back():
+def test_a_vehicle_outside_the_area_comes_back() -> None:
     planner = make("random")
     start = np.array([[-6.0, 50.0, 2.0]])
     last = list(fly(planner, 4, names=("a",), start=start))[-1][1]
     assert last.positions[0, 0] >= 0.0
 
 
-def track(planner, steps, **kwargs):
+def track(planner: PlannerBase, steps: int, **kwargs: Any) -> Any:
     flown = [p.positions for _, p in fly(planner, steps, total=steps, **kwargs)]
     start = make_situation(vehicles=kwargs.get("names", ("a", "b"))).positions
     return np.stack([start, *flown])
 
 
-def distances_to_track(positions, spacing=0.5):
+def distances_to_track(positions: FloatArray, spacing: float = 0.5) -> Any:
     points = [
         start + f * (end - start)
         for j in range(positions.shape[1])
@@ -170,20 +184,20 @@ def distances_to_track(positions, spacing=0.5):
 
 
 @pytest.mark.parametrize("name", ["lawnmower", "cao"])
-def test_surveys_leave_no_large_gap_where_nothing_is_known(name):
+def test_surveys_leave_no_large_gap_where_nothing_is_known(name: str) -> None:
     positions = track(make(name), 60, belief=make_belief(known=False))
     # 1200 m in 10 000 m2: lines 8.3 m apart at best.
     assert distances_to_track(positions).max() < 10.0
 
 
-def test_the_lawnmower_spends_its_budget_on_even_lines():
+def test_the_lawnmower_spends_its_budget_on_even_lines() -> None:
     positions = track(make("lawnmower"), 60)
     for j in range(2):
         length = np.linalg.norm(np.diff(positions[:, j], axis=0), axis=1).sum()
         assert 400.0 < length <= 600.0 + 1e-6
 
 
-def test_cao_goes_where_the_bottom_is_rough():
+def test_cao_goes_where_the_bottom_is_rough() -> None:
     belief = make_belief(known=False, cell=2.5)
     rough = (belief.xy_m > 60.0).all(axis=1)
     weight = np.where(rough, 4.0, 0.3)
@@ -197,7 +211,7 @@ def test_cao_goes_where_the_bottom_is_rough():
     assert np.mean(distance[inside] ** 2) < 0.6 * np.mean(distance[~inside] ** 2)
 
 
-def test_surveying_vehicles_keep_their_depths_and_the_clearance():
+def test_surveying_vehicles_keep_their_depths_and_the_clearance() -> None:
     depth = np.where(make_belief().xy_m[:, 0] > 50.0, 3.0, 9.0)
     belief = make_belief()
     shelf = Belief(belief.xy_m, depth, belief.sd_m, belief.accurate, belief.weight, 20.0)
@@ -212,7 +226,7 @@ def test_surveying_vehicles_keep_their_depths_and_the_clearance():
     assert min(reached) == pytest.approx(1.5, abs=0.01)
 
 
-def test_a_team_in_formation_keeps_in_touch():
+def test_a_team_in_formation_keeps_in_touch() -> None:
     cube = np.array([[-1.0, -1], [1, -1], [1, 1], [-1, 1]])
     axis = np.linspace(-0.95, 0.95, 20)
     east, north = np.meshgrid(axis, axis)
@@ -234,7 +248,7 @@ def test_a_team_in_formation_keeps_in_touch():
     assert seen.mean() > 0.99
 
 
-def test_an_edge_between_two_lines_counts_although_no_sounding_shows_it():
+def test_an_edge_between_two_lines_counts_although_no_sounding_shows_it() -> None:
     belief = make_belief(known=False)
     east = belief.xy_m[:, 0]
     step = Belief(

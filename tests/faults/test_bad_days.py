@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
-from tests.faults.disks import small_disk
-from tests.faults.imc_scenes import bad_day_at_sea
-from tests.faults.scenes import bad_day
+from tests.support.faults.disks import small_disk
+from tests.support.faults.imc_scenes import bad_day_at_sea
+from tests.support.faults.scenes import bad_day
 
 
 async def test_full_disk_lock_clock_and_liar_in_one_mission(tmp_path: Path) -> None:

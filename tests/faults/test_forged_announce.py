@@ -31,7 +31,7 @@ class Listener:
         return self.bridge.decoder.decoded.total() > before
 
 
-def test_one_forged_announce_is_told_of_and_forgotten():
+def test_one_forged_announce_is_told_of_and_forgotten() -> None:
     listener = Listener()
     for _ in range(3):
         listener.announced(HOME, uid=1)
@@ -53,7 +53,7 @@ def test_one_forged_announce_is_told_of_and_forgotten():
     assert node.conflict is None
 
 
-def test_two_that_go_on_announcing_stay_a_conflict():
+def test_two_that_go_on_announcing_stay_a_conflict() -> None:
     listener = Listener()
     listener.announced(HOME, uid=1)
     for _ in range(10):

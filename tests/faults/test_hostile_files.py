@@ -19,16 +19,15 @@ from app.mapping.readers.types import ReadError
 from app.missions.views.imports import ImportOptions
 from simulator.terrain import Terrain, TerrainError
 from simulator.terrain_files import load_terrain, save_npz
-from tests.faults.hostile import npy, npz
-
-ROOT = Path(__file__).parents[2]
+from tests.support.faults.hostile import npy, npz
+from tests.support.paths import PROJECT
 
 
 @pytest.mark.parametrize("reader", ["terrain", "soundings"])
 def test_each_is_refused_in_little_memory_with_what_is_wrong(reader: str, tmp_path: Path) -> None:
     ended = subprocess.run(
-        [sys.executable, "-m", "tests.faults.hostile", reader, str(tmp_path)],
-        cwd=ROOT,
+        [sys.executable, "-m", "tests.support.faults.hostile", reader, str(tmp_path)],
+        cwd=PROJECT,
         env=os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"},
         capture_output=True,
         text=True,

@@ -4,10 +4,10 @@ from pathlib import Path
 
 import pytest
 
-from tests.faults.scenes import killed_again_and_again
+from tests.support.faults.scenes import killed_again_and_again
 
 KILLS, STEPS = 3, 30
-"""The long version is ``benchmarks/faults.py``."""
+"""The long version is ``benchmarks/service/faults.py``."""
 
 
 @pytest.mark.timeout(900)

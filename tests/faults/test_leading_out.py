@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.faults.leading_out import grids, told
+from tests.support.faults.leading_out import grids, told
+from tests.support.paths import PROJECT
 
-ROOT = Path(__file__).parents[2]
 SAMPLES = ["external.nc", "external_relative.nc", "external_link.nc", "soft_link.nc", "virtual.nc"]
 TASK = {
     "kind": ".nc",
@@ -39,7 +39,7 @@ def read(folder: Path, name: str, inspection: str, layers: str) -> tuple[int, di
             stdin=file,
             capture_output=True,
             pass_fds=[result.fileno()],
-            env={"PYTHONPATH": str(ROOT), "OPENBLAS_NUM_THREADS": "1", "LANG": "C.UTF-8"},
+            env={"PYTHONPATH": str(PROJECT), "OPENBLAS_NUM_THREADS": "1", "LANG": "C.UTF-8"},
             cwd=folder,
             check=False,
         )
@@ -89,7 +89,7 @@ def test_text_of_whatever_length_takes_little_memory(
     )
     ended = subprocess.run(
         [sys.executable, "-P", "-c", code, str(tmp_path / "long.csv")],
-        env={"PYTHONPATH": str(ROOT), "OPENBLAS_NUM_THREADS": "1"},
+        env={"PYTHONPATH": str(PROJECT), "OPENBLAS_NUM_THREADS": "1"},
         capture_output=True,
         text=True,
         check=False,

@@ -5,7 +5,6 @@ import shutil
 import sqlite3
 import stat
 import subprocess
-import sys
 from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
@@ -14,11 +13,12 @@ from typing import Any
 import httpx
 import pytest
 
-from tests.conftest import PROJECT
-from tests.faults.other_users import SERVICE, as_user, holding, modes, needs_root, open_folder, stranger
-from tests.faults.service import Service, service_in
-from tests.faults.stranger import NEW_MISSION
-from tests.ports import free_ports
+from tests.support.commands import COMMAND
+from tests.support.faults.other_users import SERVICE, as_user, holding, modes, needs_root, open_folder, stranger
+from tests.support.faults.service import Service, service_in
+from tests.support.faults.stranger import NEW_MISSION
+from tests.support.paths import PROJECT
+from tests.support.ports import free_ports
 
 pytestmark = [needs_root, pytest.mark.timeout(600)]
 
@@ -109,7 +109,7 @@ async def test_an_ordinary_user_reads_writes_and_locks_none_of_its_files(uid: in
 
 def run(uid: int, folder: Path, *arguments: str) -> None:
     """Run a command as the service's user."""
-    command = [*as_user(uid), "env", "-C", str(folder), sys.executable, "-c", "from app.cli import main; main()"]
+    command = [*as_user(uid), "env", "-C", str(folder), *COMMAND]
     done = subprocess.run([*command, *arguments], capture_output=True, text=True, cwd=PROJECT, check=False)
     assert done.returncode == 0, done.stderr
 

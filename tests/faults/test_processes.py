@@ -11,9 +11,9 @@ import pytest
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed
 
-from tests.databases import Databases, query
-from tests.faults.missions import mission_of, pollers
-from tests.faults.service import Service, service_in
+from tests.support.databases import Databases, query
+from tests.support.faults.missions import mission_of, pollers
+from tests.support.faults.service import Service, service_in
 
 PATIENCE_S = 120.0
 

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from tests.faults.cut import can_be_made
-from tests.faults.disks import Disk, Ration, small_disk
-from tests.faults.imc_scenes import bad_radio, cut_in_two, lied_to_over_imc, two_services, vanished
-from tests.faults.scenes import aborted_without_a_disk, clock_jumps, disk_full, lied_to, locked
+from tests.support.faults.cut import can_be_made
+from tests.support.faults.disks import Disk, Ration, small_disk
+from tests.support.faults.imc_scenes import bad_radio, cut_in_two, lied_to_over_imc, two_services, vanished
+from tests.support.faults.scenes import aborted_without_a_disk, clock_jumps, disk_full, lied_to, locked
 
 pytestmark = pytest.mark.skipif("BATHYFLEET_FAULTS" not in os.environ, reason="set BATHYFLEET_FAULTS to play them all")
 SPEED = 20.0

@@ -1,19 +1,21 @@
 """Mutated packets, by the command that throws millions of them, and a corpus of those that once led somewhere new."""
 
 import json
-import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
-ROOT = Path(__file__).parents[2]
+from tests.support.commands import environment
+from tests.support.paths import PROJECT
+
 CORPUS = Path(__file__).parent / "corpus" / "outcomes.jsonl"
 
 REPLAY = """
 import asyncio, json, sys
 from collections import Counter
 from pathlib import Path
-from imc_fuzz import replay
+from benchmarks.imc.fuzz import replay
 targets = asyncio.run(replay(Path(sys.argv[1]).read_text().splitlines()))
 bridges = [target.bridge for target in targets]
 print(json.dumps({
@@ -27,11 +29,11 @@ print(json.dumps({
 """
 
 
-def run(*arguments: str) -> dict[str, object]:
+def run(*arguments: str) -> dict[str, Any]:
     ended = subprocess.run(
         [sys.executable, *arguments],
-        cwd=ROOT,
-        env=os.environ | {"PYTHONPATH": os.pathsep.join([str(ROOT), str(ROOT / "benchmarks")])},
+        cwd=PROJECT,
+        env=environment(),
         capture_output=True,
         text=True,
         check=False,
@@ -40,8 +42,8 @@ def run(*arguments: str) -> dict[str, object]:
     return json.loads(ended.stdout)
 
 
-def test_mutated_packets_neither_break_anything_nor_get_through():
-    result = run("benchmarks/imc_fuzz.py", "--packets", "20000", "--seed", "7")
+def test_mutated_packets_neither_break_anything_nor_get_through() -> None:
+    result = run("-m", "benchmarks.imc.fuzz", "--packets", "20000", "--seeds", "7")
     assert result["handler_errors"] == {}
     assert result["impossible_events"] == 0
     assert result["decoded"] > 5000
@@ -50,7 +52,7 @@ def test_mutated_packets_neither_break_anything_nor_get_through():
     assert result["nodes"] <= 256
 
 
-def test_what_once_led_somewhere_new_does_no_harm():
+def test_what_once_led_somewhere_new_does_no_harm() -> None:
     result = run("-c", REPLAY, str(CORPUS))
     assert result["handler_errors"] == {}
     assert result["impossible_events"] == 0

@@ -5,102 +5,49 @@ from the vehicle's own address, which on a real network takes a forged IP header
 """
 
 import asyncio
-import socket
+from collections.abc import AsyncIterator
+from typing import Any
 
 import imcpy
 import pytest
 
 from imc_bridge import Bridge, BridgeSettings, NodeState, Sounding, StateReport, WaypointStatus
 from imc_bridge.nodes.refusals import Refused
-from tests.imc_bridge.conftest import open_sea, until
-from tests.ports import free_ports
-
-VEHICLE = 0x1E
-PLACE = (0.7188, -0.1520)
-"""Radians, in the harbour of Leixoes."""
-
-
-class Speaker:
-    """A system that says what it is told to, from an address and with a clock of its own."""
-
-    def __init__(self, bridge, host="127.0.0.1", imc_id=VEHICLE, name="lauv-noptilus-1"):
-        self.bridge, self.imc_id, self.name = bridge, imc_id, name
-        self.time_s = 1.7e9
-        self.sent = []
-        self.sock = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self.sock.bind((host, 0))
-
-    def packet(self, message):
-        self.time_s += 0.1
-        message.src, message.dst, message.timestamp = self.imc_id, 0xFFFF, self.time_s
-        return imcpy.Packet.serialize(message)
-
-    def send(self, message):
-        self.throw(self.packet(message))
-
-    def throw(self, packet, port=None):
-        self.sent.append((packet, port))
-        self.sock.sendto(packet, ("127.0.0.1", port or self.bridge.settings.port))
-
-    def announce(self, address=None, uid=1):
-        host, port = address or self.sock.getsockname()
-        message = imcpy.Announce()
-        message.sys_name, message.sys_type = self.name, imcpy.SystemType.UUV
-        message.services = f"dune://0.0.0.0/uid/{uid};imc+info://0.0.0.0/version/5.4.31;imc+udp://{host}:{port}/"
-        self.throw(self.packet(message), self.bridge.transport.announce_port)
-
-    def state(self, north_m=0.0, depth_m=1.0):
-        message = imcpy.EstimatedState()
-        message.lat, message.lon, message.x, message.depth = *PLACE, north_m, depth_m
-        self.send(message)
-
-    def measure(self, range_m):
-        message = imcpy.Distance()
-        message.validity, message.value, message.src_ent = imcpy.Distance.ValidityEnum.VALID, range_m, 7
-        self.send(message)
-
-    def swim(self, seconds=1.0):
-        """Report itself on its way north, with a sounding between any two states."""
-        entities = imcpy.EntityList()
-        entities.op, entities.list = imcpy.EntityList.OperationEnum.REPORT, "Altimeter=7"
-        self.send(entities)
-        for k in range(round(seconds * 5)):
-            self.state(north_m=0.3 * k)
-            self.measure(10.0)
-        self.state(north_m=0.3 * round(seconds * 5))
-
-    def close(self):
-        self.sock.close()
+from tests.support.imc.sea import open_sea
+from tests.support.imc.speaker import VEHICLE, Speaker
+from tests.support.ports import free_ports
+from tests.support.waiting import until
 
 
 class Scene:
     """A bridge, the vehicle, and somebody else."""
 
-    def __init__(self, bridge, events):
+    def __init__(self, bridge: Bridge, events: list[Any]) -> None:
         self.bridge, self.events = bridge, events
         self.vehicle = Speaker(bridge)
         self.stranger = Speaker(bridge, host="127.0.0.2")
 
-    def of(self, kind):
+    def of(self, kind: type[Any]) -> list[Any]:
         return [event for event in self.events if isinstance(event, kind)]
 
-    async def meet(self):
+    async def meet(self) -> None:
         self.vehicle.announce()
         await until(lambda: bool(self.bridge.nodes()), "the vehicle was noticed")
         self.vehicle.swim()
         await until(lambda: len(self.of(Sounding)) == 5, "its soundings are in")
 
-    async def refused(self, reason, count):
+    async def refused(self, reason: Refused, count: int) -> None:
         await until(lambda: self.bridge.admission.refused[reason] >= count, f"{count} packets were {reason}")
 
 
 @pytest.fixture
-async def scene(request):
+async def scene(request: pytest.FixtureRequest) -> AsyncIterator[Any]:
     *announce_ports, port = free_ports(4)
     settings = BridgeSettings(
         port=port, loopback_only=True, announce_ports=tuple(announce_ports), **getattr(request, "param", {})
     )
-    bridge, events = Bridge(settings), []
+    bridge = Bridge(settings)
+    events: list[Any] = []
     await bridge.start(events.append)
     scene = Scene(bridge, events)
     yield scene
@@ -110,7 +57,7 @@ async def scene(request):
     await bridge.close()
 
 
-async def test_another_source_under_the_vehicles_id_changes_nothing(scene):
+async def test_another_source_under_the_vehicles_id_changes_nothing(scene: Scene) -> None:
     await scene.meet()
     node = scene.bridge.nodes()[0]
     forged = Speaker(scene.bridge)  # the same machine, another port
@@ -124,7 +71,7 @@ async def test_another_source_under_the_vehicles_id_changes_nothing(scene):
     forged.close()
 
 
-async def test_vehicles_place_on_the_network_is_its_own(scene):
+async def test_vehicles_place_on_the_network_is_its_own(scene: Scene) -> None:
     await scene.meet()
     stranger = scene.stranger
     stranger.time_s = scene.vehicle.time_s + 1.0
@@ -141,7 +88,7 @@ async def test_vehicles_place_on_the_network_is_its_own(scene):
     await until(lambda: len(scene.of(Sounding)) == 10, "the vehicle is still heard")
 
 
-async def test_second_system_that_offers_the_vehicles_address_does_not_get_its_place(scene):
+async def test_second_system_that_offers_the_vehicles_address_does_not_get_its_place(scene: Scene) -> None:
     await scene.meet()
     other = Speaker(scene.bridge, host="127.0.0.2", imc_id=0x77, name="other")
     other.announce(address=scene.vehicle.sock.getsockname())
@@ -151,7 +98,7 @@ async def test_second_system_that_offers_the_vehicles_address_does_not_get_its_p
     other.close()
 
 
-async def test_recording_of_the_vehicle_changes_nothing_wherever_it_is_played_from(scene):
+async def test_recording_of_the_vehicle_changes_nothing_wherever_it_is_played_from(scene: Scene) -> None:
     await scene.meet()
     recorded = list(scene.vehicle.sent)
     scene.vehicle.swim(10.0)
@@ -163,7 +110,7 @@ async def test_recording_of_the_vehicle_changes_nothing_wherever_it_is_played_fr
     await scene.refused(Refused.OLD, 10)
     said = scene.vehicle.time_s
 
-    def believed():
+    def believed() -> Any:
         scene.vehicle.state(north_m=15.3)
         return scene.of(StateReport)[-1].time_s > said
 
@@ -173,7 +120,7 @@ async def test_recording_of_the_vehicle_changes_nothing_wherever_it_is_played_fr
     assert times == sorted(times)
 
 
-async def test_position_that_it_cannot_have_reached_is_not_believed(scene):
+async def test_position_that_it_cannot_have_reached_is_not_believed(scene: Scene) -> None:
     """From the vehicle's own address and with its time: only what it says itself contradicts."""
     await scene.meet()
     for k in range(20):
@@ -188,7 +135,7 @@ async def test_position_that_it_cannot_have_reached_is_not_believed(scene):
 
 
 @pytest.mark.parametrize("scene", [{"max_packets_per_s": 1000}], indirect=True)
-async def test_flood_of_a_stranger_does_not_drown_the_vehicle(scene):
+async def test_flood_of_a_stranger_does_not_drown_the_vehicle(scene: Scene) -> None:
     await scene.meet()
     heartbeat = scene.stranger.packet(imcpy.Heartbeat())
     for k in range(3000):
@@ -202,7 +149,7 @@ async def test_flood_of_a_stranger_does_not_drown_the_vehicle(scene):
 
 
 @pytest.mark.parametrize("scene", [{"allowed_addresses": ("127.0.0.1/32",), "allowed_ids": (VEHICLE,)}], indirect=True)
-async def test_only_those_who_are_listed_are_taken_up(scene):
+async def test_only_those_who_are_listed_are_taken_up(scene: Scene) -> None:
     await scene.meet()
     scene.stranger.imc_id = 0x77
     scene.stranger.announce()
@@ -215,7 +162,7 @@ async def test_only_those_who_are_listed_are_taken_up(scene):
     stranger_id.close()
 
 
-async def test_vehicle_that_was_silent_for_long_may_come_back_elsewhere():
+async def test_vehicle_that_was_silent_for_long_may_come_back_elsewhere() -> None:
     *announce_ports, port = free_ports(4)
     settings = BridgeSettings(port=port, loopback_only=True, announce_ports=tuple(announce_ports), time_scale=1000.0)
     bridge = Bridge(settings)
@@ -225,7 +172,7 @@ async def test_vehicle_that_was_silent_for_long_may_come_back_elsewhere():
         first.announce()
         await until(lambda: bool(bridge.nodes()), "it was noticed")
 
-        def taken_up():
+        def taken_up() -> Any:
             later.time_s = first.time_s + 100.0
             later.announce()
             return bridge.nodes()[0].addresses[0][0] == "127.0.0.2"
@@ -237,7 +184,7 @@ async def test_vehicle_that_was_silent_for_long_may_come_back_elsewhere():
         await bridge.close()
 
 
-async def test_forged_packets_move_no_vehicle_that_is_led():
+async def test_forged_packets_move_no_vehicle_that_is_led() -> None:
     """Its states, arrivals and aborts, from another port of its machine and from another host, while it is led."""
     async with open_sea() as sea:
         (name,) = await sea.ready()

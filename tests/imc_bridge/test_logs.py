@@ -6,12 +6,14 @@ import statistics
 from itertools import pairwise
 from pathlib import Path
 
+import imcpy
 import numpy as np
 import pytest
+from imcpy.coordinates import WGS84
 
 from imc_bridge import BridgeSettings, Sounding, SoundingRefused, StateReport
 from imc_bridge.logs import LogError, VehicleLog
-from tests.imc_bridge import log_writer as writer
+from tests.support.imc import log_writer as writer
 
 SETTINGS = BridgeSettings()
 
@@ -28,7 +30,7 @@ def test_soundings_lie_where_and_how_deep_the_bottom_was(tmp_path: Path, name: s
     assert len(found) == 200
     for sounding in found:
         north_m = writer.SPEED_MPS * (sounding.time_s - writer.START_S)
-        lat = math.degrees(writer.WGS84.displace(writer.LAT_RAD, writer.LON_RAD, north_m, 5.0)[0])
+        lat = math.degrees(WGS84.displace(writer.LAT_RAD, writer.LON_RAD, north_m, 5.0)[0])
         assert sounding.lat_deg == pytest.approx(lat, abs=1e-8)
         assert sounding.bottom_depth_m == pytest.approx(writer.bottom_m(north_m), abs=1e-3)
     assert log.refused == {}
@@ -72,8 +74,8 @@ def test_what_is_no_sounding_is_counted_with_its_reason(tmp_path: Path) -> None:
 
 
 def test_the_beams_of_a_dvl_and_its_filtered_range_are_different_soundings(tmp_path: Path) -> None:
-    names = writer.imcpy.EntityList()
-    names.op = writer.imcpy.EntityList.OperationEnum.REPORT
+    names = imcpy.EntityList()
+    names.op = imcpy.EntityList.OperationEnum.REPORT
     names.list = "DVL Beam 0=70;DVL Beam 1=71;DVL Beam 2=72;DVL Beam 3=73;DVL Filtered=74"
     at_s = writer.START_S + 1.05
     packets = [writer.packet(names, writer.START_S), *list(writer.survey(10))[1:]]

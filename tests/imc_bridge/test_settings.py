@@ -1,3 +1,5 @@
+from typing import Any
+
 import pytest
 
 from imc_bridge import BridgeSettings
@@ -21,6 +23,6 @@ from imc_bridge import BridgeSettings
         ("lost_after_s", -1.0),
     ],
 )
-def test_wrong_values_are_refused_by_name(field, value):
+def test_wrong_values_are_refused_by_name(field: str, value: Any) -> None:
     with pytest.raises(ValueError, match=rf"\n{field}\b.*\n.*(should|no multicast|Expected)"):
         BridgeSettings(**{field: value})

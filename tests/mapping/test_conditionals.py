@@ -46,7 +46,11 @@ def test_each_term_is_the_joint_density_over_that_of_the_neighbours() -> None:
 @pytest.mark.parametrize("kernel", list(KERNEL_CODES))
 def test_gradient_is_the_derivative(kernel: KernelName) -> None:
     _, gradient = terms(kernel, THETA)
-    numeric = approx_fprime(THETA, lambda theta: terms(kernel, theta)[0], 1e-6)
+
+    def value(theta: FloatArray) -> float:
+        return float(terms(kernel, theta)[0])
+
+    numeric = approx_fprime(THETA, value, 1e-6)
     np.testing.assert_allclose(gradient, numeric, rtol=1e-3, atol=1e-3)
 
 

@@ -59,7 +59,11 @@ def test_gradient_is_the_derivative(kernel: KernelName, scales: LocalScales) -> 
     function = likelihood(kernel, scales)
     theta = function.prior_mean + np.array([-0.3, 0.2, 0.4])
     _, gradient = function.value_and_gradient(theta)
-    numeric = approx_fprime(theta, lambda t: function.value_and_gradient(t)[0], 1e-6)
+
+    def value(theta: FloatArray) -> float:
+        return float(function.value_and_gradient(theta)[0])
+
+    numeric = approx_fprime(theta, value, 1e-6)
     np.testing.assert_allclose(gradient, numeric, rtol=1e-3, atol=1e-3)
 
 

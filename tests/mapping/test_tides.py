@@ -24,7 +24,7 @@ TABLE = """# Tides Data
 
 
 def at(*when: int) -> float:
-    return datetime(*when, tzinfo=UTC).timestamp()  # type: ignore[arg-type]
+    return datetime(*when, tzinfo=UTC).timestamp()  # type: ignore[arg-type, misc]
 
 
 def test_the_table_is_met_at_its_entries_and_half_way_between() -> None:

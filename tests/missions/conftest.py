@@ -6,17 +6,14 @@ import pytest
 from app.missions.service import MissionService
 from app.missions.settings import ImcSettings, ServiceSettings
 from app.storage.database import Database
-from tests.imc_bridge.conftest import captures
-from tests.missions.fleet import Harbour
-from tests.missions.neptus_gateway import COLS, ROWS, Gateway
-from tests.ports import free_ports
-
-__all__ = ["captures"]
+from tests.support.missions.harbour import Harbour
+from tests.support.neptus.gateway import COLS, ROWS, Gateway
+from tests.support.ports import free_ports
 
 
 @pytest.fixture
 def make_settings(database_url: str) -> Callable[..., ServiceSettings]:
-    def make(**changes: object) -> ServiceSettings:
+    def make(**changes: Any) -> ServiceSettings:
         values = {
             "database_url": database_url,
             "imc": ImcSettings(enabled=False),

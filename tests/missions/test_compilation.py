@@ -7,7 +7,8 @@ import threading
 import pytest
 
 from app.missions import compilation
-from tests.missions.fleet import Harbour, sim_spec, until_step
+from app.missions.states import Action
+from tests.support.missions.harbour import Harbour, sim_spec, until_step
 
 COMPILED = """
 import pkgutil
@@ -21,7 +22,7 @@ from app.estimation import SingleBeam
 from app.exploration.planners import create_planner, warm_up_planner
 from app.missions.flight.decision import Place, decide, make_constraints
 from app.missions.live.mission import builder_of
-from tests.missions.fleet import sim_spec
+from tests.support.missions.harbour import sim_spec
 
 names = [found.name for found in pkgutil.walk_packages(app.exploration.__path__, "app.exploration.")]
 compiled = {id(f): f for name in names for f in vars(import_module(name)).values() if isinstance(f, Dispatcher)}
@@ -58,7 +59,7 @@ async def test_the_first_waypoint_does_not_wait_for_what_maps_need(
         await harbour.open()
         service = harbour.service
         mission = await service.create(sim_spec(steps=3))
-        await service.act(mission.id, "start", actor="Ana")
+        await service.act(mission.id, Action.START, actor="Ana")
         await until_step(service, mission.id, 1)
         assert not compiled.is_set()
     finally:

@@ -7,11 +7,12 @@ import pytest
 from app.missions.errors import ConflictError, MissionNotFoundError, VehicleNotFoundError
 from app.missions.operations.uploads import Uploads
 from app.missions.service import MissionService
-from app.missions.states import MissionState
+from app.missions.states import Action, MissionState
 from app.missions.views.imports import ImportOptions
 from app.missions.views.mission import CheckStatus, VehicleView
-from tests.missions.builders import make_spec
-from tests.missions.fleet import Harbour, Rover, sim_spec, until, until_step
+from tests.support.missions.harbour import Harbour, Rover, sim_spec, until_step
+from tests.support.missions.specs import make_spec
+from tests.support.waiting import until
 
 
 def by_name(views: list[VehicleView], name: str) -> VehicleView:
@@ -29,7 +30,7 @@ async def test_an_aborted_vehicle_stays_with_its_last_place_and_age_and_can_come
     async with Rover(service, mission, "b", 20, 20):
         rover = Rover(service, mission, "a", 5, 5)
         await rover.post()
-        await service.act(mission, "start", actor="Ana")
+        await service.act(mission, Action.START, actor="Ana")
         await until(lambda: rover.poll(), "it was sent somewhere")
         await service.abort_vehicle(mission, "a", actor="Ana")
         left = by_name((await service.mission(mission)).vehicles, "a")
@@ -48,14 +49,14 @@ async def test_an_aborted_vehicle_stays_with_its_last_place_and_age_and_can_come
         assert live.team.members["a"].spec.depth_m == 3.0
         with pytest.raises(VehicleNotFoundError, match="has not left"):
             await service.rejoin_vehicle(mission, "a", actor="Ana")
-        await service.act(mission, "abort", actor="Ana")
+        await service.act(mission, Action.ABORT, actor="Ana")
 
 
 async def test_simulated_vehicles_are_put_away_with_their_mission_and_stay_in_sight(service: MissionService) -> None:
     mission = (await service.create(sim_spec("a", steps=100))).id
-    await service.act(mission, "start", actor="Ana")
+    await service.act(mission, Action.START, actor="Ana")
     await until_step(service, mission, 1)
-    await service.act(mission, "abort", actor="Ana")
+    await service.act(mission, Action.ABORT, actor="Ana")
     assert await service.vehicles() == []
     [view] = (await service.mission(mission)).vehicles
     assert (view.active, view.reason) == (True, "")
@@ -64,17 +65,17 @@ async def test_simulated_vehicles_are_put_away_with_their_mission_and_stay_in_si
 
 
 async def test_a_search_is_flown_after_a_survey_with_vehicles_of_the_same_names(service: MissionService) -> None:
-    from tests.missions.test_search_missions import search_spec
+    from tests.support.missions.searches import search_spec
 
     search = search_spec()
     names = [vehicle.name for vehicle in search.vehicles]
     survey = (await service.create(sim_spec(*names, steps=100))).id
-    await service.act(survey, "start", actor="Ana")
+    await service.act(survey, Action.START, actor="Ana")
     await until_step(service, survey, 1)
-    await service.act(survey, "finish", actor="Ana")
+    await service.act(survey, Action.FINISH, actor="Ana")
     found = (await service.create(search)).id
-    assert (await service.act(found, "start", actor="Ana")).mission.state is MissionState.RUNNING
-    await service.act(found, "abort", actor="Ana")
+    assert (await service.act(found, Action.START, actor="Ana")).mission.state is MissionState.RUNNING
+    await service.act(found, Action.ABORT, actor="Ana")
 
 
 async def test_what_was_imported_is_on_the_map_and_in_the_checklist_before_the_start(service: MissionService) -> None:
@@ -107,11 +108,11 @@ async def test_a_mission_in_which_nothing_was_measured_is_deleted_and_any_other_
     with pytest.raises(MissionNotFoundError):
         await service.mission(draft)
     flown = (await service.create(sim_spec("a", steps=100))).id
-    await service.act(flown, "start", actor="Ana")
+    await service.act(flown, Action.START, actor="Ana")
     with pytest.raises(ConflictError, match="the mission is running"):
         await service.delete(flown)
     await until_step(service, flown, 2)
-    await service.act(flown, "abort", actor="Ana")
+    await service.act(flown, Action.ABORT, actor="Ana")
     with pytest.raises(ConflictError, match="what was measured is kept"):
         await service.delete(flown)
     service = await harbour.reopen()

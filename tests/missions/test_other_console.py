@@ -1,21 +1,22 @@
 """A mission over IMC beside another console, which may take a vehicle away; only our operator gives it back."""
 
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 
 import imcpy
 
 from app.missions.fleet.interface import LinkState
 from app.missions.service import MissionService
 from app.missions.settings import ImcSettings, ServiceSettings
+from app.missions.states import Action
 from app.missions.views.mission import Level
-from app.storage.database import Database
 from imc_bridge import BridgeSettings
 from simulator.dune import DuneFleet, DuneOptions, default_specs
 from simulator.seafloors import generate
-from tests.imc_bridge.conftest import Peer
-from tests.missions.builders import make_spec
-from tests.missions.fleet import until
-from tests.ports import free_ports
+from tests.support.imc.sea import Peer
+from tests.support.missions.harbour import Harbour
+from tests.support.missions.specs import make_spec
+from tests.support.ports import free_ports
+from tests.support.waiting import until
 
 SPEED = 20.0
 ORIGIN = (41.185, -8.705)
@@ -27,21 +28,19 @@ async def test_a_vehicle_aborted_elsewhere_is_left_alone_until_the_mission_is_re
 ) -> None:
     *announce_ports, port, base_port = free_ports(5)
     imc = ImcSettings(port=port, announce_ports=tuple(announce_ports), loopback_only=True)
-    settings = make_settings(imc=imc, time_scale=SPEED)
     floor = generate("slope", 0, width_m=60.0, height_m=60.0, origin=ORIGIN)
     specs = default_specs(1, floor, base_port=base_port)
-    database = Database(settings.database_url)
-    service = MissionService(settings, database)
+    harbour = Harbour(make_settings)
     console = Peer(BridgeSettings(port=port, announce_ports=tuple(announce_ports)), 0x4001, "ccu-other")
     async with DuneFleet(floor, specs, speed=SPEED, options=DuneOptions(announce_ports=tuple(announce_ports))) as fleet:
-        await service.startup()
+        service = await harbour.open(imc=imc, time_scale=SPEED)
         try:
             for announce_port in announce_ports:
                 console.announce(announce_port, sys_type=imcpy.SystemType.CCU)
             await until(lambda: link_of(service) is LinkState.READY, "the vehicle is ready")
             spec = make_spec(60.0, vehicles=[{"name": NAME, "kind": "imc"}], steps=1000)
             mission = (await service.create(spec)).id
-            await service.act(mission, "start", actor="Ana")
+            await service.act(mission, Action.START, actor="Ana")
 
             async def step() -> int:
                 return (await service.mission(mission)).progress.step
@@ -61,22 +60,21 @@ async def test_a_vehicle_aborted_elsewhere_is_left_alone_until_the_mission_is_re
             at = await step()
             [vehicle] = (await service.mission(mission)).vehicles
             assert "abort" in vehicle.reason
-            await service.act(mission, "pause", actor="Ana")
+            await service.act(mission, Action.PAUSE, actor="Ana")
             assert await step() == at, "it was sent nowhere"
             assert fleet.nodes[0].vehicle.state.distance_m < before + 20.0
-            await service.act(mission, "resume", actor="Ana")
+            await service.act(mission, Action.RESUME, actor="Ana")
             await until(lambda: later_than(step, at), "it goes on once the operator says so")
-            await service.act(mission, "abort", actor="Ana")
+            await service.act(mission, Action.ABORT, actor="Ana")
             assert link_of(service) is not LinkState.ENGAGED
         finally:
             console.close()
-            await service.shutdown()
-            await database.close()
+            await harbour.close()
 
 
 def link_of(service: MissionService) -> LinkState | None:
     return next((info.state for info, _ in service._hub.vehicles() if info.name == NAME), None)
 
 
-async def later_than(step: Callable[[], object], number: int) -> bool:
-    return await step() > number  # type: ignore[misc, operator]
+async def later_than(step: Callable[[], Awaitable[int]], number: int) -> bool:
+    return await step() > number

@@ -2,6 +2,7 @@
 
 import asyncio
 import io
+from typing import Any
 
 import httpx
 import numpy as np
@@ -11,9 +12,9 @@ import rasterio
 from app.main import serve
 from app.missions.settings import ImcSettings
 from app.settings import Settings
-from tests.databases import query
-from tests.missions.builders import FRAME, spec_json
-from tests.missions.polling import PollingVehicle
+from tests.support.databases import query
+from tests.support.missions.polling import PollingVehicle
+from tests.support.missions.specs import FRAME, spec_json
 
 SIDE_M = 50.0
 STEPS = 12
@@ -24,7 +25,8 @@ async def test_a_mission_of_two_polling_vehicles_from_create_to_geotiff(database
     settings = Settings(port=0, database_url=database_url, imc=ImcSettings(enabled=False), time_scale=10)
     started: asyncio.Future[object] = asyncio.get_running_loop().create_future()
     serving = asyncio.create_task(serve(settings, started=started.set_result))
-    await asyncio.wait([serving, started], return_when=asyncio.FIRST_COMPLETED)
+    both: set[asyncio.Future[Any]] = {serving, started}
+    await asyncio.wait(both, return_when=asyncio.FIRST_COMPLETED)
     server = started.result()
     try:
         async with httpx.AsyncClient(base_url=server.url + "/api/v1", timeout=60, verify=False) as api:  # type: ignore[attr-defined]  # noqa: S501

@@ -11,11 +11,11 @@ from shapely.geometry import LineString, Point, Polygon
 
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.constraints import Constraints
-from app.exploration.core.problem import Belief, Proposal, Situation
+from app.exploration.core.problem import Proposal, Situation
 from app.missions import safety
-from app.missions.flight.decision import Decision, Place, decide, make_constraints
-from app.missions.spec.mission import MissionSpec
-from tests.missions.builders import make_spec, rectangle
+from app.missions.flight.decision import decide, make_constraints
+from tests.support.missions.decisions import Wishes, belief_of, decide_for, place
+from tests.support.missions.specs import make_spec, rectangle
 
 AREA = np.array([[0.0, 0.0], [60.0, 0.0], [60.0, 60.0], [0.0, 60.0]])
 KEEP_OUT = np.array([[20.0, 20.0], [30.0, 20.0], [30.0, 30.0], [20.0, 30.0]])
@@ -138,55 +138,6 @@ def test_over_an_unknown_bottom_the_wanted_depth_counts() -> None:
 # Decisions
 
 
-class Wishes:
-    """A planner that proposes what it is told to."""
-
-    def __init__(self, positions: list[list[float]]) -> None:
-        self.positions = np.array(positions)
-        self.asked: list[Situation] = []
-
-    def propose(self, situation: Situation, rng: np.random.Generator) -> Proposal:
-        self.asked.append(situation)
-        return Proposal(self.positions, 0.5, {"gain": 1.0})
-
-    def snapshot(self) -> bytes:
-        return b"memory"
-
-    def restore(self, memory: bytes) -> None:
-        raise NotImplementedError
-
-
-def belief_of(depth_m: float = 9.0, sd_m: float = 0.5) -> Belief:
-    east, north = np.meshgrid(np.arange(1.0, 60.0, 4.0), np.arange(1.0, 60.0, 4.0))
-    n = east.size
-    return Belief(
-        np.column_stack([east.ravel(), north.ravel()]),
-        np.full(n, depth_m),
-        np.full(n, sd_m),
-        np.zeros(n, dtype=bool),
-        np.ones(n),
-        8.0,
-    )
-
-
-def place(name: str, east_m: float, north_m: float, depth_m: float = 2.0) -> Place:
-    return Place(name, np.array([east_m, north_m]), math.nan, depth_m)
-
-
-def decide_for(
-    places: list[Place],
-    wishes: list[list[float]],
-    belief: Belief | None = None,
-    water_level_m: float = 0.0,
-    **changes: Any,
-) -> tuple[Decision, Wishes, MissionSpec]:
-    spec = make_spec(60.0, **({"limits": {"max_step_m": 12.0, "max_depth_m": 20.0}} | changes))
-    planner = Wishes(wishes)
-    belief = belief or belief_of()
-    decision = decide(1, spec, make_constraints(spec), planner, places, belief, np.zeros((0, 2)), water_level_m)
-    return decision, planner, spec
-
-
 def test_waypoints_are_as_proposed_at_each_vehicles_depth() -> None:
     decision, planner, _ = decide_for(
         [place("a", 10, 10), place("b", 40, 40, 3.0)], [[15.0, 12.0, 99.0], [42.0, 45.0, 99.0]]
@@ -250,7 +201,7 @@ def test_the_way_in_goes_round_keep_out_zones() -> None:
     (leg,) = decision.legs
     assert leg.refusal == ""
     zone, area = Polygon(spec.to_local(spec.keep_out[0])), Polygon(spec.local_area())
-    way = LineString([(-40, 35), leg.target_m[:2]])
+    way = LineString([(-40.0, 35.0), tuple(leg.target_m[:2])])
     assert area.covers(Point(leg.target_m[:2]))
     assert way.distance(zone) > 0
 
@@ -326,7 +277,7 @@ def test_without_a_margin_legs_may_pass_along_a_zone() -> None:
     assert constraints.feasible(np.array([[19.5, 28.0, 2.0]]), np.array([[[19.5, 33.0, 2.0]]]))[0]
 
 
-def test_a_circle_lies_inside_clear_of_keep_outs_and_apart_from_others():
+def test_a_circle_lies_inside_clear_of_keep_outs_and_apart_from_others() -> None:
     start, target, radius = np.array([45.0, 5.0]), np.array([50.0, 12.0]), 8.0
     centre = safety.circling_room(LIMITS, start, target, radius, [np.array([[40.0, 30.0], [30.0, 40.0]])])
     assert centre is not None
@@ -346,7 +297,9 @@ def test_a_circle_lies_inside_clear_of_keep_outs_and_apart_from_others():
     ],
     ids=["area", "keep-out and others", "others"],
 )
-def test_where_there_is_no_room_for_a_circle_none_is_given(start, target, radius, taken):
+def test_where_there_is_no_room_for_a_circle_none_is_given(
+    start: tuple[float, float], target: tuple[float, float], radius: float, taken: list[list[list[float]]]
+) -> None:
     ways = [np.array(way) for way in taken]
     assert safety.circling_room(LIMITS, np.array(start), np.array(target), radius, ways) is None
 
@@ -354,5 +307,5 @@ def test_where_there_is_no_room_for_a_circle_none_is_given(start, target, radius
 @pytest.mark.parametrize(
     ("water_level_m", "below_m"), [(0.0, 10.0), (-1.5, 8.5), (2.0, 10.0)], ids=["datum", "low water", "high water"]
 )
-def test_depths_below_the_surface_are_on_the_safe_side(water_level_m, below_m):
+def test_depths_below_the_surface_are_on_the_safe_side(water_level_m: float, below_m: float) -> None:
     assert safety.below_surface_m(np.array([10.0]), water_level_m) == pytest.approx(below_m)

@@ -18,41 +18,14 @@ from app.missions.search.site import simulated_world
 from app.missions.search.state import Search
 from app.missions.service import MissionService
 from app.missions.spec.mission import MissionKind, MissionSpec
-from app.missions.states import MissionState
+from app.missions.states import Action, MissionState
 from app.missions.views.mission import CheckStatus
 from app.missions.views.soundings import Verdict
 from simulator.car_parks import car_park, harbour_basin
-from tests.missions.builders import lon_lat, rectangle
-from tests.missions.fleet import Harbour, Rover, until, until_state
-
-SIDE_M = 30.0
-
-
-def search_json(**changes: Any) -> dict[str, Any]:
-    """A basin of 30 x 30 m: a quay in the east is known, a pontoon across half of the middle is not."""
-    search = {
-        "goal": lon_lat(8, 25),
-        "goal_radius_m": 5.0,
-        "entry": lon_lat(14, 5),
-        "window_s": 4000.0,
-        "safety_m": 1.5,
-        "scanner": {"reach_m": 10.0, "resolution_deg": 2.0},
-        "obstacles": [rectangle(27, 0, 30, 30)],
-        "simulated_obstacles": [rectangle(0, 14, 15, 16)],
-    }
-    values: dict[str, Any] = {
-        "name": "Basin",
-        "kind": "search",
-        "area": rectangle(0, 0, SIDE_M, SIDE_M),
-        "vehicles": [{"name": "boat", "kind": "sim", "depth_m": 0}],
-        "limits": {"max_step_m": 4.0, "min_depth_m": 0.0, "min_altitude_m": 0.1},
-        "search": search | changes.pop("search", {}),
-    }
-    return values | changes
-
-
-def search_spec(**changes: Any) -> MissionSpec:
-    return MissionSpec.model_validate(search_json(**changes))
+from tests.support.missions.harbour import Harbour, Rover, until_state
+from tests.support.missions.searches import search_json, search_spec
+from tests.support.missions.specs import lon_lat, rectangle
+from tests.support.waiting import until
 
 
 def all_round(east: float, north: float, time_s: float, **changes: Any) -> Scan:
@@ -70,7 +43,7 @@ async def test_a_boat_goes_round_what_nobody_knew_of_sees_the_goal_and_is_back_i
     mission = await service.create(spec)
     checks = await service.preflight(mission.id)
     assert checks.ready
-    await service.act(mission.id, "start", actor="Ana")
+    await service.act(mission.id, Action.START, actor="Ana")
     done = await until_state(service, mission.id, MissionState.FINISHED)
     found = done.progress.search
     assert found is not None
@@ -107,7 +80,7 @@ async def test_a_killed_search_goes_on_and_its_time_has_not_stood_still(
     harbour: Harbour, service: MissionService
 ) -> None:
     mission = await service.create(search_spec())
-    await service.act(mission.id, "start", actor="Ana")
+    await service.act(mission.id, Action.START, actor="Ana")
 
     async def under_way() -> bool:
         return (await service.mission(mission.id)).progress.step >= 3
@@ -126,7 +99,7 @@ async def test_a_killed_search_goes_on_and_its_time_has_not_stood_still(
         return (await service.mission(mission.id)).progress.step >= 6
 
     await until(further, "it goes on")
-    await service.act(mission.id, "abort", actor="Ana")
+    await service.act(mission.id, Action.ABORT, actor="Ana")
 
 
 async def test_scans_are_judged_one_by_one_and_stored_once(service: MissionService) -> None:
@@ -159,7 +132,7 @@ async def test_a_vehicle_waits_for_scans_and_turns_back_where_something_comes_up
     )
     rover = Rover(service, mission.id, "boat", 14, 5)
     await rover.post()
-    await service.act(mission.id, "start", actor="Ana")
+    await service.act(mission.id, Action.START, actor="Ana")
 
     async def said(kind: str) -> bool:
         return any(event.kind == kind for event in await service.events(mission.id))
@@ -189,7 +162,7 @@ async def test_a_vehicle_waits_for_scans_and_turns_back_where_something_comes_up
     steps = await service.steps(mission.id)
     missed = next(step for step in steps if step.number == first.step)
     assert "something stands on its way" in missed.waypoints[0].reason
-    await service.act(mission.id, "abort", actor="Ana")
+    await service.act(mission.id, Action.ABORT, actor="Ana")
 
 
 def test_no_leg_leads_closer_to_a_hazard_than_asked_whatever_a_planner_says() -> None:
@@ -271,10 +244,10 @@ async def test_who_is_not_at_the_entry_and_sees_no_way_to_it_is_an_alarm(service
     mission = await service.create(search_spec(vehicles=[boat], search={"obstacles": walls, "simulated_obstacles": []}))
     warned = {check.id: check.status for check in (await service.preflight(mission.id)).checks}
     assert warned["search.ways"] is CheckStatus.WARNING
-    await service.act(mission.id, "start", actor="Ana")
+    await service.act(mission.id, Action.START, actor="Ana")
 
     async def said() -> bool:
         return any(event.kind == "stuck" for event in await service.events(mission.id))
 
     await until(said, "the operator is told")
-    await service.act(mission.id, "abort", actor="Ana")
+    await service.act(mission.id, Action.ABORT, actor="Ana")

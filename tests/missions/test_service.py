@@ -34,14 +34,15 @@ from app.missions.service import MissionService
 from app.missions.settings import ServiceSettings
 from app.missions.soundings.measurement import Measurement
 from app.missions.spec.mission import MissionSpec, VehicleKind, VehicleSpec
-from app.missions.states import MissionState, MoveRefusedError
+from app.missions.states import Action, MissionState, MoveRefusedError
 from app.missions.views.messages import EventMessage, MapMessage, SnapshotMessage, StateMessage
 from app.missions.views.mission import Level
 from app.missions.views.soundings import Verdict
 from app.storage.database import Database
 from app.storage.models import MissionRow, MissionVehicleRow, SoundingRow, StepRow, WaypointRow
-from tests.missions.builders import lon_lat, make_spec, rectangle
-from tests.missions.fleet import CLOCK_S, Harbour, Rover, sim_spec, state_of, until, until_state, until_step
+from tests.support.missions.harbour import CLOCK_S, Harbour, Rover, sim_spec, state_of, until_state, until_step
+from tests.support.missions.specs import lon_lat, make_spec, rectangle
+from tests.support.waiting import until
 
 S = MissionState
 
@@ -67,7 +68,7 @@ async def until_stopped(service: MissionService, mission_id: str, count: int) ->
 
 async def started(service: MissionService, spec: MissionSpec) -> str:
     mission = await service.create(spec)
-    await service.act(mission.id, "start", actor="Ana")
+    await service.act(mission.id, Action.START, actor="Ana")
     return mission.id
 
 
@@ -79,7 +80,7 @@ async def test_a_mission_from_start_to_products(service: MissionService, databas
     assert (created.state, created.progress.step) == (S.READY, 0)
     with pytest.raises(MapNotReadyError):
         await service.map(created.id)
-    action = await service.act(created.id, "start", actor="Ana")
+    action = await service.act(created.id, Action.START, actor="Ana")
     assert action.mission.state is S.RUNNING
     await until_state(service, created.id, S.FINISHED)
     await until_stopped(service, created.id, 2)
@@ -134,11 +135,11 @@ async def test_pausing_stops_the_vehicles_and_resuming_goes_on(service: MissionS
     mission_id = await started(service, sim_spec(steps=6))
     for step in (1, 2, 4):
         await until_step(service, mission_id, step)
-        paused = await service.act(mission_id, "pause", actor="Ana", note="ship ahead")
+        paused = await service.act(mission_id, Action.PAUSE, actor="Ana", note="ship ahead")
         assert (paused.mission.state, paused.mission.reason) == (S.PAUSED, "ship ahead")
         assert {stop.vehicle: stop.acknowledged for stop in paused.stops} == {"a": True, "b": True}
         assert {v.link for v in (await service.mission(mission_id)).vehicles} == {LinkState.READY}
-        await service.act(mission_id, "resume", actor="Ana")
+        await service.act(mission_id, Action.RESUME, actor="Ana")
     await until_state(service, mission_id, S.FINISHED)
     assert await step_numbers(database, mission_id) == [1, 2, 3, 4, 5, 6]
 
@@ -154,9 +155,9 @@ async def test_ending_a_mission_stops_its_vehicles_and_frees_them(
     assert [(stop.vehicle, stop.acknowledged) for stop in ended.stops] == [("a", True), ("b", True)]
     assert await service.vehicles() == []  # simulated ones are put away
     assert (await kinds(service, mission_id)).count("stop") == 2
-    for refused in ("start", "pause", "resume", "abort", "finish"):
+    for refused in Action:
         with pytest.raises(MoveRefusedError) as caught:
-            await service.act(mission_id, refused, actor="Ana")  # type: ignore[arg-type]
+            await service.act(mission_id, refused, actor="Ana")
         assert "create a new mission" in caught.value.remedy.lower()
     with pytest.raises(ConflictError, match="takes no more vehicles"):
         await service.add_vehicle(mission_id, VehicleSpec(name="c", kind="sim"))
@@ -168,9 +169,9 @@ async def test_a_stop_that_is_not_acknowledged_is_an_alarm(service: MissionServi
     mission = await service.create(make_spec(steps=50, vehicles=[{"name": "a", "kind": "rest"}]))
     rover = Rover(service, mission.id, "a")
     await rover.post()
-    await service.act(mission.id, "start", actor="Ana")
+    await service.act(mission.id, Action.START, actor="Ana")
     await until(lambda: rover.poll(), "it was sent somewhere")
-    aborted = await service.act(mission.id, "abort", actor="Ana")
+    aborted = await service.act(mission.id, Action.ABORT, actor="Ana")
     (stop,) = aborted.stops
     assert not stop.acknowledged
     assert "told at its next poll" in stop.detail
@@ -185,11 +186,11 @@ async def test_an_abort_while_the_last_stops_go_out_is_refused_or_stays(service:
     mission = await service.create(make_spec(steps=1, vehicles=[{"name": "a", "kind": "rest"}]))
     rover = Rover(service, mission.id, "a")
     await rover.post()
-    await service.act(mission.id, "start", actor="Ana")
+    await service.act(mission.id, Action.START, actor="Ana")
     await until(lambda: rover.poll(), "it was sent somewhere")  # and arrived: the loop ends, the stop waits for a poll
     await until(lambda: service._registry._live[mission.id].halted, "its stop is on the way")
     try:
-        await service.act(mission.id, "abort", actor="Ana")
+        await service.act(mission.id, Action.ABORT, actor="Ana")
     except MoveRefusedError:
         expected = S.FINISHED
     else:
@@ -207,7 +208,7 @@ async def test_a_service_that_is_shut_down_while_a_mission_ends_writes_the_end_f
     mission = await service.create(make_spec(steps=1, vehicles=[{"name": "a", "kind": "rest"}]))
     rover = Rover(service, mission.id, "a")
     await rover.post()
-    await service.act(mission.id, "start", actor="Ana")
+    await service.act(mission.id, Action.START, actor="Ana")
     await until(lambda: rover.poll(), "it was sent somewhere")
     await until(lambda: service._registry._live[mission.id].halted, "its stop is on the way")
     await harbour.close()
@@ -304,19 +305,19 @@ async def test_vehicles_join_and_leave_while_a_mission_runs(service: MissionServ
     await service.add_vehicle(mission_id, VehicleSpec(name="a", kind="sim"))
     await until(flown_by("a"), "the one that came back reached a waypoint")
     async with database.reading() as session:
-        assert (await session.get(MissionVehicleRow, (mission_id, "a"))).slot == 0  # type: ignore[union-attr]
+        assert (await session.get(MissionVehicleRow, (mission_id, "a"))).slot == 0
     with pytest.raises(ConflictError, match="takes part already"):
         await service.add_vehicle(mission_id, VehicleSpec(name="a", kind="sim"))
     with pytest.raises(VehicleNotFoundError, match="'x' takes no part"):
         await service.remove_vehicle(mission_id, "x")
-    await service.act(mission_id, "abort", actor="Ana")
+    await service.act(mission_id, Action.ABORT, actor="Ana")
 
 
 async def test_a_draft_becomes_ready_with_its_first_vehicle_and_back(service: MissionService) -> None:
     mission = await service.create(make_spec(vehicles=[]))
     assert (mission.state, mission.reason) == (S.DRAFT, "no vehicle yet")
     with pytest.raises(MoveRefusedError) as caught:
-        await service.act(mission.id, "start", actor="Ana")
+        await service.act(mission.id, Action.START, actor="Ana")
     assert "Add at least one vehicle" in caught.value.remedy
     assert (await service.add_vehicle(mission.id, VehicleSpec(name="a", kind="rest"))).state is S.READY
     assert (await service.remove_vehicle(mission.id, "a")).state is S.DRAFT
@@ -330,7 +331,7 @@ async def test_a_straggler_does_not_stall_the_others(service: MissionService, da
     )
     stuck = Rover(service, mission.id, "stuck")
     await stuck.post()
-    await service.act(mission.id, "start", actor="Ana")
+    await service.act(mission.id, Action.START, actor="Ana")
 
     async def poll_without_moving() -> None:
         after = None
@@ -356,7 +357,7 @@ async def test_a_straggler_does_not_stall_the_others(service: MissionService, da
 
 async def test_a_mission_waits_for_a_vehicle_and_says_so(service: MissionService) -> None:
     mission = await service.create(make_spec(steps=2, step_deadline_s=5, vehicles=[{"name": "a", "kind": "rest"}]))
-    await service.act(mission.id, "start", actor="Ana")
+    await service.act(mission.id, Action.START, actor="Ana")
 
     async def complains() -> bool:
         return "waiting" in await kinds(service, mission.id)
@@ -371,16 +372,16 @@ async def test_a_vehicle_is_in_one_mission_at_a_time(service: MissionService) ->
     first = await started(service, sim_spec(steps=500))
     second = await service.create(sim_spec(steps=1))
     with pytest.raises(ConflictError, match=f"'a' takes part in mission {first}") as caught:
-        await service.act(second.id, "start", actor="Ana")
+        await service.act(second.id, Action.START, actor="Ana")
     assert caught.value.remedy
     assert await state_of(service, second.id) is S.READY
     third = await started(service, sim_spec("c", steps=500))
     with pytest.raises(ConflictError, match=f"'a' takes part in mission {first}"):
         await service.add_vehicle(third, VehicleSpec(name="a", kind="sim"))
     assert [v.name for v in (await service.mission(third)).vehicles] == ["c"]
-    await service.act(first, "abort", actor="Ana")
-    await service.act(third, "abort", actor="Ana")
-    await service.act(second.id, "start", actor="Ana")
+    await service.act(first, Action.ABORT, actor="Ana")
+    await service.act(third, Action.ABORT, actor="Ana")
+    await service.act(second.id, Action.START, actor="Ana")
     await until_state(service, second.id, S.FINISHED)
 
 
@@ -388,7 +389,7 @@ async def test_a_start_that_fails_half_way_claims_nothing(service: MissionServic
     vehicles = [{"name": "a", "kind": "sim"}, {"name": "far", "kind": "sim", "start": lon_lat(5000, 0)}]
     mission = await service.create(sim_spec(vehicles=vehicles))
     with pytest.raises(ConflictError, match="'far' cannot be launched") as caught:
-        await service.act(mission.id, "start", actor="Ana")
+        await service.act(mission.id, Action.START, actor="Ana")
     assert "start" in caught.value.remedy
     assert await state_of(service, mission.id) is S.READY
     other = await started(service, sim_spec("a", steps=1))
@@ -397,19 +398,19 @@ async def test_a_start_that_fails_half_way_claims_nothing(service: MissionServic
     with pytest.raises(ConflictError, match="'far' cannot be launched"):
         await service.add_vehicle(running, VehicleSpec.model_validate(vehicles[1]))
     assert [v.name for v in (await service.mission(running)).vehicles] == ["b"]
-    await service.act(running, "abort", actor="Ana")
+    await service.act(running, Action.ABORT, actor="Ana")
 
 
 async def test_a_vehicle_taken_out_is_told_at_its_next_poll(service: MissionService) -> None:
     mission = await service.create(make_spec(steps=500))
     async with Rover(service, mission.id, "a", 5, 5), Rover(service, mission.id, "b", 20, 20) as leaving:
-        await service.act(mission.id, "start", actor="Ana")
+        await service.act(mission.id, Action.START, actor="Ana")
         await until_step(service, mission.id, 2)
         await service.remove_vehicle(mission.id, "b")
         await until(lambda: leaving.told, "it was told")
         stops = [line for line in await service.events(mission.id) if line.kind == "stop"]
         assert [(line.data["vehicle"], line.data["acknowledged"]) for line in stops] == [("b", True)]
-        await service.act(mission.id, "abort", actor="Ana")
+        await service.act(mission.id, Action.ABORT, actor="Ana")
 
 
 async def test_a_vehicle_that_comes_back_later_is_told_that_it_takes_no_part(service: MissionService) -> None:
@@ -417,7 +418,7 @@ async def test_a_vehicle_that_comes_back_later_is_told_that_it_takes_no_part(ser
     here = Rover(service, mission.id, "b")
     await here.post()
     async with Rover(service, mission.id, "a"):
-        await service.act(mission.id, "start", actor="Ana")
+        await service.act(mission.id, Action.START, actor="Ana")
         await until(lambda: here.poll(), "it was sent somewhere")
         removing = asyncio.create_task(service.remove_vehicle(mission.id, "b"))
         await until(lambda: service._registry._live[mission.id].team.get("b") is None, "it is out")
@@ -427,7 +428,7 @@ async def test_a_vehicle_that_comes_back_later_is_told_that_it_takes_no_part(ser
         await removing
         (line,) = [line for line in await service.events(mission.id) if line.kind == "stop"]
         assert line.data["acknowledged"]
-        await service.act(mission.id, "abort", actor="Ana")
+        await service.act(mission.id, Action.ABORT, actor="Ana")
 
 
 @pytest.mark.parametrize(
@@ -583,7 +584,7 @@ async def test_a_position_on_the_other_side_of_the_earth_harms_nobody(service: M
     mission = await service.create(make_spec(steps=3, vehicles=[{"name": "a", "kind": "rest"}]))
     lost = Measurement(vehicle="a", time_s=CLOCK_S - 1, lat_deg=-41.0, lon_deg=171.0, depth_m=0.0)
     await service.measure(mission.id, [lost])
-    await service.act(mission.id, "start", actor="Ana")
+    await service.act(mission.id, Action.START, actor="Ana")
     answer = await service.measure(mission.id, [lost])
     assert "within 200 km" in answer.items[0].reason
     async with Rover(service, mission.id, "a"):
@@ -614,13 +615,13 @@ async def test_a_restart_goes_on_after_the_last_step(harbour: Harbour, database:
 
 async def test_a_paused_mission_is_paused_after_a_restart_and_keeps_its_vehicles(harbour: Harbour) -> None:
     mission_id = await started(harbour.service, sim_spec(steps=3))
-    await harbour.service.act(mission_id, "pause", actor="Ana")
+    await harbour.service.act(mission_id, Action.PAUSE, actor="Ana")
     service = await harbour.reopen()
     assert await state_of(service, mission_id) is S.PAUSED
     other = await service.create(sim_spec("a", steps=1))
     with pytest.raises(ConflictError, match="takes part in mission"):
-        await service.act(other.id, "start", actor="Ana")
-    await service.act(mission_id, "resume", actor="Ana")
+        await service.act(other.id, Action.START, actor="Ana")
+    await service.act(mission_id, Action.RESUME, actor="Ana")
     await until_state(service, mission_id, S.FINISHED)
 
 
@@ -659,14 +660,14 @@ async def test_a_vehicle_that_only_polls_after_a_restart_is_remembered(harbour: 
     mission = await harbour.service.create(make_spec(steps=10, vehicles=[{"name": "a", "kind": "rest"}]))
     rover = Rover(harbour.service, mission.id, "a")
     await rover.post()
-    await harbour.service.act(mission.id, "start", actor="Ana")
+    await harbour.service.act(mission.id, Action.START, actor="Ana")
     await until(lambda: rover.poll(), "it was sent somewhere")
     rover.service = await harbour.reopen()
     # It holds where it said it is, and says no more.
     await until(lambda: rover.poll(), "it was sent on")
     assert rover.steps == [1, 2]
     await until(lambda: rover.poll(), "it was sent on")
-    await harbour.service.act(mission.id, "abort", actor="Ana")
+    await harbour.service.act(mission.id, Action.ABORT, actor="Ana")
 
 
 async def test_a_batch_sent_again_to_a_new_process_tells_where_the_vehicle_is(harbour: Harbour) -> None:
@@ -695,7 +696,7 @@ async def test_a_mission_whose_vehicle_cannot_be_launched_any_more_fails_alone(h
     assert await state_of(service, far) is S.FAILED
     assert "'z' cannot be launched" in (await service.mission(far)).reason
     assert await state_of(service, good) is S.RUNNING
-    await service.act(good, "abort", actor="Ana")
+    await service.act(good, Action.ABORT, actor="Ana")
 
 
 # What watchers see
@@ -707,7 +708,7 @@ async def test_a_watcher_gets_a_snapshot_first_and_then_every_event_in_order(ser
         first = await anext(messages)
         assert isinstance(first, SnapshotMessage)
         assert first.mission.state is S.READY
-        await service.act(mission.id, "start", actor="Ana")
+        await service.act(mission.id, Action.START, actor="Ana")
         seen: list[int] = []
         steps: list[int] = []
         types = set()
@@ -735,7 +736,7 @@ async def test_a_crowd_is_told_of_a_new_map_less_often_but_always_of_the_last(
         for _ in range(feed.CROWD - 1):
             await crowd.enter_async_context(service.subscribe(mission.id))
         messages = await crowd.enter_async_context(service.subscribe(mission.id))
-        await service.act(mission.id, "start", actor="Ana")
+        await service.act(mission.id, Action.START, actor="Ana")
         told: list[int] = []
         while_running = None
         async for message in messages:
@@ -760,7 +761,7 @@ async def test_events_are_ordered_and_can_be_taken_up_after_any(harbour: Harbour
     assert [line.data["state"] for line in every if line.kind == "state"] == ["ready", "running", "finished"]
     for i, line in enumerate(every):
         assert await harbour.service.events(mission_id, after=line.id) == every[i + 1 :]
-    paged = []
+    paged: list[Any] = []
     while page := await harbour.service.events(mission_id, after=paged[-1].id if paged else 0, limit=2):
         paged += page
     assert paged == every
@@ -786,7 +787,7 @@ async def test_what_vehicles_told_while_a_mission_ran_is_kept_for_charts(harbour
 async def test_missions_are_listed_newest_first_and_survive_leaving_memory(service: MissionService) -> None:
     made = [await service.create(make_spec(name=f"M{i}")) for i in range(14)]
     for mission in made:
-        await service.act(mission.id, "abort", actor="Ana")
+        await service.act(mission.id, Action.ABORT, actor="Ana")
     assert [m.name for m in await service.missions()] == [f"M{i}" for i in reversed(range(14))]
     assert all(m.state is S.ABORTED for m in await service.missions())
 

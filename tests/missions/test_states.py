@@ -16,7 +16,7 @@ from app.missions.spec.mission import MissionSpec
 from app.missions.states import ENDED, MOVES, Action, MissionState, MoveRefusedError, allowed_actions, move
 from app.missions.views.messages import StateMessage
 from app.missions.views.mission import MissionSummary, Progress
-from tests.missions.builders import LAT, LON, lon_lat, make_spec, rectangle, spec_json
+from tests.support.missions.specs import LAT, LON, lon_lat, make_spec, rectangle, spec_json
 
 S = MissionState
 TABLE = {

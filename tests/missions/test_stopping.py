@@ -11,13 +11,14 @@ from app.missions.errors import ConflictError, MissionError
 from app.missions.fleet.interface import LinkState
 from app.missions.maps.builder import MapBuilder
 from app.missions.service import WORKERS, MissionService
-from app.missions.states import MissionState, MoveRefusedError
+from app.missions.states import Action, MissionState, MoveRefusedError
 from app.missions.views.corrections import TideCorrection
 from app.missions.views.soundings import Ruling
 from app.storage import missions as mission_queries
-from tests.missions.builders import make_spec
-from tests.missions.fleet import Harbour, Rover, sim_spec, state_of, until, until_state, until_step
-from tests.missions.test_reviewing import NOT_USED, measured
+from tests.support.missions.harbour import Harbour, Rover, sim_spec, state_of, until_state, until_step
+from tests.support.missions.measured import NOT_USED, measured
+from tests.support.missions.specs import make_spec
+from tests.support.waiting import until
 
 S = MissionState
 LONG_S = 20.0
@@ -55,7 +56,7 @@ async def link_of(service: MissionService, name: str) -> LinkState:
 
 async def test_a_mission_ends_before_its_last_map_is_made(service: MissionService, held_maps: Hold) -> None:
     mission = (await service.create(sim_spec(steps=2))).id
-    await service.act(mission, "start", actor="Ana")
+    await service.act(mission, Action.START, actor="Ana")
     await until(held_maps.begun.is_set, "the last map is begun")
     async with asyncio.timeout(LONG_S):
         await until_state(service, mission, S.FINISHED)
@@ -65,7 +66,7 @@ async def test_a_mission_ends_before_its_last_map_is_made(service: MissionServic
         assert [(stop.vehicle, stop.acknowledged) for stop in again.stops] == [("a", True)]
         assert [member.name for member in (await service.mission(mission)).vehicles] == ["a", "b"]
         with pytest.raises(MoveRefusedError):
-            await service.act(mission, "abort", actor="Ana")
+            await service.act(mission, Action.ABORT, actor="Ana")
     asked = asyncio.create_task(service.map(mission))
     held_maps.free.set()
     snapshot = await asked
@@ -77,14 +78,14 @@ async def test_an_abort_answers_while_all_planning_threads_are_taken(service: Mi
     other = (await service.create(make_spec())).id
     await service.measure(other, measured())
     mission = (await service.create(sim_spec("c", "d", steps=500))).id
-    await service.act(mission, "start", actor="Ana")
+    await service.act(mission, Action.START, actor="Ana")
     await until_step(service, mission, 1)
     maps = [asyncio.create_task(service.map(other)) for _ in range(WORKERS)]
     await until(held_maps.begun.is_set, "they are begun")
     async with asyncio.timeout(LONG_S):
         one = await service.abort_vehicle(mission, "c")
         assert [(stop.vehicle, stop.acknowledged) for stop in one.stops] == [("c", True)]
-        rest = await service.act(mission, "abort", actor="Ana")
+        rest = await service.act(mission, Action.ABORT, actor="Ana")
     assert [(stop.vehicle, stop.acknowledged) for stop in rest.stops] == [("d", True)]
     assert not {"c", "d"} & {vehicle.name for vehicle in await service.vehicles()}  # simulated: put away
     held_maps.free.set()
@@ -95,7 +96,7 @@ async def test_a_ruling_or_a_correction_that_waits_for_a_thread_keeps_no_abort_w
     service: MissionService, held_maps: Hold
 ) -> None:
     mission = (await service.create(sim_spec("c", steps=500))).id
-    await service.act(mission, "start", actor="Ana")
+    await service.act(mission, Action.START, actor="Ana")
     await until_step(service, mission, 1)
     other = (await service.create(make_spec())).id
     await service.measure(other, measured())
@@ -122,11 +123,11 @@ async def test_a_stop_does_not_wait_for_the_database(harbour: Harbour, whole: bo
     """Another transaction takes long: the vehicles are stopped meanwhile, and the answer comes when it is written."""
     service = harbour.service
     mission = (await service.create(sim_spec("a", steps=500, limits={"max_step_m": 20.0}))).id
-    await service.act(mission, "start", actor="Ana")
+    await service.act(mission, Action.START, actor="Ana")
     await until_step(service, mission, 1)
     async with harbour.database.writing():
-        abort = service.act(mission, "abort", actor="Ana") if whole else service.abort_vehicle(mission, "a")
-        answer = asyncio.create_task(abort)  # type: ignore[var-annotated]
+        abort = service.act(mission, Action.ABORT, actor="Ana") if whole else service.abort_vehicle(mission, "a")
+        answer = asyncio.create_task(abort)
         async with asyncio.timeout(LONG_S):
 
             async def stopped() -> bool:
@@ -146,9 +147,9 @@ async def test_a_vehicle_that_did_not_acknowledge_is_told_again_after_the_end(se
     mission = (await service.create(make_spec(steps=50, vehicles=[{"name": "a", "kind": "rest"}]))).id
     rover = Rover(service, mission, "a")
     await rover.post()
-    await service.act(mission, "start", actor="Ana")
+    await service.act(mission, Action.START, actor="Ana")
     await until(lambda: rover.poll(), "it was sent somewhere")
-    first = await service.act(mission, "abort", actor="Ana")
+    first = await service.act(mission, Action.ABORT, actor="Ana")
     assert [stop.acknowledged for stop in first.stops] == [False]
     again = asyncio.create_task(service.abort_vehicle(mission, "a"))
     await until(service._supervisor.acting(mission).locked, "it is told again")
@@ -157,11 +158,11 @@ async def test_a_vehicle_that_did_not_acknowledge_is_told_again_after_the_end(se
     assert [(stop.acknowledged, stop.detail) for stop in (await again).stops] == [(True, "told at its poll")]
 
     other = (await service.create(make_spec(steps=50, vehicles=[{"name": "a", "kind": "rest"}]))).id
-    await service.act(other, "start", actor="Ana")
+    await service.act(other, Action.START, actor="Ana")
     with pytest.raises(MissionError, match="takes part in mission") as refused:
         await service.abort_vehicle(mission, "a")
     assert other in refused.value.remedy
-    await service.act(other, "abort", actor="Ana")
+    await service.act(other, Action.ABORT, actor="Ana")
 
 
 async def test_a_start_that_cannot_be_written_leaves_the_vehicles_free(
@@ -176,6 +177,6 @@ async def test_a_start_that_cannot_be_written_leaves_the_vehicles_free(
     with monkeypatch.context() as patch:
         patch.setattr(mission_queries, "set_state", fail)
         with pytest.raises(OSError, match="disk full"):
-            await service.act(one, "start", actor="Ana")
+            await service.act(one, Action.START, actor="Ana")
     assert (await service.mission(one)).state is MissionState.READY
-    assert (await service.act(other, "start", actor="Ana")).mission.state is MissionState.RUNNING
+    assert (await service.act(other, Action.START, actor="Ana")).mission.state is MissionState.RUNNING

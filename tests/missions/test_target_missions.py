@@ -9,15 +9,16 @@ from app.missions.errors import TargetNotFoundError
 from app.missions.service import MissionService
 from app.missions.settings import ImcSettings
 from app.missions.soundings.measurement import Measurement
-from app.missions.states import MissionState
+from app.missions.states import Action, MissionState
 from app.missions.views.soundings import Verdict
 from app.storage.database import Database
 from simulator.dune import DuneFleet, DuneOptions, default_specs
 from simulator.seafloors import generate
 from simulator.targets import RangingNoise, TargetSpec
-from tests.missions.builders import LAT, LON, lon_lat, make_spec, rectangle
-from tests.missions.fleet import Harbour, Rover, until, until_state
-from tests.ports import free_ports
+from tests.support.missions.harbour import Harbour, Rover, until_state
+from tests.support.missions.specs import LAT, LON, lon_lat, make_spec, rectangle
+from tests.support.ports import free_ports
+from tests.support.waiting import until
 
 TAG = (20.0, 18.0, 5.0)
 
@@ -42,7 +43,7 @@ async def test_posted_ranges_find_a_target_and_a_restart_does_not_forget_it(
     mission = await service.create(make_spec(targets=[{"name": "tag-1"}], steps=50))
     for name in "ab":
         await Rover(service, mission.id, name).post()
-    await service.act(mission.id, "start", actor="Ana")
+    await service.act(mission.id, Action.START, actor="Ana")
     first = await service.measure(mission.id, round_trip(30, 1000.0), idempotency_key="one")
     assert (first.accepted, first.rejected) == (30, 0)
     # A step keeps the filters; what comes after it is found again among the stored ranges.
@@ -50,14 +51,17 @@ async def test_posted_ranges_find_a_target_and_a_restart_does_not_forget_it(
     assert second.accepted == 31
     # Before the pause: that waits for vehicles to stop, while the target's place grows old.
     (before,) = await service.targets(mission.id)
-    await service.act(mission.id, "pause", actor="Ana")
+    await service.act(mission.id, Action.PAUSE, actor="Ana")
     assert before.accurate
+    assert before.east_m is not None
+    assert before.north_m is not None
     assert math.hypot(before.east_m - TAG[0], before.north_m - TAG[1]) < 3.0
     assert (await service.mission(mission.id)).targets[0].name == "tag-1"
 
     service = await harbour.reopen()
     (after,) = await service.targets(mission.id)
     assert (after.ranges, after.rejected) == (before.ranges, before.rejected)
+    assert after.sd_east_m is not None
     assert after.east_m == pytest.approx(before.east_m, abs=max(0.5, 3 * after.sd_east_m))
     again = await service.measure(mission.id, round_trip(30, 1000.0), idempotency_key="one")
     assert again.replayed
@@ -109,7 +113,7 @@ async def test_simulated_vehicles_map_and_keep_track_of_a_simulated_target(harbo
         steps=5,
     )
     mission = await service.create(spec)
-    await service.act(mission.id, "start", actor="Ana")
+    await service.act(mission.id, Action.START, actor="Ana")
     pursued: set[str] = set()
 
     async def over() -> bool:
@@ -165,10 +169,10 @@ async def test_vehicles_over_udp_find_what_swims_about_and_every_waypoint_was_ch
             return target.state in ("uncertain", "accurate") and target.ranges > 30 and target.rejected > 0
 
         await until(lambda: _ready(service), "the vehicles are ready")
-        await service.act(mission.id, "start", actor="Ana")
+        await service.act(mission.id, Action.START, actor="Ana")
         # How well and how soon it is known is a matter of the filters' own tests: a busy machine is late by minutes.
         await until(known, "the target is known")
-        await service.act(mission.id, "finish", actor="Ana")
+        await service.act(mission.id, Action.FINISH, actor="Ana")
         assert await until_state(service, mission.id, MissionState.FINISHED)
         (seen,) = await service.targets(mission.id)
         assert "were expected" in seen.last_refusal

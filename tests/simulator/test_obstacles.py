@@ -11,7 +11,7 @@ WORLDS = [car_park(scenario, seed) for scenario in SCENARIOS for seed in (0, 3)]
 
 
 @pytest.mark.parametrize("world", WORLDS, ids=lambda world: world.name)
-def test_a_robot_gets_from_the_entry_to_the_goal(world):
+def test_a_robot_gets_from_the_entry_to_the_goal(world: ObstacleWorld) -> None:
     assert (world.clearance_m(np.array([world.entry_m, world.goal_m])) > 2.0).all()
     north, east = np.indices(world.solid.shape) + 0.5
     clear = world.clearance_m(np.column_stack([east.ravel(), north.ravel()])).reshape(world.solid.shape) >= 1.0
@@ -21,13 +21,13 @@ def test_a_robot_gets_from_the_entry_to_the_goal(world):
 
 
 @pytest.mark.parametrize("world", WORLDS, ids=lambda world: world.name)
-def test_some_obstacles_are_known_beforehand_and_most_of_the_others_are_not(world):
+def test_some_obstacles_are_known_beforehand_and_most_of_the_others_are_not(world: ObstacleWorld) -> None:
     assert world.known.any()
     assert not (world.known & ~world.solid).any()
     assert (world.solid & ~world.known).sum() > 200
 
 
-def test_the_third_car_park_traps_who_goes_straight_for_the_goal():
+def test_the_third_car_park_traps_who_goes_straight_for_the_goal() -> None:
     for seed in range(3):
         world = car_park(3, seed)
         along = np.linspace(0.0, 1.0, 1000)[:, None]
@@ -41,14 +41,14 @@ def test_the_third_car_park_traps_who_goes_straight_for_the_goal():
         assert hit.max() <= corner + 3
 
 
-def test_the_same_seed_draws_the_same_and_another_another():
+def test_the_same_seed_draws_the_same_and_another_another() -> None:
     assert np.array_equal(car_park(2, 4).solid, car_park(2, 4).solid)
     assert not np.array_equal(car_park(2, 4).solid, car_park(2, 5).solid)
     with pytest.raises(ValueError, match=r"scenario is 4; it must be one of 1, 2, 3"):
         car_park(4)
 
 
-def test_clearance_is_the_distance_to_the_closest_edge():
+def test_clearance_is_the_distance_to_the_closest_edge() -> None:
     solid = np.zeros((10, 10), dtype=bool)
     solid[5, 5] = True
     corner = np.array([0.5, 0.5])

@@ -1,27 +1,32 @@
 import gzip
 import os
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from affine import Affine
 
+from app.arrays import FloatArray
 from simulator import seafloors
 from simulator.terrain import TerrainError
 from simulator.terrain_files import load_terrain, save_npz
+from tests.support.paths import TERRAINS
 
 pytestmark = pytest.mark.filterwarnings("ignore:Use `@` matmul:PendingDeprecationWarning")
 
 FLOOR = seafloors.generate("slope", 4, width_m=40, height_m=30, cell_m=2.0, origin=(41.18, -8.7))
 
 
-def write_esri(path, z, cell, nodata=-9999.0):
+def write_esri(path: Path, z: FloatArray, cell: float, nodata: float = -9999.0) -> None:
     rows = np.where(np.isnan(z), nodata, z)[::-1]
     header = f"ncols {z.shape[1]}\nnrows {z.shape[0]}\nxllcorner 0\nyllcorner 0\ncellsize {cell}\n"
     body = "\n".join(" ".join(f"{value:.6f}" for value in row) for row in rows)
     path.write_text(f"{header}NODATA_value {nodata}\n{body}\n")
 
 
-def write_geotiff(path, z, transform, crs):
+def write_geotiff(path: Path, z: FloatArray, transform: Affine, crs: str) -> None:
     import rasterio
 
     with rasterio.open(
@@ -39,7 +44,7 @@ def write_geotiff(path, z, transform, crs):
         target.write(np.where(np.isnan(z), -1.0, z)[::-1], 1)
 
 
-def test_npz_comes_back_as_written(tmp_path):
+def test_npz_comes_back_as_written(tmp_path: Path) -> None:
     save_npz(FLOOR, tmp_path / "floor.npz")
     back = load_terrain(tmp_path / "floor.npz")
     np.testing.assert_allclose(back.z_m, FLOOR.z_m, rtol=1e-6)
@@ -47,7 +52,7 @@ def test_npz_comes_back_as_written(tmp_path):
 
 
 @pytest.mark.parametrize("packed", [False, True])
-def test_esri_ascii_is_turned_south_up(tmp_path, packed):
+def test_esri_ascii_is_turned_south_up(tmp_path: Path, packed: bool) -> None:
     z = FLOOR.z_m.copy()
     z[2, 3] = np.nan
     path = tmp_path / "floor.asc"
@@ -61,7 +66,7 @@ def test_esri_ascii_is_turned_south_up(tmp_path, packed):
     assert back.cell_m == 2.0
 
 
-def test_a_projected_geotiff_keeps_cells_and_place(tmp_path):
+def test_a_projected_geotiff_keeps_cells_and_place(tmp_path: Path) -> None:
     import pyproj
     from rasterio.transform import from_origin
 
@@ -76,7 +81,7 @@ def test_a_projected_geotiff_keeps_cells_and_place(tmp_path):
     assert back.origin_lon_deg == pytest.approx(-8.7, abs=1e-9)
 
 
-def test_a_geotiff_in_degrees_becomes_metres(tmp_path):
+def test_a_geotiff_in_degrees_becomes_metres(tmp_path: Path) -> None:
     from rasterio.transform import from_origin
 
     floor = seafloors.generate("smooth", 1, width_m=200, height_m=200, cell_m=2.0)
@@ -90,7 +95,7 @@ def test_a_geotiff_in_degrees_becomes_metres(tmp_path):
     np.testing.assert_allclose(back.depth_at(e, n), floor.depth_at(e, n), atol=0.15)
 
 
-def soundings():
+def soundings() -> tuple[FloatArray, FloatArray]:
     rng = np.random.default_rng(0)
     corners = np.array([[0, 0], [40, 0], [0, 30], [40, 30]], dtype=float)
     at = np.vstack([corners, rng.uniform(0, 1, (4000, 2)) * [40, 30]])
@@ -107,7 +112,9 @@ def soundings():
         ("s.xyz", "# a comment\n# east north depth\n", "\t", 500.0),
     ],
 )
-def test_scattered_soundings_are_triangulated(tmp_path, name, header, separator, shift):
+def test_scattered_soundings_are_triangulated(
+    tmp_path: Path, name: str, header: str, separator: str, shift: float
+) -> None:
     at, depth = soundings()
     number = "7;" if header.startswith("id") else ""
     lines = [
@@ -123,7 +130,7 @@ def test_scattered_soundings_are_triangulated(tmp_path, name, header, separator,
     np.testing.assert_allclose(back.depth_at(e, n), FLOOR.depth_at(e, n), atol=0.2)
 
 
-def test_soundings_in_degrees_get_a_place(tmp_path):
+def test_soundings_in_degrees_get_a_place(tmp_path: Path) -> None:
     at, depth = soundings()
     lat, lon = np.transpose([FLOOR.frame.to_geodetic(e, n) for e, n in at])
     rows = "\n".join(f"{a:.9f},{b:.9f},{d:.4f}" for a, b, d in zip(lat, lon, depth, strict=True))
@@ -135,29 +142,29 @@ def test_soundings_in_degrees_get_a_place(tmp_path):
     assert back.depth_at(20, 15) == pytest.approx(float(FLOOR.depth_at(20, 15)), abs=0.1)
 
 
-def test_the_default_cell_is_finer_than_the_soundings(tmp_path):
+def test_the_default_cell_is_finer_than_the_soundings(tmp_path: Path) -> None:
     e, n = np.meshgrid(np.arange(0, 100, 6.0), np.arange(0, 100, 6.0))
     rows = "\n".join(f"{a} {b} {5 + a / 50}" for a, b in zip(e.ravel(), n.ravel(), strict=True))
     (tmp_path / "s.xyz").write_text(rows)
     assert load_terrain(tmp_path / "s.xyz").cell_m == 2.0
 
 
-def test_heights_can_be_turned_into_depths(tmp_path):
+def test_heights_can_be_turned_into_depths(tmp_path: Path) -> None:
     save_npz(FLOOR, tmp_path / "floor.npz")
     back = load_terrain(tmp_path / "floor.npz", vertical="up")
     np.testing.assert_allclose(back.z_m, -FLOOR.z_m, rtol=1e-6)
 
 
 class Evil:
-    def __reduce__(self):
+    def __reduce__(self) -> tuple[Callable[..., Any], tuple[str]]:
         return (os.system, ("touch owned",))
 
 
-def pickled(path):
+def pickled(path: Path) -> None:
     np.savez(path, z=np.array([Evil()], dtype=object), cell_m=1.0)
 
 
-BAD_FILES = {
+BAD_FILES: dict[str, tuple[Any, str]] = {
     "not a zip.npz": (b"hello", "numpy.savez_compressed"),
     "no z.npz": (lambda p: np.savez(p, cell_m=1.0), "'z' is missing"),
     "no cell.npz": (lambda p: np.savez(p, z=np.ones((3, 3))), "'cell_m' is missing"),
@@ -190,7 +197,7 @@ BAD_FILES = {
 
 
 @pytest.mark.parametrize("name", BAD_FILES)
-def test_malformed_files_say_what_would_be_right(tmp_path, monkeypatch, name):
+def test_malformed_files_say_what_would_be_right(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str) -> None:
     monkeypatch.chdir(tmp_path)
     content, message = BAD_FILES[name]
     path = tmp_path / name
@@ -204,12 +211,12 @@ def test_malformed_files_say_what_would_be_right(tmp_path, monkeypatch, name):
     assert not Path("owned").exists()
 
 
-def test_a_missing_file_is_named(tmp_path):
+def test_a_missing_file_is_named(tmp_path: Path) -> None:
     with pytest.raises(TerrainError, match=r"nowhere\.npz: no such file"):
         load_terrain(tmp_path / "nowhere.npz")
 
 
-def test_a_truncated_archive_is_refused(tmp_path):
+def test_a_truncated_archive_is_refused(tmp_path: Path) -> None:
     save_npz(FLOOR, tmp_path / "floor.npz")
     whole = (tmp_path / "floor.npz").read_bytes()
     for cut in (10, len(whole) // 2, len(whole) - 5):
@@ -218,15 +225,13 @@ def test_a_truncated_archive_is_refused(tmp_path):
             load_terrain(tmp_path / "cut.npz")
 
 
-def real_terrains():
-    default = Path(__file__).resolve().parents[3] / "shared" / "terrains"
-    folder = Path(os.environ.get("BATHYFLEET_TERRAINS", default))
-    return sorted(p for p in folder.glob("*") if p.name.endswith((".npz", ".csv.gz")) and "large" not in p.name)
+def real_terrains() -> list[Path]:
+    return sorted(p for p in TERRAINS.glob("*") if p.name.endswith((".npz", ".csv.gz")) and "large" not in p.name)
 
 
 @pytest.mark.terrains
 @pytest.mark.skipif(not real_terrains(), reason="no real terrains beside the project")
-def test_every_real_terrain_is_read():
+def test_every_real_terrain_is_read() -> None:
     for path in real_terrains():
         terrain = load_terrain(path)
         assert terrain.min_depth_m > 0.0, path

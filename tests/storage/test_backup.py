@@ -14,13 +14,12 @@ from pathlib import Path
 import pytest
 from sqlalchemy import func, select
 
-from app.storage import backup as module
 from app.storage.backup import BackupError, back_up, contents_of, restore_to
 from app.storage.database import Database
 from app.storage.models import Base, MissionRow, SoundingRow
 from app.storage.retention import ended_before, give_space_back, remove
-from tests.databases import Databases
-from tests.storage.rows import mission, one_of_each, sounding
+from tests.support.databases import Databases
+from tests.support.rows import mission, one_of_each, sounding
 
 WRITER = """
 import sqlite3, sys
@@ -169,7 +168,7 @@ async def test_postgresql_is_copied_by_its_own_programs(
     with pytest.raises(BackupError, match="pg_restore"):
         contents_of(half)
 
-    monkeypatch.setattr(module.shutil, "which", lambda name: None)
+    monkeypatch.setattr(shutil, "which", lambda name: None)
     with pytest.raises(BackupError, match="pg_dump is not installed") as refused:
         back_up(url, tmp_path / "again.dump")
     assert "docker compose exec database pg_dump" in refused.value.remedy

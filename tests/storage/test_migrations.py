@@ -14,7 +14,7 @@ from app.storage import migrate
 from app.storage.database import Database, make_engine
 from app.storage.models import Base, MissionRow
 from app.storage.prepare import prepare_database
-from tests.storage.rows import one_of_each
+from tests.support.rows import one_of_each
 
 EARLIER = sorted(path.name.partition("_")[0] for path in Path(migrate.MIGRATIONS, "versions").glob("0*.py"))[:-1]
 
@@ -28,7 +28,7 @@ def _tables(connection: Connection) -> set[str]:
     return set(inspect(connection).get_table_names())
 
 
-async def _on(url: str, question):  # type: ignore[no-untyped-def]
+async def _on(url: str, question: Any) -> Any:
     engine = make_engine(url)
     try:
         async with engine.connect() as connection:
@@ -74,7 +74,7 @@ async def test_up_with_data_down_to_nothing_and_up_again(empty_url: str) -> None
 def _kept(connection: Connection, columns: dict[str, list[str]]) -> dict[str, list[Any]]:
     """What stands in these columns, by table."""
     return {
-        table: [tuple(row) for row in connection.execute(select(*map(column, names)).select_from(text(table)))]
+        table: list(map(tuple, connection.execute(select(*map(column, names)).select_from(text(table)))))
         for table, names in columns.items()
     }
 

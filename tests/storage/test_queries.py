@@ -12,7 +12,7 @@ from app.storage import telemetry as telemetry_queries
 from app.storage.bulk import read_in_pieces
 from app.storage.database import Database
 from app.storage.models import EventRow, ImportRow, MissionRow, ReferenceRow
-from tests.storage.rows import TIME, mission, one_of_each, position, sounding, step, vehicle, waypoint
+from tests.support.rows import TIME, mission, one_of_each, position, sounding, step, vehicle, waypoint
 
 
 async def _two_missions(database: Database) -> None:

@@ -242,7 +242,7 @@ class VehicleRefusedError(Exception):
 class FleetLink(Protocol):
     """One way of reaching vehicles. Names of vehicles are unique within a link.
 
-    Contract, tested for every implementation by ``tests/missions/test_fleet_links.py``:
+    Contract, tested for every implementation by ``tests/missions/fleet/test_interface.py``:
 
     * ``order`` replaces the vehicle's current waypoint, returns without waiting for the vehicle, and is followed by
       ``WaypointReport`` events (sent, acknowledged, reached) or by one with status ``refused`` and a reason.

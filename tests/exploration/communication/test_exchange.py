@@ -1,5 +1,8 @@
 """Vehicles and station together, over links that lose messages."""
 
+from collections.abc import Collection
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -18,7 +21,7 @@ STEP = 0.05
 class Fleet:
     """A small team over 60 landmarks; ``central`` is what one would know if everything were transmitted."""
 
-    def __init__(self, seed, vehicles=3, capacity=10, n=60):
+    def __init__(self, seed: int, vehicles: int = 3, capacity: int = 10, n: int = 60) -> None:
         self.rng = np.random.default_rng(seed)
         self.truth = np.column_stack([self.rng.uniform(-0.4, 0.4, (n, 2)), self.rng.uniform(0.5, 0.6, n)])
         self.xy = self.truth[:, :2]
@@ -29,13 +32,13 @@ class Fleet:
         self.central = Landmarks.unknown(self.xy)
         self.step = 0
 
-    def new_vehicle(self, number):
+    def new_vehicle(self, number: Any) -> Any:
         return VehicleNode(number, self.xy, ESTIMATOR, WIRE, self.capacity)
 
-    def place(self):
+    def place(self) -> Any:
         return np.array([*self.rng.uniform(-0.3, 0.3, 2), 0.3])
 
-    def sense(self):
+    def sense(self) -> None:
         for vehicle in self.vehicles:
             position = self.positions[vehicle.number]
             index = np.flatnonzero(SENSOR.visible(position[None], self.truth)[0])
@@ -43,7 +46,7 @@ class Fleet:
             vehicle.sense(position, index, ranges)
             self.central = ESTIMATOR.update(self.central, vehicle.number, position, index, ranges)
 
-    def exchange(self, lost=lambda: False, silent=()):
+    def exchange(self, lost: Any = lambda: False, silent: Collection[int] = ()) -> Any:
         """One step of messages; returns the orders that arrived, by vehicle."""
         self.step += 1
         self.station.begin()
@@ -61,11 +64,11 @@ class Fleet:
                 arrived[vehicle.number] = vehicle.receive(message)
         return arrived
 
-    def move(self):
+    def move(self) -> None:
         self.positions = {k: self.place() for k in self.positions}
 
 
-def test_with_room_enough_everybody_knows_what_a_central_filter_would():
+def test_with_room_enough_everybody_knows_what_a_central_filter_would() -> None:
     fleet = Fleet(0, capacity=255)
     for _ in range(8):
         fleet.move()
@@ -85,7 +88,7 @@ def test_with_room_enough_everybody_knows_what_a_central_filter_would():
 
 @given(seed=st.integers(0, 1000), capacity=st.integers(1, 12), loss=st.floats(0.0, 0.6))
 @settings(max_examples=20, deadline=None)
-def test_nobody_ever_claims_to_know_more_than_was_measured(seed, capacity, loss):
+def test_nobody_ever_claims_to_know_more_than_was_measured(seed: int, capacity: int, loss: float) -> None:
     fleet = Fleet(seed, capacity=capacity)
     radio = np.random.default_rng(seed)
     known = fleet.station.known_accurate.copy()
@@ -106,7 +109,7 @@ def test_nobody_ever_claims_to_know_more_than_was_measured(seed, capacity, loss)
 
 @given(seed=st.integers(0, 1000), loss=st.floats(0.0, 0.7))
 @settings(max_examples=10, deadline=None)
-def test_lost_messages_delay_but_nothing_is_lost_for_good(seed, loss):
+def test_lost_messages_delay_but_nothing_is_lost_for_good(seed: int, loss: float) -> None:
     fleet = Fleet(seed, capacity=5)
     radio = np.random.default_rng(seed)
     for _ in range(10):
@@ -124,7 +127,7 @@ def test_lost_messages_delay_but_nothing_is_lost_for_good(seed, loss):
         assert len(WIRE.decode_report(vehicle.report(200, fleet.positions[vehicle.number])).entries) == 0
 
 
-def test_a_silent_vehicle_holds_up_nobody_and_tells_all_when_it_is_back():
+def test_a_silent_vehicle_holds_up_nobody_and_tells_all_when_it_is_back() -> None:
     fleet = Fleet(2)
     fleet.sense()
     fleet.exchange()
@@ -143,7 +146,7 @@ def test_a_silent_vehicle_holds_up_nobody_and_tells_all_when_it_is_back():
     assert fleet.station.known_accurate[untold].all()
 
 
-def test_a_vehicle_that_is_not_heard_once_is_presumed_to_have_followed_its_order():
+def test_a_vehicle_that_is_not_heard_once_is_presumed_to_have_followed_its_order() -> None:
     fleet = Fleet(2, vehicles=1)
     fleet.sense()
     fleet.exchange()
@@ -156,7 +159,7 @@ def test_a_vehicle_that_is_not_heard_once_is_presumed_to_have_followed_its_order
         fleet.station.order(0, goal + 1.0)
 
 
-def test_a_vehicle_joins_on_the_fly_and_learns_what_the_others_know():
+def test_a_vehicle_joins_on_the_fly_and_learns_what_the_others_know() -> None:
     fleet = Fleet(3, vehicles=2)
     for _ in range(10):
         fleet.move()
@@ -171,7 +174,7 @@ def test_a_vehicle_joins_on_the_fly_and_learns_what_the_others_know():
     assert fleet.vehicles[-1].accurate.sum() == fleet.station.known_accurate.sum() > 0
 
 
-def test_reports_that_come_late_or_twice_change_nothing():
+def test_reports_that_come_late_or_twice_change_nothing() -> None:
     fleet = Fleet(4, vehicles=1)
     fleet.sense()
     old = fleet.vehicles[0].report(1, fleet.positions[0])
@@ -190,7 +193,7 @@ def test_reports_that_come_late_or_twice_change_nothing():
     np.testing.assert_array_equal(fleet.station.sd_m, sd)
 
 
-def test_the_order_in_which_reports_arrive_does_not_matter():
+def test_the_order_in_which_reports_arrive_does_not_matter() -> None:
     first, second = Fleet(5), Fleet(5)
     second.vehicles.reverse()
     for fleet in (first, second):
@@ -202,7 +205,7 @@ def test_the_order_in_which_reports_arrive_does_not_matter():
     np.testing.assert_allclose(first.station.sd_m, second.station.sd_m, rtol=1e-12)
 
 
-def test_finished_landmarks_go_first_and_then_those_that_are_nearly_finished():
+def test_finished_landmarks_go_first_and_then_those_that_are_nearly_finished() -> None:
     fleet = Fleet(6, vehicles=2, capacity=4)
     above = np.argmin(np.hypot(*(fleet.xy - [0.1, 0.0]).T))
     fleet.positions = {0: np.array([0.0, 0.0, 0.3]), 1: np.array([*fleet.xy[above], 0.3])}
@@ -224,14 +227,14 @@ def test_finished_landmarks_go_first_and_then_those_that_are_nearly_finished():
     assert sent.index[2:].tolist() == np.flatnonzero(open_)[best_known[:2]].tolist()
 
 
-def test_a_vehicle_out_of_reach_is_no_neighbour():
+def test_a_vehicle_out_of_reach_is_no_neighbour() -> None:
     fleet = Fleet(6, vehicles=2)
     fleet.positions = {0: np.array([-0.3, 0.0, 0.3]), 1: np.array([0.95, 0.95, 0.3])}
     fleet.sense()
     assert len(fleet.exchange()[0].neighbours) == 0
 
 
-def test_what_must_have_been_measured_is_presumed_until_told_or_too_long_ago():
+def test_what_must_have_been_measured_is_presumed_until_told_or_too_long_ago() -> None:
     fleet = Fleet(7, vehicles=1, capacity=2)
     for _ in range(30):
         fleet.sense()
@@ -244,7 +247,7 @@ def test_what_must_have_been_measured_is_presumed_until_told_or_too_long_ago():
     np.testing.assert_array_equal(fleet.station.accurate, told)
 
 
-def test_an_order_for_another_vehicle_is_refused():
+def test_an_order_for_another_vehicle_is_refused() -> None:
     fleet = Fleet(8, vehicles=2)
     fleet.sense()
     fleet.exchange()

@@ -1,3 +1,6 @@
+from typing import Any
+
+import imcpy
 import numpy as np
 import pytest
 from hypothesis import given
@@ -12,7 +15,7 @@ coordinates = st.tuples(st.floats(-1.0, 1.0), st.floats(-0.75, 0.75), st.floats(
 
 
 @st.composite
-def entries(draw, at_most=20):
+def entries(draw: Any, at_most: int = 20) -> Any:
     k = draw(st.integers(0, at_most))
     numbers = st.lists(st.integers(0, 65535), min_size=k, max_size=k)
     return Entries(
@@ -27,15 +30,15 @@ reports = st.builds(Report, st.integers(0, 65535), st.integers(0, 255), coordina
 
 
 @st.composite
-def orders(draw):
+def orders(draw: Any) -> Any:
     m = draw(st.integers(0, 15))
     near = draw(st.lists(coordinates, min_size=m, max_size=m))
     numbers = np.array(draw(st.lists(st.integers(0, 255), min_size=m, max_size=m)), dtype=np.int64)
-    head = draw(st.tuples(st.integers(0, 65535), st.integers(0, 255), coordinates, st.booleans()))
-    return Order(*head, numbers, np.array(near).reshape(m, 3), draw(entries()))
+    step, count, place, last = draw(st.tuples(st.integers(0, 65535), st.integers(0, 255), coordinates, st.booleans()))
+    return Order(step, count, place, last, numbers, np.array(near).reshape(m, 3), draw(entries()))
 
 
-def assert_same(sent, got):
+def assert_same(sent: Any, got: Any) -> None:
     np.testing.assert_array_equal(got.index, sent.index)
     np.testing.assert_array_equal(got.accurate, sent.accurate)
     np.testing.assert_allclose(got.depth_m, sent.depth_m, atol=0.501 * WIRE.depth_resolution_m)
@@ -43,24 +46,24 @@ def assert_same(sent, got):
     assert (got.sd_m <= sent.sd_m * 2 ** (1 / 16) * (1 + 1e-9)).all()
 
 
-def ten_entries():
+def ten_entries() -> Any:
     k = np.arange(10)
     return Entries(k, np.full(10, 0.5), np.full(10, 0.03), k % 2 == 0)
 
 
-def test_header_and_ten_entries_take_64_bytes():
+def test_header_and_ten_entries_take_64_bytes() -> None:
     assert len(WIRE.encode_report(Report(1, 2, np.zeros(3), True, ten_entries()))) == 64
     order = Order(1, 2, np.zeros(3), True, np.array([3]), np.zeros((1, 3)), ten_entries())
     assert len(WIRE.encode_order(order)) == 64 + 10
 
 
-def test_the_cube_is_resolved_far_below_the_accuracy_threshold():
+def test_the_cube_is_resolved_far_below_the_accuracy_threshold() -> None:
     assert WIRE.depth_resolution_m < 4e-5
     assert (WIRE.position_resolution_m < 2e-7).all()
 
 
 @given(report=reports)
-def test_reports_come_out_as_they_went_in(report):
+def test_reports_come_out_as_they_went_in(report: Any) -> None:
     message = WIRE.encode_report(report)
     got = WIRE.decode_report(message)
     assert (got.step, got.vehicle, got.acknowledges) == (report.step, report.vehicle, report.acknowledges)
@@ -70,7 +73,7 @@ def test_reports_come_out_as_they_went_in(report):
 
 
 @given(order=orders())
-def test_orders_come_out_as_they_went_in(order):
+def test_orders_come_out_as_they_went_in(order: Any) -> None:
     message = WIRE.encode_order(order)
     got = WIRE.decode_order(message)
     assert (got.step, got.vehicle, got.acknowledges) == (order.step, order.vehicle, order.acknowledges)
@@ -82,7 +85,7 @@ def test_orders_come_out_as_they_went_in(order):
 
 
 @given(message=st.binary(max_size=120))
-def test_garbage_is_refused_or_read_but_never_crashes(message):
+def test_garbage_is_refused_or_read_but_never_crashes(message: imcpy.Message) -> None:
     for decode in (WIRE.decode_report, WIRE.decode_order):
         try:
             read = decode(message)
@@ -91,7 +94,7 @@ def test_garbage_is_refused_or_read_but_never_crashes(message):
         assert 14 + 5 * len(read.entries.index) <= len(message), "nothing is read that was not sent"
 
 
-def test_messages_cut_short_or_of_the_other_direction_are_refused():
+def test_messages_cut_short_or_of_the_other_direction_are_refused() -> None:
     message = WIRE.encode_report(Report(1, 2, np.zeros(3), True, ten_entries()))
     with pytest.raises(MessageError, match="63 bytes where the header announces 64"):
         WIRE.decode_report(message[:-1])
@@ -101,7 +104,7 @@ def test_messages_cut_short_or_of_the_other_direction_are_refused():
         WIRE.decode_order(message)
 
 
-def test_what_lies_out_of_range_saturates():
+def test_what_lies_out_of_range_saturates() -> None:
     far = Entries(np.array([1]), np.array([7.0]), np.array([1e-6]), np.array([True]))
     got = WIRE.decode_report(WIRE.encode_report(Report(1, 2, np.array([9.0, -9.0, 0.0]), False, far)))
     np.testing.assert_allclose(got.position[:2], [1.2, -0.9])
@@ -109,7 +112,7 @@ def test_what_lies_out_of_range_saturates():
     assert got.entries.sd_m[0] == pytest.approx(0.005)
 
 
-def test_a_deviation_too_large_to_send_arrives_as_infinite():
+def test_a_deviation_too_large_to_send_arrives_as_infinite() -> None:
     sd = np.array([WIRE.largest_sd_m, 1.01 * WIRE.largest_sd_m, np.inf])
     sent = Entries(np.arange(3), np.zeros(3), sd, np.zeros(3, dtype=np.bool_))
     got = WIRE.decode_report(WIRE.encode_report(Report(1, 2, np.zeros(3), False, sent)))
@@ -119,7 +122,7 @@ def test_a_deviation_too_large_to_send_arrives_as_infinite():
 @pytest.mark.parametrize(
     ("vehicle", "index", "count", "named"), [(256, 0, 1, "vehicle"), (0, 65536, 1, "index"), (0, 0, 256, "256 entries")]
 )
-def test_what_does_not_fit_is_named(vehicle, index, count, named):
+def test_what_does_not_fit_is_named(vehicle: Any, index: Any, count: int, named: Any) -> None:
     sent = Entries(np.full(count, index), np.zeros(count), np.ones(count), np.zeros(count, dtype=np.bool_))
     with pytest.raises(MessageError, match=named):
         WIRE.encode_report(Report(1, vehicle, np.zeros(3), False, sent))

@@ -1,3 +1,5 @@
+from typing import Any
+
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -8,7 +10,7 @@ from app.exploration.communication.selection import fill
 
 @given(seed=st.integers(0, 10_000))
 @settings(max_examples=50, deadline=None)
-def test_the_reachable_exploration_area_is_as_the_paper_words_it(seed):
+def test_the_reachable_exploration_area_is_as_the_paper_words_it(seed: int) -> None:
     rng = np.random.default_rng(seed)
     positions, xy = rng.uniform(-1, 1, (4, 3)), rng.uniform(-1, 1, (15, 2))
     visible_by = rng.random((4, 15)) < 0.3
@@ -22,14 +24,14 @@ def test_the_reachable_exploration_area_is_as_the_paper_words_it(seed):
 
 @given(seed=st.integers(0, 10_000), capacity=st.integers(0, 12))
 @settings(max_examples=50, deadline=None)
-def test_a_message_holds_the_most_wanted_that_are_no_near_duplicates(seed, capacity):
+def test_a_message_holds_the_most_wanted_that_are_no_near_duplicates(seed: int, capacity: int) -> None:
     rng = np.random.default_rng(seed)
     xy = rng.uniform(0, 1, (20, 2))
     order = rng.permutation(20)[:15]
     chosen = fill(order, xy, capacity, 0.2).tolist()
     assert len(chosen) == min(capacity, 15)
     assert len(set(chosen)) == len(chosen)
-    distinct = []
+    distinct: list[Any] = []
     for m in order:
         if all(np.hypot(*(xy[m] - xy[c])) >= 0.2 for c in distinct):
             distinct.append(m)

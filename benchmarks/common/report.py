@@ -1,0 +1,125 @@
+"""What every benchmark has in common: its options, the facts of a run, and pages of results."""
+
+import argparse
+import os
+import re
+import shlex
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from app.evaluation.runs.facts import made
+from tests.support.paths import PROJECT
+
+
+@dataclass(frozen=True)
+class Page:
+    """A page of results: its name below ``docs/results`` and what stands above its sections."""
+
+    name: str
+    head: str = ""
+
+    @property
+    def path(self) -> Path:
+        """Where it is written unless something else is asked for."""
+        return PROJECT / "docs" / "results" / self.name
+
+
+LOAD = Page(
+    "load.md",
+    """# Load and endurance: what was measured
+
+Every section is written by the command that stands in it (`--write`). Service, vehicles and clients share the cores of
+one machine, on which other programs may run beside: processor time and ratios say more than seconds by the clock. A
+machine that was busy is told by `load_of_the_machine`, the mean number of programs that wanted a core: where that is
+well above the number of cores, paces and times say nothing, and `service_cores` says what the service got.
+""",
+)
+IMC = Page(
+    "imc.md",
+    """# The IMC bridge: what was measured
+
+Every section is written by the command that stands in it (`--write`). Vehicles are the simulator's fake DUNE nodes on
+real UDP sockets of the same machine, which take part of its processor themselves.
+""",
+)
+PLANNING = Page(
+    "planning.md",
+    """# Planners: what was measured
+
+Every section is written by the command that stands in it (`--write`).
+""",
+)
+
+
+def make_parser(doc: str | None, page: Page, *, seeds: Sequence[int] | None = None) -> argparse.ArgumentParser:
+    """Options that all have: ``--write``, and ``--seeds`` for what is drawn at random."""
+    parser = argparse.ArgumentParser(description=doc, formatter_class=argparse.RawDescriptionHelpFormatter)
+    shown = f"docs/results/{page.name}"
+    parser.add_argument("--write", nargs="?", type=Path, const=page.path, metavar="PAGE", help=f"write {shown}")
+    if seeds is not None:
+        parser.add_argument("--seeds", nargs="+", type=int, default=list(seeds), help="one run for each")
+    return parser
+
+
+def command_line(hidden: Mapping[Path | None, str] | None = None) -> str:
+    """How this program was called; paths of this machine by the names given."""
+    spec = sys.modules["__main__"].__spec__
+    module = spec.name if spec is not None else Path(sys.argv[0]).stem
+    shown = {str(path): name for path, name in (hidden or {}).items() if path is not None}
+    words = [shown.get(word, shlex.quote(word)) for word in sys.argv[1:]]
+    return " ".join(["python -m", module, *words])
+
+
+def facts(
+    *,
+    seeds: Sequence[int] | None = None,
+    hidden: Mapping[Path | None, str] | None = None,
+    command: str | None = None,
+    processes: int = 1,
+) -> list[str]:
+    """List what a run was: its command, date, machine, versions and seeds."""
+    found = made(command or command_line(hidden), processes)
+    if seeds:
+        found["seeds"] = ", ".join(map(str, seeds))
+    return [f"- {name}: {value}" for name, value in found.items()]
+
+
+def write_section(
+    file: Path | None,
+    page: Page,
+    title: str,
+    figures: dict[str, Any],
+    *,
+    seeds: Sequence[int] | None = None,
+    hidden: Mapping[Path | None, str] | None = None,
+) -> None:
+    """Write the section ``title`` of a page, in the place of an older one; nothing where no file is asked for."""
+    if file is None:
+        return
+    if page is LOAD:
+        figures = figures | {"load_of_the_machine": round(os.getloadavg()[1], 1)}
+    lines = [f"## {title}", "", *facts(seeds=seeds, hidden=hidden)]
+    lines += ["", "| | |", "| --- | --- |", *(f"| {name} | {_shown(value)} |" for name, value in figures.items()), ""]
+    text = file.read_text(encoding="utf-8") if file.exists() else page.head
+    beginning, *sections = re.split(r"(?m)^(?=## )", text)
+    kept = [section for section in sections if not section.startswith(f"## {title}\n")]
+    place = next((i for i, section in enumerate(sections) if section.startswith(f"## {title}\n")), len(kept))
+    kept.insert(place, "\n".join(lines))
+    write_page(file, "\n\n".join(part.strip() for part in (beginning, *kept)))
+
+
+def write_page(file: Path, text: str) -> None:
+    """Write a whole page."""
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.write_text(text.rstrip() + "\n", encoding="utf-8")
+
+
+def _shown(value: Any) -> str:
+    if isinstance(value, dict):
+        return ", ".join(f"{name}: {_shown(item)}" for name, item in value.items()) or "none"
+    if isinstance(value, list):
+        return "; ".join(map(_shown, value)) or "none"
+    return str(value).replace("|", "/").replace("\n", " ")

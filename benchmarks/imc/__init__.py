@@ -1,0 +1,1 @@
+"""Vehicles, fleets and panels on the IMC side."""

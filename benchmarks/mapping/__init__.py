@@ -1,0 +1,1 @@
+"""Maps: how true, how fast, and what is claimed of them."""

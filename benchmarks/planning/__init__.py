@@ -1,0 +1,1 @@
+"""Planners: their time, and what surveys of theirs are worth."""

@@ -1,0 +1,174 @@
+"""The dynamic case in closed loop, small."""
+
+import json
+from dataclasses import asdict, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from app.estimation import Fading, Landmarks3D
+from app.evaluation.cli import evaluate_app
+from app.evaluation.track import consistency
+from app.evaluation.track.plain_ekf import PlainEkf
+from app.evaluation.track.presumed import Presumed
+from app.evaluation.track.run import run_track
+from app.evaluation.track.setups import TrackJob
+from app.evaluation.track.trace_greedy import foretold_trace
+from app.evaluation.track.world import TrackScenario, TrackWorld
+from app.exploration.planner.options import PlannerOptions
+from simulator.seafloors import generate
+
+FLOOR = generate("rugged", 1, width_m=50.0, height_m=50.0)
+OPTIONS = PlannerOptions(rollouts=5, candidates=8)
+SMALL = TrackScenario(FLOOR, landmarks=150, steps=12)
+FADING = TrackScenario(landmarks=60, steps=60, fading=Fading(drift=0.06))
+
+
+def figures(run: Any) -> Any:
+    return {k: v for k, v in asdict(run).items() if k not in ("wall_s", "plan_ms_median", "plan_ms_p99")}
+
+
+@pytest.mark.parametrize("planner", ["rollout", "cao", "lawnmower", "random"])
+def test_the_same_seed_gives_the_same_run(planner: Any) -> None:
+    first, second = (run_track(SMALL, planner, OPTIONS) for _ in range(2))
+    assert figures(first) == figures(second)
+    assert first.broken_constraints == 0
+
+
+def test_vehicles_keep_the_clearance_and_know_where_they_are_without_fading() -> None:
+    world = TrackWorld(SMALL)
+    for _ in range(10):
+        world.move(world.positions + np.array([0.02, 0.01, 0.04]))
+        floor = world._cube.depth_at(world.positions[:, :2])
+        assert (floor - world.positions[:, 2] >= SMALL.clearance - 1e-9).all()
+    assert world.localization_errors().max() == 0.0
+
+
+def test_nobody_is_told_where_an_unseen_landmark_is() -> None:
+    """Two worlds whose landmarks differ look the same before anything is seen."""
+    far = replace(SMALL, visibility=0.01)
+    one, other = TrackWorld(far), TrackWorld(far)
+    other.truth = np.random.default_rng(5).permutation(other.truth) * [1.0, -1.0, 1.0]
+    np.testing.assert_array_equal(one.belief.xy_m, other.belief.xy_m)
+    assert np.isinf(one.belief.sd_m).all()
+
+
+def test_presumed_places_keep_to_what_nobody_looked_at() -> None:
+    presumed = Presumed(np.array([[-1.0, -1.0, 0.0], [1.0, 1.0, 1.0]]), 0.4, flat=True)
+    everywhere = presumed.places(800, np.zeros((0, 3)))
+    assert abs(everywhere[:, 0].mean()) < 0.02
+    cells = len(presumed.middles)
+    for x in np.arange(-1.0, 0.01, 0.1):
+        for y in np.arange(-1.0, 1.01, 0.1):
+            presumed.look(np.array([[x, y, 0.3]]), np.full((1, cells), 0.5))
+    later = presumed.places(800, np.array([[-0.5, -0.5, 0.5]]))
+    assert np.mean(later[:, 0] > 0.0) > 0.7
+    assert presumed.places(0, np.zeros((0, 3))).shape == (0, 3)
+
+
+def test_where_several_vehicles_looked_in_vain_less_is_presumed_than_where_one_did() -> None:
+    presumed = Presumed(np.array([[-1.0, -1.0, 0.0], [1.0, 1.0, 1.0]]), 0.4, flat=True)
+    floor = np.full((1, len(presumed.middles)), 0.5)
+    for east in np.linspace(-1.0, 1.0, 41):
+        for north in np.linspace(-1.0, 1.0, 11):
+            for _ in range(4 if east < 0.0 else 1):
+                presumed.look(np.array([[east, north, 0.3]]), floor)
+    assert (presumed.looks > 0).all()
+    places = presumed.places(100, np.zeros((0, 3)))
+    assert np.mean(places[:, 0] > 0.0) > 0.95
+
+
+def test_a_vehicle_surfaces_when_needed_and_localization_becomes_good_again() -> None:
+    run = run_track(FADING, "cao", OPTIONS)
+    assert run.resurfacings >= 1
+    assert run.needless_resurfacings == 0
+    assert run.localization_ok_pct is not None
+    assert run.localization_ok_pct > 80.0
+
+
+def test_ranges_and_own_fixes_serve_where_fixes_are_not_shared() -> None:
+    run = run_track(replace(FADING, shared_fix=False), "cao", OPTIONS)
+    assert run.resurfacings >= 2
+
+
+@pytest.mark.parametrize(("noise", "fixed"), [(0.1, 0.0), (0.0, 0.1)])
+def test_the_foretold_trace_is_that_of_a_slow_reference(noise: Any, fixed: Any) -> None:
+    rng = np.random.default_rng(0)
+    points, team = rng.uniform(-1, 1, (4, 3)), rng.uniform(-1, 1, (1, 3, 3))
+    covariances = np.array([a @ a.T + 0.1 * np.eye(3) for a in rng.standard_normal((4, 3, 3))])
+    expected = 0.0
+    for point, P in zip(points, covariances, strict=True):
+        for place in team[0]:
+            u = point - place
+            r = np.linalg.norm(u)
+            H = u[None] / r
+            S = H @ P @ H.T + noise**2 * (r**2 + H @ P @ H.T) + fixed**2
+            P = P - P @ H.T @ H @ P / S
+        expected += np.trace(P)
+    assert foretold_trace(team, points, covariances, np.full(4, np.inf), noise, fixed)[0] == pytest.approx(expected)
+
+
+def test_a_filter_that_takes_its_noise_to_be_fixed_believes_ranges_from_afar_too_much() -> None:
+    box = np.array([[-1.0, -1.0, 0.0], [1.0, 1.0, 1.0]])
+    far = (0, np.array([-1.0, 0.0, -1.0]), np.array([0]), np.array([1.8]))
+    knows, believes = (PlainEkf(0.1, 0.05, box, fixed).update(Landmarks3D.unknown(1), *far) for fixed in (None, 0.05))
+    assert np.trace(believes.covariance_m2[0]) < np.trace(knows.covariance_m2[0])
+
+
+def test_runs_that_were_kept_before_a_scenario_learned_more_are_found_again() -> None:
+    assert "fixed_noise" not in TrackJob("figure1", "cao", SMALL, OPTIONS).key
+    assert "fixed_noise" in TrackJob("figure1", "cao", replace(SMALL, fixed_noise=0.1), OPTIONS).key
+
+
+def call(*arguments: Any) -> Any:
+    return CliRunner().invoke(evaluate_app, ["track", *arguments])
+
+
+def test_the_command_prints_one_object_with_the_contracts_figures() -> None:
+    result = call("--landmarks", "40", "--steps", "5", "--planner", "random", "--json")
+    run = json.loads(result.stdout)
+    contract = {
+        "remaining_pct", "target_tracked_pct", "localization_ok_pct", "resurfacings", "needless_resurfacings",
+        "sum_of_error",
+    }  # fmt: skip
+    assert contract <= run.keys()
+    assert run["landmarks"] == 40
+
+
+def test_a_report_is_made_taken_up_again_and_counts_what_is_missing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # A hundred runs of every filter take most of a report's time; what they find is tested with the filters.
+    monkeypatch.setattr(consistency, "consistency", partial(consistency.consistency, runs=4))
+    arguments = ("--write", str(tmp_path), "--only", "ngcuv12-own-fix", "--steps", "12", "--seeds")
+    assert call(*arguments, "0:1").exit_code == 0
+    lines = (tmp_path / "tracking.jsonl").read_text().splitlines()
+    assert len(lines) == 1
+    assert "incomplete" not in (tmp_path / "tracking.md").read_text()
+    assert (tmp_path / "tracking.md").read_text().count("| 4 |") == 5
+    assert call(*arguments, "0:2", "--no-run").exit_code == 0
+    assert "1 of 2 runs are still missing" in (tmp_path / "tracking.md").read_text()
+    assert (tmp_path / "tracking.jsonl").read_text().splitlines() == lines
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("--setup", "auro15"), "none of med13, ngcuv12"),
+        (("--own-fix",), "vehicles know where they are"),
+        (("--no-run",), "goes with --write only"),
+        (("--planner", "osarses"), "choose from"),
+        (("--write", "x", "--only", "figure7"), "choose from"),
+    ],
+)
+def test_what_cannot_be_is_refused_with_what_would_be_right(
+    arguments: Any, said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    result = call(*arguments)
+    assert result.exit_code == 2
+    assert said in " ".join(result.output.split())

@@ -1,0 +1,249 @@
+"""Whole-mission rollouts, against slow references and by properties."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+from app.exploration.core.bottom import Bottom
+from app.exploration.core.bottom_contacts import FeltBottom
+from app.exploration.core.constraints import Constraints
+from app.exploration.core.problem import Belief
+from app.exploration.rollout.flight import (
+    Flown,
+    Plan,
+    Rules,
+    Task,
+    begin,
+    fly_plan,
+    fly_step,
+    look,
+    make_work,
+    new_checkpoints,
+)
+from app.exploration.rollout.floor import ENVELOPE_SLOPE, estimate_floor, sample
+from app.exploration.rollout.free_space import clear_ways, free_space, settle_waypoint
+from app.exploration.rollout.initial_plans import Backbone, backbones, with_team
+from app.exploration.rollout.local_search import DRAWS, improve
+from tests.support.situations import SQUARE, make_situation
+
+CUBE = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+RULES = Rules(0.05, 0.3, -1.0, 1.0, 0.4, 0.1, cut_corners=True)
+LINK = 0.29
+ROOM = 12
+CLEARANCE = 0.05
+
+
+def hilly(seed: int, n: int = 250) -> Any:
+    """Landmarks all over the cube, on gentle hills; a third of them was seen."""
+    rng = np.random.default_rng(seed)
+    xy = rng.uniform(-1.0, 1.0, (n, 2))
+    depth = 0.6 + 0.2 * np.sin(2.0 * xy[:, 0] + seed) * np.cos(1.5 * xy[:, 1])
+    seen = rng.random(n) < 0.33
+    belief = Belief(
+        xy, np.where(seen, depth, np.nan), np.where(seen, 0.03, np.inf), np.zeros(n, dtype=bool), np.ones(n), 0.2
+    )
+    return belief, depth
+
+
+def floor_of(belief: Belief, felt: Any = None) -> Any:
+    bottom = Bottom.from_landmarks(belief.xy_m, belief.depth_m)
+    return estimate_floor(belief, bottom, np.zeros((0, 3)) if felt is None else felt, CUBE, 0.4, CLEARANCE, 0.6)
+
+
+def make_case(seed: int, vehicles: int = 3, waypoints: int = 5) -> Any:
+    """A team in a row, a random plan that keeps its links, and the landmarks to be done."""
+    rng = np.random.default_rng(seed)
+    belief, depth = hilly(seed)
+    floor = floor_of(belief)
+    row = np.column_stack([np.zeros(vehicles), 0.25 * np.arange(vehicles)])
+    start = np.column_stack([row - 0.8, np.zeros(vehicles)])
+    for i in range(vehicles):
+        start[i, 2] = sample(floor.deepest_m, floor.west_m, floor.south_m, floor.cell_m, *start[i, :2]) - 0.05
+    plan = Plan(np.zeros((ROOM, vehicles, 2)), np.zeros(ROOM), np.arange(vehicles))
+    for k in range(waypoints):
+        angle = rng.uniform(0.0, 2.0 * np.pi)
+        turned = row @ np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+        plan.at_m[k] = np.clip(rng.uniform(-0.7, 0.7, 2) + turned, -1.0, 1.0)
+        plan.height_m[k] = rng.uniform(0.12, 0.25)
+    work, _ = make_work(np.column_stack([belief.xy_m, depth]), np.full(len(depth), 2500.0), CUBE, 0.15, 2.0, 250, 30.0)
+    return start, plan, waypoints, work, floor
+
+
+def flown(
+    start: Any,
+    plan: Any,
+    count: Any,
+    work: Any,
+    floor: Any,
+    checkpoints: Any = None,
+    origin: int = 0,
+    bound: Any = np.inf,
+    save: Any = None,
+) -> Any:
+    if checkpoints is None:
+        checkpoints = new_checkpoints(ROOM, len(start), len(work.need))
+        begin(checkpoints, start, work)
+    left = np.empty(len(work.need))
+    score = fly_plan(
+        checkpoints, origin, plan, count, Task(work, floor, RULES, 400.0), bound, left, save or checkpoints
+    )
+    return score, left, checkpoints
+
+
+def copied(plan: Plan) -> Any:
+    return Plan(plan.at_m.copy(), plan.height_m.copy(), plan.chain)
+
+
+@given(seed=st.integers(0, 1000), at=st.tuples(*[st.floats(-1.2, 1.2)] * 2, st.floats(-0.2, 0.9)))
+@settings(max_examples=40, deadline=None)
+def test_a_look_gives_what_eq_5_says_to_every_landmark_in_sight(seed: int, at: Any) -> None:
+    _, _, _, work, _ = make_case(seed)
+    need = work.need.copy()
+    done = look(at[0], at[1], at[2], work, RULES, need)
+    offset = work.xyz.T - np.array(at)
+    r2 = (offset**2).sum(axis=1)
+    gained = np.where(r2 < 0.4**2, offset[:, 2] ** 2 / (0.1**2 * r2**2), 0.0)
+    np.testing.assert_allclose(need, work.need - gained, rtol=1e-9)
+    assert done == ((work.need - gained) <= 0.0).sum()
+
+
+@given(seed=st.integers(0, 1000))
+@settings(max_examples=30, deadline=None)
+def test_flying_obeys_step_links_depths_and_the_estimated_floor(seed: int) -> None:
+    start, plan, count, _, floor = make_case(seed)
+    at, k, after = start, 0, np.empty_like(start)
+    for _ in range(200):
+        if k >= count:
+            break
+        k = fly_step(at, plan, k, count, floor, RULES, after)
+        assert (np.linalg.norm(after - at, axis=1) <= RULES.step_m + 1e-9).all()
+        assert (after[:, 2] >= RULES.min_depth_m).all()
+        assert (after[:, 2] <= RULES.max_depth_m).all()
+        for i in range(2):
+            assert np.linalg.norm(after[i] - after[i + 1]) <= RULES.com_range_m + 1e-6
+        for x, y, z in after:
+            assert z <= sample(floor.depth_m, floor.west_m, floor.south_m, floor.cell_m, x, y) - CLEARANCE + 1e-6
+        at = after.copy()
+    assert k == count, "the plan is flown to its end"
+
+
+@given(seed=st.integers(0, 1000), changed=st.integers(0, 4))
+@example(seed=458, changed=4)
+@example(seed=153, changed=1)
+@settings(max_examples=40, deadline=None)
+def test_a_changed_plan_flown_from_the_change_on_scores_as_if_flown_from_the_start(seed: int, changed: Any) -> None:
+    start, plan, count, work, floor = make_case(seed)
+    _, _, checkpoints = flown(start, plan, count, work, floor)
+    other = copied(plan)
+    other.at_m[changed] += np.random.default_rng(seed).uniform(-0.05, 0.05, 2)
+    scratch = new_checkpoints(ROOM, len(start), len(work.need))
+    resumed, left, _ = flown(start, other, count, work, floor, checkpoints, changed, save=scratch)
+    whole, left_whole, _ = flown(start, other, count, work, floor)
+    assert resumed == pytest.approx(whole, abs=1e-9)
+    np.testing.assert_allclose(left, left_whole, atol=1e-9)
+
+
+@given(seed=st.integers(0, 1000))
+@settings(max_examples=20, deadline=None)
+def test_a_flight_is_given_up_only_when_it_cannot_beat_the_bound(seed: int) -> None:
+    start, plan, count, work, floor = make_case(seed)
+    score, _, _ = flown(start, plan, count, work, floor)
+    assert flown(start, plan, count, work, floor, bound=score * 1.001)[0] == score
+    assert flown(start, plan, count, work, floor, bound=score * 0.999)[0] >= score * 0.999
+
+
+@given(seed=st.integers(0, 1000), zones=st.booleans())
+@settings(max_examples=15, deadline=None)
+def test_the_search_never_worsens_a_plan_and_reports_its_true_score(seed: int, zones: Any) -> None:
+    start, plan, count, work, floor = make_case(seed)
+    zone = np.array([[-0.2, -0.2], [0.2, -0.2], [0.2, 0.2], [-0.2, 0.2]])
+    free = free_space(Constraints(CUBE, (zone,) if zones else ()))
+    before, left, checkpoints = flown(start, plan, count, work, floor)
+    trial, scratch = copied(plan), new_checkpoints(ROOM, len(start), len(work.need))
+    draws = np.random.default_rng(seed).random((150, DRAWS))
+    best, tried = Flown(plan, checkpoints, left), Flown(trial, scratch, left.copy())
+    count, score = improve(best, count, before, tried, draws, Task(work, floor, RULES, 400.0), free, LINK)
+    assert score <= before
+    again, _, _ = flown(start, plan, count, work, floor)
+    # An appended waypoint is flown to from where the plan ended before, which may cost part of a step.
+    assert again == pytest.approx(score, abs=1.0)
+
+
+@given(seed=st.integers(0, 1000))
+@settings(max_examples=30, deadline=None)
+def test_ways_lead_round_zones_with_the_team_together(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    low = rng.uniform(-0.5, 0.1, 2)
+    high = low + rng.uniform(0.2, 0.4, 2)
+    zone = np.array([low, [high[0], low[1]], high, [low[0], high[1]]])
+    constraints = Constraints(CUBE, (zone,))
+    free = free_space(constraints)
+    start = np.array([[-0.9, -0.9], [-0.9, -0.7], [-0.9, -0.5]])
+    plan = Plan(np.zeros((ROOM, 3, 2)), np.zeros(ROOM), np.arange(3))
+    plan.at_m[0] = [[0.9, 0.5], [0.9, 0.7], [0.9, 0.9]]
+    assert settle_waypoint(free, plan.at_m[0], plan.chain, LINK)
+    count = clear_ways(free, plan, 1, start, 0, 0, LINK)
+    if count < 0:
+        return  # it may find no way within its few detours, but must then say so
+    here = start
+    for k in range(count):
+        for f in np.linspace(0.0, 1.0, 60):
+            at = here + f * (plan.at_m[k] - here)
+            assert not ((at > low) & (at < high)).all(axis=1).any()
+            assert (np.hypot(*np.diff(at, axis=0).T) <= LINK + 1e-9).all()
+        here = plan.at_m[k]
+
+
+def test_the_envelope_lets_every_rise_be_climbed() -> None:
+    belief, depth = hilly(3)
+    known = Belief(belief.xy_m, depth, np.full(len(depth), 0.01), belief.accurate, belief.weight, 0.2)
+    floor = floor_of(known)
+    slope = np.abs(np.diff(floor.deepest_m, axis=1)) / floor.cell_m
+    assert slope.max() <= ENVELOPE_SLOPE + 1e-9
+    assert (floor.deepest_m <= floor.depth_m - CLEARANCE).all()
+
+
+def test_a_wall_that_was_felt_is_kept_clear_of() -> None:
+    belief, _ = hilly(3)
+    wall = np.array([[0.1, 0.2, 0.3]])
+    felt = floor_of(belief, wall)
+    here = sample(felt.deepest_m, felt.west_m, felt.south_m, felt.cell_m, 0.1, 0.2)
+    assert here <= 0.3 - CLEARANCE + ENVELOPE_SLOPE * felt.cell_m
+    before = floor_of(belief)
+    assert here < sample(before.deepest_m, before.west_m, before.south_m, before.cell_m, 0.1, 0.2)
+
+
+def test_altimeters_tell_where_the_bottom_is() -> None:
+    felt = FeltBottom()
+    team = make_situation(constraints=Constraints(SQUARE, max_step_m=10.0, min_altitude_m=1.5))
+    felt.ask(team.vehicles, team.positions + np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 1.0]]))
+    assert felt.feel(team).tolist() == [False, True]
+    np.testing.assert_allclose(felt.points_m, [team.positions[1] + np.array([0.0, 0.0, 1.5])])
+
+
+def test_sweeps_cover_what_is_left_from_every_corner() -> None:
+    rng = np.random.default_rng(0)
+    left = rng.uniform(-1.0, 1.0, (300, 2))
+    here = np.array([[-0.9, -0.9], [-0.8, -0.9], [-0.9, -0.8]])
+    sweeps = backbones(left, here, CUBE, 0.4, 0.3, LINK)
+    corners = {tuple(np.sign(sweep.at_m[0].mean(axis=0)).astype(int)) for sweep in sweeps if len(sweep.at_m) > 2}
+    assert corners == {(-1, -1), (-1, 1), (1, -1), (1, 1)}
+    for sweep in sweeps:
+        gaps = np.hypot(*np.diff(sweep.at_m[:, sweep.chain], axis=1).transpose(2, 0, 1))
+        assert (gaps <= LINK + 1e-9).all()
+
+
+def test_a_plan_outlives_a_change_of_the_team() -> None:
+    at = np.stack([np.column_stack([np.full(3, x), [0.0, 0.2, 0.4]]) for x in (0.0, 0.5)])
+    plan = Backbone(at, np.array([0, 1, 2]))
+    fewer = with_team(plan, ("a", "b", "c"), ("a", "c"))
+    assert fewer is not None
+    np.testing.assert_array_equal(fewer.at_m, at[:, [0, 2]])
+    more = with_team(plan, ("a", "b", "c"), ("a", "b", "c", "d"))
+    assert more is not None
+    np.testing.assert_allclose(more.at_m[:, 3], [[0.0, 0.6], [0.5, 0.6]])
+    assert more.chain.tolist() == [0, 1, 2, 3]
+    assert with_team(plan, ("a", "b", "c"), ("x", "y")) is None

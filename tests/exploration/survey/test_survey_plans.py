@@ -1,0 +1,161 @@
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial import cKDTree
+
+from app.arrays import FloatArray
+from app.estimation import SingleBeam
+from app.evaluation.survey.world import SurveyScenario, fly_planner
+from app.exploration.core.constraints import Constraints
+from app.exploration.core.routes import CORNER_TOLERANCE, fly, next_waypoint
+from app.exploration.planner.options import PlannerOptions
+from app.exploration.planners import create_planner
+from app.exploration.survey.error import MOST_DOUBTS, SECOND_LOOK, with_second_looks
+from app.exploration.survey.local_search import DRAWS, Plan, Search, improve
+from app.exploration.survey.value import Objective, lower_to_segment, make_nodes, plan_value
+from simulator.seafloors import generate
+from tests.support.situations import make_situation
+
+SQUARE = np.array([[0.0, 0.0], [100.0, 0.0], [100.0, 100.0], [0.0, 100.0]])
+coordinate = st.floats(0.0, 100.0)
+
+
+def nodes_of(seed: int = 0, n: int = 400) -> Any:
+    rng = np.random.default_rng(seed)
+    return make_nodes(rng.uniform(0.0, 100.0, (n, 2)), rng.gamma(1.0, 1.0, n))
+
+
+def distance_to_segment(points: Any, a: Any, b: FloatArray) -> Any:
+    along = b - a
+    t = np.clip((points - a) @ along / max(along @ along, 1e-12), 0.0, 1.0)
+    return np.hypot(*(points - a - t[:, None] * along).T)
+
+
+@settings(max_examples=50, deadline=None)
+@given(coordinate, coordinate, coordinate, coordinate, st.floats(1.0, 150.0))
+def test_nodes_within_reach_of_a_leg_get_their_distance_to_it(ax: Any, ay: Any, bx: Any, by: Any, reach: Any) -> None:
+    nodes = nodes_of()
+    d2 = np.full(len(nodes.x), np.inf)
+    lower_to_segment(d2, nodes, ax, ay, bx, by, reach)
+    true = distance_to_segment(nodes.en_m, np.array([ax, ay]), np.array([bx, by]))
+    near = true <= reach
+    np.testing.assert_allclose(np.sqrt(d2[near]), true[near], atol=1e-6)
+    assert (np.sqrt(d2[~near]) >= reach - 1e-6).all()
+
+
+@dataclass(frozen=True)
+class WithZone(SurveyScenario):
+    """A survey round keep-out zones."""
+
+    zones: tuple[np.ndarray, ...] = ()
+
+    @property
+    def constraints(self) -> Constraints:
+        return replace(super().constraints, keep_out=self.zones)
+
+
+@settings(max_examples=50, deadline=None)
+@given(st.integers(0, 10**6), st.integers(1, 6), st.integers(1, 80))
+def test_a_route_is_flown_leg_by_leg_however_many_are_taken_at_once(seed: int, corners: Any, steps: int) -> None:
+    # Drawn at random, so that no corner lies a whole number of steps away: there rounding decides.
+    rng = np.random.default_rng(seed)
+    route, step = rng.uniform(0.0, 100.0, (corners, 2)), rng.uniform(0.5, 12.0)
+    vertices = np.empty((steps + 2, 2))
+    n, used = fly(3.0, 4.0, route, len(route), step, steps, vertices)
+    x, y, first, legs = 3.0, 4.0, 0, 0
+    while legs < steps and first < len(route):
+        nx, ny, first = next_waypoint(x, y, route, first, len(route), step, CORNER_TOLERANCE)
+        if np.hypot(nx - x, ny - y) < 1e-9:
+            break
+        x, y, legs = nx, ny, legs + 1
+    assert used == legs
+    np.testing.assert_allclose(vertices[n - 1], [x, y], atol=1e-6)
+
+
+def test_vertices_close_together_are_flown_in_one_leg() -> None:
+    arc = np.array([[0.0, 8.0], [0.02, 8.05], [0.06, 8.1], [0.12, 8.14], [0.2, 8.16], [30.0, 8.16]])
+    x, y, first = next_waypoint(0.0, 0.0, arc, 0, len(arc), 10.0, CORNER_TOLERANCE)
+    assert (x, y, first) == pytest.approx((0.2, 8.16, 5))
+    x, y, first = next_waypoint(0.0, 0.0, arc, 0, len(arc), 10.0, 0.0)
+    assert (x, y, first) == (0.0, 8.0, 1)
+
+
+@pytest.mark.parametrize("planner", ["cao", "lawnmower"])
+def test_vehicles_do_not_linger_at_the_corners_of_a_keep_out_zone(planner: Any) -> None:
+    zone = np.array([[40.0, 30.0], [70.0, 30.0], [70.0, 60.0], [40.0, 60.0]])
+    terrain = generate("flat", 1)
+    scenario = WithZone(terrain, 2, 100, 10.0, "step", zones=(zone,))
+    track = fly_planner(scenario, planner, PlannerOptions(search=200))
+    legs = np.linalg.norm(np.diff(track.positions_m, axis=0), axis=2)
+    inside = (track.positions_m[..., 0] > 40) & (track.positions_m[..., 0] < 70)
+    inside &= (track.positions_m[..., 1] > 30) & (track.positions_m[..., 1] < 60)
+    assert not inside.any()
+    assert (legs < 0.5).sum() <= 4  # a team gives way now and then; a rounded corner took a step every 5 cm
+    assert np.median(legs) > 9.0
+
+
+def test_searching_never_worsens_a_plan_and_says_truly_what_it_is_worth() -> None:
+    nodes = nodes_of(1)
+    starts, headings = np.array([[2.0, 2.0], [7.0, 2.0]]), np.full(2, np.nan)
+    objective = Objective(5.0, 60, 15.0, 2.0, 0.002, 60.0)
+    d2 = np.full(len(nodes.x), np.inf)
+    vias = np.zeros((2, 40, 2))
+    vias[:, :2] = [[[20.0, 90.0], [40.0, 10.0]], [[70.0, 90.0], [90.0, 10.0]]]
+    counts, locked = np.array([2, 2]), np.array([1, 0])
+    before = plan_value(d2, nodes, objective, starts, headings, vias, counts)
+    draws = np.random.default_rng(0).random((1500, DRAWS))
+    search = Search(5.0, Constraints(SQUARE).region, 0.5, 0.01)
+    after, after_counts, value = improve(
+        d2, nodes, objective, starts, headings, Plan(vias, counts, locked), search, draws
+    )
+    assert value < 0.9 * before
+    assert value == pytest.approx(plan_value(d2, nodes, objective, starts, headings, after, after_counts))
+    np.testing.assert_array_equal(after[0, 0], vias[0, 0])
+    for j in range(2):
+        route = after[j, : after_counts[j]]
+        assert ((route >= 0.5 - 1e-9) & (route <= 99.5 + 1e-9)).all()
+
+
+def test_doubted_soundings_raise_the_weight_around_them_unless_they_are_many() -> None:
+    situation = make_situation(soundings=np.random.default_rng(0).uniform(0.0, 100.0, (1000, 2)))
+    even = np.ones(len(situation.belief.xy_m))
+    few, many = (np.random.default_rng(1).uniform(0.0, 100.0, (n, 2)) for n in (3, int(3000 * MOST_DOUBTS)))
+    raised = with_second_looks(even, replace(situation, doubtful_en_m=few), 10.0)
+    near = cKDTree(few).query(situation.belief.xy_m)[0] <= 6.0
+    assert near.any()
+    np.testing.assert_array_equal(raised, np.where(near, SECOND_LOOK, 1.0))
+    np.testing.assert_array_equal(with_second_looks(even, replace(situation, doubtful_en_m=many), 10.0), even)
+    np.testing.assert_array_equal(with_second_looks(even, situation, 10.0), even)
+
+
+def closest_m(place: np.ndarray, *, doubted: bool) -> float:
+    """Fly a survey of a flat floor; return how close its legs come to a place that is doubted from step six on."""
+    situation = make_situation()
+    xy, positions = situation.belief.xy_m, situation.positions
+    planner, rng = create_planner("cao", PlannerOptions(search=400), SingleBeam(0.01)), np.random.default_rng(0)
+    sounded, closest = positions[:, :2], np.inf
+    for step in range(1, situation.steps_total + 1):
+        away = np.asarray(cKDTree(sounded).query(xy)[0])
+        belief = replace(
+            situation.belief, depth_m=np.full(len(xy), 12.0), sd_m=0.05 + 0.02 * away, weight=np.ones(len(xy))
+        )
+        doubtful = place[None] if doubted and step > 5 else np.zeros((0, 2))
+        now = replace(
+            situation, step=step, positions=positions, belief=belief, soundings_en_m=sounded, doubtful_en_m=doubtful
+        )
+        after = planner.propose(now, rng).positions
+        for a, b in zip(positions[:, :2], after[:, :2], strict=True):
+            sounded = np.vstack([sounded, np.linspace(a, b, 9)])
+            closest = min(closest, float(distance_to_segment(place[None], a, b)[0]))
+        positions = after
+    return closest
+
+
+def test_a_doubted_sounding_is_looked_at_again() -> None:
+    place = np.array([29.0, 50.0])  # between two lines
+    assert closest_m(place, doubted=False) > 2.5
+    assert closest_m(place, doubted=True) < 1.5

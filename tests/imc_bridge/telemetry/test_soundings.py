@@ -1,0 +1,200 @@
+"""From a Distance to a place on the bottom."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from imcpy.coordinates import WGS84
+
+from app.arrays import FloatArray
+from imc_bridge.events import Sounding, SoundingRefused
+from imc_bridge.telemetry.soundings import (
+    Beam,
+    SoundingGate,
+    StateHistory,
+    StateSample,
+    beam_table,
+    footprint,
+    interpolate,
+    rotate_to_local,
+)
+
+LAT, LON = math.radians(41.185), math.radians(-8.705)
+angles = st.floats(-3.1, 3.1)
+
+
+def state(
+    time_s: float = 0.0,
+    depth_m: float = 2.0,
+    roll: float = 0.0,
+    pitch: float = 0.0,
+    yaw: float = 0.0,
+    north_m: float = 0.0,
+    east_m: float = 0.0,
+) -> StateSample:
+    lat, lon = WGS84.displace(LAT, LON, north_m, east_m)
+    return StateSample(time_s, lat, lon, depth_m, roll, pitch, yaw)
+
+
+def offset_of(lat_deg: float, lon_deg: float) -> tuple[float, float]:
+    """North and east (m) of a footprint."""
+    return WGS84.displacement(LAT, LON, 0.0, math.radians(lat_deg), math.radians(lon_deg), 0.0)[:2]
+
+
+def rotation(roll: float, pitch: float, yaw: float) -> FloatArray:
+    """Independent reference: the product of the three elementary rotations."""
+    cr, sr, cp, sp, cy, sy = (f(a) for a in (roll, pitch, yaw) for f in (math.cos, math.sin))
+    about_z = np.array([[cy, -sy, 0], [sy, cy, 0], [0, 0, 1]])
+    about_y = np.array([[cp, 0, sp], [0, 1, 0], [-sp, 0, cp]])
+    about_x = np.array([[1, 0, 0], [0, cr, -sr], [0, sr, cr]])
+    return about_z @ about_y @ about_x
+
+
+@given(angles, st.floats(-1.5, 1.5), angles, st.tuples(angles, angles, angles))
+def test_rotation_is_the_product_of_yaw_pitch_and_roll(roll: float, pitch: float, yaw: float, vector: Any) -> None:
+    local = rotate_to_local(state(roll=roll, pitch=pitch, yaw=yaw), *vector)
+    assert np.allclose(local, rotation(roll, pitch, yaw) @ vector, atol=1e-9)
+
+
+def test_vertical_range_lands_below_the_vehicle_whatever_its_attitude() -> None:
+    beam = beam_table("vertical")["Altimeter"]
+    lat, lon, depth = footprint(state(roll=0.3, pitch=-0.2, yaw=1.0), beam, 10.0)
+    assert np.allclose(offset_of(lat, lon), 0.0, atol=1e-3)
+    assert depth == pytest.approx(12.0)
+
+
+def test_body_fixed_altimeter_looks_ahead_when_the_bow_is_up() -> None:
+    beam = beam_table("body")["Altimeter"]
+    pitch = math.radians(10.0)
+    lat, lon, depth = footprint(state(pitch=pitch, yaw=math.pi / 2), beam, 10.0)
+    north, east = offset_of(lat, lon)
+    assert (north, east) == pytest.approx((0.0, 10.0 * math.sin(pitch)), abs=1e-3)
+    assert depth == pytest.approx(2.0 + 10.0 * math.cos(pitch))
+
+
+@pytest.mark.parametrize(
+    ("beam", "direction"),
+    [(0, (1, 0)), (1, (0, 1)), (2, (-1, 0)), (3, (0, -1))],
+    ids=["bow", "starboard", "stern", "port"],
+)
+def test_dvl_beams_point_all_around_at_22_and_a_half_degrees(beam: int, direction: tuple[int, int]) -> None:
+    lat, lon, depth = footprint(state(), beam_table("vertical")[f"DVL Beam {beam}"], 20.0)
+    reach = 20.0 * math.sin(math.radians(22.5))
+    assert np.allclose(offset_of(lat, lon), np.multiply(direction, reach), atol=1e-3)
+    assert depth == pytest.approx(2.0 + 20.0 * math.cos(math.radians(22.5)))
+
+
+def test_lever_arm_turns_with_the_vehicle() -> None:
+    lat, lon, depth = footprint(state(yaw=math.pi / 2), Beam(body_fixed=False), 5.0, (1.0, 0.0, 0.5))
+    assert np.allclose(offset_of(lat, lon), (0.0, 1.0), atol=1e-3)
+    assert depth == pytest.approx(7.5)
+
+
+def test_angles_are_interpolated_the_short_way_round() -> None:
+    middle = interpolate(state(0.0, yaw=3.1), state(1.0, yaw=-3.1), 0.5)
+    assert abs(middle.yaw_rad) == pytest.approx(math.pi)
+
+
+@given(st.floats(0.0, 1.0), st.floats(0.0, 50.0), st.floats(0.0, 50.0))
+def test_interpolation_stays_between_its_ends(w: Any, depth_a: Any, depth_b: Any) -> None:
+    middle = interpolate(state(0.0, depth_a), state(1.0, depth_b), w)
+    assert min(depth_a, depth_b) - 1e-9 <= middle.depth_m <= max(depth_a, depth_b) + 1e-9
+
+
+def test_history_puts_late_states_in_their_place_and_drops_repeats() -> None:
+    history = StateHistory()
+    assert [history.add(state(t)) for t in (1.0, 3.0, 2.0, 3.0)] == [True, True, True, False]
+    before, after = history.around(2.5)
+    assert (before.time_s, after.time_s) == (2.0, 3.0)
+    assert history.around(0.5)[0] is None
+    assert history.around(3.5)[1] is None
+
+
+class Gate:
+    """A gate with states at whole seconds, sinking 1 m/s while going north at 1 m/s."""
+
+    def __init__(self) -> None:
+        self.gate = SoundingGate("v", beam_table("vertical"), 200.0)
+        self.history = StateHistory()
+        for t in range(4):
+            self.add_state(float(t))
+
+    def add_state(self, t: float) -> None:
+        self.history.add(state(t, depth_m=t, north_m=t))
+
+    def resolve(self) -> list[Any]:
+        return list(self.gate.resolve(self.history, 0.3))
+
+
+def test_sounding_takes_the_state_at_its_own_time() -> None:
+    g = Gate()
+    assert g.gate.offer(1.5, "Altimeter", True, 10.0) is None
+    (sounding,) = g.resolve()
+    assert isinstance(sounding, Sounding)
+    assert sounding.bottom_depth_m == pytest.approx(11.5)
+    assert sounding.vehicle_depth_m == pytest.approx(1.5)
+    assert offset_of(sounding.lat_deg, sounding.lon_deg)[0] == pytest.approx(1.5, abs=1e-3)
+    assert (sounding.source, sounding.range_m, sounding.position_sd_m) == ("Altimeter", 10.0, 0.3)
+
+
+def test_sounding_waits_for_the_state_after_it() -> None:
+    g = Gate()
+    g.gate.offer(3.4, "Altimeter", True, 10.0)
+    assert g.resolve() == []
+    g.add_state(4.0)
+    (sounding,) = g.resolve()
+    assert sounding.bottom_depth_m == pytest.approx(13.4)
+
+
+@pytest.mark.parametrize(
+    ("source", "valid", "range_m", "reason"),
+    [
+        ("Altimeter", False, 10.0, "invalid"),
+        ("Altimeter", True, 0.0, "zero"),
+        ("Altimeter", True, -1.0, "zero or negative"),
+        ("Altimeter", True, math.nan, "not a number"),
+        ("Altimeter", True, math.inf, "not a number"),
+        ("DVL Beam 2", True, 500.0, "beyond 200 m"),
+        (None, True, 10.0, "names not known"),
+    ],
+)
+def test_bad_ranges_are_refused_with_their_reason(source: str | None, valid: bool, range_m: float, reason: str) -> None:
+    g = Gate()
+    refused = g.gate.offer(1.5, source, valid, range_m)
+    assert isinstance(refused, SoundingRefused)
+    assert reason in refused.reason
+    assert g.gate.refused.total() == 1
+    assert g.resolve() == []
+
+
+def test_forward_looking_echo_sounder_is_ignored() -> None:
+    g = Gate()
+    assert g.gate.offer(1.5, "Echo Sounder", True, 10.0) is None
+    assert g.resolve() == []
+    assert g.gate.ignored["Echo Sounder"] == 1
+
+
+def test_repeated_distance_is_refused_and_a_late_one_is_not() -> None:
+    g = Gate()
+    assert g.gate.offer(1.5, "Altimeter", True, 10.0) is None
+    assert g.gate.offer(1.5, "Altimeter", True, 10.0).reason == "repeated"
+    assert g.gate.offer(1.2, "Altimeter", True, 10.0) is None
+    assert len(g.resolve()) == 2
+
+
+def test_distance_in_a_gap_of_the_states_is_refused() -> None:
+    g = Gate()
+    g.gate.offer(5.0, "Altimeter", True, 10.0)
+    g.add_state(30.0)
+    (refused,) = g.resolve()
+    assert isinstance(refused, SoundingRefused)
+    assert "no state" in refused.reason
+
+
+def test_distance_without_a_later_state_is_given_up_in_bounded_memory() -> None:
+    g = Gate()
+    refusals = [g.gate.offer(10.0 + k, "Altimeter", True, 5.0) for k in range(300)]
+    assert sum(r is not None for r in refusals) == 300 - 256

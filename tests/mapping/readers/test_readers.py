@@ -1,0 +1,264 @@
+"""Soundings and maps from elsewhere: every format, what files do not say, and what is wrong with them."""
+
+import gzip
+import io
+from contextlib import suppress
+from pathlib import Path
+
+import netCDF4
+import numpy as np
+import pyproj
+import pytest
+import rasterio
+from affine import Affine
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from app.mapping.georeference import LocalFrame
+from app.mapping.layers import LayerSource, file_layers
+from app.mapping.products.bag import bag
+from app.mapping.products.geotiff import geotiff
+from app.mapping.products.netcdf import netcdf
+from app.mapping.products.text import map_xyz, soundings_xyz
+from app.mapping.readers.endings import ending
+from app.mapping.readers.files import read_file
+from app.mapping.readers.placing import place_reference, place_soundings
+from app.mapping.readers.text import read_text
+from app.mapping.readers.types import Place, Points, Raster, ReadError, ReadOptions
+from app.mapping.s44 import NORMAL_95, Order
+from app.mapping.types import BathymetricMap, Grid, Soundings
+from app.mapping.vertical import VerticalDatum
+
+FRAME = LocalFrame(41.1850, -8.7040)
+GRID = Grid(0.0, 0.0, 2.0, 20, 25)
+PLACE = Place(FRAME, GRID, margin_m=6.0)
+UTM = pyproj.CRS.from_epsg(32629)
+SD = ReadOptions(sd_m=0.3)
+
+
+def read_path(path: Path) -> Points | Raster:
+    with path.open("rb") as file:
+        return read_file(file, ending(path.name))
+
+
+def read_words(text: str) -> Points:
+    return read_text(io.BytesIO(text.encode(errors="surrogatepass")))
+
+
+def depth_at(east_m: np.ndarray, north_m: np.ndarray) -> np.ndarray:
+    return 6.0 + 0.1 * east_m + 0.05 * north_m
+
+
+def make_map() -> BathymetricMap:
+    depth = depth_at(*np.meshgrid(GRID.east_m, GRID.north_m))
+    depth[15:, :3] = np.nan
+    sd = np.where(np.isnan(depth), np.nan, 0.2)
+    none = np.zeros(depth.shape, np.int64)
+    return BathymetricMap(GRID, depth, sd, none, none > 0, np.ones_like(depth), 8.0, "test")
+
+
+def own_product(kind: str) -> bytes:
+    bathymetry, datum = make_map(), VerticalDatum(5861, "LAT")
+    layers = file_layers(LayerSource(bathymetry, Order.ORDER_2))
+    if kind == "tif":
+        return geotiff(bathymetry, layers, FRAME, vertical_datum=datum)
+    if kind == "nc":
+        created = __import__("datetime").datetime(2026, 1, 1)
+        return netcdf(bathymetry, layers, FRAME, vertical_datum=datum, title="t", created=created)
+    if kind == "bag":
+        return bag(bathymetry, FRAME, vertical_datum=datum, title="t")
+    return map_xyz(bathymetry, FRAME, vertical_datum="LAT", geographic=True)
+
+
+@pytest.mark.parametrize("kind", ["tif", "nc", "bag", "xyz"])
+def test_our_own_maps_come_back_in_their_place(kind: str, tmp_path: Path) -> None:
+    (path := tmp_path / f"map.{kind}").write_bytes(own_product(kind))
+    content = read_path(path)
+    found = place_soundings(content, ReadOptions(), PLACE)
+    s = found.soundings
+    assert len(s) == found.found == np.isfinite(make_map().depth_m).sum()
+    np.testing.assert_allclose(s.depth_m, depth_at(s.east_m, s.north_m), atol=2e-3)
+    np.testing.assert_allclose(s.sd_m, 0.2, atol=1e-6)
+    assert found.notes == []
+    sampled, _ = place_reference(content, ReadOptions(), PLACE)
+    np.testing.assert_allclose(sampled, make_map().depth_m, atol=2e-3)
+
+
+def write_grid(path: Path, cell_m: float, crs: pyproj.CRS | None, *, up: bool = False, sd: float | None = None) -> None:
+    """A grid in UTM over the mission's area with a border."""
+    to_utm = pyproj.Transformer.from_crs(FRAME.crs, UTM, always_xy=True)
+    west, south = (np.floor(v) - 20.0 for v in to_utm.transform(0.0, 0.0))
+    n = int(100 / cell_m)
+    x = west + (np.arange(n) + 0.5) * cell_m
+    y = south + (np.arange(n) + 0.5) * cell_m
+    utm_east, utm_north = np.meshgrid(x, y[::-1])
+    east, north = to_utm.transform(utm_east, utm_north, direction="INVERSE")
+    z = depth_at(east, north) * (-1.0 if up else 1.0)
+    layers = [z] if sd is None else [z, np.full(z.shape, sd)]
+    transform = Affine(cell_m, 0, west, 0, -cell_m, south + n * cell_m)
+    with rasterio.open(
+        path, "w", driver="GTiff" if path.suffix == ".tif" else "AAIGrid", width=n, height=n, count=len(layers),
+        dtype="float64" if path.suffix == ".tif" else "float32", transform=transform, nodata=-9999.0,
+        crs=None if crs is None else crs.to_wkt(),
+    ) as file:  # fmt: skip
+        for number, layer in enumerate(layers, 1):
+            file.write(layer, number)
+            if sd is not None:
+                file.set_band_description(number, ["elevation" if up else "depth", "uncertainty"][number - 1])
+
+
+@pytest.mark.parametrize("cell_m", [0.5, 5.0], ids=["finer", "coarser"])
+def test_a_grid_in_another_projection_is_placed_whatever_its_cells(cell_m: float, tmp_path: Path) -> None:
+    write_grid(path := tmp_path / "a.tif", cell_m, UTM, up=True, sd=0.15)
+    found = place_soundings(read_path(path), ReadOptions(), PLACE)
+    s = found.soundings
+    np.testing.assert_allclose(s.depth_m, depth_at(s.east_m, s.north_m), atol=0.02)
+    np.testing.assert_allclose(s.sd_m, 0.15, rtol=1e-6)
+    assert s.east_m.min() >= -6.0
+    assert s.east_m.max() <= 56.0
+    expected = (50 + 12) * (40 + 12) / max(cell_m, 2.0) ** 2
+    assert 0.8 * expected <= len(s) <= 1.1 * expected
+    assert any("averaged" in note for note in found.notes) == (cell_m < 2.0)
+
+
+def test_what_a_file_does_not_say_has_to_be_said(tmp_path: Path) -> None:
+    write_grid(path := tmp_path / "a.asc", 4.0, None)
+    path.with_suffix(".prj").unlink(missing_ok=True)
+    content = read_path(path)
+    for options, field in ((ReadOptions(), "crs"), (ReadOptions(crs="EPSG:32629"), "sd_m")):
+        with pytest.raises(ReadError) as caught:
+            place_soundings(content, options, PLACE)
+        assert caught.value.field == field
+    found = place_soundings(content, ReadOptions(crs="EPSG:32629", order="special", datum_offset_m=-1.0), PLACE)
+    s = found.soundings
+    np.testing.assert_allclose(s.depth_m, depth_at(s.east_m, s.north_m) - 1.0, atol=0.02)
+    np.testing.assert_allclose(s.sd_m, np.hypot(0.25, 0.0075 * s.depth_m) / NORMAL_95)
+    assert len(found.notes) == 2
+    assert "positive down, from their sign" in found.notes[0]
+
+
+def test_netcdf_with_latitude_and_longitude_and_heights(tmp_path: Path) -> None:
+    with netCDF4.Dataset(path := tmp_path / "topo.nc", "w") as file:
+        lat, lon = 41.1849 + 2e-5 * np.arange(30), -8.7042 + 3e-5 * np.arange(30)
+        for name, values in (("lat", lat), ("lon", lon)):
+            file.createDimension(name, 30)
+            file.createVariable(name, "f8", (name,))[:] = values
+        east, north = FRAME.to_local(*np.meshgrid(lat, lon, indexing="ij"))
+        file.createVariable("elevation", "f4", ("lat", "lon"))[:] = -depth_at(east, north)
+    s = place_soundings(read_path(path), SD, PLACE).soundings
+    np.testing.assert_allclose(s.depth_m, depth_at(s.east_m, s.north_m), atol=0.01)
+
+
+def test_text_in_every_usual_shape(tmp_path: Path) -> None:
+    east, north = np.array([5.0, 20.0]), np.array([8.0, 30.0])
+    (lat, lon), depth = FRAME.to_geographic(east, north), depth_at(east, north)
+    shapes = {
+        "a.xyz": "\n".join(f"{x} {y} {z}" for x, y, z in zip(lon, lat, depth, strict=True)),
+        "b.csv": "Latitude;Longitude;Depth;SD\n"
+        + "\n".join(f"{y};{x};{z};0.3" for x, y, z in zip(lon, lat, depth, strict=True)),
+        "c.txt": "# lon lat elevation\n"
+        + "\n".join(f"{x}\t{y}\t{-z}" for x, y, z in zip(lon, lat, depth, strict=True)),
+        "d.csv": "id,east_m,north_m,depth_m\n"
+        + "\n".join(f"7,{x},{y},{z}" for x, y, z in zip(east, north, depth, strict=True)),
+    }
+    for name, text in shapes.items():
+        (path := tmp_path / f"{name}.gz").write_bytes(gzip.compress(text.encode()))
+        s = place_soundings(
+            read_path(path), ReadOptions(crs="EPSG:4326" if name == "a.xyz" else None, sd_m=0.3), PLACE
+        ).soundings
+        np.testing.assert_allclose(np.column_stack([s.east_m, s.north_m]), np.column_stack([east, north]), atol=1e-3)
+        np.testing.assert_allclose(s.depth_m, depth)
+        np.testing.assert_allclose(s.sd_m, 0.3)
+
+
+def test_soundings_of_another_mission_come_in_without_the_rejected_ones(tmp_path: Path) -> None:
+    s = Soundings(*(np.array(v, float) for v in ([5, 9], [6, 7], [8, 9], [0.1, 0.2])))
+    again = place_soundings(
+        read_words(soundings_xyz(s, FRAME, vertical_datum="LAT", geographic=True).decode()), ReadOptions(), PLACE
+    ).soundings
+    np.testing.assert_allclose(again.depth_m, s.depth_m)
+    np.testing.assert_allclose(again.sd_m, s.sd_m)
+    text = "# depth_m: positive down\nlat_deg,lon_deg,depth_m,sd_m,verdict\n"
+    text += "41.1851,-8.7039,7,0.1,accepted\n0,0,,,rejected\n"
+    assert len(place_soundings(read_words(text), ReadOptions(), PLACE).soundings) == 1
+
+
+@pytest.mark.parametrize(
+    ("text", "field", "message"),
+    [
+        ("lon,lat,depth\n-8.7,41.1,5\n-8.7,41.1,deep", "line 3, column 3 (depth)", "it is not a number"),
+        ("lon,lat,depth\n-8.7,41.1", "line 2, column 3 (depth)", "only 2 columns"),
+        ("lon,lat,depth\n-8.7,nan,4", "line 2, column 2 (lat)", "it is not a number"),
+        ("lon,lat,depth\n# x\n-8.7,41.1,99999", "line 3", "its depth is not between"),
+        ("lon,lat,depth\n-500,41.1,5", "position 1", "is no longitude and latitude"),
+        ("lon,lat,depth\n8.7,41.1,5", "file", "none of its depths lies near"),
+        ("lon,lat,z\n-8.7039,41.1851,5\n-8.7039,41.1851,-5", "positive", "both signs"),
+        ("lon,lat,depth\n-8.7039,41.1851,5", "sd_m", "state no uncertainty"),
+        ("1 2 3", "crs", "does not say"),
+        ("lon,lat,depth,sd\n-8.7039,41.1851,5,5000", "uncertainty", "is above 1000 m"),
+        ("", "file", "no sounding"),
+        ("\x00\x01\x02", "line 1", "is not a number"),
+    ],
+)
+def test_wrong_text_is_refused_by_line_and_column(text: str, field: str, message: str) -> None:
+    with pytest.raises(ReadError, match=message) as caught:
+        place_soundings(read_words(text), ReadOptions(), PLACE)
+    assert caught.value.field.startswith(field)
+    assert caught.value.remedy
+
+
+@pytest.mark.parametrize("crs", ["EPSG:0", "somewhere", "EPSG:5861"])
+def test_a_reference_system_that_is_none_is_refused(crs: str) -> None:
+    with pytest.raises(ReadError) as caught:
+        place_soundings(read_words("1 2 3"), ReadOptions(crs=crs, sd_m=1.0), PLACE)
+    assert caught.value.field == "crs"
+
+
+@pytest.mark.parametrize("name", ["a.tif", "a.nc", "a.bag", "a.asc", "a.xyz.gz"])
+def test_a_file_that_is_not_what_it_is_called_is_refused(name: str, tmp_path: Path) -> None:
+    for content in (b"not that at all", b"", b"\x89HDF\r\n\x1a\n" + bytes(200), b"II*\0" + b"\xff" * 99):
+        (path := tmp_path / name).write_bytes(content)
+        with pytest.raises(ReadError):
+            read_path(path)
+
+
+def test_a_grid_without_any_value_names_its_band(tmp_path: Path) -> None:
+    with rasterio.open(tmp_path / "a.tif", "w", driver="GTiff", width=2, height=2, count=1, dtype="float32",
+                       nodata=0.0, transform=Affine(2, 0, 9, 0, -2, 9)) as file:  # fmt: skip
+        file.write(np.zeros((2, 2), np.float32), 1)
+    with pytest.raises(ReadError, match="no cell of it has a value") as caught:
+        read_path(tmp_path / "a.tif")
+    assert caught.value.field == "band 1"
+
+
+@pytest.mark.parametrize("name", ["a.exe", "a", "a.tif.gz", ".gz", "map.png"])
+def test_other_endings_are_refused(name: str) -> None:
+    with pytest.raises(ReadError, match="has no ending that is read"):
+        ending(name)
+
+
+def test_uneven_axes_are_refused_by_name(tmp_path: Path) -> None:
+    with netCDF4.Dataset(path := tmp_path / "a.nc", "w") as file:
+        for name in ("y", "x"):
+            file.createDimension(name, 3)
+            file.createVariable(name, "f8", (name,))[:] = [0, 1, 5]
+        file.createVariable("depth", "f4", ("y", "x"))[:] = 5.0
+    with pytest.raises(ReadError, match="not evenly spaced") as caught:
+        read_path(path)
+    assert caught.value.field == "variable y"
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None, max_examples=60)
+@given(st.text() | st.text(alphabet="0123456789.,;- \n#xyzlatdepth"))
+def test_whatever_text_comes_it_is_read_or_refused(text: str) -> None:
+    with suppress(ReadError):
+        assert len(place_soundings(read_words(text), ReadOptions(crs="local", sd_m=1.0), PLACE).soundings) > 0
+
+
+@pytest.mark.terrains
+def test_real_soundings_of_a_harbour_are_read(terrains: Path) -> None:
+    content = read_path(terrains / "leixoes_west_soundings.csv.gz")
+    wide = Place(FRAME, Grid(-5000.0, -5000.0, 10.0, 1000, 1000), margin_m=0.0)
+    found = place_soundings(content, SD, wide)
+    assert found.found == 6354
+    assert len(found.soundings) > 1000

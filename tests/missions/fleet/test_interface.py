@@ -1,0 +1,423 @@
+"""One contract, three links: IMC over real UDP with fake DUNE nodes, vehicles that poll, vehicles in this process."""
+
+import asyncio
+import contextlib
+import math
+from abc import ABC, abstractmethod
+from collections.abc import AsyncIterator, Callable
+
+import numpy as np
+import pytest
+
+from app.missions.fleet.interface import (
+    FleetEvent,
+    FleetLink,
+    LinkReport,
+    LinkState,
+    Position,
+    SoundingReport,
+    VehicleInfo,
+    VehicleRefusedError,
+    VehicleReport,
+    WaypointOrder,
+    WaypointReport,
+    WaypointStatus,
+)
+from app.missions.fleet.links.imc import ImcFleetLink
+from app.missions.fleet.links.rest import RestFleetLink, horizontal_distance_m
+from app.missions.fleet.links.sim import Launch, SimFleetLink
+from app.missions.settings import SimulationSettings
+from app.missions.spec.mission import Sensor
+from imc_bridge import BridgeSettings
+from simulator import seafloors
+from simulator.dune import DuneFleet, DuneOptions, default_specs
+from simulator.dune.plan import PlanState
+from simulator.terrain import Terrain
+from tests.support.missions.specs import LAT, LON
+from tests.support.ports import free_ports
+from tests.support.waiting import until
+
+SPEED = 20.0
+MISSION = "m1"
+ARRIVAL_M = 4.0
+FLOOR = seafloors.generate("harbour", 0, origin=(LAT, LON))
+S, A, R = WaypointStatus.SENT, WaypointStatus.ACKNOWLEDGED, WaypointStatus.REACHED
+
+
+class Bench(ABC):
+    """A link with one vehicle at its other end, over ``FLOOR``."""
+
+    name: str
+    link: FleetLink
+
+    def __init__(self) -> None:
+        self.events: list[FleetEvent] = []
+
+    @abstractmethod
+    async def launch(self) -> None:
+        """Start both ends."""
+
+    @abstractmethod
+    async def land(self) -> None:
+        """Take the vehicle away; the link is closed already."""
+
+    async def fall_silent(self) -> None:
+        """Let the vehicle hear and say nothing more."""
+        raise NotImplementedError
+
+    @abstractmethod
+    def follows(self) -> bool:
+        """Whether the vehicle itself still goes where it was sent."""
+
+    async def give(self, order: WaypointOrder) -> None:
+        await self.link.order(order)
+
+    def order(self, step: int, east_m: float, north_m: float, depth_m: float = 1.5) -> WaypointOrder:
+        lat, lon = FLOOR.frame.to_geodetic(east_m, north_m)
+        return WaypointOrder(MISSION, step, self.name, Position(lat, lon, depth_m), 1.3, ARRIVAL_M, 1.0)
+
+    def info(self) -> VehicleInfo:
+        return next(info for info in self.link.vehicles() if info.name == self.name)
+
+    def state(self) -> LinkState | None:
+        return next((info.state for info in self.link.vehicles() if info.name == self.name), None)
+
+    def statuses(self, step: int) -> list[WaypointStatus]:
+        return [e.status for e in self.events if isinstance(e, WaypointReport) and e.step == step]
+
+    def states(self) -> list[LinkState]:
+        return [e.state for e in self.events if isinstance(e, LinkReport)]
+
+    async def reached(self, step: int) -> None:
+        await until(lambda: R in self.statuses(step), f"step {step} is reached")
+
+
+class ImcBench(Bench):
+    name = "lauv-sim-1"
+
+    async def launch(self) -> None:
+        *announce_ports, port, vehicle_port = free_ports(5)
+        self.link = ImcFleetLink(
+            BridgeSettings(port=port, loopback_only=True, announce_ports=tuple(announce_ports), time_scale=SPEED)
+        )
+        self.fleet = DuneFleet(
+            FLOOR,
+            default_specs(1, FLOOR, base_port=vehicle_port),
+            speed=SPEED,
+            options=DuneOptions(announce_ports=tuple(announce_ports)),
+        )
+        await self.fleet.start()
+        await self.link.start(self.events.append)
+
+    async def land(self) -> None:
+        await self.fleet.stop()
+
+    async def fall_silent(self) -> None:
+        await self.fleet.stop()
+
+    def follows(self) -> bool:
+        return self.fleet.nodes[0].plan.plan_state is PlanState.EXECUTING
+
+
+class SimBench(Bench):
+    name = "s"
+
+    async def launch(self) -> None:
+        link = SimFleetLink(SimulationSettings(), SPEED)
+        self.link = link
+        await link.start(self.events.append)
+        link.launch(
+            Launch(
+                self.name,
+                "m",
+                Sensor.SINGLE_BEAM,
+                (LAT, LON),
+                100,
+                100,
+                start=FLOOR.frame.to_geodetic(50, 5),
+                noise=0.005,
+            )
+        )
+
+    async def land(self) -> None:
+        """It went with the link."""
+
+    def follows(self) -> bool:
+        return self.link._swimmers[self.name].order is not None  # type: ignore[attr-defined]
+
+
+class RestBench(Bench):
+    """The vehicle's requests are calls of what the service calls when a request comes in."""
+
+    name = "r"
+
+    async def launch(self) -> None:
+        self.rest = RestFleetLink(lost_after_s=300.0)
+        self.link = self.rest
+        self._laid_out: WaypointOrder | None = None
+        self._goal: WaypointOrder | None = None
+        self._place = np.array([50.0, 5.0])
+        self._time_s = 1_795_225_140.0
+        await self.rest.start(self.events.append)
+        self._task = asyncio.create_task(self._sail())
+
+    async def give(self, order: WaypointOrder) -> None:
+        await self.rest.order(order)
+        self._laid_out = order
+
+    async def land(self) -> None:
+        self._task.cancel()
+        await asyncio.gather(self._task, return_exceptions=True)
+
+    async def fall_silent(self) -> None:
+        await self.land()
+
+    def follows(self) -> bool:
+        return self._goal is not None
+
+    async def _sail(self) -> None:
+        while True:
+            self._post()
+            self._poll()
+            await asyncio.sleep(0.01)
+
+    def _post(self) -> None:
+        if self._goal is not None:
+            goal = np.array(FLOOR.frame.to_local(self._goal.position.lat_deg, self._goal.position.lon_deg))
+            way = goal - self._place
+            self._place += way * min(1.0, 0.5 / max(float(np.linalg.norm(way)), 1e-9))
+        self._time_s += 0.5
+        lat, lon = FLOOR.frame.to_geodetic(*self._place)
+        self.rest.heard(VehicleReport(self.name, self._time_s, Position(lat, lon, 1.5)))
+
+    def _poll(self) -> None:
+        if self.state() is not LinkState.ENGAGED:
+            self._goal = None
+            self.rest.told_to_stop(self.name, MISSION)
+        elif self._laid_out is not None:
+            self._goal = self._laid_out
+            self.rest.has_waypoint(self.name, self._goal.step)
+
+
+BENCHES: dict[str, Callable[[], Bench]] = {"imc": ImcBench, "rest": RestBench, "sim": SimBench}
+
+
+@contextlib.asynccontextmanager
+async def opened(bench: Bench) -> AsyncIterator[Bench]:
+    try:
+        await bench.launch()
+        await until(lambda: bench.state() is LinkState.READY, "the vehicle is ready")
+        yield bench
+    finally:
+        await bench.link.close()
+        await bench.land()
+
+
+@pytest.fixture(params=sorted(BENCHES))
+async def bench(request: pytest.FixtureRequest) -> AsyncIterator[Bench]:
+    async with opened(BENCHES[request.param]()) as bench:
+        yield bench
+
+
+def distance_m(bench: Bench, order: WaypointOrder) -> float:
+    report = bench.info().report
+    assert report is not None
+    return horizontal_distance_m(report.position, order.position)
+
+
+async def test_a_vehicle_never_heard_of_is_refused_with_reason_and_remedy(bench: Bench) -> None:
+    with pytest.raises(VehicleRefusedError) as caught:
+        await bench.link.engage("nobody")
+    assert caught.value.vehicle == "nobody"
+    assert caught.value.reason
+    assert caught.value.remedy
+    nowhere = bench.order(1, 50, 20)
+    with pytest.raises(VehicleRefusedError) as caught:
+        await bench.link.order(WaypointOrder(MISSION, 1, "nobody", nowhere.position, 1.3, 3.0, 1.0))
+    assert caught.value.remedy
+    assert (await bench.link.stop("nobody", timeout_s=0.5)).vehicle == "nobody"
+
+
+async def test_an_order_before_engaging_is_refused(bench: Bench) -> None:
+    with pytest.raises(VehicleRefusedError) as caught:
+        await bench.link.order(bench.order(1, 50, 20))
+    assert caught.value.reason
+    assert caught.value.remedy
+    assert bench.statuses(1) == []
+
+
+async def test_known_vehicles_are_of_the_links_kind(bench: Bench) -> None:
+    assert [(info.name, info.kind) for info in bench.link.vehicles()] == [(bench.name, bench.link.kind)]
+    age_s = bench.info().age_s
+    assert age_s is not None
+    assert age_s >= 0.0
+
+
+async def test_from_engaging_to_arrival(bench: Bench) -> None:
+    await bench.link.engage(bench.name)
+    assert bench.state() is LinkState.ENGAGED
+    await until(lambda: LinkState.ENGAGED in bench.states(), "the link reports that it is engaged")
+    await bench.link.engage(bench.name)  # again is harmless
+    assert bench.state() is LinkState.ENGAGED
+    order = bench.order(1, 50, 25)
+    await bench.give(order)
+    await bench.reached(1)
+    assert bench.statuses(1) == [S, A, R]
+    assert all(
+        e.mission_id == MISSION and e.vehicle == bench.name for e in bench.events if isinstance(e, WaypointReport)
+    )
+    assert distance_m(bench, order) <= ARRIVAL_M + 2.0
+    times = [e.time_s for e in bench.events if isinstance(e, VehicleReport)]
+    assert times == sorted(times)
+    assert len(times) > 3
+
+
+async def test_a_repeated_order_is_harmless(bench: Bench) -> None:
+    await bench.link.engage(bench.name)
+    order = bench.order(1, 50, 25)
+    await bench.give(order)
+    await bench.give(order)
+    await bench.reached(1)
+    await bench.give(order)
+    await until(lambda: bench.statuses(1)[-1] is R, "it is reached after all")
+    assert set(bench.statuses(1)) == {S, A, R}
+    assert bench.state() is LinkState.ENGAGED
+    assert distance_m(bench, order) <= ARRIVAL_M + 2.0
+    await bench.give(bench.order(2, 50, 35))
+    await bench.reached(2)
+
+
+async def test_a_new_order_replaces_the_old(bench: Bench) -> None:
+    await bench.link.engage(bench.name)
+    await bench.give(bench.order(1, 50, 95))
+    await until(lambda: A in bench.statuses(1), "the first is acknowledged")
+    order = bench.order(2, 60, 20)
+    await bench.give(order)
+    await bench.reached(2)
+    assert R not in bench.statuses(1)
+    assert bench.statuses(2) == [S, A, R]
+    # DUNE circles where it arrived, by up to 10 m from it.
+    assert distance_m(bench, order) <= ARRIVAL_M + 10.0
+
+
+async def test_a_stop_is_acknowledged_and_can_be_repeated(bench: Bench) -> None:
+    assert (await bench.link.stop(bench.name)).vehicle == bench.name  # before anything
+    await bench.link.engage(bench.name)
+    await bench.give(bench.order(1, 50, 95))
+    await until(lambda: A in bench.statuses(1), "it is under way")
+    receipt = await bench.link.stop(bench.name, timeout_s=20.0)
+    assert (receipt.vehicle, receipt.acknowledged) == (bench.name, True)
+    assert receipt.detail
+    await until(lambda: not bench.follows(), "the vehicle itself has stopped")
+    await until(lambda: bench.state() is LinkState.READY, "it is ready again")
+    assert bench.states()[-1] is LinkState.READY
+    assert (await bench.link.stop(bench.name, timeout_s=20.0)).acknowledged
+    with pytest.raises(VehicleRefusedError) as caught:
+        await bench.link.order(bench.order(2, 50, 20))
+    assert caught.value.remedy
+    assert R not in bench.statuses(1)
+
+
+async def test_after_a_stop_it_can_be_engaged_again(bench: Bench) -> None:
+    await bench.link.engage(bench.name)
+    await bench.give(bench.order(1, 50, 60))
+    assert (await bench.link.stop(bench.name, timeout_s=20.0)).acknowledged
+    await until(lambda: bench.state() is LinkState.READY, "it is ready again")
+    await bench.link.engage(bench.name)
+    await bench.give(bench.order(2, 50, 20))
+    await bench.reached(2)
+
+
+@pytest.mark.parametrize("make", [ImcBench, RestBench])
+async def test_a_stop_of_a_silent_vehicle_comes_back_without_acknowledgement(make: type[Bench]) -> None:
+    async with opened(make()) as bench:
+        await bench.link.engage(bench.name)
+        await bench.give(bench.order(1, 50, 95))
+        await bench.fall_silent()
+        async with asyncio.timeout(60):
+            receipt = await bench.link.stop(bench.name, timeout_s=0.5)
+            again = await bench.link.stop(bench.name, timeout_s=0.5)
+        assert (receipt.vehicle, receipt.acknowledged) == (bench.name, False)
+        assert receipt.detail
+        assert again.vehicle == bench.name
+        with pytest.raises(VehicleRefusedError):
+            await bench.link.order(bench.order(2, 50, 20))
+
+
+async def test_closing_stops_an_engaged_vehicle(bench: Bench) -> None:
+    await bench.link.engage(bench.name)
+    await bench.give(bench.order(1, 50, 95))
+    await until(lambda: A in bench.statuses(1), "it is under way")
+    await bench.link.close()
+    await until(lambda: not bench.follows(), "the vehicle itself has stopped")
+
+
+@pytest.mark.parametrize("make", [ImcBench, SimBench])
+async def test_soundings_tell_the_true_depth(make: type[Bench]) -> None:
+    async with opened(make()) as bench:
+        terrain: Terrain = FLOOR
+        if isinstance(bench, SimBench):
+            terrain = bench.link._swimmers[bench.name].terrain  # type: ignore[attr-defined]
+        await bench.link.engage(bench.name)
+        await bench.give(bench.order(1, 50, 30))
+        await bench.reached(1)
+        soundings = [e for e in bench.events if isinstance(e, SoundingReport)]
+    assert len(soundings) > 20
+    assert {s.vehicle for s in soundings} == {bench.name}
+    assert len({(s.time_s, s.beam) for s in soundings}) == len(soundings)
+    errors = []
+    for sounding in soundings:
+        place = sounding.footprint
+        assert place.depth_m == pytest.approx(sounding.vehicle_depth_m + sounding.range_m, abs=0.5)
+        errors.append(place.depth_m - terrain.depth_at_point(*terrain.frame.to_local(place.lat_deg, place.lon_deg)))
+    errors = [error for error in errors if math.isfinite(error)]
+    assert len(errors) > 20
+    assert abs(np.mean(errors)) < 0.1
+    assert np.median(np.abs(errors)) < 0.2
+
+
+# What only a link that waits to be asked can get wrong
+
+
+async def test_a_polling_vehicle_that_is_silent_too_long_counts_as_lost_and_comes_back() -> None:
+    link = RestFleetLink(lost_after_s=0.2)
+    events: list[FleetEvent] = []
+    await link.start(events.append)
+    report = VehicleReport("r", 1.0, Position(LAT, LON, 1.0))
+    link.heard(report)
+    await link.engage("r")
+    await until(lambda: link.vehicles()[0].state is LinkState.LOST, "it is lost")
+    lost = next(e for e in events if isinstance(e, LinkReport) and e.state is LinkState.LOST)
+    assert "silent for more than 0.2 s" in lost.reason
+    with pytest.raises(VehicleRefusedError, match="silent"):
+        await link.engage("r")
+    with pytest.raises(VehicleRefusedError):
+        await link.order(WaypointOrder(MISSION, 1, "r", report.position, 1.0, 3.0, 1.0))
+    link.heard(report)
+    assert link.vehicles()[0].state is LinkState.READY
+    await link.engage("r")
+    await link.close()
+
+
+async def test_a_stranger_that_is_told_to_stop_is_not_taken_up() -> None:
+    link = RestFleetLink()
+    await link.start(lambda _event: None)
+    link.told_to_stop("nobody", "m")
+    assert link.vehicles() == []
+    await link.close()
+
+
+async def test_a_waypoint_counts_as_reached_only_once_the_vehicle_has_it() -> None:
+    link = RestFleetLink()
+    events: list[FleetEvent] = []
+    await link.start(events.append)
+    here = Position(LAT, LON, 1.0)
+    link.heard(VehicleReport("r", 1.0, here))
+    await link.engage("r")
+    await link.order(WaypointOrder(MISSION, 7, "r", here, 1.0, 3.0, 1.0))
+    link.heard(VehicleReport("r", 2.0, here))
+    link.has_waypoint("r", 6)
+    assert [e.status for e in events if isinstance(e, WaypointReport)] == [S]
+    link.has_waypoint("r", 7)
+    assert [e.status for e in events if isinstance(e, WaypointReport)] == [S, A, R]
+    await link.close()

@@ -1,0 +1,63 @@
+"""The bottom that comes with an order is counted from the water's surface, whatever tells the level."""
+
+import numpy as np
+import pytest
+
+from app.exploration.core.problem import Belief
+from app.exploration.planners import create_planner
+from app.mapping.tides import TideTable
+from app.missions.clock import now
+from app.missions.fleet.interface import Position, VehicleReport
+from app.missions.flight.commit import StepCommit
+from app.missions.flight.decision import Place, decide, make_constraints
+from app.missions.service import MissionService
+from app.missions.soundings.corrections import Corrections
+from tests.support.missions.harbour import sim_spec
+
+DATUM_DEPTH_M = 10.0
+
+
+def a_table(level_m: float) -> TideTable:
+    """A level that stays for days around now."""
+    moment = now().timestamp()
+    return TideTable("pier", np.array([moment - 1e6, moment + 1e6]), np.array([level_m, level_m]), "0" * 64)
+
+
+@pytest.mark.parametrize(
+    ("level_m", "offset_m", "table_m", "expected_m"),
+    [
+        (0.0, 0.0, None, 10.0),
+        (-1.5, 0.0, None, 8.5),
+        (1.5, 0.0, None, 10.0),
+        (1.5, 2.0, None, 9.5),
+        (1.5, 0.0, -2.0, 8.0),
+        (0.0, 1.0, -2.0, 7.0),
+    ],
+    ids=["none", "low", "high, not used", "datum offset", "table", "table and offset"],
+)
+async def test_the_guard_gets_the_bottom_below_the_surface(
+    service: MissionService, level_m: float, offset_m: float, table_m: float | None, expected_m: float
+) -> None:
+    tide = {"level_m": level_m, "datum_offset_m": offset_m, "source": "gauge"}
+    spec = sim_spec("a", tide=tide)
+    mission = (await service.create(spec)).id
+    live = await service._get(mission)
+    table = None if table_m is None else a_table(table_m)
+    level = Corrections(live.frame, spec.tide, table=table).water_level_m(now().timestamp())
+    constraints = make_constraints(spec)
+    east, north = np.meshgrid(np.arange(1.0, 30.0, 2.0), np.arange(1.0, 30.0, 2.0))
+    landmarks = np.column_stack([east.ravel(), north.ravel()])
+    count = len(landmarks)
+    depth = np.full(count, DATUM_DEPTH_M)
+    belief = Belief(landmarks, depth, np.zeros(count), np.ones(count, bool), np.ones(count), 5.0)
+    places = [Place("a", np.array([10.0, 10.0]), 0.0, 2.0)]
+    planner = create_planner("random", spec.planner.options)
+    decision = decide(1, spec, constraints, planner, places, belief, np.zeros((0, 2)), level)
+    committing = StepCommit(live, constraints, leads=True)
+    member = live.team.join(spec.vehicles[0], 0)
+    lat, lon = live.frame.to_geographic(np.array(10.0), np.array(10.0))
+    member.report = VehicleReport("a", 0.0, Position(float(lat), float(lon), 0.0))
+    await committing.commit(decision)
+    assert member.order is not None
+    assert member.order.bottom
+    assert {round(place.depth_m, 6) for place in member.order.bottom} == {expected_m}

@@ -1,0 +1,89 @@
+"""What nobody flies is no step, and what was decided while a link was away is sent all the same."""
+
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from app.missions.fleet.hub import FleetHub
+from app.missions.fleet.interface import LinkState, VehicleRefusedError
+from app.missions.flight import step_loop
+from app.missions.flight.commit import StepCommit
+from app.missions.flight.decision import Decision, decide
+from app.missions.service import MissionService
+from app.missions.states import Action, MissionState
+from app.storage import missions as mission_queries
+from tests.support.missions.harbour import sim_spec, until_state
+from tests.support.waiting import until
+
+REASON = "leaves no safe depth"
+
+
+async def test_a_step_in_which_every_order_is_refused_does_not_count(
+    service: MissionService, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    spoilt, asked = True, 0
+
+    def refusing(*arguments: Any, **more: Any) -> Decision:
+        nonlocal asked
+        asked += 1
+        decision = decide(*arguments, **more)
+        return replace(decision, legs=[replace(leg, refusal=REASON) for leg in decision.legs]) if spoilt else decision
+
+    monkeypatch.setattr(step_loop, "decide", refusing)
+    mission = (await service.create(sim_spec(steps=3))).id
+    await service.act(mission, Action.START, actor="Ana")
+    await until(lambda: asked >= 4, "it was decided again and again")
+    view = await service.mission(mission)
+    assert view.progress.step == 0
+    assert REASON in view.reason
+    told = [event for event in await service.events(mission) if REASON in event.message]
+    assert [event.level for event in told] == ["alarm"], "it is told once"
+    spoilt = False
+    view = await until_state(service, mission, MissionState.FINISHED)
+    assert view.progress.step == 3
+    assert {str(waypoint.status) for waypoint in view.waypoints} == {"reached"}
+    assert REASON not in view.reason
+
+
+async def test_a_step_that_every_vehicle_turns_down_is_sent_again(
+    service: MissionService, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    order, refused = FleetHub.order, 0
+
+    async def refusing(hub: FleetHub, key: Any, waypoint: Any) -> None:
+        nonlocal refused
+        if refused < 4:
+            refused += 1
+            raise VehicleRefusedError(key[1], "not engaged", "Engage it first")
+        await order(hub, key, waypoint)
+
+    monkeypatch.setattr(FleetHub, "order", refusing)
+    mission = (await service.create(sim_spec(steps=2))).id
+    await service.act(mission, Action.START, actor="Ana")
+    view = await until_state(service, mission, MissionState.FINISHED)
+    assert refused == 4
+    async with service._database.reading() as session:
+        steps = [await mission_queries.waypoints_of_step(session, mission, number) for number in (1, 2)]
+    assert view.progress.step == 2
+    assert {row.status for rows in steps for row in rows} == {"reached"}
+
+
+async def test_a_waypoint_that_is_committed_while_the_link_is_away_is_sent(
+    service: MissionService, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    commit = StepCommit.commit
+
+    async def committed_in_a_gap(self: StepCommit, decision: Decision) -> None:
+        await commit(self, decision)
+        for member in self._live.team:
+            member.link = LinkState.LOST
+
+    monkeypatch.setattr(StepCommit, "commit", committed_in_a_gap)
+    mission = (await service.create(sim_spec(steps=2, step_deadline_s=200))).id
+    await service.act(mission, Action.START, actor="Ana")
+    await until_state(service, mission, MissionState.FINISHED)
+    async with service._database.reading() as session:
+        steps = [await mission_queries.waypoints_of_step(session, mission, number) for number in (1, 2)]
+    assert all(row.status in ("sent", "acknowledged", "reached") for rows in steps for row in rows)
+    assert all(row.status == "reached" for row in steps[0]) or any(row.status != "planned" for row in steps[1])

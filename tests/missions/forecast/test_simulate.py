@@ -1,0 +1,160 @@
+"""What is foretold of a mission, beside what comes of it."""
+
+import asyncio
+import threading
+from typing import Any
+
+import numpy as np
+import pytest
+
+from app.missions.errors import ConflictError, InvalidRequestError
+from app.missions.forecast import request
+from app.missions.forecast.floor import Floor, floors_of
+from app.missions.forecast.simulate import Flown, Forecast, forecast
+from app.missions.service import MissionService
+from app.missions.spec.mission import MissionSpec
+from app.missions.states import Action, MissionState
+from app.missions.team import Team
+from tests.support.missions.harbour import sim_spec, until_state
+from tests.support.missions.specs import make_spec
+from tests.support.waiting import until
+
+NONE = np.zeros((0, 4))
+
+
+def lines(**changes: Any) -> MissionSpec:
+    return sim_spec(steps=8, planner={"name": "lawnmower"}, **changes)
+
+
+async def test_a_forecast_is_near_what_comes_and_says_what_it_assumes(
+    service: MissionService, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # On a slow machine, too, all steps are simulated over all floors.
+    monkeypatch.setattr(request, "BUDGET_S", 600.0)
+    monkeypatch.setattr(request, "PATIENCE_S", 600.0)
+    spec = lines()
+    before = await service.forecast(spec)
+    assert before.steps == before.steps_simulated == before.steps_flown == 8
+    assert before.floors > 3
+    assert before.coverage_pct_range.low <= before.coverage_pct <= before.coverage_pct_range.high
+    mission = (await service.create(spec)).id
+    assert (await service.forecast_of(mission)).duration_s == pytest.approx(before.duration_s, rel=0.05)
+    await service.act(mission, Action.START, actor="Ana")
+    await until_state(service, mission, MissionState.FINISHED)
+    # Between its waypoints: on a slow machine vehicles of this speed circle for long until they get the next one.
+    ways: dict[str, list[tuple[float, float, float]]] = {}
+    for step in await service.steps(mission):
+        for w in step.waypoints:
+            ways.setdefault(w.vehicle, []).append((w.east_m, w.north_m, w.depth_m))
+    legs = sum(float(np.linalg.norm(np.diff(way, axis=0), axis=1).sum()) for way in ways.values())
+    foretold = sum(vehicle.distance_m for vehicle in before.vehicles)
+    # The same plan is flown otherwise by vehicles that turn in circles, in so small an area above all.
+    assert legs / 2 < foretold < 2 * legs
+    assert {vehicle.vehicle for vehicle in before.vehicles} == {"a", "b"}
+    assert 0 <= before.coverage_pct <= 100
+    assert any("guess" in words for words in before.assumptions)
+    with pytest.raises(ConflictError, match="nothing before it"):
+        await service.forecast_of(mission)
+
+
+async def test_what_cannot_be_foretold_is_refused_and_nothing_is_stored(service: MissionService) -> None:
+    with pytest.raises(InvalidRequestError, match="no vehicle"):
+        await service.forecast(make_spec(vehicles=[]))
+    with pytest.raises(InvalidRequestError, match="no planner"):
+        await service.forecast(make_spec(planner={"name": "oracle"}))
+    assert await service.missions() == []
+
+
+async def test_one_who_leaves_ends_the_simulation(service: MissionService, monkeypatch: pytest.MonkeyPatch) -> None:
+    begun, ended = threading.Event(), threading.Event()
+
+    def endless(*_: object, stop: object, **__: object) -> Forecast:
+        begun.set()
+        while not stop():  # type: ignore[operator]
+            pass
+        ended.set()
+        raise RuntimeError("nobody waits")
+
+    monkeypatch.setattr(request, "forecast", endless)
+    asked = asyncio.create_task(service.forecast(lines()))
+    await until(begun.is_set, "it is begun")
+    asked.cancel()
+    await until(ended.is_set, "it ends")
+    with pytest.raises(asyncio.CancelledError):
+        await asked
+
+
+def test_time_that_is_up_leaves_a_forecast_that_says_so() -> None:
+    spec = lines()
+    team = Team()
+    members = [team.join(vehicle, slot) for slot, vehicle in enumerate(spec.vehicles)]
+    starts, _ = request.starts_of(spec, members)
+    found = forecast(spec, members, starts, NONE, budget_s=0.0)
+    assert found.steps_flown == 1
+    view = request._view(spec, found, "", 8)
+    # Drawn out: as if every step were as long as the first.
+    assert view.duration_s == pytest.approx(8 * min(8.0 / spec.speed_mps + 2.0, 60.0), rel=0.2)
+    assert any("1 of 8 steps" in words for words in view.assumptions)
+    assert view.steps_flown == view.steps_simulated == 1
+    # After one step there is nothing to be sure of, and it is not drawn out to the end.
+    assert view.coverage_pct_range.high < 20.0
+
+
+def test_without_patience_one_floor_is_flown_and_that_is_said() -> None:
+    spec = lines()
+    team = Team()
+    members = [team.join(vehicle, slot) for slot, vehicle in enumerate(spec.vehicles)]
+    starts, _ = request.starts_of(spec, members)
+    found = forecast(spec, members, starts, NONE, budget_s=0.0, patience_s=0.0)
+    assert (len(found.flights), len(found.floors)) == (1, 1)
+    view = request._view(spec, found, "", 8)
+    assert view.floors == 1
+    assert any("one floor only" in words for words in view.assumptions)
+
+
+def test_ranges_span_what_came_over_the_floors() -> None:
+    spec = lines()
+    floors = list(floors_of(spec, NONE, 4.0, None))
+    flights = [
+        Flown(100.0 + 10.0 * k, {"a": 50.0 + k, "b": 40.0}, 20.0 * k, 100.0 - 20.0 * k, 0.1 * k if k else None, 8)
+        for k in range(len(floors))
+    ]
+    view = request._view(spec, Forecast(flights, floors), "", 8)
+    assert view.coverage_pct == 40.0
+    assert (view.coverage_pct_range.low, view.coverage_pct_range.high) == (pytest.approx(8.0), pytest.approx(72.0))
+    assert view.duration_s_range.low < view.duration_s < view.duration_s_range.high
+    assert view.mean_sd_m_range is not None
+    assert 0.1 < view.mean_sd_m_range.low < view.mean_sd_m_range.high < 0.4
+    ways = {vehicle.vehicle: vehicle.distance_m_range for vehicle in view.vehicles}
+    assert ways["b"].low == ways["b"].high == 40.0
+    assert ways["a"].low < ways["a"].high
+    assert view.floors == len(floors)
+    assert not any("Only" in words for words in view.assumptions)
+
+
+def floors_under(spec: MissionSpec, prior: np.ndarray, depth_m: float | None = None) -> list[Floor]:
+    return list(floors_of(spec, prior, 4.0, depth_m))
+
+
+def test_floors_are_guesses_of_different_roughness_that_agree_where_soundings_were_imported() -> None:
+    spec = make_spec(40.0)
+    guessed = floors_under(spec, NONE)
+    assert {floor.known for floor in guessed} == {0.0}
+    assert all("guess" in floor.words for floor in guessed)
+    for floor in guessed:
+        assert np.median(floor.terrain.z_m) == pytest.approx(10.0, rel=0.3)
+    steps = [float(np.abs(np.diff(floor.terrain.z_m, axis=0)).mean()) for floor in guessed]
+    assert max(steps) > 5 * min(steps)
+    assert np.median(floors_under(spec, NONE, 55.0)[0].terrain.z_m) == pytest.approx(55.0, rel=0.2)
+    east, north = np.meshgrid(np.arange(1.0, 20.0, 2.0), np.arange(1.0, 40.0, 2.0))
+    prior = np.column_stack([east.ravel(), north.ravel(), 20.0 + 0.1 * east.ravel(), np.full(east.size, 0.1)])
+    half = floors_under(spec, prior)
+    for floor in half:
+        assert 0.1 < floor.known < 0.6
+        assert floor.terrain.depth_at_point(9.0, 21.0) == pytest.approx(20.9, abs=0.5)
+        assert "imported" in floor.words
+    apart = np.ptp([floor.terrain.z_m for floor in half], axis=0)
+    west, east_end = apart[:20, :9].mean(), apart[:20, 17:20].mean()
+    assert east_end > 3 * west
+    for one, again in zip(guessed, floors_under(spec, NONE), strict=True):
+        np.testing.assert_array_equal(one.terrain.z_m, again.terrain.z_m)

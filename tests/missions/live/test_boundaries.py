@@ -1,0 +1,140 @@
+"""Vehicles that go where they must not be."""
+
+import numpy as np
+import pytest
+
+from app.missions.fleet.links.sim import Launch, SimFleetLink
+from app.missions.flight.decision import make_constraints
+from app.missions.live.boundaries import Boundaries
+from app.missions.safety import WAITING_CIRCLE_M
+from app.missions.service import MissionService
+from app.missions.settings import SimulationSettings
+from app.missions.spec.mission import Sensor, VehicleKind
+from app.missions.states import Action
+from app.missions.views.mission import CheckStatus, EventView, Level
+from simulator.seafloors import generate
+from simulator.sensors import SensorKind, SonarNoise
+from simulator.world import SimulatedVehicle
+from tests.support.missions.harbour import Rover
+from tests.support.missions.specs import LAT, LON, lon_lat, make_spec, rectangle
+from tests.support.waiting import until
+
+AREA = np.array([[0.0, 0], [100, 0], [100, 100], [0, 100]])
+ZONE = np.array([[40.0, 40], [60, 40], [60, 60], [40, 60]])
+
+
+def told(boundaries: Boundaries, places: list[tuple[float, float]]) -> list[tuple[Level, str]]:
+    lines = [boundaries.judge("a", place, 2.0, at_s) for at_s, place in enumerate(places)]
+    return [(line.level, line.message) for found in lines for line in found]
+
+
+def test_an_entry_into_a_zone_is_one_alarm_and_its_end_says_how_long_and_how_far() -> None:
+    way = [(30.0, 50.0), (39.9, 50.0), (41.0, 50.0), (44.0, 50.0), (40.5, 50.0), (39.5, 50.0), (40.2, 50.0), (35, 50)]
+    assert told(Boundaries(AREA, [ZONE]), way) == [
+        (Level.ALARM, "a is in keep-out zone 1, at 2.0 m depth: abort it if it goes on"),
+        (Level.WARNING, "a is no longer in keep-out zone 1: it was for 5 s, by up to 4.0 m"),
+    ]
+
+
+def test_leaving_the_area_is_an_alarm_beyond_the_circle_of_waiting_and_coming_from_outside_is_none() -> None:
+    boundaries = Boundaries(AREA, [])
+    assert told(boundaries, [(-80, 50), (-30, 50), (5, 50), (-15, 50), (5, 50)]) == []
+    assert told(boundaries, [(-21, 50)]) == [
+        (Level.ALARM, "a is outside the area, at 2.0 m depth: abort it if it goes on")
+    ]
+    assert boundaries.breach("a") == "outside the area"
+    assert told(boundaries, [(-15, 50)]) == []
+    assert [level for level, _ in told(boundaries, [(-9, 50)])] == [Level.WARNING]
+    assert boundaries.breach("a") == ""
+
+
+def test_a_vehicle_that_left_the_mission_is_forgotten() -> None:
+    boundaries = Boundaries(AREA, [ZONE])
+    assert len(told(boundaries, [(50, 50)])) == 1
+    boundaries.forget("a")
+    assert boundaries.breach("a") == ""
+
+
+@pytest.mark.parametrize("speed_mps", [0.5, 1.0, 1.5, 2.0])
+def test_no_vehicle_that_waits_at_its_waypoint_circles_farther_than_the_margin(speed_mps: float) -> None:
+    terrain = generate("harbour", 0, width_m=200, height_m=200, origin=(LAT, LON))
+    body = SimulatedVehicle(
+        "a",
+        terrain,
+        SensorKind.SINGLE,
+        (80.0, 88.0, 0.0),
+        np.random.default_rng(1),
+        noise=SonarNoise(relative_sd=0.01),
+        start_time_s=0.0,
+        drift_m2ps=0.0,
+    )
+    body.go_to(100, 100, 2.0, speed_mps, arrival_radius_m=3.0)
+    farthest_m = 0.0
+    for _ in range(1200):
+        body.advance(0.1)
+        if body.arrived or farthest_m:
+            farthest_m = max(farthest_m, body.position.horizontal_distance_m(100, 100))
+    assert 5.0 < farthest_m < WAITING_CIRCLE_M
+
+
+def test_waypoints_stay_a_waiting_circle_away_from_zones_by_default() -> None:
+    zone, margin = make_constraints(make_spec(100, keep_out=[rectangle(40, 40, 60, 60)])).keep_out
+    assert zone[:, 0].min() - margin[:, 0].min() == pytest.approx(WAITING_CIRCLE_M, abs=0.05)
+
+
+@pytest.mark.parametrize(("margin_m", "warned"), [(5.0, True), (10.0, False), (25.0, False)])
+async def test_the_checklist_warns_of_a_margin_that_waiting_vehicles_overstep(
+    service: MissionService, margin_m: float, warned: bool
+) -> None:
+    limits = {"max_step_m": 8, "keep_out_margin_m": margin_m}
+    mission = await service.create(make_spec(100, keep_out=[rectangle(40, 40, 60, 60)], limits=limits))
+    checks = {check.id: check for check in (await service.preflight(mission.id)).checks}
+    assert ("waiting" in checks) is warned
+    if warned:
+        assert checks["waiting"].status is CheckStatus.WARNING
+
+
+async def test_a_vehicle_reported_in_a_zone_is_an_alarm_of_its_mission(service: MissionService) -> None:
+    spec = make_spec(100, steps=50, vehicles=[{"name": "a", "kind": "rest"}], keep_out=[rectangle(40, 40, 60, 60)])
+    mission = (await service.create(spec)).id
+    rover = Rover(service, mission, "a", 10, 10)
+    await rover.post()
+    await service.act(mission, Action.START, actor="Ana")
+
+    async def post_at(east_m: float, north_m: float) -> None:
+        lon, lat = lon_lat(east_m, north_m)
+        await rover.post(lat_deg=lat, lon_deg=lon)
+
+    async def lines() -> list[EventView]:
+        return [line for line in await service.events(mission) if line.kind == "boundary"]
+
+    await post_at(50, 50)
+    await until(lines, "the entry is in the log")
+    [line] = await lines()
+    assert (line.level, line.data["vehicle"], line.data["zone"]) == (Level.ALARM, "a", 1)
+    [view] = (await service.mission(mission)).vehicles
+    assert view.breach == "in keep-out zone 1"
+    await post_at(30, 50)
+
+    async def ended() -> bool:
+        return len(await lines()) == 2
+
+    await until(ended, "its end is in the log")
+    [view] = (await service.mission(mission)).vehicles
+    assert view.breach == ""
+    await service.act(mission, Action.ABORT, actor="Ana")
+
+
+async def test_simulated_vehicles_of_another_mission_are_launched_anew(service: MissionService) -> None:
+    link = SimFleetLink(SimulationSettings(), 1.0)
+    places = []
+    for mission, east_m in (("m1", 20), ("m1", 40), ("m2", 60)):
+        lon, lat = lon_lat(east_m, 20)
+        link.launch(Launch("a", mission, Sensor.DVL, (LAT, LON), 100, 100, start=(lat, lon), noise=0.01))
+        [info] = link.vehicles()
+        assert info.report is not None
+        places.append(round((info.report.position.lon_deg - LON) / (lon_lat(1, 0)[0] - LON)))
+    assert places == [20, 20, 60]
+    link.put_away("a")
+    assert link.vehicles() == []
+    assert VehicleKind(link.kind) is VehicleKind.SIM

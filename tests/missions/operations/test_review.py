@@ -1,0 +1,165 @@
+"""Soundings that are kept out of the map, and an operator's word on them."""
+
+from collections.abc import AsyncIterator
+from typing import Any
+
+import numpy as np
+import pytest
+
+from app.missions.errors import ConflictError, SoundingNotFoundError
+from app.missions.service import MissionService
+from app.missions.soundings.measurement import Measurement
+from app.missions.states import Action
+from app.missions.views.soundings import Ruling, SoundingState
+from tests.support.missions.harbour import CLOCK_S, Harbour
+from tests.support.missions.measured import NOT_USED, measured
+from tests.support.missions.specs import lon_lat, make_spec
+from tests.support.waiting import until
+
+
+async def depth_at(service: MissionService, mission: str, item: Measurement) -> float:
+    snapshot = await service.map(mission)
+    east, north = snapshot.facts.frame.to_local(item.lat_deg, item.lon_deg)
+    grid = snapshot.built.map.grid
+    return float(snapshot.built.map.depth_m[int(north / grid.cell_m), int(east / grid.cell_m)])
+
+
+async def test_what_is_not_in_the_map_is_listed_with_the_reason_page_by_page(service: MissionService) -> None:
+    mission = (await service.create(make_spec())).id
+    items = measured()
+    await service.measure(mission, items)
+    await service.map(mission)
+    page = await service.review(mission, NOT_USED)
+    states = {item.state: item for item in page.items}
+    assert page.total == 2
+    assert set(states) == {SoundingState.DOUBTED, SoundingState.REJECTED}
+    assert states[SoundingState.DOUBTED].raw_depth_m == pytest.approx(4.5)
+    assert "standard deviations from the" in states[SoundingState.DOUBTED].reason
+    assert "outside the area" in states[SoundingState.REJECTED].reason
+    used = [item async for item in _all_pages(service, mission, SoundingState.USED)]
+    assert used == sorted(used)
+    assert len(used) == 79
+    assert (await service.review(mission, NOT_USED, vehicle="b")).total == 0
+
+
+async def _all_pages(service: MissionService, mission: str, state: SoundingState) -> AsyncIterator[Any]:
+    after: int | None = 0
+    while after is not None:
+        page = await service.review(mission, [state], after=after, limit=30)
+        for item in page.items:
+            yield item.id
+        after = page.next_after
+
+
+async def test_a_restored_sounding_bends_the_map_at_once_and_after_a_restart(harbour: Harbour) -> None:
+    service = harbour.service
+    mission = (await service.create(make_spec())).id
+    items = measured()
+    await service.measure(mission, items)
+    assert await depth_at(service, mission, items[40]) == pytest.approx(8.15, abs=0.3)
+    doubted = (await service.review(mission, [SoundingState.DOUBTED])).items[0]
+    before = await service.mission(mission)
+
+    restored = await service.rule(mission, doubted.id, Ruling.RESTORED, note="a mast, seen by divers", actor="Ana")
+    assert restored.state is SoundingState.RESTORED
+    assert (restored.range_m, restored.raw_depth_m) == (doubted.range_m, doubted.raw_depth_m)
+    assert await depth_at(service, mission, items[40]) < 7.0
+    line = (await service.events(mission))[-1]
+    assert (line.kind, line.data["actor"], line.data["sounding"]) == ("sounding", "Ana", doubted.id)
+    assert "a mast, seen by divers" in line.message
+    assert "standard deviations" in line.data["before"]
+
+    service = await harbour.reopen()
+    assert await depth_at(service, mission, items[40]) < 7.0
+    withdrawn = await service.rule(mission, doubted.id, Ruling.REJECTED, actor="Rui")
+    assert withdrawn.state is SoundingState.WITHDRAWN
+    assert await depth_at(service, mission, items[40]) == pytest.approx(8.15, abs=0.3)
+    progress = (await service.mission(mission)).progress
+    assert (progress.soundings, progress.rejected) == (before.progress.soundings - 1, before.progress.rejected + 1)
+    events = len(await service.events(mission))
+    await service.rule(mission, doubted.id, Ruling.REJECTED, actor="Rui")
+    assert len(await service.events(mission)) == events
+
+
+async def test_a_sounding_that_the_gate_refused_counts_when_restored_and_stays_through_corrections(
+    service: MissionService,
+) -> None:
+    from app.missions.views.corrections import TideCorrection
+
+    mission = (await service.create(make_spec())).id
+    await service.measure(mission, measured(wrong=None))
+    refused = (await service.review(mission, [SoundingState.REJECTED])).items[0]
+    restored = await service.rule(mission, refused.id, Ruling.RESTORED, actor="Ana")
+    assert restored.depth_m == pytest.approx(11.0)
+    corrected = await service.set_tide(mission, TideCorrection(level_m=1.0, source="gauge"))
+    assert (corrected.accepted, corrected.rejected) == (81, 0)
+    again = (await service.review(mission, [SoundingState.RESTORED])).items[0]
+    assert (again.depth_m, again.raw_depth_m) == (pytest.approx(10.0), pytest.approx(11.0))
+
+
+async def test_what_has_no_depth_cannot_be_restored(service: MissionService) -> None:
+    mission = (await service.create(make_spec())).id
+    lon, lat = lon_lat(5, 5)
+    bad = Measurement(vehicle="a", time_s=CLOCK_S, lat_deg=lat, lon_deg=lon, depth_m=2, range_m=-3)
+    await service.measure(mission, [bad])
+    refused = (await service.review(mission, NOT_USED)).items[0]
+    assert (refused.depth_m, refused.range_m) == (None, -3)
+    with pytest.raises(ConflictError, match="range_m: -3 is not positive"):
+        await service.rule(mission, refused.id, Ruling.RESTORED)
+    with pytest.raises(SoundingNotFoundError):
+        await service.rule(mission, refused.id + 1, Ruling.RESTORED)
+    other = (await service.create(make_spec())).id
+    with pytest.raises(SoundingNotFoundError):
+        await service.rule(other, refused.id, Ruling.REJECTED)
+
+
+async def test_a_mission_that_is_taken_up_has_its_map_without_being_asked_for_it(harbour: Harbour) -> None:
+    service = harbour.service
+    mission = (await service.create(make_spec())).id
+    await service.measure(mission, measured())
+    await service.act(mission, Action.START, actor="Ana")
+    await service.act(mission, Action.FINISH, actor="Ana")
+
+    async def mapped() -> bool:
+        return bool((await service.mission(mission)).progress.coverage_pct)
+
+    await until(mapped, "the last map was made by itself")
+    shown = (await service.mission(mission)).progress
+
+    service = await harbour.reopen()
+    await service.missions()
+    await until(mapped, "the map was made by itself")
+    progress = (await service.mission(mission)).progress
+    assert progress.coverage_pct == pytest.approx(shown.coverage_pct, abs=2)
+    async with service.subscribe(mission) as messages:
+        snapshot = await anext(messages)
+    assert snapshot.map_version > 0
+
+
+async def test_missions_that_left_memory_are_listed_as_they_were(harbour: Harbour) -> None:
+    service = harbour.service
+    ids = []
+    for number in range(11):
+        mission = (await service.create(make_spec(name=f"Quay {number}"))).id
+        await service.act(mission, Action.ABORT, actor="Ana")
+        ids.append(mission)
+    first = await service.missions()
+    assert [m.id for m in first] == ids[::-1]
+    assert {m.state for m in first} == {"aborted"}
+    assert len(list(service._registry)) <= 9
+    assert await service.missions() == first
+
+
+async def test_the_map_of_an_earlier_step_is_that_of_the_soundings_until_then(service: MissionService) -> None:
+    from app.missions.operations.history import map_at_step
+
+    mission = (await service.create(make_spec())).id
+    await service.measure(mission, measured()[:30])
+    live = await service._get(mission)
+    live.set_step(1, None, {})
+    await service.measure(mission, measured())
+    whole = await service.map(mission)
+    early = await map_at_step(live, 0)
+    assert early.built.soundings == 30
+    assert early.built.map.count.sum() == 30
+    assert np.nanmean(early.built.map.sd_m) > np.nanmean(whole.built.map.sd_m)

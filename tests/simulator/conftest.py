@@ -1,8 +1,0 @@
-import pytest
-from dune_bench import Bench
-
-
-@pytest.fixture
-def bench():
-    """A node in service with a console that it talks to."""
-    return Bench().ready()

@@ -1,0 +1,1 @@
+"""Services, networks, disks and people that fail or mean harm."""

@@ -1,0 +1,1 @@
+"""Vehicles and systems that speak IMC."""

@@ -1,0 +1,1 @@
+"""Missions and what is measured in them."""

@@ -1,0 +1,1 @@
+"""Neptus' panel and the service that it speaks to."""
