@@ -59,7 +59,7 @@ from app.missions.operations.target_pages import target_ranges_page
 from app.missions.operations.uploads import Upload, Uploads
 from app.missions.preflight.survey import preflight
 from app.missions.running.admission import check_spec
-from app.missions.running.claims import Claims, Lead, ShowArea, free_elsewhere
+from app.missions.running.claims import Claims, free_elsewhere
 from app.missions.running.deletion import check_deletable, delete_mission
 from app.missions.running.failover import Failover
 from app.missions.running.final_maps import FinalMaps
@@ -145,19 +145,13 @@ class MissionService:
         self._settings = settings
         self._database = database
         self._at_once = AtOnce(database)
-        self._rest = RestFleetLink()
-        self._sim = SimFleetLink(settings.simulation, settings.time_scale)
-        links: list[FleetLink] = [self._rest, self._sim]
+        links: list[FleetLink] = [RestFleetLink(), SimFleetLink(settings.simulation, settings.time_scale)]
         self._examine: Examine = switched_off
-        show_area: ShowArea = lambda _mission, _ring: None  # noqa: E731
-        lead: Lead = lambda _vehicle, _guidance, _gateway: None  # noqa: E731
         if settings.imc.enabled:
             from app.missions.fleet.links.imc import make_imc_link
 
             imc = make_imc_link(settings.imc, settings.time_scale)
             self._examine = imc.diagnosis
-            lead = imc.lead
-            show_area = imc.show_area
             links.append(imc)
         if settings.neptus.enabled:
             from app.missions.neptus_sessions import NeptusSessions
@@ -165,9 +159,9 @@ class MissionService:
             links.append(NeptusSessions(self, database, settings.neptus, log_in or _nobody, is_own_user).link)
         self._hub = FleetHub(links)
         self._executor = ThreadPoolExecutor(WORKERS, thread_name_prefix="planning")
-        self._claims = Claims(self._hub, self._sim, lead, show_area)
+        self._claims = Claims(self._hub)
         self._maps = FinalMaps()
-        self._forecaster = Forecaster()
+        self._forecaster = Forecaster(self._hub.capabilities)
         self._compilation = Compilation(self._executor)
         self._supervisor = MissionSupervisor(
             self._hub, self._claims, self._executor, self._maps, self._compilation, settings.time_scale
@@ -388,14 +382,14 @@ class MissionService:
     ) -> BatchVerdict:
         """Take in measurements; see ``measuring.measure``."""
         live = await self._get(mission_id)
-        return await measure(live, self._hub, self._rest, items, idempotency_key=idempotency_key, sender=sender)
+        return await measure(live, self._hub, items, idempotency_key=idempotency_key, sender=sender)
 
     async def waypoint(
         self, mission_id: str, vehicle: str, *, after_step: int | None = None, timeout_s: float = 0.0
     ) -> WaypointView | None:
         """Return a vehicle's waypoint when it is newer than ``after_step``; see ``polling.waypoint``."""
         return await waypoint(
-            await self._get(mission_id), self._rest, vehicle, after_step=after_step, timeout_s=timeout_s
+            await self._get(mission_id), self._hub, vehicle, after_step=after_step, timeout_s=timeout_s
         )
 
     async def import_log(

@@ -9,6 +9,8 @@ from pydantic import ValidationError
 from shapely.geometry import Point, shape
 
 from app.missions.errors import ConflictError, InvalidRequestError
+from app.missions.fleet.interface import LinkCapabilities
+from app.missions.fleet.links.rest import RestFleetLink
 from app.missions.fleet.links.sim import AGROUND
 from app.missions.operations.scans import report_of_posted
 from app.missions.search.course import hold_before_hazards
@@ -252,6 +254,22 @@ async def test_the_checklist_says_when_nobody_could_leave_or_get_there(service: 
         mission = await service.create(search_spec(search=change))
         (line,) = [c for c in (await service.preflight(mission.id)).checks if c.id == "search.ways"]
         assert (line.status, words in line.message) == (status, True), line
+
+
+async def test_a_mission_treats_vehicles_by_what_their_link_says_they_can_do(
+    service: MissionService, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    capabilities = LinkCapabilities(ready_before_start=True, scans=True, circles_m=1e3)
+    monkeypatch.setattr(RestFleetLink, "capabilities", capabilities)
+    mission = await service.create(search_spec(vehicles=[{"name": "boat", "kind": "rest", "depth_m": 0}]))
+    checks = {check.id: check for check in (await service.preflight(mission.id)).checks}
+    assert checks["link.boat"].status is CheckStatus.PROBLEM
+    assert "within 1000 m" in checks["circles.boat"].message
+    assert "scans.boat" not in checks
+    [refused] = (await service.scan(mission.id, [all_round(14, 5, 1.0)])).items
+    assert "scans by itself" in refused.reason
+    with pytest.raises(ConflictError, match="not every vehicle is ready: boat is unknown"):
+        await service.act(mission.id, "start", actor="Ana")
 
 
 def test_the_examples_are_missions() -> None:

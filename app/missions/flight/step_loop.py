@@ -214,6 +214,7 @@ class Runner:
                 member.cruise_depth_m(self._spec.limits),
                 member.report.position_sd_m if member.report and member.report.position_sd_m is not None else math.nan,
                 member.report.position.depth_m if member.surfacing and member.report else math.nan,
+                member.capabilities.keeps_depth,
             )
             for member in self._live.team.present
         ]

@@ -2,6 +2,7 @@
 
 import asyncio
 import threading
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 
@@ -11,8 +12,9 @@ from shapely.geometry import Point, Polygon
 
 from app.arrays import FloatArray
 from app.missions.errors import InvalidRequestError
+from app.missions.fleet.interface import LinkCapabilities
 from app.missions.forecast.simulate import Forecast, forecast
-from app.missions.spec.mission import MissionSpec
+from app.missions.spec.mission import MissionSpec, VehicleKind
 from app.missions.team import Member, Team
 from app.missions.views.base import View
 
@@ -69,7 +71,8 @@ class ForecastView(View):
 class Forecaster:
     """Makes forecasts beside the planning of running missions."""
 
-    def __init__(self) -> None:
+    def __init__(self, capabilities_of: Callable[[VehicleKind], LinkCapabilities]) -> None:
+        self._capabilities_of = capabilities_of
         self._executor = ThreadPoolExecutor(1, thread_name_prefix="forecast")
         self._one = asyncio.Lock()
         self._closing = threading.Event()
@@ -102,7 +105,7 @@ class Forecaster:
         InvalidRequestError
             When the mission has no vehicle.
         """
-        team = Team()
+        team = Team(self._capabilities_of)
         ours = members or [team.join(vehicle, slot) for slot, vehicle in enumerate(spec.vehicles)]
         if not ours:
             raise InvalidRequestError("vehicles", "the mission has no vehicle", "add one: without any nothing is done")

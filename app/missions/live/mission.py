@@ -105,7 +105,7 @@ class LiveMission:
         self.header = Header(MissionState(row.state), row.reason, row.created_at, row.updated_at, row.elapsed_s)
         self.frame: LocalFrame = spec.frame()
         self.area = spec.local_area()
-        self.team = Team()
+        self.team = Team(hub.capabilities)
         self.broadcaster = Broadcaster()
         self.builder = builder or builder_of(spec)
         self.margin_m = 2 * spec.limits.max_step_m

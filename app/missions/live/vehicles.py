@@ -8,7 +8,7 @@ from app.missions.clock import now
 from app.missions.fleet.hub import FleetHub
 from app.missions.fleet.interface import LinkState, Position, VehicleInfo
 from app.missions.live.position_quality import position_quality
-from app.missions.spec.mission import MissionSpec, VehicleKind
+from app.missions.spec.mission import MissionSpec
 from app.missions.team import Member, Team
 from app.missions.views.mission import VehicleView
 
@@ -102,7 +102,7 @@ class VehicleViews:
 
 
 def _reason(member: Member, info: VehicleInfo) -> str:
-    launched = member.spec.kind is VehicleKind.SIM and info.state is LinkState.UNKNOWN and member.report is not None
+    launched = member.capabilities.simulated and info.state is LinkState.UNKNOWN and member.report is not None
     # Nothing is to be done about a simulated vehicle that was put away with its mission.
     return member.refusal or ("" if launched else info.reason)
 

@@ -8,7 +8,6 @@ from app.missions.fleet.interface import Position, ScanReport
 from app.missions.live.mission import LiveMission
 from app.missions.search.scan_schema import Scan
 from app.missions.search.state import Search
-from app.missions.spec.mission import VehicleKind
 from app.missions.states import MissionState
 from app.missions.views.soundings import BatchVerdict, ItemVerdict, Verdict, batch_verdict
 
@@ -59,8 +58,8 @@ def _stranger(live: LiveMission, vehicle: str) -> str:
     member = live.team.get(vehicle)
     if member is None:
         return f"vehicle: {vehicle!r} takes no part in this mission"
-    if member.spec.kind is VehicleKind.SIM:
-        return f"vehicle: {vehicle!r} is simulated and scans by itself"
+    if member.capabilities.scans:
+        return f"vehicle: {vehicle!r} scans by itself"
     return ""
 
 

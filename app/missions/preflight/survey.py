@@ -13,7 +13,6 @@ from app.missions.live.mission import LiveMission
 from app.missions.live.vehicles import local_place
 from app.missions.preflight.search import search_checks
 from app.missions.safety import WAITING_CIRCLE_M
-from app.missions.spec.mission import VehicleKind
 from app.missions.team import Member
 from app.missions.views.mission import CheckStatus, CheckView, PreflightView
 
@@ -67,10 +66,10 @@ def _vehicles(live: LiveMission, hub: FleetHub) -> Iterator[CheckView]:
             )
             continue
         status, message, remedy = OK, f"{info.state}".replace("_", " "), ""
-        if member.spec.kind is VehicleKind.SIM:
+        if member.capabilities.simulated:
             message = "simulated inside the service, starts with the mission"
         elif info.state not in (LinkState.READY, LinkState.ENGAGED):
-            must = member.spec.kind is VehicleKind.IMC
+            must = member.capabilities.ready_before_start
             status = PROBLEM if must else WARNING
             message = info.reason or message
             remedy = (
@@ -86,7 +85,7 @@ def _batteries(live: LiveMission, hub: FleetHub) -> Iterator[CheckView]:
         report = member.report or hub.info(member.key).report
         level = report.battery_pct if report is not None else None
         if level is None:
-            if member.spec.kind is not VehicleKind.SIM:
+            if not member.capabilities.simulated:
                 yield CheckView(
                     id=f"battery.{member.name}",
                     title=f"Battery of {member.name}",
