@@ -123,8 +123,16 @@ class LiveMission:
         self.search = search
         """What a mission of kind search knows of its site."""
         take_scans = None if self.search is None else partial(take, self.search, row.id, self.changed.set)
-        self.journal = Journal(database, row.id, self.gate, counts, self.broadcaster, self._take_soundings, take_scans)
-        self.journal.on_trouble = self.publish_summary
+        self.journal = Journal(
+            database,
+            row.id,
+            self.gate,
+            counts,
+            self.broadcaster,
+            self._take_soundings,
+            self.publish_summary,
+            take_scans,
+        )
         self.whole = SoundingStore(database, row.id, self.builder, self.journal)
         """All its soundings, and its map as it is stored."""
         self.ranges = RangeJournal(database, row.id, Tracking(spec, self.frame), self.journal, time_scale)
