@@ -105,6 +105,8 @@ class LiveMission:
         self.header = Header(MissionState(row.state), row.reason, row.created_at, row.updated_at, row.elapsed_s)
         self.frame: LocalFrame = spec.frame()
         self.area = spec.local_area()
+        self.hub = hub
+        """All links, those to its vehicles among them."""
         self.team = Team(hub.capabilities)
         self.broadcaster = Broadcaster()
         self.builder = builder or builder_of(spec)
@@ -183,6 +185,11 @@ class LiveMission:
 
         await self.journal.count_again(read)
         self.publish_summary()
+
+    @property
+    def running(self) -> bool:
+        """Whether its step loop goes on in this process."""
+        return self.running_since_s is not None
 
     def halt(self) -> None:
         """Keep the step loop from sending anything more, and wake everyone who waits for a waypoint."""

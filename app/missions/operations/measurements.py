@@ -14,7 +14,6 @@ from sqlalchemy.ext.asyncio import AsyncSession
 from app.mapping.georeference import LocalFrame
 from app.missions.clock import now
 from app.missions.errors import ConflictError, InvalidRequestError
-from app.missions.fleet.hub import FleetHub
 from app.missions.fleet.interface import BeamGeometry, Position, RangeReport, SoundingReport, VehicleReport
 from app.missions.large_batches import each_of, made_of
 from app.missions.live.mission import LiveMission
@@ -40,7 +39,6 @@ _Answer = tuple[str, BatchVerdict]
 
 async def measure(
     live: LiveMission,
-    hub: FleetHub,
     items: Sequence[Measurement],
     *,
     idempotency_key: str | None = None,
@@ -59,23 +57,23 @@ async def measure(
         raise ConflictError("the mission is a draft and takes no measurements yet", "add a vehicle to it first")
     if len(items) > MAX_BATCH:
         raise InvalidRequestError("items", f"{len(items)} items are too many", f"send at most {MAX_BATCH} at once")
-    digest, strangers, reports = await made_of(items, _looked_through, live, hub, items)
+    digest, strangers, reports = await made_of(items, _looked_through, live, items)
     ranges = _ranges(live, items, strangers)
     key = _Key.of(sender, idempotency_key) if idempotency_key is not None else None
     batch = _Batch(items, key, digest, strangers, reports, ranges)
     if live.intake is None:
-        live.intake = Grouped(partial(_take, live, hub), lambda batch: bool(batch.ranges))
+        live.intake = Grouped(partial(_take, live), lambda batch: bool(batch.ranges))
     answer: BatchVerdict = await live.intake(batch)
     return answer
 
 
 def _looked_through(
-    live: LiveMission, hub: FleetHub, items: Sequence[Measurement]
+    live: LiveMission, items: Sequence[Measurement]
 ) -> tuple[str, dict[int, str], dict[int, SoundingReport]]:
     """Return what a batch is known by, and by item why it is refused and its sounding; changes nothing."""
     digest = hashlib.sha256(orjson.dumps([item.model_dump() for item in items])).hexdigest()
     near = _all_near(items, live.frame)
-    strangers = {i: _stranger(live, hub, item, near=near) for i, item in enumerate(items)}
+    strangers = {i: _stranger(live, item, near=near) for i, item in enumerate(items)}
     reports = {i: report for i, item in enumerate(items) if not strangers[i] and (report := _sounding(item))}
     return digest, strangers, reports
 
@@ -113,7 +111,7 @@ class _Batch:
         return [item for i, item in enumerate(self.items) if not self.strangers[i]]
 
 
-async def _take(live: LiveMission, hub: FleetHub, batches: Sequence[_Batch]) -> list[BatchVerdict | Exception]:
+async def _take(live: LiveMission, batches: Sequence[_Batch]) -> list[BatchVerdict | Exception]:
     """Store batches in one transaction: many vehicles that post at the same time wait for the disk once."""
     keys = {name for batch in batches if batch.key for name in (batch.key.stored, batch.key.before) if name}
     async with live.journal.writing, live.ranges.writing, live.database.writing() as session:
@@ -132,7 +130,7 @@ async def _take(live: LiveMission, hub: FleetHub, batches: Sequence[_Batch]) -> 
     for batch, result in zip(batches, results, strict=True):
         if isinstance(result, BatchVerdict):
             # The first answer may have got lost together with the process that knew where the vehicle is.
-            await _hear(live, hub, batch.known, only_unknown=result.replayed)
+            await _hear(live, batch.known, only_unknown=result.replayed)
     # Where the vehicle is, and whether it arrived, is on disk as well before it is answered.
     await live.journal.flush()
     return results
@@ -217,25 +215,25 @@ async def _store(
     return answers, then
 
 
-async def _hear(live: LiveMission, hub: FleetHub, items: Sequence[Measurement], *, only_unknown: bool = False) -> None:
+async def _hear(live: LiveMission, items: Sequence[Measurement], *, only_unknown: bool = False) -> None:
     """Tell the links where vehicles are; ``only_unknown``: of those only whose place they do not know."""
     links = {}
     for name in {item.vehicle for item in items}:
         # One that left meanwhile was still heard.
         member = live.team.get(name) or live.team.left[name]
-        link = hub.polled.get(member.spec.kind)
-        if link is not None and not (only_unknown and hub.info(member.key).report is not None):
+        link = live.hub.polled.get(member.spec.kind)
+        if link is not None and not (only_unknown and live.hub.info(member.key).report is not None):
             links[name] = link
     fresh = [item for item in items if item.vehicle in links]
     await each_of(fresh, lambda item: links[item.vehicle].heard(_vehicle_report(item)))
 
 
-def _stranger(live: LiveMission, hub: FleetHub, item: Measurement, *, near: bool) -> str:
+def _stranger(live: LiveMission, item: Measurement, *, near: bool) -> str:
     member = live.team.get(item.vehicle)
     if member is None:
         return f"vehicle: {item.vehicle!r} takes no part in this mission"
-    if member.spec.kind not in hub.polled:
-        polled = " or ".join(hub.polled)
+    if member.spec.kind not in live.hub.polled:
+        polled = " or ".join(live.hub.polled)
         words = f"is of kind {member.spec.kind}; only vehicles of kind {polled} post measurements"
         return f"vehicle: {item.vehicle!r} {words}"
     return ("" if near else _impossible_place(item, live.frame)) or _useless_range(item, live)

@@ -4,7 +4,6 @@ import asyncio
 from collections.abc import Callable
 
 from app.missions.errors import ConflictError, VehicleNotFoundError
-from app.missions.fleet.hub import FleetHub
 from app.missions.fleet.interface import WaypointStatus
 from app.missions.live.mission import LiveMission
 from app.missions.states import MissionState
@@ -12,7 +11,7 @@ from app.missions.views.mission import WaypointView
 
 
 async def waypoint(
-    live: LiveMission, hub: FleetHub, vehicle: str, *, after_step: int | None = None, timeout_s: float = 0.0
+    live: LiveMission, vehicle: str, *, after_step: int | None = None, timeout_s: float = 0.0
 ) -> WaypointView | None:
     """Return a vehicle's waypoint when it is newer than ``after_step``, waiting for it; None when none came.
 
@@ -20,12 +19,12 @@ async def waypoint(
     """
     member = live.team.get(vehicle)
     if member is None:
-        for polled in hub.polled.values():
+        for polled in live.hub.polled.values():
             polled.told_to_stop(vehicle, live.id)
         raise VehicleNotFoundError(
             f"vehicle {vehicle!r} takes no part in this mission", "stop; nothing more comes from here for it"
         )
-    link = hub.polled.get(member.spec.kind)
+    link = live.hub.polled.get(member.spec.kind)
     after = -1 if after_step is None else after_step
 
     def newer() -> WaypointView | None:

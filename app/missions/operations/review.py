@@ -22,7 +22,12 @@ Doubts = dict[int, str]
 
 
 async def soundings_page(
-    live: LiveMission, states: Sequence[SoundingState], vehicle: str | None, after: int, limit: int
+    live: LiveMission,
+    states: Sequence[SoundingState],
+    *,
+    vehicle: str | None = None,
+    after: int = 0,
+    limit: int = 200,
 ) -> SoundingPage:
     """Return up to ``limit`` soundings in any of the states with an id above ``after``, in the order they came."""
     await live.journal.flush()
@@ -41,7 +46,7 @@ async def soundings_page(
     )
 
 
-async def rule(live: LiveMission, sounding_id: int, ruling: Ruling, note: str, actor: str) -> SoundingView:
+async def rule(live: LiveMission, sounding_id: int, ruling: Ruling, *, note: str = "", actor: str) -> SoundingView:
     """Restore a sounding or reject it; the map is that of the new choice when this returns. Raw values stay.
 
     Raises

@@ -6,9 +6,12 @@ from collections.abc import Sequence
 from app.missions.errors import ConflictError, InvalidRequestError
 from app.missions.fleet.interface import Position, ScanReport
 from app.missions.live.mission import LiveMission
+from app.missions.search.obstacles import obstacles_geojson
+from app.missions.search.progress import grid_view
 from app.missions.search.scan_schema import Scan
 from app.missions.search.state import Search
 from app.missions.states import MissionState
+from app.missions.views.search import SearchGridView
 from app.missions.views.soundings import BatchVerdict, ItemVerdict, Verdict, batch_verdict
 
 MAX_SCANS = 1000
@@ -52,6 +55,17 @@ def search_of(live: LiveMission) -> Search:
     if live.search is None:
         raise ConflictError("the mission is of kind survey", "create a mission of kind search")
     return live.search
+
+
+def search_grid(live: LiveMission, after: int | None = None) -> SearchGridView | None:
+    """Return a search's site as known now; None when nothing is newer than ``after``. Raises ConflictError."""
+    search = search_of(live)
+    return None if after is not None and search.version <= after else grid_view(search, live.id, live.frame)
+
+
+async def search_obstacles(live: LiveMission) -> bytes:
+    """Return the obstacles of a search's site as GeoJSON. Raises ConflictError."""
+    return await live.in_thread(obstacles_geojson, search_of(live), live.frame)
 
 
 def _stranger(live: LiveMission, vehicle: str) -> str:

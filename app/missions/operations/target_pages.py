@@ -7,7 +7,9 @@ from app.missions.views.targets import TargetRangePage, TargetRangeView
 from app.storage import target_ranges as range_queries
 
 
-async def target_ranges_page(live: LiveMission, target: str | None, after: int, limit: int) -> TargetRangePage:
+async def target_ranges_page(
+    live: LiveMission, target: str | None = None, after: int = 0, limit: int = 200
+) -> TargetRangePage:
     """Return a page of the ranges. Raises TargetNotFoundError for a target that the mission does not have."""
     names = list(live.ranges.tracking.specs)
     if target is not None and target not in names:

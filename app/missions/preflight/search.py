@@ -5,7 +5,6 @@ from collections.abc import Iterator
 import numpy as np
 
 from app.exploration.site_search.ground import UNREACHED, Ground
-from app.missions.fleet.hub import FleetHub
 from app.missions.live.mission import LiveMission
 from app.missions.live.vehicles import local_place
 from app.missions.search.course import FIRST_PACE
@@ -16,14 +15,14 @@ from app.missions.views.mission import CheckStatus, CheckView
 OK, NOTE, WARNING, PROBLEM = CheckStatus.OK, CheckStatus.NOTE, CheckStatus.WARNING, CheckStatus.PROBLEM
 
 
-def search_checks(live: LiveMission, hub: FleetHub) -> Iterator[CheckView]:
+def search_checks(live: LiveMission) -> Iterator[CheckView]:
     """Return the lines of the checklist that only a search has; none for other missions."""
     search = live.search
     if search is None:
         return
     yield _ways(search, live.spec)
     for member in live.team:
-        report = member.report or hub.info(member.key).report
+        report = member.report or live.hub.info(member.key).report
         place = None if report is None else local_place(live.frame, report.position)
         if place is not None:
             away_m = search.way_to_entry_m(np.array(place))
