@@ -141,7 +141,7 @@ async def test_an_import_that_failed_anywhere_goes_on_where_it_was(
             for m in (whole, broken)
         ]
         assert rows[0] == rows[1]
-    assert (await later.mission(broken.id)).progress.soundings == straight.soundings
+    assert (await view_of(later, broken.id)).progress.soundings == straight.soundings
     await later.shutdown()
 
 

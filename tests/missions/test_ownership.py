@@ -95,7 +95,7 @@ async def test_a_process_that_was_taken_for_dead_writes_nothing_and_lets_go(two:
     mission = await one.create(sim_spec(steps=500))
     await act(one, mission.id, "start", actor="Ana")
     await until_step(one, mission.id, 1)
-    live = await one._get(mission.id)
+    live = await one.get(mission.id)
     await asyncio.to_thread(query, two[0].database.url, "delete from processes")
     with pytest.raises(MissionElsewhereError):
         await live.journal.log(Level.INFO, "note", "never written")
@@ -132,6 +132,6 @@ async def test_a_guest_that_only_looks_takes_nothing(
     one = await two[0].open()
     mission = await one.create(make_spec())
     guest = MissionService(make_settings(database_url=two[0].database.url), two[0].database)
-    assert (await guest.mission(mission.id)).id == mission.id
+    assert (await guest.get(mission.id)).id == mission.id
     await guest.shutdown()
     assert query_owner(two[0], mission.id) == {one.process.number}

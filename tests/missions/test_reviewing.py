@@ -173,7 +173,7 @@ async def test_missions_that_left_memory_are_listed_as_they_were(harbour: Harbou
 
 
 async def test_the_map_of_an_earlier_step_is_that_of_the_soundings_until_then(service: MissionService) -> None:
-    from app.missions.operations.history import map_at_step
+    from app.missions.operations.mission_maps import map_at_step
 
     mission = (await service.create(make_spec())).id
     await measure(await service.get(mission), measured()[:30])

@@ -90,8 +90,7 @@ class Journal(WriteBehind[Noted]):
         self.counts = counts
         self.travelled_m = 0.0
         self.step = 0
-        self.told_of_missing_level = False
-        """Whether the log has it that no water level is known for soundings; once is enough."""
+        self._told_of_missing_level = False
         self._untold = ""
         self._track_ends: dict[str, tuple[float, float]] = {}
 
@@ -239,6 +238,10 @@ class Journal(WriteBehind[Noted]):
         log.info("mission event", **(row.data | said))
         self._broadcaster.publish(EventMessage(event=event_view(row)))
 
+    def tell_of_missing_level(self) -> None:
+        """Write into the log again, once, when no water level is known for soundings."""
+        self._told_of_missing_level = False
+
     async def count_again(self, read: Callable[[], Awaitable[Counts]]) -> None:
         """Let ``read`` take up what another process has written, while nothing is written here."""
         await self.flush()
@@ -262,8 +265,8 @@ class Journal(WriteBehind[Noted]):
         accepted = [item for item in reversed(fresh) if item.accepted]
         rejected = len(fresh) - len(accepted)
         no_level = next((item.reason for item in fresh if item.reason.startswith(NO_LEVEL)), "")
-        if no_level and not self.told_of_missing_level:
-            self.told_of_missing_level, self._untold = True, no_level.removeprefix(NO_LEVEL)
+        if no_level and not self._told_of_missing_level:
+            self._told_of_missing_level, self._untold = True, no_level.removeprefix(NO_LEVEL)
         self.counts = Counts(self.counts.accepted + len(accepted), self.counts.rejected + rejected)
         metrics.SOUNDINGS.labels(Verdict.ACCEPTED).inc(len(accepted))
         metrics.SOUNDINGS.labels(Verdict.REJECTED).inc(rejected)

@@ -61,10 +61,7 @@ async def measure(
     ranges = _ranges(live, items, strangers)
     key = _Key.of(sender, idempotency_key) if idempotency_key is not None else None
     batch = _Batch(items, key, digest, strangers, reports, ranges)
-    if live.intake is None:
-        live.intake = Grouped(partial(_take, live), lambda batch: bool(batch.ranges))
-    answer: BatchVerdict = await live.intake(batch)
-    return answer
+    return await live.part(_Intake).group(batch)
 
 
 def _looked_through(
@@ -111,29 +108,45 @@ class _Batch:
         return [item for i, item in enumerate(self.items) if not self.strangers[i]]
 
 
-async def _take(live: LiveMission, batches: Sequence[_Batch]) -> list[BatchVerdict | Exception]:
-    """Store batches in one transaction: many vehicles that post at the same time wait for the disk once."""
-    keys = {name for batch in batches if batch.key for name in (batch.key.stored, batch.key.before) if name}
-    async with live.journal.writing, live.ranges.writing, live.database.writing() as session:
-        rows = await sounding_queries.answers_to(session, live.id, keys)
-        known = _answers(batches, {row.key: (row.digest, BatchVerdict.model_validate(row.answer)) for row in rows})
-        fresh = _first_of_each(batches, known)
-        stored, committed = await _store(live, [batches[i] for i in fresh], session)
-        await _forget_old_keys(live, session)
-    for work in committed:
-        work()
-    answers = dict(zip(fresh, stored, strict=True))
-    known |= {key.stored: (batches[i].digest, answers[i]) for i in fresh if (key := batches[i].key) is not None}
-    results: list[BatchVerdict | Exception] = [
-        answers.get(i) or _again(batch, known) for i, batch in enumerate(batches)
-    ]
-    for batch, result in zip(batches, results, strict=True):
-        if isinstance(result, BatchVerdict):
-            # The first answer may have got lost together with the process that knew where the vehicle is.
-            await _hear(live, batch.known, only_unknown=result.replayed)
-    # Where the vehicle is, and whether it arrived, is on disk as well before it is answered.
-    await live.journal.flush()
-    return results
+class _Intake:
+    """One mission's batches on their way to the disk."""
+
+    def __init__(self, live: LiveMission) -> None:
+        self._live = live
+        self._keys_looked_at_s = -math.inf
+        self.group: Grouped[_Batch, BatchVerdict] = Grouped(self._take, lambda batch: bool(batch.ranges))
+
+    async def _take(self, batches: Sequence[_Batch]) -> list[BatchVerdict | Exception]:
+        """Store batches in one transaction: many vehicles that post at the same time wait for the disk once."""
+        live = self._live
+        keys = {name for batch in batches if batch.key for name in (batch.key.stored, batch.key.before) if name}
+        async with live.journal.writing, live.ranges.writing, live.database.writing() as session:
+            rows = await sounding_queries.answers_to(session, live.id, keys)
+            known = _answers(batches, {row.key: (row.digest, BatchVerdict.model_validate(row.answer)) for row in rows})
+            fresh = _first_of_each(batches, known)
+            stored, committed = await _store(live, [batches[i] for i in fresh], session)
+            await self._forget_old_keys(session)
+        for work in committed:
+            work()
+        answers = dict(zip(fresh, stored, strict=True))
+        known |= {key.stored: (batches[i].digest, answers[i]) for i in fresh if (key := batches[i].key) is not None}
+        results: list[BatchVerdict | Exception] = [
+            answers.get(i) or _again(batch, known) for i, batch in enumerate(batches)
+        ]
+        for batch, result in zip(batches, results, strict=True):
+            if isinstance(result, BatchVerdict):
+                # The first answer may have got lost together with the process that knew where the vehicle is.
+                await _hear(live, batch.known, only_unknown=result.replayed)
+        # Where the vehicle is, and whether it arrived, is on disk as well before it is answered.
+        await live.journal.flush()
+        return results
+
+    async def _forget_old_keys(self, session: AsyncSession) -> None:
+        """Once an hour forget keys that nobody sends again; a sounding is known without them, too."""
+        moment = asyncio.get_running_loop().time()
+        if moment - self._keys_looked_at_s >= LOOK_AT_KEYS_S:
+            self._keys_looked_at_s = moment
+            await sounding_queries.forget_answers(session, self._live.id, now() - KEYS_KEPT, LOG_KEY)
 
 
 def _answers(batches: Sequence[_Batch], rows: Mapping[str, _Answer]) -> dict[str, _Answer]:
@@ -175,14 +188,6 @@ def _again(batch: _Batch, known: Mapping[str, _Answer]) -> BatchVerdict | Confli
     return ConflictError(
         f"idempotency key {key.given!r} was used before with other measurements", "use a new key for every new batch"
     )
-
-
-async def _forget_old_keys(live: LiveMission, session: AsyncSession) -> None:
-    """Once an hour forget keys that nobody sends again; a sounding is known without them, too."""
-    moment = asyncio.get_running_loop().time()
-    if moment - live.keys_looked_at_s >= LOOK_AT_KEYS_S:
-        live.keys_looked_at_s = moment
-        await sounding_queries.forget_answers(session, live.id, now() - KEYS_KEPT, LOG_KEY)
 
 
 async def _store(

@@ -107,12 +107,7 @@ async def _recorrect(live: LiveMission, spec: MissionSpec, table: TideTable | No
             await stored_maps.forget(session, live.id)
             counted = await sounding_queries.counts(session, live.id)
         # Committed: from here on nothing waits until all of it holds.
-        live.spec = spec
-        live.gate.corrections = corrections
-        live.journal.counts = Counts(counted.get("accepted", 0), counted.get("rejected", 0))
-        live.whole.changed()
-        live.journal.told_of_missing_level = False
-        live.revision += 1
+        live.recorrect(spec, corrections, Counts(counted.get("accepted", 0), counted.get("rejected", 0)))
     live.changed.set()
     live.publish_summary()
 

@@ -97,8 +97,7 @@ async def _store(live: LiveMission, sounding_id: int, ruling: Ruling, note: str,
         await stored_maps.forget(session, live.id)
     # To count all of them again takes seconds where there are millions.
     counts, more = live.journal.counts, int(row.verdict == Verdict.ACCEPTED) - int(was_accepted)
-    live.journal.counts = Counts(counts.accepted + more, counts.rejected - more)
-    live.whole.changed()
+    live.recount(Counts(counts.accepted + more, counts.rejected - more))
     return line
 
 
