@@ -40,6 +40,8 @@ class Member:
     """Whether it ever followed in this run: one that then refuses is an alarm."""
     refusal: str = ""
     order: WaypointOrder | None = None
+    target_m: NDArray[np.float64] | None = None
+    """Where its order leads in the mission's frame, (2,): east, north."""
     status: WaypointStatus | None = None
     reason: str = ""
     surfacing: bool = False
@@ -79,6 +81,10 @@ class Member:
         """Whether it has a waypoint that was never sent, as when its link was lost just then."""
         return self.order is not None and self.status is WaypointStatus.PLANNED
 
+    def set_order(self, order: WaypointOrder | None, target_m: NDArray[np.float64] | None = None) -> None:
+        """Give it an order and where that leads, or take its order away."""
+        self.order, self.target_m = order, target_m
+
     def cruise_depth_m(self, limits: Limits) -> float:
         """Return the depth it travels at where the bottom leaves room: as asked for, or its place in the stack."""
         if self.spec.depth_m is not None:
@@ -117,7 +123,8 @@ class Team:
         """Take a vehicle out; what was last known of it stays."""
         member = self.members.pop(name, None)
         if member is not None:
-            member.left_at, member.order, member.status, member.pursuing = at, None, None, None
+            member.left_at, member.status, member.pursuing = at, None, None
+            member.set_order(None)
             member.engaged = member.surfacing = False
             self.left[name] = member
 

@@ -20,8 +20,8 @@ from app.missions.large_batches import made_of
 from app.missions.live.broadcast import Broadcaster
 from app.missions.live.db_retry import DatabaseRetry
 from app.missions.live.write_behind import Committed, WriteBehind
-from app.missions.soundings.corrections import NO_LEVEL
-from app.missions.soundings.gate import Gate, GatedSounding
+from app.missions.soundings.corrections import NO_LEVEL, PlacedSounding
+from app.missions.soundings.gate import Gate
 from app.missions.views.messages import EventMessage
 from app.missions.views.mission import EventView, Level
 from app.missions.views.soundings import ItemVerdict, Verdict
@@ -250,16 +250,18 @@ class Journal(WriteBehind[Noted]):
 
     async def _store_soundings(
         self, session: AsyncSession, reports: Sequence[SoundingReport], gate: Gate | None = None
-    ) -> tuple[list[GatedSounding], set[sounding_queries.Identity]]:
+    ) -> tuple[list[PlacedSounding], set[sounding_queries.Identity]]:
         gated, rows = await made_of(reports, self._gated, reports, gate or self._gate)
         return gated, await sounding_queries.insert_new(session, rows)
 
-    def _gated(self, reports: Sequence[SoundingReport], gate: Gate) -> tuple[list[GatedSounding], list[dict[str, Any]]]:
+    def _gated(
+        self, reports: Sequence[SoundingReport], gate: Gate
+    ) -> tuple[list[PlacedSounding], list[dict[str, Any]]]:
         """Return soundings as the gate judges them, and how they are stored."""
         gated, received = gate.check(reports), now()
         return gated, [_row(self._mission_id, self.step, received, item) for item in gated if _storable(item)]
 
-    def _count(self, gated: Sequence[GatedSounding], new: set[sounding_queries.Identity]) -> None:
+    def _count(self, gated: Sequence[PlacedSounding], new: set[sounding_queries.Identity]) -> None:
         first = {_identity(item.report): item for item in reversed(gated) if _storable(item)}
         fresh = [item for identity, item in first.items() if identity in new]
         accepted = [item for item in reversed(fresh) if item.accepted]
@@ -324,7 +326,7 @@ def _identity(report: SoundingReport) -> sounding_queries.Identity:
     return report.vehicle, report.time_s, report.beam
 
 
-def _verdicts(gated: Sequence[GatedSounding], new: set[sounding_queries.Identity]) -> list[ItemVerdict]:
+def _verdicts(gated: Sequence[PlacedSounding], new: set[sounding_queries.Identity]) -> list[ItemVerdict]:
     """Return the verdicts on soundings of which those in ``new`` were stored."""
     left = set(new)
     verdicts = []
@@ -340,7 +342,7 @@ def _verdicts(gated: Sequence[GatedSounding], new: set[sounding_queries.Identity
     return verdicts
 
 
-def _storable(item: GatedSounding) -> bool:
+def _storable(item: PlacedSounding) -> bool:
     # NaN and infinity have no place in a database column that is summed later; the verdict still goes out.
     report = item.report
     place = report.footprint
@@ -355,7 +357,7 @@ def _storable(item: GatedSounding) -> bool:
     )
 
 
-def _row(mission_id: str, step: int, received: Any, item: GatedSounding) -> dict[str, Any]:
+def _row(mission_id: str, step: int, received: Any, item: PlacedSounding) -> dict[str, Any]:
     report = item.report
     geometry = report.beam_geometry
     return {
