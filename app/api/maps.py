@@ -17,8 +17,7 @@ from app.mapping.layers import Layer
 from app.mapping.products.overlay import overlay_png
 from app.mapping.s44 import Order
 from app.missions.maps.products import MAP, PRODUCTS, SOUNDINGS, TRACKS, ProductOptions, layers_of
-from app.missions.maps.quality import quality_of
-from app.missions.maps.snapshot import MapSnapshot
+from app.missions.maps.snapshot import MapSnapshot, quality_of
 from app.missions.operations.mission_maps import export, map_tiles, newest_map
 from app.missions.spec.base import Name
 from app.missions.views.map import MapView, ProductView, QualityView

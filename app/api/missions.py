@@ -1,7 +1,7 @@
 """Missions: describing, listing, moving through their states, and their vehicles."""
 
 from enum import StrEnum
-from typing import Annotated
+from typing import Annotated, Any
 
 from fastapi import APIRouter, Body, Query, Request, Response
 from pydantic import TypeAdapter
@@ -28,6 +28,12 @@ router = APIRouter(
 )
 
 _summaries = TypeAdapter(list[MissionSummary])
+
+_FOUND = problems("mission-not-found", "invalid-request")
+_OF_A_VEHICLE: dict[str, Any] = {
+    "responses": problems("mission-not-found", "vehicle-not-found", "conflict", "invalid-request"),
+    "tags": ["vehicles"],
+}
 
 EXAMPLE_SPEC = {
     "name": "Leixoes quay",
@@ -88,7 +94,7 @@ async def list_missions(request: Request, state: State, service: Service, reader
     "/{mission_id}",
     operation_id="getMission",
     summary="See a mission",
-    responses=problems("mission-not-found", "invalid-request"),
+    responses=_FOUND,
 )
 async def get_mission(reader: Reader, mission: Mission) -> MissionView:
     """Return a mission with its description, its vehicles as they are now and their newest waypoints."""
@@ -169,7 +175,7 @@ for _action in Action:
     "/{mission_id}/preflight",
     operation_id="checkMission",
     summary="See what stands before the start",
-    responses=problems("mission-not-found", "invalid-request"),
+    responses=_FOUND,
 )
 async def check_mission(reader: Reader, mission: Mission) -> PreflightView:
     """Return the checklist: links, batteries, places, depths, area, tide, and how long it takes at most."""
@@ -180,7 +186,7 @@ async def check_mission(reader: Reader, mission: Mission) -> PreflightView:
     "/{mission_id}/steps",
     operation_id="listSteps",
     summary="See what was decided",
-    responses=problems("mission-not-found", "invalid-request"),
+    responses=_FOUND,
 )
 async def list_steps(
     reader: Reader,
@@ -196,7 +202,7 @@ async def list_steps(
     "/{mission_id}/telemetry",
     operation_id="getTelemetry",
     summary="See the vehicles' figures over time",
-    responses=problems("mission-not-found", "invalid-request"),
+    responses=_FOUND,
 )
 async def get_telemetry(
     reader: Reader,
@@ -225,8 +231,7 @@ async def write_note(note: NoteRequest, operator: Operator, mission: Mission) ->
     "/{mission_id}/vehicles/{name}/abort",
     operation_id="abortVehicle",
     summary="Stop one vehicle",
-    responses=problems("mission-not-found", "vehicle-not-found", "conflict", "invalid-request"),
-    tags=["vehicles"],
+    **_OF_A_VEHICLE,
 )
 async def abort_vehicle(name: VehicleName, service: Service, operator: Operator, mission: Mission) -> ActionView:
     """Stop a vehicle now and go on without it; the answer tells whether it acknowledged."""
@@ -257,8 +262,7 @@ async def add_vehicle(vehicle: VehicleSpec, service: Service, operator: Operator
     "/{mission_id}/vehicles/{name}/rejoin",
     operation_id="rejoinVehicle",
     summary="Take back a vehicle that left",
-    responses=problems("mission-not-found", "vehicle-not-found", "conflict", "invalid-request"),
-    tags=["vehicles"],
+    **_OF_A_VEHICLE,
 )
 async def rejoin_vehicle(name: VehicleName, service: Service, operator: Operator, mission: Mission) -> MissionView:
     """Let a vehicle that was aborted or removed take part again, as it was described: it joins at the next step."""
@@ -270,8 +274,7 @@ async def rejoin_vehicle(name: VehicleName, service: Service, operator: Operator
     "/{mission_id}/vehicles/{name}",
     operation_id="removeVehicle",
     summary="Take a vehicle out of a mission",
-    responses=problems("mission-not-found", "vehicle-not-found", "conflict", "invalid-request"),
-    tags=["vehicles"],
+    **_OF_A_VEHICLE,
 )
 async def remove_vehicle(name: VehicleName, service: Service, operator: Operator, mission: Mission) -> MissionView:
     """Stop the vehicle and go on without it; what it measured stays."""

@@ -8,7 +8,7 @@ from app.api.auth import Reader
 from app.api.mission import Mission
 from app.api.problems import problems
 from app.api.schemas import API
-from app.missions.operations.target_pages import target_ranges_page
+from app.missions.operations.history import target_ranges_page
 from app.missions.spec.base import Name
 from app.missions.views.targets import TargetRangePage, TargetView
 

@@ -26,7 +26,6 @@ from app.missions.operations.recorrection import check_level_is_known
 from app.missions.operations.uploads import Uploads
 from app.missions.running.admission import check_spec
 from app.missions.running.claims import Claims, free_elsewhere
-from app.missions.running.deletion import check_deletable, delete_mission
 from app.missions.running.failover import Failover
 from app.missions.running.final_maps import FinalMaps
 from app.missions.running.mission_views import action_view, idle_vehicle_view, mission_view
@@ -231,10 +230,7 @@ class MissionService:
     async def delete(self, live: LiveMission) -> None:
         """Remove a mission in which nothing was measured. Raises ConflictError."""
         async with self._supervisor.acting(live.id):
-            check_deletable(live)
-            self.maps.forget(live.id)
-            await delete_mission(live)
-            await self._registry.forget(live.id)
+            await self._registry.delete(live)
 
     def doctor(self) -> DoctorView:
         """Return what keeps IMC vehicles from working with us, as far as listening tells."""

@@ -6,9 +6,8 @@ from typing import Any
 import pytest
 
 from app.missions.errors import TargetNotFoundError
-from app.missions.operations.history import events_after, steps_after
+from app.missions.operations.history import events_after, steps_after, target_ranges_page
 from app.missions.operations.measurements import measure
-from app.missions.operations.target_pages import target_ranges_page
 from app.missions.service import MissionService
 from app.missions.settings import ImcSettings
 from app.missions.soundings.measurement import Measurement
