@@ -5203,10 +5203,10 @@ export interface operations {
             query?: never;
             header?: never;
             path: {
-                /** @description The mission's id */
-                mission_id: string;
                 /** @description The vehicle's name */
                 name: string;
+                /** @description The mission's id */
+                mission_id: string;
             };
             cookie?: never;
         };
@@ -5408,10 +5408,10 @@ export interface operations {
             query?: never;
             header?: never;
             path: {
-                /** @description The mission's id */
-                mission_id: string;
                 /** @description The vehicle's name */
                 name: string;
+                /** @description The mission's id */
+                mission_id: string;
             };
             cookie?: never;
         };
@@ -5487,10 +5487,10 @@ export interface operations {
             query?: never;
             header?: never;
             path: {
-                /** @description The mission's id */
-                mission_id: string;
                 /** @description The vehicle's name */
                 name: string;
+                /** @description The mission's id */
+                mission_id: string;
             };
             cookie?: never;
         };
@@ -5915,10 +5915,10 @@ export interface operations {
             };
             header?: never;
             path: {
-                /** @description The mission's id */
-                mission_id: string;
                 /** @description The vehicle's name */
                 name: string;
+                /** @description The mission's id */
+                mission_id: string;
             };
             cookie?: never;
         };
@@ -6590,10 +6590,10 @@ export interface operations {
             query?: never;
             header?: never;
             path: {
-                /** @description The mission's id */
-                mission_id: string;
                 /** @description The import's id */
                 import_id: string;
+                /** @description The mission's id */
+                mission_id: string;
             };
             cookie?: never;
         };
@@ -7317,10 +7317,10 @@ export interface operations {
             };
             header?: never;
             path: {
-                /** @description The mission's id */
-                mission_id: string;
                 /** @description One of tif, nc, bag, xyz, csv, geojson, kml, png */
                 format: string;
+                /** @description The mission's id */
+                mission_id: string;
             };
             cookie?: never;
         };
@@ -7405,10 +7405,10 @@ export interface operations {
             };
             header?: never;
             path: {
-                /** @description The mission's id */
-                mission_id: string;
                 /** @description One of csv, xyz, geojson */
                 format: string;
+                /** @description The mission's id */
+                mission_id: string;
             };
             cookie?: never;
         };
@@ -7488,10 +7488,10 @@ export interface operations {
             };
             header?: never;
             path: {
-                /** @description The mission's id */
-                mission_id: string;
                 /** @description One of geojson, kml, gpx */
                 format: string;
+                /** @description The mission's id */
+                mission_id: string;
             };
             cookie?: never;
         };
@@ -7637,10 +7637,10 @@ export interface operations {
             query?: never;
             header?: never;
             path: {
-                /** @description The mission's id */
-                mission_id: string;
                 /** @description The sounding's id */
                 sounding_id: number;
+                /** @description The mission's id */
+                mission_id: string;
             };
             cookie?: never;
         };
@@ -7765,10 +7765,10 @@ export interface operations {
             query?: never;
             header?: never;
             path: {
-                /** @description The mission's id */
-                mission_id: string;
                 /** @description The sounding's id */
                 sounding_id: number;
+                /** @description The mission's id */
+                mission_id: string;
             };
             cookie?: never;
         };
