@@ -4,9 +4,11 @@ from fastapi import APIRouter
 
 from app.api.auth import Operator, Reader
 from app.api.json_route import JsonRoute
+from app.api.mission import Mission
 from app.api.problems import problems
-from app.api.schemas import API, MissionId
-from app.api.state import Service
+from app.api.schemas import API
+from app.missions.operations import recorrection
+from app.missions.operations.recorrection import corrections_view
 from app.missions.spec.mission import SoundSpeed
 from app.missions.views.corrections import CorrectionsView, TideCorrection
 
@@ -26,25 +28,21 @@ _CHANGE = problems("malformed-body", "mission-not-found", "body-too-large", "uns
     summary="See how soundings are corrected",
     responses=problems("mission-not-found", "invalid-request"),
 )
-async def get_corrections(mission_id: MissionId, service: Service, reader: Reader) -> CorrectionsView:
+async def get_corrections(reader: Reader, mission: Mission) -> CorrectionsView:
     """Return tide, sound speed and the datum that depths are counted from."""
-    return await service.corrections(mission_id)
+    return corrections_view(mission)
 
 
 @router.put("/tide", operation_id="setTide", summary="Correct the tide", responses=_CHANGE)
-async def set_tide(
-    mission_id: MissionId, tide: TideCorrection, service: Service, operator: Operator
-) -> CorrectionsView:
+async def set_tide(tide: TideCorrection, operator: Operator, mission: Mission) -> CorrectionsView:
     """Set the water level or a tide table, at any time: every sounding is corrected anew from its raw depth."""
-    return await service.set_tide(mission_id, tide, actor=operator.name)
+    return await recorrection.set_tide(mission, tide, operator.name)
 
 
 @router.put("/sound-speed", operation_id="setSoundSpeed", summary="Correct the sound speed", responses=_CHANGE)
-async def set_sound_speed(
-    mission_id: MissionId, sound_speed: SoundSpeed, service: Service, operator: Operator
-) -> CorrectionsView:
+async def set_sound_speed(sound_speed: SoundSpeed, operator: Operator, mission: Mission) -> CorrectionsView:
     """Set the measured sound speed, at any time: every sounding is corrected anew from its raw range."""
-    return await service.set_sound_speed(mission_id, sound_speed, actor=operator.name)
+    return await recorrection.set_sound_speed(mission, sound_speed, operator.name)
 
 
 @router.delete(
@@ -53,6 +51,6 @@ async def set_sound_speed(
     summary="Take the sonars' own ranges",
     responses=problems("mission-not-found", "invalid-request"),
 )
-async def delete_sound_speed(mission_id: MissionId, service: Service, operator: Operator) -> CorrectionsView:
+async def delete_sound_speed(operator: Operator, mission: Mission) -> CorrectionsView:
     """Correct no sound speed any more."""
-    return await service.set_sound_speed(mission_id, None, actor=operator.name)
+    return await recorrection.set_sound_speed(mission, None, operator.name)

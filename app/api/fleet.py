@@ -8,10 +8,12 @@ from app.api.peer_lists import from_peers
 from app.api.problems import problems
 from app.api.schemas import API
 from app.api.state import Service, State
+from app.missions.running.mission_views import planner_views
 from app.missions.views.doctor import DoctorView
 from app.missions.views.mission import PlannerView, VehicleView
 
 _views = TypeAdapter(list[VehicleView])
+
 
 router = APIRouter(prefix=API, responses=problems("unauthenticated", "forbidden"))
 
@@ -32,6 +34,6 @@ async def examine_links(service: Service, reader: Reader) -> DoctorView:
 
 
 @router.get("/planners", operation_id="listPlanners", summary="List the planners", tags=["planners"])
-async def list_planners(service: Service, reader: Reader) -> list[PlannerView]:
+async def list_planners(reader: Reader) -> list[PlannerView]:
     """Return the planners that a mission may name, each with the JSON schema of its options."""
-    return service.planners()
+    return planner_views()

@@ -8,9 +8,10 @@ from fastapi import APIRouter, Body, Query, Request, Response
 
 from app.api.auth import Operator
 from app.api.json_route import JsonRoute
+from app.api.mission import Mission
 from app.api.missions import EXAMPLE_SPEC
 from app.api.problems import problems
-from app.api.schemas import API, MissionId
+from app.api.schemas import API
 from app.api.state import Service
 from app.missions.forecast.request import ForecastView
 from app.missions.spec.mission import MissionSpec
@@ -41,10 +42,10 @@ _FloorDepth = Annotated[
     ),
 )
 async def forecast_mission(
-    mission_id: MissionId, service: Service, operator: Operator, request: Request, floor_depth_m: _FloorDepth = None
+    service: Service, operator: Operator, mission: Mission, request: Request, floor_depth_m: _FloorDepth = None
 ) -> Any:
     """Simulate what is left of a mission, over what was imported of the sea floor and a guess for the rest."""
-    return await _while_connected(request, service.forecast_of(mission_id, floor_depth_m=floor_depth_m))
+    return await _while_connected(request, service.forecaster.of_mission(mission, floor_depth_m))
 
 
 @router.post(
@@ -67,7 +68,7 @@ async def forecast_description(
 
     Takes half a minute or so, on a busy machine a minute or two; a client that does not wait any more ends it.
     """
-    return await _while_connected(request, service.forecast(spec, floor_depth_m=floor_depth_m))
+    return await _while_connected(request, service.forecaster.of_description(spec, floor_depth_m))
 
 
 async def _while_connected(request: Request, work: Coroutine[Any, Any, ForecastView]) -> ForecastView | Response:

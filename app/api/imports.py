@@ -8,9 +8,12 @@ from fastapi import APIRouter, Path, Query, Request, Response
 from starlette.requests import ClientDisconnect
 
 from app.api.auth import Operator, Reader
+from app.api.mission import Mission
 from app.api.problems import ProblemError, problems
-from app.api.schemas import API, MissionId
+from app.api.schemas import API
 from app.api.state import EdgeState, Service, State
+from app.missions.live.mission import LiveMission
+from app.missions.operations.imports import imports_of, kind_of, reference_of
 from app.missions.operations.uploads import Upload
 from app.missions.views.imports import ImportOptions, ImportView, ReferenceView
 
@@ -34,12 +37,17 @@ ImportId = Annotated[str, Path(min_length=1, max_length=64, pattern=r"^[A-Za-z0-
 
 
 @asynccontextmanager
-async def _sent(state: EdgeState, request: Request, mission_id: str, options: ImportOptions) -> AsyncIterator[Upload]:
-    """Take a file in. What would be refused anyhow is not waited for."""
-    await state.service.expect_file(mission_id, options)
+async def _sent(
+    state: EdgeState, request: Request, mission: LiveMission, options: ImportOptions
+) -> AsyncIterator[tuple[LiveMission, Upload]]:
+    """Take a file in. What would be refused anyhow is not waited for.
+
+    Beside the file the mission comes as it is in memory now: that one may have left it meanwhile.
+    """
+    kind_of(options)
     try:
         async with state.service.uploads.receive(request.stream(), state.settings.max_import_bytes) as upload:
-            yield upload
+            yield await state.service.get(mission.id), upload
     except ClientDisconnect:
         raise ProblemError("malformed-body", "the connection ended before the file did") from None
 
@@ -53,20 +61,20 @@ async def _sent(state: EdgeState, request: Request, mission_id: str, options: Im
     responses=_SENT | {200: {"description": "The same file was imported before: nothing changed", "model": ImportView}},
 )
 async def import_soundings(
-    mission_id: MissionId,
     options: Annotated[ImportOptions, Query()],
     request: Request,
     response: Response,
     state: State,
     operator: Operator,
+    mission: Mission,
 ) -> ImportView:
     """Take all of a file's soundings near the area, or nothing when any of it is wrong.
 
     They count in the map by their own uncertainty, and are told apart from the mission's own. Sending the same file
     again changes nothing.
     """
-    async with _sent(state, request, mission_id, options) as upload:
-        view = await state.service.import_soundings(mission_id, upload, options, actor=operator.name)
+    async with _sent(state, request, mission, options) as (mission, upload):
+        view = await state.service.imports.add(mission, upload, options, operator.name)
     if view.replayed:
         response.status_code = 200
     return view
@@ -78,9 +86,9 @@ async def import_soundings(
     summary="List what was imported",
     responses=problems("mission-not-found", "invalid-request"),
 )
-async def list_imports(mission_id: MissionId, service: Service, reader: Reader) -> list[ImportView]:
+async def list_imports(reader: Reader, mission: Mission) -> list[ImportView]:
     """Return what the mission began with, oldest first."""
-    return await service.imports(mission_id)
+    return await imports_of(mission)
 
 
 @router.delete(
@@ -90,9 +98,9 @@ async def list_imports(mission_id: MissionId, service: Service, reader: Reader) 
     status_code=204,
     responses=_FOUND,
 )
-async def delete_import(mission_id: MissionId, import_id: ImportId, service: Service, operator: Operator) -> None:
+async def delete_import(import_id: ImportId, service: Service, operator: Operator, mission: Mission) -> None:
     """Leave the soundings of a file out of the map again."""
-    await service.delete_import(mission_id, import_id, actor=operator.name)
+    await service.imports.delete(mission, import_id, operator.name)
 
 
 @router.put(
@@ -103,24 +111,24 @@ async def delete_import(mission_id: MissionId, import_id: ImportId, service: Ser
     responses=_SENT,
 )
 async def set_reference(
-    mission_id: MissionId,
     options: Annotated[ImportOptions, Query()],
     request: Request,
     state: State,
     operator: Operator,
+    mission: Mission,
 ) -> ReferenceView:
     """Sample a file's depths at the map's cells, to see how far off the map is.
 
     Shown by `quality`, the layer `difference` and the GeoTIFF; never used for the map or for planning.
     """
-    async with _sent(state, request, mission_id, options) as upload:
-        return await state.service.set_reference(mission_id, upload, options, actor=operator.name)
+    async with _sent(state, request, mission, options) as (mission, upload):
+        return await state.service.imports.set_reference(mission, upload, options, operator.name)
 
 
 @router.get("/reference", operation_id="getReference", summary="See what the map is compared with", responses=_FOUND)
-async def get_reference(mission_id: MissionId, service: Service, reader: Reader) -> ReferenceView:
+async def get_reference(reader: Reader, mission: Mission) -> ReferenceView:
     """Return the reference grid in short."""
-    return await service.reference(mission_id)
+    return await reference_of(mission)
 
 
 @router.delete(
@@ -130,6 +138,6 @@ async def get_reference(mission_id: MissionId, service: Service, reader: Reader)
     status_code=204,
     responses=_FOUND,
 )
-async def delete_reference(mission_id: MissionId, service: Service, operator: Operator) -> None:
+async def delete_reference(service: Service, operator: Operator, mission: Mission) -> None:
     """Forget the reference grid."""
-    await service.delete_reference(mission_id, actor=operator.name)
+    await service.imports.delete_reference(mission, operator.name)

@@ -13,15 +13,16 @@ from pydantic import Field, GetCoreSchemaHandler
 from pydantic_core import CoreSchema
 
 from app.api.auth import Reader
+from app.api.mission import Mission
 from app.api.problems import ProblemError, problems
-from app.api.schemas import API, MissionId
+from app.api.schemas import API
 from app.api.state import EdgeState, Service, State
 from app.mapping.layers import LAYERS, Layer, LayerKind
 from app.mapping.products.overlay import overlay_png
 from app.mapping.s44 import Order
 from app.missions.maps.products import MAP, PRODUCTS, SEARCH, SOUNDINGS, TRACKS, Product, ProductOptions
-from app.missions.maps.quality import quality_of
-from app.missions.maps.snapshot import MapSnapshot
+from app.missions.maps.snapshot import MapSnapshot, quality_of
+from app.missions.operations.mission_maps import export, map_tiles, newest_map
 from app.missions.spec.base import Name
 from app.missions.views.map import LayerView, MapView, ProductView, QualityView
 
@@ -117,10 +118,10 @@ async def list_layers(reader: Reader) -> list[LayerView]:
     responses=_NOT_MODIFIED,
 )
 async def get_map(
-    mission_id: MissionId,
     service: Service,
     state: State,
     reader: Reader,
+    mission: Mission,
     layer: Annotated[
         list[Annotated[str, _OneOf(JSON_LAYERS)]] | None,
         Query(max_length=len(JSON_LAYERS), description="Further layers, in `layers`; repeat it for several"),
@@ -129,7 +130,7 @@ async def get_map(
     if_none_match: _IfNoneMatch = None,
 ) -> Response:
     """Return depth, standard deviation and count of every cell, with an ETag that changes with every new map."""
-    snapshot = await service.map(mission_id)
+    snapshot = await newest_map(mission, service.maps)
     names = sorted(set(layer or ()))
     tag = _tag(state, snapshot, names, *([order] if names else []))
     if _matches(tag, if_none_match):
@@ -157,10 +158,10 @@ async def get_map(
     },
 )
 async def get_overlay(
-    mission_id: MissionId,
     service: Service,
     state: State,
     reader: Reader,
+    mission: Mission,
     layer: Annotated[str, _OneOf(PICTURES), Query(description="What is shown")] = "depth",
     order: _Order = Order.ORDER_1A,
     min: Annotated[_End, Query(description="Value at the palette's begin, m; default: the map's least")] = None,  # noqa: A002
@@ -173,7 +174,7 @@ async def get_overlay(
     """
     if min is not None and max is not None and max <= min:
         raise ProblemError("invalid-request", f"max is {max:g} but min is {min:g}", remedy="Give a max above min")
-    snapshot = await service.map(mission_id)
+    snapshot = await newest_map(mission, service.maps)
     tag = _tag(state, snapshot, [layer], order, min, max)
     if _matches(tag, if_none_match):
         return _not_modified(tag)
@@ -202,10 +203,10 @@ async def get_overlay(
     },
 )
 async def get_tiles(
-    mission_id: MissionId,
     service: Service,
     state: State,
     reader: Reader,
+    mission: Mission,
     since: Annotated[
         str, Query(max_length=80, pattern=r"^[A-Za-z0-9.@]*$", description="`tag` of the map that the client has")
     ] = "",
@@ -218,24 +219,23 @@ async def get_tiles(
     ] = None,
 ) -> Response:
     """Return what changed in the map since the client last asked; all of it when that map is not known any more."""
-    content = await service.map_tiles(mission_id, state.run_id, since, layer or (), step)
+    content = await map_tiles(mission, service.maps, state.run_id, since, layer or (), step)
     headers = {"Content-Encoding": "deflate", "Cache-Control": "no-store"}
     return Response(content, media_type="application/octet-stream", headers=headers)
 
 
 @router.get("/quality", operation_id="getQuality", summary="Judge the map")
-async def get_quality(mission_id: MissionId, service: Service, reader: Reader) -> QualityView:
+async def get_quality(service: Service, reader: Reader, mission: Mission) -> QualityView:
     """Say in how many cells the TVU estimate stays within each order of IHO S-44, and how far a reference grid is off.
 
     No order is claimed by that: an order asks for more than vertical uncertainty.
     """
-    return await asyncio.to_thread(quality_of, await service.map(mission_id))
+    return await asyncio.to_thread(quality_of, await newest_map(mission, service.maps))
 
 
 @router.get("/products", operation_id="listProducts", summary="List the files", responses=problems("mission-not-found"))
-async def list_products(mission_id: MissionId, service: Service, reader: Reader) -> list[ProductView]:
+async def list_products(reader: Reader, mission: Mission) -> list[ProductView]:
     """Return every file that can be downloaded, with its path."""
-    mission = await service.mission(mission_id)
     base = f"{API}/missions/{mission.id}"
     return [
         ProductView(
@@ -270,10 +270,10 @@ def _add_files(resource: str, operation_id: str, summary: str, description: str)
     formats = ", ".join(kinds)
 
     async def get_file(
-        mission_id: MissionId,
         format: Annotated[str, Path(description=f"One of {formats}", examples=[next(iter(kinds))])],  # noqa: A002
         service: Service,
         reader: Reader,
+        mission: Mission,
         options: _FileOptions,
     ) -> Response:
         if format not in kinds:
@@ -282,7 +282,7 @@ def _add_files(resource: str, operation_id: str, summary: str, description: str)
                 f"the {resource} {'is' if resource == MAP else 'are'} not made as .{format[:20]}",
                 remedy="Use one of " + ", ".join(f".{name}" for name in kinds),
             )
-        product = await service.export(mission_id, kinds[format], options)
+        product = await export(mission, service.maps, service.settings.provider, kinds[format], options)
         return file_answer(product)
 
     get_file.__doc__ = description

@@ -7,9 +7,12 @@ from fastapi import APIRouter, Header, Query, Request, Response
 from app.api.auth import VehicleOrOperator, check_vehicle
 from app.api.first_completed import first_of
 from app.api.json_route import JsonRoute
+from app.api.mission import Mission
 from app.api.problems import ProblemError, problems
-from app.api.schemas import API, MeasurementBatch, MissionId, VehicleName
+from app.api.schemas import API, MeasurementBatch, VehicleName
 from app.api.state import Service, State
+from app.missions.operations.measurements import measure
+from app.missions.operations.polling import waypoint
 from app.missions.soundings.measurement import Measurement
 from app.missions.views.mission import WaypointView
 from app.missions.views.soundings import BatchVerdict, ItemVerdict, Verdict
@@ -38,10 +41,9 @@ MAX_WAIT_S = 60.0
     ),
 )
 async def post_measurements(
-    mission_id: MissionId,
     batch: MeasurementBatch,
-    service: Service,
     vehicle: VehicleOrOperator,
+    mission: Mission,
     idempotency_key: Annotated[
         str | None,
         Header(
@@ -67,8 +69,8 @@ async def post_measurements(
         for i, item in enumerate(batch.items)
         if isinstance(item, str)
     ]
-    answer = await service.measure(
-        mission_id, [item for _, item in readable], idempotency_key=idempotency_key, sender=vehicle.identity
+    answer = await measure(
+        mission, [item for _, item in readable], idempotency_key=idempotency_key, sender=vehicle.identity
     )
     if not verdicts:
         return answer
@@ -90,12 +92,12 @@ async def post_measurements(
     | {204: {"description": "Nothing newer than `after_step` within `timeout_s`: ask again"}},
 )
 async def get_waypoint(
-    mission_id: MissionId,
     name: VehicleName,
     request: Request,
     service: Service,
     state: State,
     vehicle: VehicleOrOperator,
+    mission: Mission,
     after_step: Annotated[
         int | None,
         Query(
@@ -115,7 +117,7 @@ async def get_waypoint(
 
     async def fetch() -> None:
         nonlocal found
-        found = await service.waypoint(mission_id, name, after_step=after_step, timeout_s=timeout_s)
+        found = await waypoint(mission, name, after_step=after_step, timeout_s=timeout_s)
 
     async def leave() -> None:
         while (await request.receive())["type"] != "http.disconnect":

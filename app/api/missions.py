@@ -1,16 +1,20 @@
 """Missions: describing, listing, moving through their states, and their vehicles."""
 
-from typing import Annotated
+from typing import Annotated, Any
 
 from fastapi import APIRouter, Body, Query, Request, Response
 from pydantic import TypeAdapter
 
 from app.api.auth import Operator, Reader
 from app.api.json_route import JsonRoute
+from app.api.mission import Mission
 from app.api.peer_lists import from_peers
 from app.api.problems import problems
-from app.api.schemas import API, ActionRequest, MissionId, NoteRequest, VehicleName
+from app.api.schemas import API, ActionRequest, NoteRequest, VehicleName
 from app.api.state import Service, State
+from app.missions.operations import history
+from app.missions.preflight.survey import preflight
+from app.missions.running.mission_views import action_view, mission_view
 from app.missions.spec.mission import MissionSpec, VehicleSpec
 from app.missions.states import Action
 from app.missions.views.mission import ActionView, EventView, MissionSummary, MissionView, PreflightView, StepView
@@ -24,6 +28,12 @@ router = APIRouter(
 )
 
 _summaries = TypeAdapter(list[MissionSummary])
+
+_FOUND = problems("mission-not-found", "invalid-request")
+_OF_A_VEHICLE: dict[str, Any] = {
+    "responses": problems("mission-not-found", "vehicle-not-found", "conflict", "invalid-request"),
+    "tags": ["vehicles"],
+}
 
 EXAMPLE_SPEC = {
     "name": "Leixoes quay",
@@ -74,11 +84,11 @@ async def list_missions(request: Request, state: State, service: Service, reader
     "/{mission_id}",
     operation_id="getMission",
     summary="See a mission",
-    responses=problems("mission-not-found", "invalid-request"),
+    responses=_FOUND,
 )
-async def get_mission(mission_id: MissionId, service: Service, reader: Reader) -> MissionView:
+async def get_mission(reader: Reader, mission: Mission) -> MissionView:
     """Return a mission with its description, its vehicles as they are now and their newest waypoints."""
-    return await service.mission(mission_id)
+    return mission_view(mission)
 
 
 @router.delete(
@@ -88,12 +98,12 @@ async def get_mission(mission_id: MissionId, service: Service, reader: Reader) -
     status_code=204,
     responses=problems("mission-not-found", "conflict", "invalid-request"),
 )
-async def delete_mission(mission_id: MissionId, service: Service, operator: Operator) -> None:
+async def delete_mission(service: Service, operator: Operator, mission: Mission) -> None:
     """Remove a mission in which no step was taken and nothing measured, with its imports. The audit log keeps who did.
 
     Any other one is refused: what was measured is kept.
     """
-    await service.delete(mission_id)
+    await service.delete(mission)
 
 
 _ACTION_PROBLEMS = problems(
@@ -131,10 +141,10 @@ def _add_action(action: Action) -> None:
     summary, description = _ACTION_TEXTS[action]
 
     async def act(
-        mission_id: MissionId, service: Service, operator: Operator, body: ActionRequest | None = None
+        service: Service, operator: Operator, mission: Mission, body: ActionRequest | None = None
     ) -> ActionView:
         note = body.note if body is not None else ""
-        return await service.act(mission_id, action, actor=operator.name, note=note)
+        return await service.act(mission, action, actor=operator.name, note=note)
 
     router.add_api_route(
         f"/{{mission_id}}/{action}",
@@ -155,44 +165,42 @@ for _action in Action:
     "/{mission_id}/preflight",
     operation_id="checkMission",
     summary="See what stands before the start",
-    responses=problems("mission-not-found", "invalid-request"),
+    responses=_FOUND,
 )
-async def check_mission(mission_id: MissionId, service: Service, reader: Reader) -> PreflightView:
+async def check_mission(reader: Reader, mission: Mission) -> PreflightView:
     """Return the checklist: links, batteries, places, depths, area, tide, and how long it takes at most."""
-    return await service.preflight(mission_id)
+    return preflight(mission)
 
 
 @router.get(
     "/{mission_id}/steps",
     operation_id="listSteps",
     summary="See what was decided",
-    responses=problems("mission-not-found", "invalid-request"),
+    responses=_FOUND,
 )
 async def list_steps(
-    mission_id: MissionId,
-    service: Service,
     reader: Reader,
+    mission: Mission,
     after: Annotated[int, Query(ge=0, lt=2**31, description="Only steps with a larger number")] = 0,
     limit: Annotated[int, Query(ge=1, le=1000, description="Most steps in the answer")] = 1000,
 ) -> list[StepView]:
     """Return the steps with their figures and with what became of their waypoints, first to last."""
-    return await service.steps(mission_id, after=after, limit=limit)
+    return await history.steps_after(mission, after, limit)
 
 
 @router.get(
     "/{mission_id}/telemetry",
     operation_id="getTelemetry",
     summary="See the vehicles' figures over time",
-    responses=problems("mission-not-found", "invalid-request"),
+    responses=_FOUND,
 )
 async def get_telemetry(
-    mission_id: MissionId,
-    service: Service,
     reader: Reader,
+    mission: Mission,
     points: Annotated[int, Query(ge=2, le=5000, description="Most moments in the answer, evenly spread")] = 720,
 ) -> TelemetryView:
     """Return depth, altitude, battery and link age of every vehicle while the mission ran, oldest first."""
-    return await service.telemetry(mission_id, points)
+    return await history.telemetry_of(mission, points)
 
 
 @router.post(
@@ -204,21 +212,20 @@ async def get_telemetry(
         "malformed-body", "mission-not-found", "body-too-large", "unsupported-media-type", "invalid-request"
     ),
 )
-async def write_note(mission_id: MissionId, note: NoteRequest, service: Service, operator: Operator) -> EventView:
+async def write_note(note: NoteRequest, operator: Operator, mission: Mission) -> EventView:
     """Keep an operator's words in the mission's log, for the next watch."""
-    return await service.write_note(mission_id, note.text.strip(), actor=operator.name)
+    return await history.write_note(mission, note.text.strip(), operator.name)
 
 
 @router.post(
     "/{mission_id}/vehicles/{name}/abort",
     operation_id="abortVehicle",
     summary="Stop one vehicle",
-    responses=problems("mission-not-found", "vehicle-not-found", "conflict", "invalid-request"),
-    tags=["vehicles"],
+    **_OF_A_VEHICLE,
 )
-async def abort_vehicle(mission_id: MissionId, name: VehicleName, service: Service, operator: Operator) -> ActionView:
+async def abort_vehicle(name: VehicleName, service: Service, operator: Operator, mission: Mission) -> ActionView:
     """Stop a vehicle now and go on without it; the answer tells whether it acknowledged."""
-    return await service.abort_vehicle(mission_id, name, actor=operator.name)
+    return action_view(mission, await service.team_changes.stop_one(mission, name, operator.name))
 
 
 @router.post(
@@ -235,30 +242,31 @@ async def abort_vehicle(mission_id: MissionId, name: VehicleName, service: Servi
     ),
     tags=["vehicles"],
 )
-async def add_vehicle(mission_id: MissionId, vehicle: VehicleSpec, service: Service, operator: Operator) -> MissionView:
+async def add_vehicle(vehicle: VehicleSpec, service: Service, operator: Operator, mission: Mission) -> MissionView:
     """Let a vehicle take part, also while the mission runs: it joins at the next step."""
-    return await service.add_vehicle(mission_id, vehicle, actor=operator.name)
+    await service.team_changes.join(mission, vehicle, operator.name)
+    return mission_view(mission)
 
 
 @router.post(
     "/{mission_id}/vehicles/{name}/rejoin",
     operation_id="rejoinVehicle",
     summary="Take back a vehicle that left",
-    responses=problems("mission-not-found", "vehicle-not-found", "conflict", "invalid-request"),
-    tags=["vehicles"],
+    **_OF_A_VEHICLE,
 )
-async def rejoin_vehicle(mission_id: MissionId, name: VehicleName, service: Service, operator: Operator) -> MissionView:
+async def rejoin_vehicle(name: VehicleName, service: Service, operator: Operator, mission: Mission) -> MissionView:
     """Let a vehicle that was aborted or removed take part again, as it was described: it joins at the next step."""
-    return await service.rejoin_vehicle(mission_id, name, actor=operator.name)
+    await service.team_changes.rejoin(mission, name, operator.name)
+    return mission_view(mission)
 
 
 @router.delete(
     "/{mission_id}/vehicles/{name}",
     operation_id="removeVehicle",
     summary="Take a vehicle out of a mission",
-    responses=problems("mission-not-found", "vehicle-not-found", "conflict", "invalid-request"),
-    tags=["vehicles"],
+    **_OF_A_VEHICLE,
 )
-async def remove_vehicle(mission_id: MissionId, name: VehicleName, service: Service, operator: Operator) -> MissionView:
+async def remove_vehicle(name: VehicleName, service: Service, operator: Operator, mission: Mission) -> MissionView:
     """Stop the vehicle and go on without it; what it measured stays."""
-    return await service.remove_vehicle(mission_id, name, actor=operator.name)
+    await service.team_changes.take_out(mission, name, operator.name)
+    return mission_view(mission)

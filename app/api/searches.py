@@ -7,9 +7,12 @@ from fastapi import APIRouter, Body, Query, Response
 from app.api.auth import Reader, VehicleOrOperator, check_vehicle
 from app.api.json_route import JsonRoute
 from app.api.maps import file_answer
+from app.api.mission import Mission
 from app.api.problems import problems
-from app.api.schemas import API, MissionId, ScanBatch
+from app.api.schemas import API, ScanBatch
 from app.api.state import Service
+from app.missions.operations.mission_maps import export
+from app.missions.operations.scans import scan, search_grid
 from app.missions.views.search import SearchGridView
 from app.missions.views.soundings import BatchVerdict
 
@@ -34,9 +37,7 @@ router = APIRouter(
         "invalid-request",
     ),
 )
-async def post_scans(
-    mission_id: MissionId, batch: Annotated[ScanBatch, Body()], service: Service, vehicle: VehicleOrOperator
-) -> BatchVerdict:
+async def post_scans(batch: Annotated[ScanBatch, Body()], vehicle: VehicleOrOperator, mission: Mission) -> BatchVerdict:
     """Store scans of a mission of kind search, and add them to what is known of its site.
 
     Each scan has its own verdict; one that came before, by its vehicle and time, is a duplicate. Vehicles of any kind
@@ -44,7 +45,7 @@ async def post_scans(
     """
     for item in batch.items:
         check_vehicle(vehicle, item.vehicle)
-    return await service.scan(mission_id, batch.items)
+    return await scan(mission, batch.items)
 
 
 @router.get(
@@ -56,13 +57,12 @@ async def post_scans(
     response_model=SearchGridView,
 )
 async def get_search(
-    mission_id: MissionId,
-    service: Service,
     reader: Reader,
+    mission: Mission,
     after: Annotated[int | None, Query(ge=0, lt=2**62, description="Only what is newer than this version")] = None,
 ) -> Response:
     """Return what is known of every cell: explored, not explored, an obstacle known beforehand, or one found."""
-    view = await service.search_grid(mission_id, after=after)
+    view = search_grid(mission, after)
     if view is None:
         return Response(status_code=204)
     return Response(view.model_dump_json(), media_type="application/json")
@@ -76,6 +76,6 @@ async def get_search(
     | {200: {"content": {"application/geo+json": {}}, "description": "A FeatureCollection of polygons"}},
     response_class=Response,
 )
-async def get_search_obstacles(mission_id: MissionId, service: Service, reader: Reader) -> Response:
+async def get_search_obstacles(service: Service, reader: Reader, mission: Mission) -> Response:
     """Return the outlines of all cells that obstacles fill: known beforehand, and found."""
-    return file_answer(await service.export(mission_id, "obstacles.geojson"))
+    return file_answer(await export(mission, service.maps, service.settings.provider, "obstacles.geojson"))

@@ -6,9 +6,11 @@ from fastapi import APIRouter, Path, Query
 
 from app.api.auth import Operator, Reader
 from app.api.json_route import JsonRoute
+from app.api.mission import Mission
 from app.api.problems import problems
-from app.api.schemas import API, ActionRequest, MissionId
-from app.api.state import Service
+from app.api.schemas import API, ActionRequest
+from app.missions.live.mission import LiveMission
+from app.missions.operations.review import rule, soundings_page
 from app.missions.spec.base import Name
 from app.missions.views.soundings import Ruling, SoundingPage, SoundingState, SoundingView
 
@@ -26,9 +28,8 @@ SoundingId = Annotated[int, Path(ge=1, lt=2**62, description="The sounding's id"
 
 @router.get("", operation_id="listSoundings", summary="See which soundings are not in the map, and why")
 async def list_soundings(
-    mission_id: MissionId,
-    service: Service,
     reader: Reader,
+    mission: Mission,
     state: Annotated[
         list[SoundingState] | None,
         Query(
@@ -41,7 +42,7 @@ async def list_soundings(
     limit: Annotated[int, Query(ge=1, le=1000, description="Most soundings in the answer")] = 200,
 ) -> SoundingPage:
     """Return soundings with their raw values, whether they count and why not, in the order they came."""
-    return await service.review(mission_id, state or TO_REVIEW, vehicle=vehicle, after=after, limit=limit)
+    return await soundings_page(mission, state or TO_REVIEW, vehicle=vehicle, after=after, limit=limit)
 
 
 _RULING = problems(
@@ -53,30 +54,28 @@ _RULING = problems(
     "/{sounding_id}/restore", operation_id="restoreSounding", summary="Let a sounding count", responses=_RULING
 )
 async def restore_sounding(
-    mission_id: MissionId,
     sounding_id: SoundingId,
-    service: Service,
     operator: Operator,
+    mission: Mission,
     body: ActionRequest | None = None,
 ) -> SoundingView:
     """Take a sounding into the map whatever gate and neighbours say; the log keeps who did so."""
-    return await _rule(service, mission_id, sounding_id, Ruling.RESTORED, operator.name, body)
+    return await _rule(mission, sounding_id, Ruling.RESTORED, operator.name, body)
 
 
 @router.post("/{sounding_id}/reject", operation_id="rejectSounding", summary="Keep a sounding out", responses=_RULING)
 async def reject_sounding(
-    mission_id: MissionId,
     sounding_id: SoundingId,
-    service: Service,
     operator: Operator,
+    mission: Mission,
     body: ActionRequest | None = None,
 ) -> SoundingView:
     """Take a sounding out of the map; its values stay, the log keeps who did so, and it can be restored."""
-    return await _rule(service, mission_id, sounding_id, Ruling.REJECTED, operator.name, body)
+    return await _rule(mission, sounding_id, Ruling.REJECTED, operator.name, body)
 
 
 async def _rule(
-    service: Service, mission_id: str, sounding_id: int, ruling: Ruling, actor: str, body: ActionRequest | None
+    mission: LiveMission, sounding_id: int, ruling: Ruling, actor: str, body: ActionRequest | None
 ) -> SoundingView:
     note = body.note if body is not None else ""
-    return await service.rule(mission_id, sounding_id, ruling, note=note, actor=actor)
+    return await rule(mission, sounding_id, ruling, note=note, actor=actor)

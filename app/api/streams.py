@@ -13,12 +13,14 @@ from sse_starlette import EventSourceResponse, ServerSentEvent
 
 from app.api.auth import Reader, authenticate, until_unwelcome
 from app.api.first_completed import first_of
+from app.api.mission import Mission
 from app.api.problems import ProblemError, describe_mission_error, problems
-from app.api.schemas import API, MissionId
-from app.api.state import EdgeState, Service, State, edge_state
+from app.api.schemas import API
+from app.api.state import EdgeState, State, edge_state
 from app.missions.errors import MissionError
 from app.missions.live.broadcast import WatchEndedError
-from app.missions.service import MissionService
+from app.missions.operations.history import events_after
+from app.missions.running.mission_views import watched
 from app.missions.views.messages import EventMessage, LiveMessage, SnapshotMessage
 from app.missions.views.mission import EventView
 
@@ -69,11 +71,10 @@ _texts: OrderedDict[int, tuple[LiveMessage, str]] = OrderedDict()
     response_class=Response,
 )
 async def get_events(
-    mission_id: MissionId,
     request: Request,
-    service: Service,
     state: State,
     reader: Reader,
+    mission: Mission,
     last_event_id: Annotated[
         int | None, Header(ge=0, lt=2**62, description="Id of the newest entry that the client has")
     ] = None,
@@ -85,12 +86,11 @@ async def get_events(
     """Return the mission's log, oldest entry first."""
     start = after if last_event_id is None else last_event_id
     if _wants_list(request.headers.get("accept", "*/*")):
-        entries = await service.events(mission_id, after=start, limit=limit)
+        entries = await events_after(mission, start, limit)
         return Response(_events.dump_json(entries), media_type="application/json")
-    await service.mission(mission_id)
     state.check_stream(request)  # before the answer begins
     return EventSourceResponse(
-        _stream(service, state, mission_id, start, request),
+        _stream(state, mission.id, start, request),
         ping=KEEP_ALIVE_S,
         headers={"Cache-Control": "no-store", "X-Accel-Buffering": "no"},
     )
@@ -126,17 +126,16 @@ def _wants_list(accept: str) -> bool:
     return (weights[json], specific[json]) > (weights[stream], specific[stream])
 
 
-async def _stream(
-    service: MissionService, state: EdgeState, mission_id: str, start: int, request: Request
-) -> AsyncIterator[ServerSentEvent]:
+async def _stream(state: EdgeState, mission_id: str, start: int, request: Request) -> AsyncIterator[ServerSentEvent]:
     """Yield the log after ``start``, first what is stored, then what happens, as long as the client may see it."""
     with state.stream("sse", request):
-        async with service.subscribe(mission_id) as messages:
+        mission = await state.service.get(mission_id)
+        async with watched(mission) as messages:
             snapshot = await anext(messages)
             assert isinstance(snapshot, SnapshotMessage)  # noqa: S101 - the subscription's contract
             sent = start
             while sent < snapshot.last_event_id:
-                page = await service.events(mission_id, after=sent, limit=PAGE)
+                page = await events_after(mission, sent, PAGE)
                 if not page:
                     break
                 for event in page:
@@ -201,7 +200,7 @@ async def live(websocket: WebSocket, mission_id: str) -> None:
 
 
 async def _serve(websocket: WebSocket, state: EdgeState, mission_id: str) -> None:
-    async with state.service.subscribe(mission_id) as messages:
+    async with watched(await state.service.get(mission_id)) as messages:
         ended = await first_of(
             _send_all(websocket, messages),
             _until_left(websocket),

@@ -5,9 +5,10 @@ from typing import Annotated
 from fastapi import APIRouter, Query
 
 from app.api.auth import Reader
+from app.api.mission import Mission
 from app.api.problems import problems
-from app.api.schemas import API, MissionId
-from app.api.state import Service
+from app.api.schemas import API
+from app.missions.operations.history import target_ranges_page
 from app.missions.spec.base import Name
 from app.missions.views.targets import TargetRangePage, TargetView
 
@@ -19,9 +20,9 @@ router = APIRouter(
 
 
 @router.get("", operation_id="listTargets", summary="See what is known of a mission's moving targets")
-async def list_targets(mission_id: MissionId, service: Service, reader: Reader) -> list[TargetView]:
+async def list_targets(reader: Reader, mission: Mission) -> list[TargetView]:
     """Return every target of the mission, foretold from its last range until now."""
-    return await service.targets(mission_id)
+    return mission.target_views()
 
 
 @router.get(
@@ -31,12 +32,11 @@ async def list_targets(mission_id: MissionId, service: Service, reader: Reader) 
     responses=problems("mission-not-found", "target-not-found"),
 )
 async def list_target_ranges(
-    mission_id: MissionId,
-    service: Service,
     reader: Reader,
+    mission: Mission,
     target: Annotated[Name | None, Query(description="Only ranges to this target")] = None,
     after: Annotated[int, Query(ge=0, lt=2**62, description="Only ranges with a larger id")] = 0,
     limit: Annotated[int, Query(ge=1, le=1000, description="Most ranges in the answer")] = 200,
 ) -> TargetRangePage:
     """Return ranges as they were measured, with the verdict on each, in the order they were judged."""
-    return await service.target_ranges(mission_id, target=target, after=after, limit=limit)
+    return await target_ranges_page(mission, target, after, limit)

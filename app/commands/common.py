@@ -12,6 +12,7 @@ M = TypeVar("M", bound="BaseModel")
 if TYPE_CHECKING:
     from pydantic import BaseModel
 
+    from app.missions.live.mission import LiveMission
     from app.missions.service import MissionService
     from app.settings import Settings
 
@@ -108,13 +109,13 @@ def with_missions(
     return asyncio.run(use())
 
 
-async def resting_mission(service: "MissionService", begin: str) -> str:
-    """Return the id of a mission that no service is running. Raises CommandError."""
-    mission_id = await meant_mission(service, begin)
-    state = (await service.mission(mission_id)).state
+async def resting_mission(service: "MissionService", begin: str) -> "LiveMission":
+    """Return a mission that no service is running. Raises CommandError."""
+    mission = await meant_mission(service, begin)
+    state = mission.header.state
     if state in ("running", "paused"):
         raise CommandError(f"the mission is {state} in a service that would not notice", "Name that service with --url")
-    return mission_id
+    return mission
 
 
 def checked(model: "type[M]", values: dict[str, Any]) -> "M":
@@ -157,11 +158,11 @@ def _answer(response: Any) -> Any:
     raise CommandError(faults or said.get("detail", "the service refused it"), said.get("remedy", ""))
 
 
-async def meant_mission(service: "MissionService", begin: str) -> str:
-    """Return the id of the one mission whose id begins so. Raises CommandError."""
+async def meant_mission(service: "MissionService", begin: str) -> "LiveMission":
+    """Return the one mission whose id begins so. Raises CommandError."""
     every = await service.missions()
     meant = [summary.id for summary in every if summary.id.startswith(begin)]
     if len(meant) != 1:
         ids = "; ".join(f"{summary.id} {summary.name}" for summary in every[:5]) or "none"
         raise CommandError(f"{len(meant)} missions have ids that begin with {begin!r}", f"There are: {ids}")
-    return meant[0]
+    return await service.get(meant[0])

@@ -57,6 +57,7 @@ def export(
     settings = command_settings(database_url=database)
     from app.mapping.s44 import Order
     from app.missions.maps.products import PRODUCTS, Product, ProductOptions
+    from app.missions.operations import mission_maps
     from app.missions.service import MissionService
     from app.storage import private
 
@@ -67,7 +68,8 @@ def export(
     options = ProductOptions(Order(order), interval, vehicle=vehicle)
 
     async def run(service: MissionService) -> Product:
-        return await service.export(await meant_mission(service, mission), format, options)
+        live = await meant_mission(service, mission)
+        return await mission_maps.export(live, service.maps, service.settings.provider, format, options)
 
     product = with_missions(settings, run)
     if out == Path("-"):
@@ -152,12 +154,12 @@ def import_file(
     else:
 
         async def run(service: "MissionService") -> ImportView | ReferenceView:
-            mission_id = await resting_mission(service, mission)
+            live = await resting_mission(service, mission)
             upload = await asyncio.to_thread(open_upload, file)
             with upload.file:
                 if reference:
-                    return await service.set_reference(mission_id, upload, options, actor="command line")
-                return await service.import_soundings(mission_id, upload, options, actor="command line")
+                    return await service.imports.set_reference(live, upload, options, "command line")
+                return await service.imports.add(live, upload, options, "command line")
 
         view = with_missions(
             command_settings(database_url=database), run, changing="import", mission=f"{mission} {file.name}"
@@ -196,6 +198,7 @@ def tide(
     database: Database = None,
 ) -> None:
     """Correct a mission's tide, also afterwards: every sounding is corrected anew from its raw depth."""
+    from app.missions.operations.recorrection import set_tide
     from app.missions.views.corrections import CorrectionsView, TideCorrection
 
     try:
@@ -216,7 +219,7 @@ def tide(
     else:
 
         async def run(service: "MissionService") -> CorrectionsView:
-            return await service.set_tide(await resting_mission(service, mission), wanted, actor="command line")
+            return await set_tide(await resting_mission(service, mission), wanted, "command line")
 
         view = with_missions(command_settings(database_url=database), run, changing="tide", mission=mission)
     typer.echo(f"depths are below {view.vertical_datum}; {view.accepted} soundings accepted, {view.rejected} rejected")

@@ -30,6 +30,7 @@ def import_logs(
     from rich.console import Console
     from rich.progress import BarColumn, DownloadColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
 
+    from app.missions.operations.log_import import import_log
     from app.missions.views.soundings import LogImportView
 
     console = Console(stderr=True)
@@ -38,18 +39,15 @@ def import_logs(
     views: list[LogImportView] = []
 
     async def run(service: "MissionService") -> None:
-        mission_id = await meant_mission(service, mission)
+        live = await meant_mission(service, mission)
+        actor = f"{getpass.getuser()} at the console"
         for path in logs:
             task = bar.add_task(path.name, total=None)
 
             def show(done: int, total: int, task: TaskID = task) -> None:
                 bar.update(task, completed=done, total=total)
 
-            views.append(
-                await service.import_log(
-                    mission_id, path, vehicle=vehicle, actor=f"{getpass.getuser()} at the console", progress=show
-                )
-            )
+            views.append(await import_log(live, service.settings, path, vehicle=vehicle, actor=actor, progress=show))
 
     try:
         with Progress(*columns, console=console, disable=not console.is_terminal) as bar:

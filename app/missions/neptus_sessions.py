@@ -10,6 +10,7 @@ import numpy as np
 from app.mapping.georeference import LocalFrame
 from app.missions.errors import MissionError
 from app.missions.fleet.links.neptus import NeptusFleetLink
+from app.missions.live.mission import LiveMission
 from app.missions.settings import NeptusSettings
 from app.missions.spec.base import PolygonGeometry
 from app.missions.spec.mission import Limits, MissionSpec, PlannerSpec, Tide, VehicleKind, VehicleSpec
@@ -42,14 +43,11 @@ class Missions(Protocol):
     async def create(self, spec: MissionSpec, *, actor: str) -> MissionView:
         """Store a new mission."""
 
-    async def mission(self, mission_id: str) -> MissionView:
+    async def get(self, mission_id: str) -> LiveMission:
         """Return one."""
 
-    async def act(self, mission_id: str, action: Action, *, actor: str, note: str) -> ActionView:
+    async def act(self, live: LiveMission, action: Action, *, actor: str, note: str) -> ActionView:
         """Start, finish or abort one."""
-
-    async def note(self, mission_id: str, level: Level, kind: str, message: str, **data: str | float) -> None:
-        """Write a line of its log."""
 
 
 class NeptusSessions:
@@ -127,18 +125,19 @@ class NeptusSessions:
             taken = [cell for cell in depths if cell[2] > 0.0]
             self.link.prior(session, taken)
             words = f"{len(taken)} cells of a sparse map with {len(cells)} known ones are used as depths"
-        await self._service.note(self._missions[session], Level.INFO, EVENT + "-map", words)
+        await self._log(session, Level.INFO, EVENT + "-map", words)
 
     async def step(self, data: StepData, user: str, host: str, *, answered: bool) -> None:
         """Hand a step to the mission, and start it with the first one."""
         mission_id = self._missions[data.session]
         try:
-            state = (await self._service.mission(mission_id)).state
+            mission = await self._service.get(mission_id)
+            state = mission.header.state
             if state in ENDED:
                 raise SessionRefusedError(f"the session's mission is {state}: press STOP, then RENEW for another one")
             self.link.locate(data, host)
             if state is MissionState.READY:
-                await self._service.act(mission_id, Action.START, actor=user, note="START in the panel")
+                await self._service.act(mission, Action.START, actor=user, note="START in the panel")
         except MissionError as error:
             raise SessionRefusedError(f"{error}. {error.remedy}") from error
         await self._warn_of_border(data)
@@ -151,7 +150,7 @@ class NeptusSessions:
     async def refused(self, session: str, reason: str) -> None:
         """Write into the mission's log what the panel was told, which it shows to nobody."""
         if session in self._missions:
-            await self._service.note(self._missions[session], Level.WARNING, EVENT + "-refused", reason)
+            await self._log(session, Level.WARNING, EVENT + "-refused", reason)
 
     def polled(self, session: str, *, answered: bool) -> None:
         """Note that the panel polled, and whether it got the answer to its last step."""
@@ -162,10 +161,10 @@ class NeptusSessions:
         mission_id = self._missions.get(session)
         if mission_id is None:
             return True  # its own file was lost: it begins with the next step
-        if (await self._service.mission(mission_id)).state in ENDED:
+        mission = await self._service.get(mission_id)
+        if mission.header.state in ENDED:
             return False
-        await self._service.note(
-            mission_id,
+        await mission.journal.log(
             Level.WARNING,
             EVENT + "-repeat",
             f"the panel waits for the answer to step {time_step}, which was lost or refused: its vehicles stay where "
@@ -179,8 +178,8 @@ class NeptusSessions:
             name = vehicle_name(data.session, index)
             if area.on_border(place.row, place.col) and name not in self._warned:
                 self._warned.add(name)
-                await self._service.note(
-                    self._missions[data.session],
+                await self._log(
+                    data.session,
                     Level.WARNING,
                     EVENT + "-border",
                     f"{name} is on the border of the area, where the panel puts whatever lies outside: "
@@ -197,8 +196,8 @@ class NeptusSessions:
                 continue
             ratios.append(ratio)
             if len(ratios) == ENOUGH_RATIOS and looks_slanted(median(ratios)):
-                await self._service.note(
-                    self._missions[data.session],
+                await self._log(
+                    data.session,
                     Level.WARNING,
                     EVENT + "-samples",
                     f"the samples of {name} have it {100 * (1 - median(ratios)):.0f} % nearer to the bottom than it "
@@ -215,14 +214,20 @@ class NeptusSessions:
 
     async def _finish(self, session: str, reason: str, user: str) -> None:
         mission_id = self._missions.get(session)
-        state = (await self._service.mission(mission_id)).state if mission_id is not None else None
-        if mission_id is None or state in ENDED:
+        if mission_id is None:
             return
-        await self._service.act(mission_id, Action.FINISH if state in FLYING else Action.ABORT, actor=user, note=reason)
+        mission = await self._service.get(mission_id)
+        if mission.header.state not in ENDED:
+            action = Action.FINISH if mission.header.state in FLYING else Action.ABORT
+            await self._service.act(mission, action, actor=user, note=reason)
+
+    async def _log(self, session: str, level: Level, kind: str, message: str, /, **data: str | float) -> None:
+        """Write a line of the log of the session's mission."""
+        await (await self._service.get(self._missions[session])).journal.log(level, kind, message, **data)
 
     async def _note(self, session: str, level: Level, message: str, time_step: int, host: str) -> None:
-        await self._service.note(
-            self._missions[session],
+        await self._log(
+            session,
             level,
             EVENT,
             message,

@@ -1,6 +1,6 @@
 """The vehicles of one mission as its step loop sees them."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from datetime import datetime
 
@@ -10,12 +10,13 @@ from numpy.typing import NDArray
 from app.mapping.georeference import LocalFrame
 from app.missions.fleet.hub import VehicleKey
 from app.missions.fleet.interface import (
+    LinkCapabilities,
     LinkState,
     VehicleReport,
     WaypointOrder,
     WaypointStatus,
 )
-from app.missions.spec.mission import Limits, VehicleSpec
+from app.missions.spec.mission import Limits, VehicleKind, VehicleSpec
 
 SETTLED = frozenset({WaypointStatus.REACHED, WaypointStatus.REFUSED, WaypointStatus.MISSED})
 OUT_OF_REACH = frozenset({LinkState.UNKNOWN, LinkState.LOST})
@@ -27,6 +28,7 @@ class Member:
 
     spec: VehicleSpec
     slot: int
+    capabilities: LinkCapabilities = field(default_factory=LinkCapabilities)
     report: VehicleReport | None = None
     heard_s: float | None = None
     """When that was, Unix seconds by the service's clock."""
@@ -38,6 +40,8 @@ class Member:
     """Whether it ever followed in this run: one that then refuses is an alarm."""
     refusal: str = ""
     order: WaypointOrder | None = None
+    target_m: NDArray[np.float64] | None = None
+    """Where its order leads in the mission's frame, (2,): east, north."""
     status: WaypointStatus | None = None
     reason: str = ""
     surfacing: bool = False
@@ -77,6 +81,10 @@ class Member:
         """Whether it has a waypoint that was never sent, as when its link was lost just then."""
         return self.order is not None and self.status is WaypointStatus.PLANNED
 
+    def set_order(self, order: WaypointOrder | None, target_m: NDArray[np.float64] | None = None) -> None:
+        """Give it an order and where that leads, or take its order away."""
+        self.order, self.target_m = order, target_m
+
     def cruise_depth_m(self, limits: Limits) -> float:
         """Return the depth it travels at where the bottom leaves room: as asked for, or its place in the stack."""
         if self.spec.depth_m is not None:
@@ -96,6 +104,8 @@ class Member:
 class Team:
     """All vehicles of a mission, by name, in the order of their slots."""
 
+    capabilities_of: Callable[[VehicleKind], LinkCapabilities] = lambda _kind: LinkCapabilities()
+    """Returns what vehicles of a kind can do."""
     members: dict[str, Member] = field(default_factory=dict)
     left: dict[str, Member] = field(default_factory=dict)
     """Those that took part and do not any more, as they were last."""
@@ -103,7 +113,7 @@ class Team:
     def join(self, spec: VehicleSpec, slot: int) -> Member:
         """Add a vehicle, or take one back."""
         before = self.left.pop(spec.name, None)
-        member = Member(spec, slot)
+        member = Member(spec, slot, self.capabilities_of(spec.kind))
         if before is not None and before.key == member.key:
             member.report, member.heard_s, member.risings = before.report, before.heard_s, before.risings
         self.members[spec.name] = member
@@ -113,7 +123,8 @@ class Team:
         """Take a vehicle out; what was last known of it stays."""
         member = self.members.pop(name, None)
         if member is not None:
-            member.left_at, member.order, member.status, member.pursuing = at, None, None, None
+            member.left_at, member.status, member.pursuing = at, None, None
+            member.set_order(None)
             member.engaged = member.surfacing = False
             self.left[name] = member
 

@@ -28,6 +28,9 @@ from app.api import logs
 from app.mapping.georeference import LocalFrame
 from app.missions.fleet.interface import WaypointStatus
 from app.missions.metrics import PACKETS_DROPPED
+from app.missions.operations.history import events_after, soundings_of
+from app.missions.operations.log_import import import_log
+from app.missions.running.mission_views import mission_view
 from app.missions.service import MissionService
 from app.missions.settings import ImcSettings, ServiceSettings
 from app.missions.spec.mission import MissionSpec
@@ -125,10 +128,10 @@ async def fly(options: argparse.Namespace, seed: int, folder: Path) -> dict[str,
         identity = (await service.create(mission(options))).id
         while sum(view.link == "ready" for view in await service.vehicles()) < options.vehicles:  # noqa: ASYNC110
             await asyncio.sleep(0.1)
-        await service.act(identity, Action.START, actor="benchmark")
+        await service.act(await service.get(identity), Action.START, actor="benchmark")
         killed = options.kill_at is None
         answers: dict[str, float] = {}
-        while (view := await service.mission(identity)).state not in ENDED:
+        while (view := mission_view(await service.get(identity))).state not in ENDED:
             if options.stops and not answers and view.progress.step >= options.steps // 2:
                 answers = await stopped(service, identity)
             if not killed and view.progress.step >= options.kill_at:
@@ -164,7 +167,7 @@ async def stopped(service: MissionService, identity: str) -> dict[str, float]:
         await asyncio.sleep(2.0)
         for action in (Action.PAUSE, Action.RESUME, Action.ABORT):
             begun = time.monotonic()
-            view = await service.act(identity, action, actor="benchmark")
+            view = await service.act(await service.get(identity), action, actor="benchmark")
             answers[f"{action}_answered_s"] = round(time.monotonic() - begun, 2)
             if view.stops:
                 answers[f"{action}_acknowledged"] = sum(stop.acknowledged for stop in view.stops)
@@ -194,14 +197,14 @@ async def summary(
     service: MissionService, database: Database, identity: str, floor: Terrain, begun: float
 ) -> dict[str, Any]:
     """Steps, waypoints, soundings against the truth, and what the log says."""
-    view = await service.mission(identity)
+    view = mission_view(await service.get(identity))
     statuses: dict[str, int] = {}
     async with database.reading() as session:
         for step in range(1, view.progress.step + 1):
             for row in await waypoints_of_step(session, identity, step):
                 statuses[row.status] = statuses.get(row.status, 0) + 1
     errors, rejected = await errors_m(service, identity, floor)
-    log = await service.events(identity, limit=1000)
+    log = await events_after(await service.get(identity), limit=1000)
     details = {view.name: view.reason for view in await service.vehicles()}
     return {
         "state": view.state,
@@ -230,7 +233,7 @@ async def summary(
 async def errors_m(service: MissionService, identity: str, floor: Terrain) -> tuple[list[float], int]:
     """Sounded minus true depth of every accepted sounding, and how many were rejected."""
     errors, rejected = [], 0
-    for row in await service.soundings(identity):
+    for row in await soundings_of(await service.get(identity)):
         east, north = floor.frame.to_local(row.lat_deg, row.lon_deg)
         rejected += row.verdict != "accepted"
         if row.verdict == "accepted" and floor.contains(east, north):
@@ -242,7 +245,7 @@ async def with_logs(service: MissionService, identity: str, floor: Terrain, logs
     """What the mission has once the vehicles' own logs are in it, beside what they measured."""
     measured, dives = 0, {}
     for path in logs:
-        await service.import_log(identity, path, actor="benchmark")
+        await import_log(await service.get(identity), service.settings, path, actor="benchmark")
         log = VehicleLog(path, BridgeSettings())
         dives[path.parent.parent.name] = dives_m(VehicleLog(path, BridgeSettings()))
         measured += sum(isinstance(event, Sounding) for event in log.events())

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from app.missions.operations.history import soundings_of
 from app.missions.settings import ImcSettings, ServiceSettings
 from app.missions.views.soundings import Verdict
 from app.storage.prepare import prepare_database
@@ -86,7 +87,7 @@ async def fly(asked: argparse.Namespace) -> dict[str, Any]:
 async def _figures(gateway: Gateway, panel: RealPanel, terrain: Terrain, took_s: float) -> dict[str, Any]:
     mission = await gateway.mission()
     area = gateway.service_area()
-    rows = await gateway.service.soundings(mission.id)
+    rows = await soundings_of(await gateway.service.get(mission.id))
     errors = np.array(
         [
             row.depth_m - _depth_m(terrain, *area.to_cells(row.lat_deg, row.lon_deg))

@@ -1,13 +1,18 @@
 """Who may ask for what."""
 
+import importlib
+import pkgutil
 from collections.abc import Callable
 from typing import Any
 
 import httpx
 import pytest
 import websockets
+from fastapi.routing import APIRoute
 
+import app.api
 from app.api import auth
+from app.api.mission import mission_of
 from app.api.tokens import Role, TokenStore
 from app.main import Server, create_app
 from app.settings import Settings, StartupError
@@ -185,3 +190,25 @@ async def test_listening_to_other_machines_needs_a_token(make_settings: Callable
     await database.close()
     async with app.router.lifespan_context(app):
         pass
+
+
+def test_every_route_of_a_mission_knows_who_asks_before_it_looks_for_the_mission() -> None:
+    modules = [importlib.import_module(f"app.api.{module.name}") for module in pkgutil.iter_modules(app.api.__path__)]
+    routes = [route for module in modules if hasattr(module, "router") for route in module.router.routes]
+    found = 0
+    for route in routes:
+        calls = [one.call for one in route.dependant.dependencies] if isinstance(route, APIRoute) else []
+        if mission_of in calls:
+            found += 1
+            roles = [isinstance(call, auth.RoleCheck) for call in calls]
+            assert roles.index(True) < calls.index(mission_of), route.path
+    assert found > 30
+
+
+async def test_who_may_not_look_is_not_told_whether_there_is_a_mission(guarded: Guarded, path: str) -> None:
+    for there in (path, "/missions/00000000-0000-4000-8000-000000000000"):
+        assert (await guarded.client.get(there)).status_code == 401
+        refused = await guarded.client.get(f"{there}/vehicles/rover/waypoint", headers=guarded.as_("viewer"))
+        assert refused.status_code == 403
+    missing = await guarded.client.get(there, headers=guarded.as_("viewer"))
+    assert missing.json()["type"].endswith("mission-not-found")

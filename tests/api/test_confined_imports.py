@@ -131,7 +131,7 @@ async def test_more_uploads_than_the_disk_is_meant_for_are_put_off() -> None:
 async def test_who_waits_too_long_for_others_files_is_told_to_come_back(
     client: httpx.AsyncClient, mission: dict[str, Any], server: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    reader = server.config.app.state.edge.service._imports._reader
+    reader = server.config.app.state.edge.service.imports._reader
     path = f"/missions/{mission['id']}/imports"
     monkeypatch.setattr(reading, "WAITING_TIMEOUT_S", 0.01)
     async with reader.turn():

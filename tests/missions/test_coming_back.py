@@ -6,13 +6,14 @@ import imcpy
 import pytest
 
 from app.missions.fleet.links.imc import ImcFleetLink
+from app.missions.operations.history import events_after
 from app.missions.service import MissionService
 from app.missions.settings import ImcSettings, ServiceSettings
 from app.missions.spec.mission import MissionSpec
-from app.missions.states import Action, MissionState
+from app.missions.states import MissionState
 from imc_bridge import Bridge, LinkChange, NodeState, RefusedError, WaypointStatus
 from tests.support.imc.sea import Sea, open_sea
-from tests.support.missions.harbour import Harbour
+from tests.support.missions.harbour import Harbour, act, view_of
 from tests.support.waiting import until
 
 COMMANDS = {message().msg_id.to_bytes(2, "little") for message in (imcpy.PlanControl, imcpy.Abort)}
@@ -85,19 +86,22 @@ async def test_a_mission_goes_on_by_itself_when_its_vehicle_hears_again(
                 return any(v.name == name and v.link == "ready" for v in await service.vehicles())
 
             async def said(words: str) -> bool:
-                return any(words in event.message for event in await service.events(mission.id))
+                return any(words in event.message for event in await events_after(await service.get(mission.id)))
 
             async def step() -> int:
-                return (await service.mission(mission.id)).progress.step
+                return (await view_of(service, mission.id)).progress.step
 
             async def under_way() -> bool:
                 return await step() >= 1
 
             async def ended() -> bool:
-                return (await service.mission(mission.id)).state in (MissionState.FINISHED, MissionState.FAILED)
+                return (await view_of(service, mission.id)).state in (
+                    MissionState.FINISHED,
+                    MissionState.FAILED,
+                )
 
             await until(ready, "the vehicle is ready")
-            await service.act(mission.id, Action.START, actor="tester")
+            await act(service, mission.id, "start", actor="tester")
             await until(under_way, "it is under way")
             link = Deaf(bridge)
             link.mute(COMMANDS | {REFERENCE})
@@ -109,7 +113,7 @@ async def test_a_mission_goes_on_by_itself_when_its_vehicle_hears_again(
             await until(lambda: said("executes our plan"), "engaging it again did not succeed")
             link.speak()
             await until(ended, "the mission has ended")
-            view = await service.mission(mission.id)
+            view = await view_of(service, mission.id)
             assert (view.state, view.progress.step) == (MissionState.FINISHED, 3), view.reason
         finally:
             await harbour.close()
@@ -139,7 +143,7 @@ def go_on_for_ever(sea: Sea) -> None:
 
 def bridge_of(service: MissionService) -> Bridge:
     """The bridge of a service's IMC link."""
-    return next(link._bridge for link in service._hub._links.values() if isinstance(link, ImcFleetLink))
+    return next(link._bridge for link in service.hub._links.values() if isinstance(link, ImcFleetLink))
 
 
 def mission_over(sea: Sea, name: str, steps: int) -> MissionSpec:

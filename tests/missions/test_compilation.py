@@ -7,8 +7,7 @@ import threading
 import pytest
 
 from app.missions import compilation
-from app.missions.states import Action
-from tests.support.missions.harbour import Harbour, sim_spec, until_step
+from tests.support.missions.harbour import Harbour, act, sim_spec, until_step
 
 COMPILED = """
 import pkgutil
@@ -59,7 +58,7 @@ async def test_the_first_waypoint_does_not_wait_for_what_maps_need(
         await harbour.open()
         service = harbour.service
         mission = await service.create(sim_spec(steps=3))
-        await service.act(mission.id, Action.START, actor="Ana")
+        await act(service, mission.id, "start", actor="Ana")
         await until_step(service, mission.id, 1)
         assert not compiled.is_set()
     finally:

@@ -7,13 +7,15 @@ from pathlib import Path
 import pytest
 from pydantic import ValidationError
 
+from app.missions.operations.history import events_after, soundings_of
+from app.missions.operations.log_import import import_log
 from app.missions.settings import ImcSettings, ServiceSettings
 from app.missions.spec.mission import MissionSpec, VehicleSpec
-from app.missions.states import Action, MissionState
+from app.missions.states import MissionState
 from imc_bridge import NodeState, Sounding
 from imc_bridge.logs import VehicleLog
 from tests.support.imc.sea import open_sea
-from tests.support.missions.harbour import Harbour
+from tests.support.missions.harbour import Harbour, act, view_of
 from tests.support.waiting import until
 
 SPEED = 20.0
@@ -54,14 +56,14 @@ async def test_a_mission_by_legs_finishes_without_contact_under_water_and_has_ev
                 return any(v.name == name and v.link == "ready" for v in await service.vehicles())
 
             await until(ready, "the vehicle is ready")
-            await service.act(mission.id, Action.START, actor="tester")
+            await act(service, mission.id, "start", actor="tester")
 
             async def ended() -> bool:
-                view = await service.mission(mission.id)
+                view = await view_of(service, mission.id)
                 return view.state in (MissionState.FINISHED, MissionState.FAILED)
 
             await until(ended, "the mission has ended")
-            view = await service.mission(mission.id)
+            view = await view_of(service, mission.id)
             assert view.state is MissionState.FINISHED, view.reason
             assert view.progress.step == 2
             assert {str(waypoint.status) for waypoint in view.waypoints} == {"reached"}
@@ -69,14 +71,14 @@ async def test_a_mission_by_legs_finishes_without_contact_under_water_and_has_ev
             links = {record.state for record in examined.history}
             assert NodeState.EXPECTED_OFFLINE in links, "silence under water is part of the plan"
             assert NodeState.LOST not in links
-            warnings = [e.message for e in await service.events(mission.id) if e.level != "info"]
+            warnings = [e.message for e in await events_after(await service.get(mission.id)) if e.level != "info"]
             assert not [message for message in warnings if "straggler" in message or "goes on without" in message]
-            by_radio = await service.soundings(mission.id)
+            by_radio = await soundings_of(await service.get(mission.id))
             await sea.vanish()
             [log] = list_logs(tmp_path)
-            imported = await service.import_log(mission.id, log, actor="tester")
+            imported = await import_log(await service.get(mission.id), service.settings, log, actor="tester")
             measured = [event for event in VehicleLog(log, sea.settings).events() if isinstance(event, Sounding)]
-            accepted = {s.time_s for s in await service.soundings(mission.id) if s.verdict == "accepted"}
+            accepted = {s.time_s for s in await soundings_of(await service.get(mission.id)) if s.verdict == "accepted"}
             assert len(by_radio) < 0.7 * len(measured), "radio carried only what was measured at the surface"
             assert imported.duplicate > 0, "which the log holds as well"
             assert accepted >= {event.time_s for event in measured}, "nothing that was measured is missing"

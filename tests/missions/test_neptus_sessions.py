@@ -12,9 +12,11 @@ from typing import Any
 import pytest
 
 from app.missions.maps.builder import make_grid
-from app.missions.states import Action, MissionState
+from app.missions.operations.history import soundings_of
+from app.missions.states import MissionState
 from app.missions.views.soundings import Verdict
 from imc_bridge.neptus import SessionRefusedError
+from tests.support.missions.harbour import act
 from tests.support.neptus.gateway import COLS, ROWS, SESSION, Gateway
 from tests.support.neptus.panel import ALTIMETER, DVL, FORWARD, NEAR_M, Auv, RealPanel
 from tests.support.waiting import until
@@ -55,7 +57,7 @@ async def soundings(gateway: Gateway) -> list[tuple[Any, float]]:
     """Every sounding of the mission with its error."""
     mission = await gateway.mission()
     area = gateway.service_area()
-    rows = await gateway.service.soundings(mission.id)
+    rows = await soundings_of(await gateway.service.get(mission.id))
     return [(row, row.depth_m - floor_m(*area.to_cells(row.lat_deg, row.lon_deg))) for row in rows]
 
 
@@ -186,7 +188,7 @@ async def test_nobody_is_led_on_after_the_mission(make_gateway: Callable[..., Ga
         await asyncio.to_thread(panel.connect)
         with flying(panel, 100):
             await until(lambda: len(panel.answers) >= 2, "two answers came")
-            await gateway.service.act((await gateway.mission()).id, Action.FINISH, actor="tester")
+            await act(gateway.service, (await gateway.mission()).id, "finish", actor="tester")
             answers = len(panel.answers)
             polls = panel.polls
             await until(lambda: panel.polls > polls + 100, "it polled on")

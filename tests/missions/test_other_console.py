@@ -5,15 +5,15 @@ from collections.abc import Awaitable, Callable
 import imcpy
 
 from app.missions.fleet.interface import LinkState
+from app.missions.operations.history import events_after
 from app.missions.service import MissionService
 from app.missions.settings import ImcSettings, ServiceSettings
-from app.missions.states import Action
 from app.missions.views.mission import Level
 from imc_bridge import BridgeSettings
 from simulator.dune import DuneFleet, DuneOptions, default_specs
 from simulator.seafloors import generate
 from tests.support.imc.sea import Peer
-from tests.support.missions.harbour import Harbour
+from tests.support.missions.harbour import Harbour, act, view_of
 from tests.support.missions.specs import make_spec
 from tests.support.ports import free_ports
 from tests.support.waiting import until
@@ -40,10 +40,10 @@ async def test_a_vehicle_aborted_elsewhere_is_left_alone_until_the_mission_is_re
             await until(lambda: link_of(service) is LinkState.READY, "the vehicle is ready")
             spec = make_spec(60.0, vehicles=[{"name": NAME, "kind": "imc"}], steps=1000)
             mission = (await service.create(spec)).id
-            await service.act(mission, Action.START, actor="Ana")
+            await act(service, mission, "start", actor="Ana")
 
             async def step() -> int:
-                return (await service.mission(mission)).progress.step
+                return (await view_of(service, mission)).progress.step
 
             await until(lambda: later_than(step, 2), "the mission is under way")
             abort = imcpy.Abort()
@@ -51,21 +51,21 @@ async def test_a_vehicle_aborted_elsewhere_is_left_alone_until_the_mission_is_re
             console.sock.sendto(imcpy.Packet.serialize(abort), fleet.nodes[0].address)
 
             async def alarmed() -> bool:
-                events = await service.events(mission)
+                events = await events_after(await service.get(mission))
                 return any(e.level is Level.ALARM and "abort" in e.message for e in events)
 
             await until(alarmed, "the operator is told")
             await until(lambda: link_of(service) is LinkState.READY, "it is back in service")
             before = fleet.nodes[0].vehicle.state.distance_m
             at = await step()
-            [vehicle] = (await service.mission(mission)).vehicles
+            [vehicle] = (await view_of(service, mission)).vehicles
             assert "abort" in vehicle.reason
-            await service.act(mission, Action.PAUSE, actor="Ana")
+            await act(service, mission, "pause", actor="Ana")
             assert await step() == at, "it was sent nowhere"
             assert fleet.nodes[0].vehicle.state.distance_m < before + 20.0
-            await service.act(mission, Action.RESUME, actor="Ana")
+            await act(service, mission, "resume", actor="Ana")
             await until(lambda: later_than(step, at), "it goes on once the operator says so")
-            await service.act(mission, Action.ABORT, actor="Ana")
+            await act(service, mission, "abort", actor="Ana")
             assert link_of(service) is not LinkState.ENGAGED
         finally:
             console.close()
@@ -73,7 +73,7 @@ async def test_a_vehicle_aborted_elsewhere_is_left_alone_until_the_mission_is_re
 
 
 def link_of(service: MissionService) -> LinkState | None:
-    return next((info.state for info, _ in service._hub.vehicles() if info.name == NAME), None)
+    return next((info.state for info, _ in service.hub.vehicles() if info.name == NAME), None)
 
 
 async def later_than(step: Callable[[], Awaitable[int]], number: int) -> bool:

@@ -9,8 +9,14 @@ from pydantic import ValidationError
 from shapely.geometry import Point, shape
 
 from app.missions.errors import ConflictError, InvalidRequestError
+from app.missions.fleet.interface import LinkCapabilities
+from app.missions.fleet.links.rest import RestFleetLink
 from app.missions.fleet.links.sim import AGROUND
-from app.missions.operations.scans import report_of_posted
+from app.missions.operations.history import events_after, steps_after
+from app.missions.operations.mission_maps import export
+from app.missions.operations.polling import waypoint
+from app.missions.operations.scans import report_of_posted, scan, search_grid
+from app.missions.preflight.survey import preflight
 from app.missions.search.course import hold_before_hazards
 from app.missions.search.examples import example
 from app.missions.search.scan_schema import Scan
@@ -18,11 +24,11 @@ from app.missions.search.site import simulated_world
 from app.missions.search.state import Search
 from app.missions.service import MissionService
 from app.missions.spec.mission import MissionKind, MissionSpec
-from app.missions.states import Action, MissionState
+from app.missions.states import MissionState
 from app.missions.views.mission import CheckStatus
 from app.missions.views.soundings import Verdict
 from simulator.car_parks import car_park, harbour_basin
-from tests.support.missions.harbour import Harbour, Rover, until_state
+from tests.support.missions.harbour import Harbour, Rover, act, until_state, view_of
 from tests.support.missions.searches import search_json, search_spec
 from tests.support.missions.specs import lon_lat, rectangle
 from tests.support.waiting import until
@@ -41,9 +47,9 @@ async def test_a_boat_goes_round_what_nobody_knew_of_sees_the_goal_and_is_back_i
 ) -> None:
     spec = search_spec()
     mission = await service.create(spec)
-    checks = await service.preflight(mission.id)
+    checks = preflight(await service.get(mission.id))
     assert checks.ready
-    await service.act(mission.id, Action.START, actor="Ana")
+    await act(service, mission.id, "start", actor="Ana")
     done = await until_state(service, mission.id, MissionState.FINISHED)
     found = done.progress.search
     assert found is not None
@@ -53,42 +59,43 @@ async def test_a_boat_goes_round_what_nobody_knew_of_sees_the_goal_and_is_back_i
     assert (found.back, found.left_s > 0) == (["boat"], True)
     assert found.found_cells >= 15
     # The truth is that of the description: nobody touched anything, no leg came too near.
-    assert not any(AGROUND in line.message for line in await service.events(mission.id))
+    assert not any(AGROUND in line.message for line in await events_after(await service.get(mission.id)))
     pontoon = shape(rectangle(0, 14, 15, 16))
-    for step in await service.steps(mission.id):
-        for waypoint in step.waypoints:
-            assert pontoon.distance(Point(waypoint.lon_deg, waypoint.lat_deg)) > 0
-            assert 0 <= waypoint.east_m <= 27 - 1.5
+    for step in await steps_after(await service.get(mission.id)):
+        for sent in step.waypoints:
+            assert pontoon.distance(Point(sent.lon_deg, sent.lat_deg)) > 0
+            assert 0 <= sent.east_m <= 27 - 1.5
 
     # A restart makes the grid of what was stored, and always the same.
     service = await harbour.reopen()
-    before = await service.search_grid(mission.id)
+    before = search_grid(await service.get(mission.id))
     assert before is not None
     assert before.version >= found.version
-    figures = (await service.mission(mission.id)).progress.search
-    geo = json.loads((await service.export(mission.id, "obstacles.geojson")).content)
+    figures = (await view_of(service, mission.id)).progress.search
+    product = await export(await service.get(mission.id), service.maps, service.settings.provider, "obstacles.geojson")
+    geo = json.loads(product.content)
     seen = [f for f in geo["features"] if f["properties"]["found"]]
     assert all(shape(f["geometry"]).intersects(pontoon.buffer(2e-5)) for f in seen)
     assert figures is not None
     assert sum(f["properties"]["area_m2"] for f in seen) == figures.found_cells
     service = await harbour.reopen()
-    assert await service.search_grid(mission.id) == before
-    assert await service.search_grid(mission.id, after=before.version) is None
+    assert search_grid(await service.get(mission.id)) == before
+    assert search_grid(await service.get(mission.id), after=before.version) is None
 
 
 async def test_a_killed_search_goes_on_and_its_time_has_not_stood_still(
     harbour: Harbour, service: MissionService
 ) -> None:
     mission = await service.create(search_spec())
-    await service.act(mission.id, Action.START, actor="Ana")
+    await act(service, mission.id, "start", actor="Ana")
 
     async def under_way() -> bool:
-        return (await service.mission(mission.id)).progress.step >= 3
+        return (await view_of(service, mission.id)).progress.step >= 3
 
     await until(under_way, "it is under way")
-    before = (await service.mission(mission.id)).progress.search
+    before = (await view_of(service, mission.id)).progress.search
     service = await harbour.reopen()
-    after = (await service.mission(mission.id)).progress.search
+    after = (await view_of(service, mission.id)).progress.search
     assert before is not None
     assert after is not None
     assert after.began_at == before.began_at
@@ -96,10 +103,10 @@ async def test_a_killed_search_goes_on_and_its_time_has_not_stood_still(
     assert after.version >= before.version
 
     async def further() -> bool:
-        return (await service.mission(mission.id)).progress.step >= 6
+        return (await view_of(service, mission.id)).progress.step >= 6
 
     await until(further, "it goes on")
-    await service.act(mission.id, Action.ABORT, actor="Ana")
+    await act(service, mission.id, "abort", actor="Ana")
 
 
 async def test_scans_are_judged_one_by_one_and_stored_once(service: MissionService) -> None:
@@ -112,16 +119,16 @@ async def test_scans_are_judged_one_by_one_and_stored_once(service: MissionServi
         all_round(14, 5, 5.0, ranges_m=[1.0] * 181),
         all_round(14, 5, 1.0),
     ]
-    answer = await service.scan(mission.id, scans)
+    answer = await scan(await service.get(mission.id), scans)
     assert [item.verdict for item in answer.items] == [
         Verdict.ACCEPTED, Verdict.REJECTED, Verdict.REJECTED, Verdict.REJECTED, Verdict.REJECTED, Verdict.DUPLICATE,
     ]  # fmt: skip
     wrong = ("stranger", "outside of the site", "-1", "once round")
     for item, word in zip(answer.items[1:5], wrong, strict=True):
         assert word in item.reason
-    again = await service.scan(mission.id, scans[:1])
+    again = await scan(await service.get(mission.id), scans[:1])
     assert (again.accepted, again.duplicate) == (0, 1)
-    view = await service.search_grid(mission.id)
+    view = search_grid(await service.get(mission.id))
     assert view is not None
     assert view.version == 1
 
@@ -132,16 +139,16 @@ async def test_a_vehicle_waits_for_scans_and_turns_back_where_something_comes_up
     )
     rover = Rover(service, mission.id, "boat", 14, 5)
     await rover.post()
-    await service.act(mission.id, Action.START, actor="Ana")
+    await act(service, mission.id, "start", actor="Ana")
 
     async def said(kind: str) -> bool:
-        return any(event.kind == kind for event in await service.events(mission.id))
+        return any(event.kind == kind for event in await events_after(await service.get(mission.id)))
 
     await until(lambda: said("waiting"), "the search says that it waits for a scan")
     assert not await rover.poll(0.0)
-    await service.scan(mission.id, [all_round(14, 5, 10.0)])
+    await scan(await service.get(mission.id), [all_round(14, 5, 10.0)])
     # A ring of walls 6 m away comes up while the boat is on its way: that leg ends, another one comes.
-    first = await service.waypoint(mission.id, "boat", after_step=0, timeout_s=30.0)
+    first = await waypoint(await service.get(mission.id), "boat", after_step=0, timeout_s=30.0)
     assert first is not None
     leg = np.array([first.east_m - 14.0, first.north_m - 5.0])
     assert 1.0 < np.hypot(*leg) < 4.001
@@ -155,14 +162,14 @@ async def test_a_vehicle_waits_for_scans_and_turns_back_where_something_comes_up
             bearing_step_deg=1.0,
             ranges_m=[float(np.hypot(*leg)) - 0.5] * 40,
         )
-        assert (await service.scan(mission.id, [wall])).accepted == 1
+        assert (await scan(await service.get(mission.id), [wall])).accepted == 1
     await until(lambda: said("obstacle"), "the way is barred")
-    second = await service.waypoint(mission.id, "boat", after_step=first.step, timeout_s=30.0)
+    second = await waypoint(await service.get(mission.id), "boat", after_step=first.step, timeout_s=30.0)
     assert second is not None
-    steps = await service.steps(mission.id)
+    steps = await steps_after(await service.get(mission.id))
     missed = next(step for step in steps if step.number == first.step)
     assert "something stands on its way" in missed.waypoints[0].reason
-    await service.act(mission.id, Action.ABORT, actor="Ana")
+    await act(service, mission.id, "abort", actor="Ana")
 
 
 def test_no_leg_leads_closer_to_a_hazard_than_asked_whatever_a_planner_says() -> None:
@@ -196,10 +203,10 @@ async def test_what_a_search_lacks_is_told_field_by_field(service: MissionServic
     assert "rollout" in str(refused.value.remedy)
     survey = await service.create(MissionSpec.model_validate(search_json() | {"kind": "survey", "search": None}))
     with pytest.raises(ConflictError, match="kind survey"):
-        await service.scan(survey.id, [all_round(14, 5, 1.0)])
+        await scan(await service.get(survey.id), [all_round(14, 5, 1.0)])
     mission = await service.create(search_spec())
     with pytest.raises(ConflictError, match="cannot be forecast"):
-        await service.forecast_of(mission.id)
+        await service.forecaster.of_mission(await service.get(mission.id))
 
 
 def test_a_search_has_defaults_of_its_own() -> None:
@@ -223,8 +230,24 @@ async def test_the_checklist_says_when_nobody_could_leave_or_get_there(service: 
     ]
     for change, status, words in cases:
         mission = await service.create(search_spec(search=change))
-        (line,) = [c for c in (await service.preflight(mission.id)).checks if c.id == "search.ways"]
+        (line,) = [c for c in (preflight(await service.get(mission.id))).checks if c.id == "search.ways"]
         assert (line.status, words in line.message) == (status, True), line
+
+
+async def test_a_mission_treats_vehicles_by_what_their_link_says_they_can_do(
+    service: MissionService, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    capabilities = LinkCapabilities(ready_before_start=True, scans=True, circles_m=1e3)
+    monkeypatch.setattr(RestFleetLink, "capabilities", capabilities)
+    mission = await service.create(search_spec(vehicles=[{"name": "boat", "kind": "rest", "depth_m": 0}]))
+    checks = {check.id: check for check in (preflight(await service.get(mission.id))).checks}
+    assert checks["link.boat"].status is CheckStatus.PROBLEM
+    assert "within 1000 m" in checks["circles.boat"].message
+    assert "scans.boat" not in checks
+    [refused] = (await scan(await service.get(mission.id), [all_round(14, 5, 1.0)])).items
+    assert "scans by itself" in refused.reason
+    with pytest.raises(ConflictError, match="not every vehicle is ready: boat is unknown"):
+        await act(service, mission.id, "start", actor="Ana")
 
 
 def test_the_examples_are_missions() -> None:
@@ -242,12 +265,12 @@ async def test_who_is_not_at_the_entry_and_sees_no_way_to_it_is_an_alarm(service
     boat = {"name": "boat", "kind": "sim", "depth_m": 0, "start": lon_lat(14, 25)}
     walls = [rectangle(0, 8, 30, 10)]
     mission = await service.create(search_spec(vehicles=[boat], search={"obstacles": walls, "simulated_obstacles": []}))
-    warned = {check.id: check.status for check in (await service.preflight(mission.id)).checks}
+    warned = {check.id: check.status for check in (preflight(await service.get(mission.id))).checks}
     assert warned["search.ways"] is CheckStatus.WARNING
-    await service.act(mission.id, Action.START, actor="Ana")
+    await act(service, mission.id, "start", actor="Ana")
 
     async def said() -> bool:
-        return any(event.kind == "stuck" for event in await service.events(mission.id))
+        return any(event.kind == "stuck" for event in await events_after(await service.get(mission.id)))
 
     await until(said, "the operator is told")
-    await service.act(mission.id, Action.ABORT, actor="Ana")
+    await act(service, mission.id, "abort", actor="Ana")

@@ -30,17 +30,32 @@ from app.missions.errors import (
 from app.missions.fleet.interface import LinkState, WaypointStatus
 from app.missions.live import feed
 from app.missions.maps.products import PRODUCTS
+from app.missions.operations.history import events_after, soundings_of, telemetry_of
+from app.missions.operations.measurements import measure
+from app.missions.operations.mission_maps import export, newest_map
+from app.missions.operations.polling import waypoint
+from app.missions.running.mission_views import planner_views, watched
 from app.missions.service import MissionService
 from app.missions.settings import ServiceSettings
 from app.missions.soundings.measurement import Measurement
 from app.missions.spec.mission import MissionSpec, VehicleKind, VehicleSpec
 from app.missions.states import Action, MissionState, MoveRefusedError
 from app.missions.views.messages import EventMessage, MapMessage, SnapshotMessage, StateMessage
-from app.missions.views.mission import Level
+from app.missions.views.mission import EventView, Level
 from app.missions.views.soundings import Verdict
 from app.storage.database import Database
 from app.storage.models import MissionRow, MissionVehicleRow, SoundingRow, StepRow, WaypointRow
-from tests.support.missions.harbour import CLOCK_S, Harbour, Rover, sim_spec, state_of, until_state, until_step
+from tests.support.missions.harbour import (
+    CLOCK_S,
+    Harbour,
+    Rover,
+    act,
+    sim_spec,
+    state_of,
+    until_state,
+    until_step,
+    view_of,
+)
 from tests.support.missions.specs import lon_lat, make_spec, rectangle
 from tests.support.waiting import until
 
@@ -54,7 +69,7 @@ async def step_numbers(database: Database, mission_id: str) -> list[int]:
 
 
 async def kinds(service: MissionService, mission_id: str) -> list[str]:
-    return [line.kind for line in await service.events(mission_id)]
+    return [line.kind for line in await events_after(await service.get(mission_id))]
 
 
 async def until_stopped(service: MissionService, mission_id: str, count: int) -> None:
@@ -68,7 +83,7 @@ async def until_stopped(service: MissionService, mission_id: str, count: int) ->
 
 async def started(service: MissionService, spec: MissionSpec) -> str:
     mission = await service.create(spec)
-    await service.act(mission.id, Action.START, actor="Ana")
+    await act(service, mission.id, "start", actor="Ana")
     return mission.id
 
 
@@ -79,13 +94,13 @@ async def test_a_mission_from_start_to_products(service: MissionService, databas
     created = await service.create(sim_spec(steps=6))
     assert (created.state, created.progress.step) == (S.READY, 0)
     with pytest.raises(MapNotReadyError):
-        await service.map(created.id)
-    action = await service.act(created.id, Action.START, actor="Ana")
+        await newest_map(await service.get(created.id), service.maps)
+    action = await act(service, created.id, "start", actor="Ana")
     assert action.mission.state is S.RUNNING
     await until_state(service, created.id, S.FINISHED)
     await until_stopped(service, created.id, 2)
-    soundings = [row for row in await service.soundings(created.id) if row.verdict == "accepted"]
-    ended = await service.mission(created.id)
+    soundings = [row for row in await soundings_of(await service.get(created.id)) if row.verdict == "accepted"]
+    ended = await view_of(service, created.id)
     assert ended.progress.step == 6
     assert ended.progress.soundings > 50
     assert ended.progress.distance_m > 5
@@ -101,14 +116,14 @@ async def test_a_mission_from_start_to_products(service: MissionService, databas
     assert {w.status for w in waypoints} <= {"reached", "missed", "acknowledged"}
     assert len(soundings) == ended.progress.soundings
 
-    snapshot = await service.map(created.id)
+    snapshot = await newest_map(await service.get(created.id), service.maps)
     assert snapshot.built.soundings == len(soundings)
     view = snapshot.view()
     assert (view.rows, view.cols, view.step) == (15, 15, 6)
     for extension, kind in PRODUCTS.items():
         if kind.resource != "map":
             continue
-        product = await service.export(created.id, extension)
+        product = await export(await service.get(created.id), service.maps, service.settings.provider, extension)
         assert (product.filename, product.media_type) == (f"quay.{extension}", kind.media_type)
         if extension == "tif":
             with rasterio.open(io.BytesIO(product.content)) as image:
@@ -127,7 +142,7 @@ async def test_a_mission_from_start_to_products(service: MissionService, databas
             cells = [row for row in product.content.decode().splitlines() if row and not row.startswith("#")]
             assert len(cells) >= 225
     with pytest.raises(InvalidRequestError, match="there is no format 'doc'") as caught:
-        await service.export(created.id, "doc")
+        await export(await service.get(created.id), service.maps, service.settings.provider, "doc")
     assert "tif" in caught.value.remedy
 
 
@@ -135,11 +150,11 @@ async def test_pausing_stops_the_vehicles_and_resuming_goes_on(service: MissionS
     mission_id = await started(service, sim_spec(steps=6))
     for step in (1, 2, 4):
         await until_step(service, mission_id, step)
-        paused = await service.act(mission_id, Action.PAUSE, actor="Ana", note="ship ahead")
+        paused = await act(service, mission_id, "pause", actor="Ana", note="ship ahead")
         assert (paused.mission.state, paused.mission.reason) == (S.PAUSED, "ship ahead")
         assert {stop.vehicle: stop.acknowledged for stop in paused.stops} == {"a": True, "b": True}
-        assert {v.link for v in (await service.mission(mission_id)).vehicles} == {LinkState.READY}
-        await service.act(mission_id, Action.RESUME, actor="Ana")
+        assert {v.link for v in (await view_of(service, mission_id)).vehicles} == {LinkState.READY}
+        await act(service, mission_id, "resume", actor="Ana")
     await until_state(service, mission_id, S.FINISHED)
     assert await step_numbers(database, mission_id) == [1, 2, 3, 4, 5, 6]
 
@@ -150,17 +165,19 @@ async def test_ending_a_mission_stops_its_vehicles_and_frees_them(
 ) -> None:
     mission_id = await started(service, sim_spec(steps=500))
     await until_step(service, mission_id, 1)
-    ended = await service.act(mission_id, action, actor="Ana")
+    ended = await act(service, mission_id, action, actor="Ana")
     assert ended.mission.state is state
     assert [(stop.vehicle, stop.acknowledged) for stop in ended.stops] == [("a", True), ("b", True)]
     assert await service.vehicles() == []  # simulated ones are put away
     assert (await kinds(service, mission_id)).count("stop") == 2
     for refused in Action:
         with pytest.raises(MoveRefusedError) as caught:
-            await service.act(mission_id, refused, actor="Ana")
+            await act(service, mission_id, refused, actor="Ana")
         assert "create a new mission" in caught.value.remedy.lower()
     with pytest.raises(ConflictError, match="takes no more vehicles"):
-        await service.add_vehicle(mission_id, VehicleSpec(name="c", kind="sim"))
+        await service.team_changes.join(
+            await service.get(mission_id), VehicleSpec(name="c", kind="sim"), actor="operator"
+        )
     other = await started(service, sim_spec(steps=1))
     await until_state(service, other, S.FINISHED)
 
@@ -169,13 +186,13 @@ async def test_a_stop_that_is_not_acknowledged_is_an_alarm(service: MissionServi
     mission = await service.create(make_spec(steps=50, vehicles=[{"name": "a", "kind": "rest"}]))
     rover = Rover(service, mission.id, "a")
     await rover.post()
-    await service.act(mission.id, Action.START, actor="Ana")
+    await act(service, mission.id, "start", actor="Ana")
     await until(lambda: rover.poll(), "it was sent somewhere")
-    aborted = await service.act(mission.id, Action.ABORT, actor="Ana")
+    aborted = await act(service, mission.id, "abort", actor="Ana")
     (stop,) = aborted.stops
     assert not stop.acknowledged
     assert "told at its next poll" in stop.detail
-    (line,) = [line for line in await service.events(mission.id) if line.kind == "stop"]
+    (line,) = [line for line in await events_after(await service.get(mission.id)) if line.kind == "stop"]
     assert line.level is Level.ALARM
     with pytest.raises(ConflictError, match="aborted: stop and hold"):
         await rover.poll()
@@ -186,18 +203,18 @@ async def test_an_abort_while_the_last_stops_go_out_is_refused_or_stays(service:
     mission = await service.create(make_spec(steps=1, vehicles=[{"name": "a", "kind": "rest"}]))
     rover = Rover(service, mission.id, "a")
     await rover.post()
-    await service.act(mission.id, Action.START, actor="Ana")
+    await act(service, mission.id, "start", actor="Ana")
     await until(lambda: rover.poll(), "it was sent somewhere")  # and arrived: the loop ends, the stop waits for a poll
     await until(lambda: service._registry._live[mission.id].halted, "its stop is on the way")
     try:
-        await service.act(mission.id, Action.ABORT, actor="Ana")
+        await act(service, mission.id, "abort", actor="Ana")
     except MoveRefusedError:
         expected = S.FINISHED
     else:
         expected = S.ABORTED
     await until(lambda: not service._runs, "the step loop has ended")
     assert await state_of(service, mission.id) is expected
-    states = [line.data["state"] for line in await service.events(mission.id) if line.kind == "state"]
+    states = [line.data["state"] for line in await events_after(await service.get(mission.id)) if line.kind == "state"]
     assert states == ["ready", "running", expected]
 
 
@@ -208,7 +225,7 @@ async def test_a_service_that_is_shut_down_while_a_mission_ends_writes_the_end_f
     mission = await service.create(make_spec(steps=1, vehicles=[{"name": "a", "kind": "rest"}]))
     rover = Rover(service, mission.id, "a")
     await rover.post()
-    await service.act(mission.id, Action.START, actor="Ana")
+    await act(service, mission.id, "start", actor="Ana")
     await until(lambda: rover.poll(), "it was sent somewhere")
     await until(lambda: service._registry._live[mission.id].halted, "its stop is on the way")
     await harbour.close()
@@ -261,7 +278,7 @@ async def test_a_planner_that_fails_ends_the_mission_with_the_reason(
     assert ended.progress.step == 2
     assert {v.link for v in ended.vehicles} == {LinkState.UNKNOWN}
     await until_stopped(service, mission_id, 2)
-    await until(lambda: service._hub.claimed_by((VehicleKind.SIM, "a")) is None, "its vehicles are free")
+    await until(lambda: service.hub.claimed_by((VehicleKind.SIM, "a")) is None, "its vehicles are free")
     async with database.reading() as session:
         row = await session.get(MissionRow, mission_id)
     assert row is not None
@@ -271,7 +288,7 @@ async def test_a_planner_that_fails_ends_the_mission_with_the_reason(
 async def test_a_planner_that_proposes_nowhere_makes_vehicles_hold(bad_planners: None, service: MissionService) -> None:
     mission_id = await started(service, sim_spec(steps=2, planner={"name": "nowhere"}))
     await until_state(service, mission_id, S.FINISHED)
-    notes = [line.message for line in await service.events(mission_id) if line.kind == "safety"]
+    notes = [line.message for line in await events_after(await service.get(mission_id)) if line.kind == "safety"]
     assert any("the vehicle holds" in note for note in notes)
 
 
@@ -281,18 +298,21 @@ async def test_a_planner_that_proposes_nowhere_makes_vehicles_hold(bad_planners:
 async def test_vehicles_join_and_leave_while_a_mission_runs(service: MissionService, database: Database) -> None:
     mission_id = await started(service, sim_spec("a", steps=500, side_m=40.0))
     await until_step(service, mission_id, 1)
-    joined = await service.add_vehicle(mission_id, VehicleSpec(name="late", kind="sim"))
-    assert [v.name for v in joined.vehicles] == ["a", "late"]
+    await service.team_changes.join(
+        await service.get(mission_id), VehicleSpec(name="late", kind="sim"), actor="operator"
+    )
+    assert [v.name for v in (await view_of(service, mission_id)).vehicles] == ["a", "late"]
 
     def flown_by(name: str) -> Callable[[], Any]:
         async def flown() -> bool:
-            view = await service.mission(mission_id)
+            view = await view_of(service, mission_id)
             return any(w.vehicle == name and w.status is WaypointStatus.REACHED for w in view.waypoints)
 
         return flown
 
     await until(flown_by("late"), "the late one reached a waypoint")
-    left = await service.remove_vehicle(mission_id, "a")
+    await service.team_changes.take_out(await service.get(mission_id), "a", actor="operator")
+    left = await view_of(service, mission_id)
     assert [(v.name, v.active, v.mission_id) for v in left.vehicles] == [("late", True, mission_id), ("a", False, None)]
     step = left.progress.step
     await until_step(service, mission_id, step + 3)
@@ -302,25 +322,30 @@ async def test_vehicles_join_and_leave_while_a_mission_runs(service: MissionServ
         slots = {row.name: (row.slot, row.left_at is None) for row in await session.scalars(select(MissionVehicleRow))}
     assert slots == {"a": (0, False), "late": (1, True)}
     assert {v.name: v.mission_id for v in await service.vehicles()} == {"a": None, "late": mission_id}
-    await service.add_vehicle(mission_id, VehicleSpec(name="a", kind="sim"))
+    await service.team_changes.join(await service.get(mission_id), VehicleSpec(name="a", kind="sim"), actor="operator")
     await until(flown_by("a"), "the one that came back reached a waypoint")
     async with database.reading() as session:
         assert (await session.get(MissionVehicleRow, (mission_id, "a"))).slot == 0
     with pytest.raises(ConflictError, match="takes part already"):
-        await service.add_vehicle(mission_id, VehicleSpec(name="a", kind="sim"))
+        await service.team_changes.join(
+            await service.get(mission_id), VehicleSpec(name="a", kind="sim"), actor="operator"
+        )
     with pytest.raises(VehicleNotFoundError, match="'x' takes no part"):
-        await service.remove_vehicle(mission_id, "x")
-    await service.act(mission_id, Action.ABORT, actor="Ana")
+        await service.team_changes.take_out(await service.get(mission_id), "x", actor="operator")
+    await act(service, mission_id, "abort", actor="Ana")
 
 
 async def test_a_draft_becomes_ready_with_its_first_vehicle_and_back(service: MissionService) -> None:
     mission = await service.create(make_spec(vehicles=[]))
     assert (mission.state, mission.reason) == (S.DRAFT, "no vehicle yet")
     with pytest.raises(MoveRefusedError) as caught:
-        await service.act(mission.id, Action.START, actor="Ana")
+        await act(service, mission.id, "start", actor="Ana")
     assert "Add at least one vehicle" in caught.value.remedy
-    assert (await service.add_vehicle(mission.id, VehicleSpec(name="a", kind="rest"))).state is S.READY
-    assert (await service.remove_vehicle(mission.id, "a")).state is S.DRAFT
+    live = await service.get(mission.id)
+    await service.team_changes.join(live, VehicleSpec(name="a", kind="rest"), actor="operator")
+    assert live.header.state is S.READY
+    await service.team_changes.take_out(live, "a", actor="operator")
+    assert live.header.state is S.DRAFT
 
 
 async def test_a_straggler_does_not_stall_the_others(service: MissionService, database: Database) -> None:
@@ -331,23 +356,23 @@ async def test_a_straggler_does_not_stall_the_others(service: MissionService, da
     )
     stuck = Rover(service, mission.id, "stuck")
     await stuck.post()
-    await service.act(mission.id, Action.START, actor="Ana")
+    await act(service, mission.id, "start", actor="Ana")
 
     async def poll_without_moving() -> None:
         after = None
         while True:
             try:
-                found = await service.waypoint(mission.id, "stuck", after_step=after, timeout_s=5)
+                found = await waypoint(await service.get(mission.id), "stuck", after_step=after, timeout_s=5)
             except ConflictError:
                 return
             after = found.step if found else after
-            await service.measure(mission.id, [stuck.item(range_m=None)])
+            await measure(await service.get(mission.id), [stuck.item(range_m=None)])
 
     polling = asyncio.create_task(poll_without_moving())
     await until_state(service, mission.id, S.FINISHED)
     await polling
     assert await step_numbers(database, mission.id) == [1, 2, 3, 4]
-    lines = [line for line in await service.events(mission.id) if line.kind == "straggler"]
+    lines = [line for line in await events_after(await service.get(mission.id)) if line.kind == "straggler"]
     assert any("stuck" in line.data["vehicles"] for line in lines)
     async with database.reading() as session:
         fates = {(w.vehicle, w.status): w.reason for w in await session.scalars(select(WaypointRow))}
@@ -357,7 +382,7 @@ async def test_a_straggler_does_not_stall_the_others(service: MissionService, da
 
 async def test_a_mission_waits_for_a_vehicle_and_says_so(service: MissionService) -> None:
     mission = await service.create(make_spec(steps=2, step_deadline_s=5, vehicles=[{"name": "a", "kind": "rest"}]))
-    await service.act(mission.id, Action.START, actor="Ana")
+    await act(service, mission.id, "start", actor="Ana")
 
     async def complains() -> bool:
         return "waiting" in await kinds(service, mission.id)
@@ -372,16 +397,16 @@ async def test_a_vehicle_is_in_one_mission_at_a_time(service: MissionService) ->
     first = await started(service, sim_spec(steps=500))
     second = await service.create(sim_spec(steps=1))
     with pytest.raises(ConflictError, match=f"'a' takes part in mission {first}") as caught:
-        await service.act(second.id, Action.START, actor="Ana")
+        await act(service, second.id, "start", actor="Ana")
     assert caught.value.remedy
     assert await state_of(service, second.id) is S.READY
     third = await started(service, sim_spec("c", steps=500))
     with pytest.raises(ConflictError, match=f"'a' takes part in mission {first}"):
-        await service.add_vehicle(third, VehicleSpec(name="a", kind="sim"))
-    assert [v.name for v in (await service.mission(third)).vehicles] == ["c"]
-    await service.act(first, Action.ABORT, actor="Ana")
-    await service.act(third, Action.ABORT, actor="Ana")
-    await service.act(second.id, Action.START, actor="Ana")
+        await service.team_changes.join(await service.get(third), VehicleSpec(name="a", kind="sim"), actor="operator")
+    assert [v.name for v in (await view_of(service, third)).vehicles] == ["c"]
+    await act(service, first, "abort", actor="Ana")
+    await act(service, third, "abort", actor="Ana")
+    await act(service, second.id, "start", actor="Ana")
     await until_state(service, second.id, S.FINISHED)
 
 
@@ -389,28 +414,30 @@ async def test_a_start_that_fails_half_way_claims_nothing(service: MissionServic
     vehicles = [{"name": "a", "kind": "sim"}, {"name": "far", "kind": "sim", "start": lon_lat(5000, 0)}]
     mission = await service.create(sim_spec(vehicles=vehicles))
     with pytest.raises(ConflictError, match="'far' cannot be launched") as caught:
-        await service.act(mission.id, Action.START, actor="Ana")
+        await act(service, mission.id, "start", actor="Ana")
     assert "start" in caught.value.remedy
     assert await state_of(service, mission.id) is S.READY
     other = await started(service, sim_spec("a", steps=1))
     await until_state(service, other, S.FINISHED)
     running = await started(service, sim_spec("b", steps=500))
     with pytest.raises(ConflictError, match="'far' cannot be launched"):
-        await service.add_vehicle(running, VehicleSpec.model_validate(vehicles[1]))
-    assert [v.name for v in (await service.mission(running)).vehicles] == ["b"]
-    await service.act(running, Action.ABORT, actor="Ana")
+        await service.team_changes.join(
+            await service.get(running), VehicleSpec.model_validate(vehicles[1]), actor="operator"
+        )
+    assert [v.name for v in (await view_of(service, running)).vehicles] == ["b"]
+    await act(service, running, "abort", actor="Ana")
 
 
 async def test_a_vehicle_taken_out_is_told_at_its_next_poll(service: MissionService) -> None:
     mission = await service.create(make_spec(steps=500))
     async with Rover(service, mission.id, "a", 5, 5), Rover(service, mission.id, "b", 20, 20) as leaving:
-        await service.act(mission.id, Action.START, actor="Ana")
+        await act(service, mission.id, "start", actor="Ana")
         await until_step(service, mission.id, 2)
-        await service.remove_vehicle(mission.id, "b")
+        await service.team_changes.take_out(await service.get(mission.id), "b", actor="operator")
         await until(lambda: leaving.told, "it was told")
-        stops = [line for line in await service.events(mission.id) if line.kind == "stop"]
+        stops = [line for line in await events_after(await service.get(mission.id)) if line.kind == "stop"]
         assert [(line.data["vehicle"], line.data["acknowledged"]) for line in stops] == [("b", True)]
-        await service.act(mission.id, Action.ABORT, actor="Ana")
+        await act(service, mission.id, "abort", actor="Ana")
 
 
 async def test_a_vehicle_that_comes_back_later_is_told_that_it_takes_no_part(service: MissionService) -> None:
@@ -418,17 +445,19 @@ async def test_a_vehicle_that_comes_back_later_is_told_that_it_takes_no_part(ser
     here = Rover(service, mission.id, "b")
     await here.post()
     async with Rover(service, mission.id, "a"):
-        await service.act(mission.id, Action.START, actor="Ana")
+        await act(service, mission.id, "start", actor="Ana")
         await until(lambda: here.poll(), "it was sent somewhere")
-        removing = asyncio.create_task(service.remove_vehicle(mission.id, "b"))
+        removing = asyncio.create_task(
+            service.team_changes.take_out(await service.get(mission.id), "b", actor="operator")
+        )
         await until(lambda: service._registry._live[mission.id].team.get("b") is None, "it is out")
         with pytest.raises(VehicleNotFoundError) as caught:
             await here.poll()
         assert "stop" in caught.value.remedy
         await removing
-        (line,) = [line for line in await service.events(mission.id) if line.kind == "stop"]
+        (line,) = [line for line in await events_after(await service.get(mission.id)) if line.kind == "stop"]
         assert line.data["acknowledged"]
-        await service.act(mission.id, Action.ABORT, actor="Ana")
+        await act(service, mission.id, "abort", actor="Ana")
 
 
 @pytest.mark.parametrize(
@@ -451,9 +480,10 @@ async def test_what_cannot_be_flown_is_refused_by_field_and_not_stored(
 
 
 async def test_what_does_not_exist_is_not_found(service: MissionService) -> None:
-    for request in (service.mission("x"), service.map("x"), service.events("x"), service.measure("x", [])):
-        with pytest.raises(MissionNotFoundError, match="'x'"):
-            await request
+    with pytest.raises(MissionNotFoundError, match="'x'"):
+        await service.get("x")
+    with pytest.raises(MissionNotFoundError, match="'x'"):
+        await service.check_exists("x")
 
 
 # Measurements
@@ -485,7 +515,7 @@ async def test_every_item_of_a_batch_has_its_verdict(service: MissionService, da
         rover.item(range_sd_m=1e300),
         rover.item(beam=3),
     ]
-    answer = await service.measure(mission_id, items)
+    answer = await measure(await service.get(mission_id), items)
     assert [item.index for item in answer.items] == list(range(len(items)))
     assert [item.verdict for item in answer.items] == [
         Verdict.ACCEPTED,
@@ -510,9 +540,9 @@ async def test_every_item_of_a_batch_has_its_verdict(service: MissionService, da
         assert words in reasons[index]
     assert (answer.accepted, answer.rejected, answer.duplicate) == (3, 7, 1)
     assert [row.verdict for row in await stored(database)] == ["accepted", "rejected", "rejected", "accepted"]
-    progress = (await service.mission(mission_id)).progress
+    progress = (await view_of(service, mission_id)).progress
     assert (progress.soundings, progress.rejected) == (2, 2)
-    assert (await service.map(mission_id)).built.soundings == 2
+    assert (await newest_map(await service.get(mission_id), service.maps)).built.soundings == 2
 
 
 async def test_an_item_that_cannot_be_stored_does_not_shadow_a_good_one(
@@ -521,22 +551,23 @@ async def test_an_item_that_cannot_be_stored_does_not_shadow_a_good_one(
     mission_id, rover = await rest_mission(service)
     good = rover.item()
     bad = good.model_copy(update={"depth_m": 1e308, "range_m": 1e308})
-    answer = await service.measure(mission_id, [bad, good])
+    answer = await measure(await service.get(mission_id), [bad, good])
     assert [item.verdict for item in answer.items] == [Verdict.REJECTED, Verdict.ACCEPTED]
     assert [row.verdict for row in await stored(database)] == ["accepted"]
-    assert (await service.mission(mission_id)).progress.soundings == 1
+    assert (await view_of(service, mission_id)).progress.soundings == 1
 
 
 async def test_a_batch_sent_again_is_stored_once(service: MissionService, database: Database) -> None:
     mission_id, rover = await rest_mission(service)
     items = [rover.item() for _ in range(5)]
-    answers = await asyncio.gather(*(service.measure(mission_id, items, idempotency_key="k1") for _ in range(8)))
+    live = await service.get(mission_id)
+    answers = await asyncio.gather(*(measure(live, items, idempotency_key="k1") for _ in range(8)))
     assert sum(not answer.replayed for answer in answers) == 1
     assert {answer.accepted for answer in answers} == {5}
     assert len(await stored(database)) == 5
-    assert (await service.measure(mission_id, items)).duplicate == 5
+    assert (await measure(await service.get(mission_id), items)).duplicate == 5
     with pytest.raises(ConflictError, match="'k1' was used before with other measurements") as caught:
-        await service.measure(mission_id, [rover.item()], idempotency_key="k1")
+        await measure(await service.get(mission_id), [rover.item()], idempotency_key="k1")
     assert "new key" in caught.value.remedy
     assert len(await stored(database)) == 5
 
@@ -544,10 +575,11 @@ async def test_a_batch_sent_again_is_stored_once(service: MissionService, databa
 async def test_batches_at_the_same_time_are_all_stored(service: MissionService, database: Database) -> None:
     mission_id, rover = await rest_mission(service)
     batches = [[rover.item() for _ in range(10)] for _ in range(20)]
-    answers = await asyncio.gather(*(service.measure(mission_id, batch) for batch in batches))
+    live = await service.get(mission_id)
+    answers = await asyncio.gather(*(measure(live, batch) for batch in batches))
     assert sum(answer.accepted for answer in answers) == 200
     assert len(await stored(database)) == 200
-    assert (await service.mission(mission_id)).progress.soundings == 200
+    assert (await view_of(service, mission_id)).progress.soundings == 200
 
 
 async def test_what_waits_together_is_answered_as_if_it_had_come_one_by_one(
@@ -557,8 +589,10 @@ async def test_what_waits_together_is_answered_as_if_it_had_come_one_by_one(
     first, second, third = rover.item(), rover.item(), rover.item()
     unreadable = third.model_copy(update={"lat_deg": 91.0})
     orders = [("k1", [first]), ("k2", [first, second]), ("k1", [first]), ("k1", [third]), (None, [unreadable, third])]
+    live = await service.get(mission_id)
     found = await asyncio.gather(
-        *(service.measure(mission_id, items, idempotency_key=key) for key, items in orders), return_exceptions=True
+        *(measure(live, items, idempotency_key=key) for key, items in orders),
+        return_exceptions=True,
     )
     one, two, again, other, last = found
     assert isinstance(other, ConflictError)
@@ -572,20 +606,20 @@ async def test_what_waits_together_is_answered_as_if_it_had_come_one_by_one(
 async def test_a_draft_takes_no_measurements_and_too_many_are_refused(service: MissionService) -> None:
     draft = await service.create(make_spec(vehicles=[]))
     with pytest.raises(ConflictError, match="draft"):
-        await service.measure(draft.id, [])
+        await measure(await service.get(draft.id), [])
     mission_id, rover = await rest_mission(service)
     item = rover.item()
     with pytest.raises(InvalidRequestError, match="10001 items") as caught:
-        await service.measure(mission_id, [item] * 10_001)
+        await measure(await service.get(mission_id), [item] * 10_001)
     assert caught.value.remedy
 
 
 async def test_a_position_on_the_other_side_of_the_earth_harms_nobody(service: MissionService) -> None:
     mission = await service.create(make_spec(steps=3, vehicles=[{"name": "a", "kind": "rest"}]))
     lost = Measurement(vehicle="a", time_s=CLOCK_S - 1, lat_deg=-41.0, lon_deg=171.0, depth_m=0.0)
-    await service.measure(mission.id, [lost])
-    await service.act(mission.id, Action.START, actor="Ana")
-    answer = await service.measure(mission.id, [lost])
+    await measure(await service.get(mission.id), [lost])
+    await act(service, mission.id, "start", actor="Ana")
+    answer = await measure(await service.get(mission.id), [lost])
     assert "within 200 km" in answer.items[0].reason
     async with Rover(service, mission.id, "a"):
         await until_state(service, mission.id, S.FINISHED)
@@ -598,9 +632,9 @@ async def test_a_restart_goes_on_after_the_last_step(harbour: Harbour, database:
     mission_id = await started(harbour.service, sim_spec(steps=8))
     for step in (1, 3, 5):
         await until_step(harbour.service, mission_id, step)
-        before = (await harbour.service.mission(mission_id)).progress
+        before = (await view_of(harbour.service, mission_id)).progress
         await harbour.reopen()
-        after = (await harbour.service.mission(mission_id)).progress
+        after = (await view_of(harbour.service, mission_id)).progress
         assert after.step >= before.step
         assert after.soundings >= before.soundings
         assert await state_of(harbour.service, mission_id) in (S.RUNNING, S.FINISHED)
@@ -608,20 +642,20 @@ async def test_a_restart_goes_on_after_the_last_step(harbour: Harbour, database:
     await until_stopped(harbour.service, mission_id, 2)
     assert await step_numbers(database, mission_id) == list(range(1, 9))
     assert (await kinds(harbour.service, mission_id)).count("resumed") >= 1
-    verdicts = [row.verdict for row in await harbour.service.soundings(mission_id)]
-    ended = await harbour.service.mission(mission_id)
+    verdicts = [row.verdict for row in await soundings_of(await harbour.service.get(mission_id))]
+    ended = await view_of(harbour.service, mission_id)
     assert ended.progress.soundings == verdicts.count("accepted")
 
 
 async def test_a_paused_mission_is_paused_after_a_restart_and_keeps_its_vehicles(harbour: Harbour) -> None:
     mission_id = await started(harbour.service, sim_spec(steps=3))
-    await harbour.service.act(mission_id, Action.PAUSE, actor="Ana")
+    await act(harbour.service, mission_id, "pause", actor="Ana")
     service = await harbour.reopen()
     assert await state_of(service, mission_id) is S.PAUSED
     other = await service.create(sim_spec("a", steps=1))
     with pytest.raises(ConflictError, match="takes part in mission"):
-        await service.act(other.id, Action.START, actor="Ana")
-    await service.act(mission_id, Action.RESUME, actor="Ana")
+        await act(service, other.id, "start", actor="Ana")
+    await act(service, mission_id, "resume", actor="Ana")
     await until_state(service, mission_id, S.FINISHED)
 
 
@@ -660,28 +694,28 @@ async def test_a_vehicle_that_only_polls_after_a_restart_is_remembered(harbour: 
     mission = await harbour.service.create(make_spec(steps=10, vehicles=[{"name": "a", "kind": "rest"}]))
     rover = Rover(harbour.service, mission.id, "a")
     await rover.post()
-    await harbour.service.act(mission.id, Action.START, actor="Ana")
+    await act(harbour.service, mission.id, "start", actor="Ana")
     await until(lambda: rover.poll(), "it was sent somewhere")
     rover.service = await harbour.reopen()
     # It holds where it said it is, and says no more.
     await until(lambda: rover.poll(), "it was sent on")
     assert rover.steps == [1, 2]
     await until(lambda: rover.poll(), "it was sent on")
-    await harbour.service.act(mission.id, Action.ABORT, actor="Ana")
+    await act(harbour.service, mission.id, "abort", actor="Ana")
 
 
 async def test_a_batch_sent_again_to_a_new_process_tells_where_the_vehicle_is(harbour: Harbour) -> None:
     mission = await harbour.service.create(make_spec(steps=2, vehicles=[{"name": "a", "kind": "rest"}]))
     rover = Rover(harbour.service, mission.id, "a")
     item = rover.item()
-    await harbour.service.measure(mission.id, [item], idempotency_key="k")
+    await measure(await harbour.service.get(mission.id), [item], idempotency_key="k")
     service = await harbour.reopen()
-    assert (await service.measure(mission.id, [item], idempotency_key="k")).replayed
+    assert (await measure(await service.get(mission.id), [item], idempotency_key="k")).replayed
     assert [(v.name, v.link, v.lat_deg) for v in await service.vehicles()] == [("a", LinkState.READY, item.lat_deg)]
     # A repetition that comes late does not take a vehicle back.
     newer = rover.item(lat_deg=item.lat_deg + 1e-5)
-    await service.measure(mission.id, [newer])
-    await service.measure(mission.id, [item], idempotency_key="k")
+    await measure(await service.get(mission.id), [newer])
+    await measure(await service.get(mission.id), [item], idempotency_key="k")
     assert (await service.vehicles())[0].lat_deg == newer.lat_deg
 
 
@@ -694,9 +728,9 @@ async def test_a_mission_whose_vehicle_cannot_be_launched_any_more_fails_alone(h
     np.savez(path, z=np.full((10, 10), 9.0), cell_m=1.0)
     service = await harbour.reopen(simulation={"terrain": path})
     assert await state_of(service, far) is S.FAILED
-    assert "'z' cannot be launched" in (await service.mission(far)).reason
+    assert "'z' cannot be launched" in (await view_of(service, far)).reason
     assert await state_of(service, good) is S.RUNNING
-    await service.act(good, Action.ABORT, actor="Ana")
+    await act(service, good, "abort", actor="Ana")
 
 
 # What watchers see
@@ -704,11 +738,11 @@ async def test_a_mission_whose_vehicle_cannot_be_launched_any_more_fails_alone(h
 
 async def test_a_watcher_gets_a_snapshot_first_and_then_every_event_in_order(service: MissionService) -> None:
     mission = await service.create(sim_spec(steps=3))
-    async with service.subscribe(mission.id) as messages, asyncio.timeout(90):
+    async with watched(await service.get(mission.id)) as messages, asyncio.timeout(90):
         first = await anext(messages)
         assert isinstance(first, SnapshotMessage)
         assert first.mission.state is S.READY
-        await service.act(mission.id, Action.START, actor="Ana")
+        await act(service, mission.id, "start", actor="Ana")
         seen: list[int] = []
         steps: list[int] = []
         types = set()
@@ -722,7 +756,7 @@ async def test_a_watcher_gets_a_snapshot_first_and_then_every_event_in_order(ser
                 break
     assert types >= {"vehicles", "waypoints", "mission", "map", "event"}
     assert steps == sorted(steps)
-    stored_events = await service.events(mission.id, after=first.last_event_id)
+    stored_events = await events_after(await service.get(mission.id), after=first.last_event_id)
     assert seen == [line.id for line in stored_events][: len(seen)]
     assert seen == sorted(set(seen))
 
@@ -734,9 +768,9 @@ async def test_a_crowd_is_told_of_a_new_map_less_often_but_always_of_the_last(
     mission = await service.create(sim_spec(steps=3))
     async with AsyncExitStack() as crowd, asyncio.timeout(90):
         for _ in range(feed.CROWD - 1):
-            await crowd.enter_async_context(service.subscribe(mission.id))
-        messages = await crowd.enter_async_context(service.subscribe(mission.id))
-        await service.act(mission.id, Action.START, actor="Ana")
+            await crowd.enter_async_context(watched(await service.get(mission.id)))
+        messages = await crowd.enter_async_context(watched(await service.get(mission.id)))
+        await act(service, mission.id, "start", actor="Ana")
         told: list[int] = []
         while_running = None
         async for message in messages:
@@ -756,24 +790,26 @@ async def test_events_are_ordered_and_can_be_taken_up_after_any(harbour: Harbour
     await until_state(harbour.service, mission_id, S.FINISHED)
 
     await until_stopped(harbour.service, mission_id, 2)
-    every = await harbour.service.events(mission_id)
+    every = await events_after(await harbour.service.get(mission_id))
     assert [line.id for line in every] == sorted({line.id for line in every})
     assert [line.data["state"] for line in every if line.kind == "state"] == ["ready", "running", "finished"]
     for i, line in enumerate(every):
-        assert await harbour.service.events(mission_id, after=line.id) == every[i + 1 :]
-    paged: list[Any] = []
-    while page := await harbour.service.events(mission_id, after=paged[-1].id if paged else 0, limit=2):
+        assert await events_after(await harbour.service.get(mission_id), after=line.id) == every[i + 1 :]
+    paged: list[EventView] = []
+    while page := await events_after(
+        await harbour.service.get(mission_id), after=paged[-1].id if paged else 0, limit=2
+    ):
         paged += page
     assert paged == every
     service = await harbour.reopen()
-    assert await service.events(mission_id) == every
+    assert await events_after(await service.get(mission_id)) == every
 
 
 async def test_what_vehicles_told_while_a_mission_ran_is_kept_for_charts(harbour: Harbour) -> None:
     mission_id = await started(harbour.service, sim_spec(steps=3))
     await until_state(harbour.service, mission_id, S.FINISHED)
     service = await harbour.reopen()
-    found = await service.telemetry(mission_id, 100)
+    found = await telemetry_of(await service.get(mission_id), 100)
     assert [vehicle.vehicle for vehicle in found.vehicles] == ["a", "b"]
     assert found.times_s == sorted(found.times_s)
     for vehicle in found.vehicles:
@@ -781,20 +817,20 @@ async def test_what_vehicles_told_while_a_mission_ran_is_kept_for_charts(harbour
         assert len(vehicle.age_s) == len(found.times_s) >= 1
         assert depths
         assert all(0 <= depth < 20 for depth in depths)
-    assert (await service.telemetry((await service.create(make_spec())).id, 100)).times_s == []
+    assert (await telemetry_of(await service.get((await service.create(make_spec())).id), 100)).times_s == []
 
 
 async def test_missions_are_listed_newest_first_and_survive_leaving_memory(service: MissionService) -> None:
     made = [await service.create(make_spec(name=f"M{i}")) for i in range(14)]
     for mission in made:
-        await service.act(mission.id, Action.ABORT, actor="Ana")
+        await act(service, mission.id, "abort", actor="Ana")
     assert [m.name for m in await service.missions()] == [f"M{i}" for i in reversed(range(14))]
     assert all(m.state is S.ABORTED for m in await service.missions())
 
 
 async def test_readiness_and_planners(service: MissionService) -> None:
     assert await service.ready() == (True, {"links": "ok", "database": "ok"})
-    planners = {planner.name: planner for planner in service.planners()}
+    planners = {planner.name: planner for planner in planner_views()}
     assert set(planners) == set(PLANNERS)
     assert all(planner.summary and "properties" in planner.options for planner in planners.values())
 
@@ -815,7 +851,7 @@ async def test_the_real_sea_floor_is_mapped_as_it_is(
         spec = sim_spec(steps=8, area={"type": "Polygon", "coordinates": [ring]})
     mission_id = await started(service, spec)
     await until_state(service, mission_id, S.FINISHED)
-    rows = [row for row in await service.soundings(mission_id) if row.verdict == "accepted"]
+    rows = [row for row in await soundings_of(await service.get(mission_id)) if row.verdict == "accepted"]
     errors = [row.depth_m - terrain.depth_at_point(*terrain.frame.to_local(row.lat_deg, row.lon_deg)) for row in rows]
     errors = [error for error in errors if math.isfinite(error)]
     assert len(errors) > 30

@@ -6,16 +6,18 @@ from typing import Any
 import pytest
 
 from app.missions.errors import TargetNotFoundError
+from app.missions.operations.history import events_after, steps_after, target_ranges_page
+from app.missions.operations.measurements import measure
 from app.missions.service import MissionService
 from app.missions.settings import ImcSettings
 from app.missions.soundings.measurement import Measurement
-from app.missions.states import Action, MissionState
+from app.missions.states import MissionState
 from app.missions.views.soundings import Verdict
 from app.storage.database import Database
 from simulator.dune import DuneFleet, DuneOptions, default_specs
 from simulator.seafloors import generate
 from simulator.targets import RangingNoise, TargetSpec
-from tests.support.missions.harbour import Harbour, Rover, until_state
+from tests.support.missions.harbour import Harbour, Rover, act, until_state, view_of
 from tests.support.missions.specs import LAT, LON, lon_lat, make_spec, rectangle
 from tests.support.ports import free_ports
 from tests.support.waiting import until
@@ -43,31 +45,31 @@ async def test_posted_ranges_find_a_target_and_a_restart_does_not_forget_it(
     mission = await service.create(make_spec(targets=[{"name": "tag-1"}], steps=50))
     for name in "ab":
         await Rover(service, mission.id, name).post()
-    await service.act(mission.id, Action.START, actor="Ana")
-    first = await service.measure(mission.id, round_trip(30, 1000.0), idempotency_key="one")
+    await act(service, mission.id, "start", actor="Ana")
+    first = await measure(await service.get(mission.id), round_trip(30, 1000.0), idempotency_key="one")
     assert (first.accepted, first.rejected) == (30, 0)
     # A step keeps the filters; what comes after it is found again among the stored ranges.
-    second = await service.measure(mission.id, round_trip(31, 1030.0))
+    second = await measure(await service.get(mission.id), round_trip(31, 1030.0))
     assert second.accepted == 31
     # Before the pause: that waits for vehicles to stop, while the target's place grows old.
-    (before,) = await service.targets(mission.id)
-    await service.act(mission.id, Action.PAUSE, actor="Ana")
+    (before,) = (await service.get(mission.id)).target_views()
+    await act(service, mission.id, "pause", actor="Ana")
     assert before.accurate
     assert before.east_m is not None
     assert before.north_m is not None
     assert math.hypot(before.east_m - TAG[0], before.north_m - TAG[1]) < 3.0
-    assert (await service.mission(mission.id)).targets[0].name == "tag-1"
+    assert (await view_of(service, mission.id)).targets[0].name == "tag-1"
 
     service = await harbour.reopen()
-    (after,) = await service.targets(mission.id)
+    (after,) = (await service.get(mission.id)).target_views()
     assert (after.ranges, after.rejected) == (before.ranges, before.rejected)
     assert after.sd_east_m is not None
     assert after.east_m == pytest.approx(before.east_m, abs=max(0.5, 3 * after.sd_east_m))
-    again = await service.measure(mission.id, round_trip(30, 1000.0), idempotency_key="one")
+    again = await measure(await service.get(mission.id), round_trip(30, 1000.0), idempotency_key="one")
     assert again.replayed
-    twice = await service.measure(mission.id, round_trip(31, 1030.0))
+    twice = await measure(await service.get(mission.id), round_trip(31, 1030.0))
     assert twice.duplicate == 31
-    assert (await service.targets(mission.id))[0].ranges == 61
+    assert ((await service.get(mission.id)).target_views())[0].ranges == 61
 
 
 async def test_each_item_has_its_own_verdict_with_the_name_of_what_is_wrong(service: MissionService) -> None:
@@ -79,18 +81,18 @@ async def test_each_item_has_its_own_verdict_with_the_name_of_what_is_wrong(serv
         measured(5, 5, 4.0, vehicle="stranger"),
         measured(5, 5, 1.0),
     ]
-    answer = await service.measure(mission.id, items)
+    answer = await measure(await service.get(mission.id), items)
     assert [item.verdict for item in answer.items] == [
         Verdict.ACCEPTED, Verdict.REJECTED, Verdict.REJECTED, Verdict.REJECTED, Verdict.DUPLICATE,
     ]  # fmt: skip
     assert "'tag-9' is not among the targets of this mission (tag-1)" in answer.items[1].reason
     assert "target_range_m: -4 is not positive" in answer.items[2].reason
     assert "takes no part" in answer.items[3].reason
-    page = await service.target_ranges(mission.id, target="tag-1", limit=1)
+    page = await target_ranges_page(await service.get(mission.id), target="tag-1", limit=1)
     assert [item.used for item in page.items] == [True]
     assert page.next_after is None
     with pytest.raises(TargetNotFoundError, match="not a target of this mission"):
-        await service.target_ranges(mission.id, target="tag-9")
+        await target_ranges_page(await service.get(mission.id), target="tag-9")
 
 
 async def test_a_range_needs_its_target_and_no_sounding_beside_it() -> None:
@@ -113,18 +115,18 @@ async def test_simulated_vehicles_map_and_keep_track_of_a_simulated_target(harbo
         steps=5,
     )
     mission = await service.create(spec)
-    await service.act(mission.id, Action.START, actor="Ana")
+    await act(service, mission.id, "start", actor="Ana")
     pursued: set[str] = set()
 
     async def over() -> bool:
-        view = await service.mission(mission.id)
+        view = await view_of(service, mission.id)
         pursued.update(v.pursuing for v in view.vehicles if v.pursuing)
         return view.state is MissionState.FINISHED
 
     await until(over, "the mission is finished")
-    (seen,) = await service.targets(mission.id)
+    (seen,) = (await service.get(mission.id)).target_views()
     assert seen.ranges > 20
-    said = [event.message for event in await service.events(mission.id) if event.kind == "target"]
+    said = [event.message for event in await events_after(await service.get(mission.id)) if event.kind == "target"]
     assert any("goes for tag-1" in message for message in said)
     assert pursued == {"tag-1"}
     assert seen.state != "unheard"
@@ -165,24 +167,24 @@ async def test_vehicles_over_udp_find_what_swims_about_and_every_waypoint_was_ch
         mission = await service.create(spec)
 
         async def known() -> bool:
-            (target,) = await service.targets(mission.id)
+            (target,) = (await service.get(mission.id)).target_views()
             return target.state in ("uncertain", "accurate") and target.ranges > 30 and target.rejected > 0
 
         await until(lambda: _ready(service), "the vehicles are ready")
-        await service.act(mission.id, Action.START, actor="Ana")
+        await act(service, mission.id, "start", actor="Ana")
         # How well and how soon it is known is a matter of the filters' own tests: a busy machine is late by minutes.
         await until(known, "the target is known")
-        await service.act(mission.id, Action.FINISH, actor="Ana")
+        await act(service, mission.id, "finish", actor="Ana")
         assert await until_state(service, mission.id, MissionState.FINISHED)
-        (seen,) = await service.targets(mission.id)
+        (seen,) = (await service.get(mission.id)).target_views()
         assert "were expected" in seen.last_refusal
-        view = await service.mission(mission.id)
+        view = await view_of(service, mission.id)
         assert {v.localization for v in view.vehicles} <= {"good", "fading", "poor"}
-        strangers = [e for e in await service.events(mission.id) if "'buoy'" in e.message]
+        strangers = [e for e in await events_after(await service.get(mission.id)) if "'buoy'" in e.message]
         assert len(strangers) == 1
-        ranges = await service.target_ranges(mission.id, limit=1000)
+        ranges = await target_ranges_page(await service.get(mission.id), limit=1000)
         assert {item.source for item in ranges.items} == {"AcousticOperation"}
-        waypoints = [w for step in await service.steps(mission.id) for w in step.waypoints]
+        waypoints = [w for step in await steps_after(await service.get(mission.id)) for w in step.waypoints]
         assert all(2 - 1e-3 <= w.east_m <= 58 + 1e-3 for w in waypoints if w.status != "refused")
 
 

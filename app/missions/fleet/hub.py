@@ -6,9 +6,11 @@ import structlog
 
 from app.missions.errors import ConflictError
 from app.missions.fleet.interface import (
+    Deployment,
     EventSink,
     FleetEvent,
     FleetLink,
+    LinkCapabilities,
     LinkState,
     StopReceipt,
     VehicleInfo,
@@ -19,6 +21,9 @@ from app.missions.spec.mission import VehicleKind
 
 VehicleKey = tuple[VehicleKind, str]
 
+SWITCHED_OFF = LinkCapabilities(ready_before_start=True)
+"""Of a kind without a link: nobody comes from there, so no mission may wait for that."""
+
 log = structlog.get_logger(__name__)
 
 
@@ -27,6 +32,9 @@ class FleetHub:
 
     def __init__(self, links: Sequence[FleetLink]) -> None:
         self._links = {VehicleKind(link.kind): link for link in links}
+        polled = {kind: link.polled_vehicles for kind, link in self._links.items()}
+        self.polled = {kind: vehicles for kind, vehicles in polled.items() if vehicles is not None}
+        """By kind: who is told of the requests of vehicles that poll."""
         self._claims: dict[VehicleKey, tuple[str, EventSink]] = {}
 
     async def start(self) -> None:
@@ -46,6 +54,11 @@ class FleetHub:
     def kinds(self) -> tuple[VehicleKind, ...]:
         """The kinds of vehicles that can be reached."""
         return tuple(self._links)
+
+    def capabilities(self, kind: VehicleKind) -> LinkCapabilities:
+        """Return what vehicles of a kind can do."""
+        link = self._links.get(kind)
+        return SWITCHED_OFF if link is None else link.capabilities
 
     def vehicles(self) -> list[tuple[VehicleInfo, str | None]]:
         """Return every known vehicle, each with the id of the mission it takes part in."""
@@ -69,7 +82,7 @@ class FleetHub:
             if info.name == name:
                 return info
         reason = "never heard of: is it switched on, and does it reach this service?"
-        if kind is VehicleKind.SIM:
+        if link.capabilities.simulated:
             reason = "simulated: it is launched when its mission starts"
         return VehicleInfo(name, kind, LinkState.UNKNOWN, reason)
 
@@ -93,6 +106,18 @@ class FleetHub:
         """Give up a vehicle; nothing happens when the mission does not have it."""
         if self.claimed_by(key) == mission_id:
             del self._claims[key]
+
+    def deploy(self, deployment: Deployment) -> None:
+        """Prepare a vehicle for its mission, where there is a link to it. Raises VehicleRefusedError."""
+        link = self._links.get(deployment.vehicle.kind)
+        if link is not None:
+            link.deploy(deployment)
+
+    def withdraw(self, deployment: Deployment) -> None:
+        """Undo ``deploy`` at the mission's end."""
+        link = self._links.get(deployment.vehicle.kind)
+        if link is not None:
+            link.withdraw(deployment)
 
     async def engage(self, key: VehicleKey) -> None:
         """Make a vehicle ready to follow. Raises VehicleRefusedError."""

@@ -5,10 +5,14 @@ mission gives it a local frame. Links report by calling an :data:`EventSink` fro
 block and never raise through it.
 """
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Protocol
+from typing import ClassVar, Protocol
+
+from app.missions.spec.mission import MissionSpec, VehicleSpec
+from simulator.obstacles import ObstacleWorld
 
 
 class LinkState(StrEnum):
@@ -239,7 +243,54 @@ class VehicleRefusedError(Exception):
         self.remedy = remedy
 
 
-class FleetLink(Protocol):
+@dataclass(frozen=True, slots=True)
+class LinkCapabilities:
+    """What missions have to know of a link's vehicles beside how to command them."""
+
+    simulated: bool = False
+    """They live in this service, come into the world with their mission, and need nobody to look after them."""
+    ready_before_start: bool = False
+    """A mission starts only when they take commands; others come to us in their own time."""
+    scans: bool = False
+    """They tell by themselves what is around them; others have it posted."""
+    keeps_depth: bool = False
+    """They travel at the depth that their mission began with, whatever they are told."""
+    circles_m: float = 0.0
+    """From this distance on they circle about a waypoint in place of going straight to it, unless they can hover."""
+
+
+@dataclass(frozen=True, slots=True)
+class Deployment:
+    """A vehicle as its mission takes it.
+
+    ``berth`` returns latitude and longitude of a free place that the mission has for it to begin at, None where any
+    will do; ``world`` what stands there beside the sea floor, None where nothing does.
+    """
+
+    vehicle: VehicleSpec
+    mission_id: str
+    mission: MissionSpec
+    berth: Callable[[], tuple[float, float] | None]
+    world: Callable[[], ObstacleWorld | None]
+
+
+class PolledVehicles(Protocol):
+    """What a link whose vehicles ask over HTTP is told as their requests come in."""
+
+    def heard(self, report: VehicleReport) -> None:
+        """Take a position that a vehicle posted."""
+        ...
+
+    def has_waypoint(self, vehicle: str, step: int) -> None:
+        """Note that a vehicle has the waypoint of ``step``."""
+        ...
+
+    def told_to_stop(self, vehicle: str, mission_id: str) -> None:
+        """Note that a vehicle was told to stop."""
+        ...
+
+
+class FleetLink(ABC):
     """One way of reaching vehicles. Names of vehicles are unique within a link.
 
     Contract, tested for every implementation by ``tests/missions/fleet/test_interface.py``:
@@ -252,31 +303,41 @@ class FleetLink(Protocol):
     * ``close`` stops every engaged vehicle first.
     """
 
-    @property
-    def kind(self) -> str:
-        """``imc``, ``rest`` or ``sim``."""
-        ...
+    kind: ClassVar[str]
+    """What a mission calls its vehicles' kind."""
+    capabilities: ClassVar[LinkCapabilities] = LinkCapabilities()
 
+    @property
+    def polled_vehicles(self) -> PolledVehicles | None:
+        """Who is told of its vehicles' requests; None when they send none."""
+        return None
+
+    def deploy(self, deployment: Deployment) -> None:  # noqa: B027
+        """Prepare a vehicle for the mission that takes it; harmless to repeat. Raises VehicleRefusedError."""
+
+    def withdraw(self, deployment: Deployment) -> None:  # noqa: B027
+        """Undo ``deploy``: the mission has ended."""
+
+    @abstractmethod
     async def start(self, sink: EventSink) -> None:
         """Begin to listen; every event from now on goes to ``sink``."""
-        ...
 
+    @abstractmethod
     async def close(self) -> None:
         """Stop every engaged vehicle, then release sockets and tasks."""
-        ...
 
+    @abstractmethod
     def vehicles(self) -> Sequence[VehicleInfo]:
         """Every vehicle known to this link, in a stable order."""
-        ...
 
+    @abstractmethod
     async def engage(self, vehicle: str) -> None:
         """Make the vehicle ready to follow waypoints of ours. Raises VehicleRefusedError."""
-        ...
 
+    @abstractmethod
     async def order(self, order: WaypointOrder) -> None:
         """Send a waypoint; see the class's contract. Raises VehicleRefusedError when the vehicle is not engaged."""
-        ...
 
+    @abstractmethod
     async def stop(self, vehicle: str, *, timeout_s: float = 3.0) -> StopReceipt:
         """Stop the vehicle; see the class's contract."""
-        ...

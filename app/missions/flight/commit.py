@@ -75,7 +75,7 @@ class StepCommit:
         self._bottom = decision.bottom
         self._targets = {leg.vehicle: leg.target_m[:2] for leg in decision.legs}
         for member in live.team:
-            member.order = None
+            member.set_order(None)
             member.status = None
         for row in rows:
             member_of_row = live.team.get(row.vehicle)
@@ -94,14 +94,15 @@ class StepCommit:
         circle: Position | None = None
         bottom: tuple[Position, ...] = ()
         spec = self._live.spec
+        target = np.array([row.east_m, row.north_m])
         if member.report is not None and self._leads:
-            start, target = member.place_m(self._live.frame), np.array([row.east_m, row.north_m])
+            start = member.place_m(self._live.frame)
             beyond = safety.lead_point(self._constraints, start, target, LEAD_M)
             lead = self._position(beyond[0], beyond[1], row.depth_m)
             known = safety.bottom_on_way(np.array([start, target, beyond]), self._bottom)
             bottom = tuple(self._position(east, north, depth) for east, north, depth in known)
             circle = self._circle(member, start, target)
-        member.order = WaypointOrder(
+        order = WaypointOrder(
             mission_id=self._live.id,
             step=row.step,
             vehicle=row.vehicle,
@@ -113,6 +114,7 @@ class StepCommit:
             circle=circle,
             bottom=bottom,
         )
+        member.set_order(order, target)
         member.status = WaypointStatus.PLANNED
 
     def _circle(self, member: Member, start: FloatArray, target: FloatArray) -> Position | None:

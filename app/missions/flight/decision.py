@@ -15,7 +15,7 @@ from app.exploration.core.problem import Belief, Planner, Situation
 from app.exploration.site_search import SearchTask
 from app.missions import safety
 from app.missions.search.course import hold_before_hazards
-from app.missions.spec.mission import MissionSpec, SurfacePolicy, VehicleKind
+from app.missions.spec.mission import MissionSpec, SurfacePolicy
 
 NEARBY_OUTSIDE_M = 10.0
 """A vehicle that drifted or overshot this little is planned for as if it were at the border."""
@@ -46,6 +46,8 @@ class Place:
     """How well it says that it knows where it is; NaN: it does not say."""
     surfacing_depth_m: float = math.nan
     """Its depth, when its last waypoint brought it up for a fix; NaN when not."""
+    keeps_depth: bool = False
+    """Whether it travels at the depth that its mission began with, whatever it is told."""
 
     @property
     def surfacing(self) -> bool:
@@ -211,10 +213,9 @@ def decide(
         proposed[i, 2] = min(proposed[i, 2], depth_m)
     checked = safety.check_step(names, origin, proposed, constraints, bottom)
     notes += [f"{name}: {reason}" for name, reason in (checked.corrections | checked.refusals).items()]
-    layered = {vehicle.name for vehicle in spec.vehicles if vehicle.kind is VehicleKind.NEPTUS}
     for i, place in enumerate(team):
         refusal = checked.refusals.get(place.vehicle, "")
-        if not refusal and place.vehicle in layered:
+        if not refusal and place.keeps_depth:
             refusal = safety.too_deep(place.cruise_depth_m, float(checked.positions[i, 2]))
             notes += [f"{place.vehicle}: {refusal}"] if refusal else []
         legs.append(Leg(place.vehicle, checked.positions[i], refusal, bool(up[i])))

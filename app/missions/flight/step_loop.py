@@ -12,7 +12,6 @@ from concurrent.futures import Executor
 
 import numpy as np
 
-from app.arrays import FloatArray
 from app.exploration.core.problem import Planner
 from app.exploration.planners import create_planner
 from app.missions import metrics
@@ -20,7 +19,6 @@ from app.missions.clock import now
 from app.missions.fleet.hub import FleetHub
 from app.missions.fleet.interface import (
     VehicleRefusedError,
-    WaypointOrder,
     WaypointReport,
     WaypointStatus,
 )
@@ -192,28 +190,25 @@ class Runner:
 
     def _about_to_arrive(self, member: Member) -> bool:
         """Tell whether a vehicle will be at its waypoint by the time a decision takes."""
-        if member.order is None or member.report is None:
+        if member.target_m is None or member.report is None:
             return False
-        left_m = float(np.linalg.norm(self._target_m(member.order) - member.place_m(self._live.frame)))
+        left_m = float(np.linalg.norm(member.target_m - member.place_m(self._live.frame)))
         ahead_s = (self._decision_s + REPORT_DELAY_S) * self._time_scale
         return left_m <= self._spec.arrival_radius_m + self._spec.speed_mps * ahead_s
-
-    def _target_m(self, order: WaypointOrder) -> FloatArray:
-        east, north = self._live.frame.to_local(np.array(order.position.lat_deg), np.array(order.position.lon_deg))
-        return np.array([float(east), float(north)])
 
     def _places(self, *, ahead: bool = False) -> list[Place]:
         """Return where the vehicles are that can be planned for; ``ahead``: or will be, where they are under way."""
         return [
             Place(
                 member.name,
-                self._target_m(member.order)
-                if ahead and member.busy and member.order
+                member.target_m
+                if ahead and member.busy and member.target_m is not None
                 else member.place_m(self._live.frame),
                 member.report.heading_rad if member.report and member.report.heading_rad is not None else math.nan,
                 member.cruise_depth_m(self._spec.limits),
                 member.report.position_sd_m if member.report and member.report.position_sd_m is not None else math.nan,
                 member.report.position.depth_m if member.surfacing and member.report else math.nan,
+                member.capabilities.keeps_depth,
             )
             for member in self._live.team.present
         ]
@@ -360,13 +355,14 @@ class Runner:
         """Return how long a step may take: longer than asked for where a vehicle is silent until its leg is over."""
         legs_s = [
             leg_time_s(
-                float(np.linalg.norm(self._target_m(member.order) - member.place_m(self._live.frame))),
+                float(np.linalg.norm(member.target_m - member.place_m(self._live.frame))),
                 member.order.position.depth_m,
                 member.order.speed_mps,
             )
             + (SOUND_S if member.spec.guidance is Guidance.ACOUSTIC else 0.0)
             for member in self._live.team
-            if member.spec.guidance is not Guidance.FOLLOW and member.order is not None and member.report is not None
+            if member.spec.guidance is not Guidance.FOLLOW and member.report is not None
+            if member.order is not None and member.target_m is not None
         ]
         return max(self._spec.step_deadline_s, *legs_s) if legs_s else self._spec.step_deadline_s
 

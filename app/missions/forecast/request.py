@@ -3,6 +3,7 @@
 import asyncio
 import threading
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -10,11 +11,19 @@ from pydantic import Field
 from shapely.geometry import Point, Polygon
 
 from app.arrays import FloatArray
-from app.missions.errors import InvalidRequestError
+from app.missions.compilation import Compilation
+from app.missions.errors import ConflictError, InvalidRequestError
+from app.missions.fleet.hub import FleetHub
 from app.missions.forecast.simulate import Forecast, forecast
-from app.missions.spec.mission import MissionSpec
+from app.missions.live.mission import LiveMission
+from app.missions.running.admission import check_spec
+from app.missions.running.team_changes import refuse_ended
+from app.missions.spec.mission import MissionKind, MissionSpec
 from app.missions.team import Member, Team
 from app.missions.views.base import View
+from app.storage import soundings as sounding_queries
+
+NO_FORECAST = "what a search will find cannot be forecast: it depends on what stands there"
 
 BUDGET_S = 10.0
 """Seconds of the processor for each floor."""
@@ -69,7 +78,9 @@ class ForecastView(View):
 class Forecaster:
     """Makes forecasts beside the planning of running missions."""
 
-    def __init__(self) -> None:
+    def __init__(self, hub: FleetHub, compilation: Compilation) -> None:
+        self._hub = hub
+        self._compilation = compilation
         self._executor = ThreadPoolExecutor(1, thread_name_prefix="forecast")
         self._one = asyncio.Lock()
         self._closing = threading.Event()
@@ -78,6 +89,29 @@ class Forecaster:
         """End what is being made."""
         self._closing.set()
         self._executor.shutdown(wait=True, cancel_futures=True)
+
+    async def of_description(self, spec: MissionSpec, floor_depth_m: float | None = None) -> ForecastView:
+        """Return what is to be expected of a mission as it is described. Raises InvalidRequestError."""
+        check_spec(spec, self._hub.kinds)
+        if spec.kind is MissionKind.SEARCH:
+            raise InvalidRequestError("kind", NO_FORECAST, "forecast missions of kind survey")
+        return await self.make(spec, floor_depth_m=floor_depth_m)
+
+    async def of_mission(self, live: LiveMission, floor_depth_m: float | None = None) -> ForecastView:
+        """Return what is to be expected of a mission from now on. Raises ConflictError, InvalidRequestError."""
+        refuse_ended(live, "has nothing before it")
+        if live.search is not None:
+            raise ConflictError(NO_FORECAST, "see its time window, search.window_s")
+        async with live.database.reading() as session:
+            prior = await sounding_queries.imported_arrays(session, live.id)
+        team = [replace(member, report=member.report or live.hub.info(member.key).report) for member in live.team]
+        return await self.make(
+            live.spec,
+            members=team,
+            prior=prior,
+            first_step=live.header.step + 1,
+            floor_depth_m=floor_depth_m,
+        )
 
     async def make(
         self,
@@ -102,10 +136,12 @@ class Forecaster:
         InvalidRequestError
             When the mission has no vehicle.
         """
-        team = Team()
+        team = Team(self._hub.capabilities)
         ours = members or [team.join(vehicle, slot) for slot, vehicle in enumerate(spec.vehicles)]
         if not ours:
             raise InvalidRequestError("vehicles", "the mission has no vehicle", "add one: without any nothing is done")
+        # The time that a forecast may take is for steps, not for compiling.
+        await self._compilation.maps()
         gone = threading.Event()
         known = np.zeros((0, 4)) if prior is None else prior
         starts, where = await asyncio.to_thread(starts_of, spec, ours)

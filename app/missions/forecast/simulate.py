@@ -177,7 +177,10 @@ def fly(
     heading = np.full(len(members), np.nan)
     distance, seconds = np.zeros(len(members)), 0.0
     for step in range(first_step, spec.steps + 1):
-        places = [Place(member.name, here[i, :2], float(heading[i]), cruise[i]) for i, member in enumerate(members)]
+        places = [
+            Place(member.name, here[i, :2], float(heading[i]), cruise[i], keeps_depth=member.capabilities.keeps_depth)
+            for i, member in enumerate(members)
+        ]
         decision = decide(step, spec, constraints, planner, places, builder.belief(), builder.sounded_at_m()[0])
         target = {leg.vehicle: leg.target_m for leg in decision.legs}
         longest = 0.0

@@ -1,16 +1,13 @@
 """What a mission writes down as it goes: soundings, tracks, waypoint states and its log.
 
-Everything that arrives from vehicles is buffered for a moment and written in one transaction; a sounding counts as
-accepted only when that transaction has committed. What cannot be written, because the disk is full for example, stays
-noted until it can.
+A sounding counts as accepted only when the transaction that stores it has committed.
 """
 
-import asyncio
 import math
 from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import asdict, dataclass
 from itertools import pairwise
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import structlog
@@ -18,13 +15,13 @@ from sqlalchemy.ext.asyncio import AsyncSession
 
 from app.missions import metrics
 from app.missions.clock import now
-from app.missions.errors import MissionElsewhereError
 from app.missions.fleet.interface import ScanReport, SoundingReport, VehicleReport, WaypointReport
 from app.missions.large_batches import made_of
 from app.missions.live.broadcast import Broadcaster
-from app.missions.live.db_retry import RETRY_S, DatabaseRetry
-from app.missions.soundings.corrections import NO_LEVEL
-from app.missions.soundings.gate import Gate, GatedSounding
+from app.missions.live.db_retry import DatabaseRetry
+from app.missions.live.write_behind import Committed, WriteBehind
+from app.missions.soundings.corrections import NO_LEVEL, PlacedSounding
+from app.missions.soundings.gate import Gate
 from app.missions.views.messages import EventMessage
 from app.missions.views.mission import EventView, Level
 from app.missions.views.soundings import ItemVerdict, Verdict
@@ -40,8 +37,13 @@ FLUSH_PERIOD_S = 0.1
 TRACK_SPACING_M = 1.0
 METRES_PER_DEGREE = 111_320.0
 
-TakeScans = Callable[[Sequence[ScanReport], int, AsyncSession], Awaitable[tuple[list[ItemVerdict], Callable[[], None]]]]
+TakeScans = Callable[[Sequence[ScanReport], int, AsyncSession], Awaitable[tuple[list[ItemVerdict], Committed]]]
 """Stores scans of a step in a transaction; returns the verdicts and what to call once it has committed."""
+
+Noted = SoundingReport | ScanReport | VehicleReport | WaypointReport | VehicleSample | EventRow
+"""What a journal writes; of a vehicle's report its place."""
+
+T = TypeVar("T")
 
 log = structlog.get_logger(__name__)
 
@@ -54,13 +56,15 @@ class Counts:
     rejected: int = 0
 
 
-class Journal:
+class Journal(WriteBehind[Noted]):
     """Writes one mission's records.
 
     Parameters
     ----------
     on_accepted
         Called with every committed batch of accepted soundings, shape (n, 4): east, north, depth, sd.
+    on_trouble
+        Called when the database cannot be used any more, or can be again.
     take_scans
         Stores scans; None in missions that have no use for any.
     """
@@ -73,10 +77,12 @@ class Journal:
         counts: Counts,
         broadcaster: Broadcaster,
         on_accepted: Callable[[np.ndarray[Any, np.dtype[np.float64]]], None],
+        on_trouble: Callable[[], None],
         take_scans: TakeScans | None = None,
     ) -> None:
-        self._database = database
-        self._mission_id = mission_id
+        super().__init__(
+            database, mission_id, DatabaseRetry(mission_id, on_trouble, self._note_trouble), FLUSH_PERIOD_S
+        )
         self._gate = gate
         self._broadcaster = broadcaster
         self._on_accepted = on_accepted
@@ -84,34 +90,18 @@ class Journal:
         self.counts = counts
         self.travelled_m = 0.0
         self.step = 0
-        self._soundings: list[SoundingReport] = []
-        self._scans: list[ScanReport] = []
-        self._positions: list[dict[str, Any]] = []
-        self._statuses: list[WaypointReport] = []
-        self._telemetry: list[dict[str, Any]] = []
-        self._lines: list[EventRow] = []
-        self.storage = DatabaseRetry(mission_id, lambda: self.on_trouble(), self._note_trouble)
-        """Waits where the database cannot be used."""
-        self.on_trouble: Callable[[], None] = lambda: None
-        """Called when the database cannot be used any more, or can be again."""
-        self.told_of_missing_level = False
-        """Whether the log has it that no water level is known for soundings; once is enough."""
+        self._told_of_missing_level = False
         self._untold = ""
         self._track_ends: dict[str, tuple[float, float]] = {}
-        self.writing = asyncio.Lock()
-        """Held while soundings are stored, so that corrections do not change under them."""
-        self._pump: asyncio.Task[None] | None = None
 
     def sounding(self, report: SoundingReport) -> None:
         """Note a sounding; it is written within a moment."""
-        self._soundings.append(report)
-        self._start_pump()
+        self._note(report)
 
     def scan(self, report: ScanReport) -> None:
         """Note a look round; it is written within a moment, in a mission that has use for it."""
         if self._take_scans is not None:
-            self._scans.append(report)
-            self._start_pump()
+            self._note(report)
 
     def position(self, report: VehicleReport) -> None:
         """Note a point of a track, unless it is close to the last one."""
@@ -124,68 +114,55 @@ class Journal:
                 return
             self.travelled_m += leg_m
         self._track_ends[report.vehicle] = end
-        self._positions.append(position_row(self._mission_id, report))
-        self._start_pump()
+        self._note(report)
 
     def waypoint(self, report: WaypointReport) -> None:
         """Note what became of a waypoint."""
-        self._statuses.append(report)
-        self._start_pump()
+        self._note(report)
 
     def telemetry(self, samples: Sequence[VehicleSample]) -> None:
         """Note what the vehicles told of themselves."""
-        self._telemetry += [{"mission_id": self._mission_id} | asdict(sample) for sample in samples]
-        self._start_pump()
+        self._note(*samples)
+
+    def note_line(self, row: EventRow) -> None:
+        """Note a line; it is written within a moment, or when that is possible again."""
+        self._note(row)
 
     async def flush(self) -> None:
         """Write everything noted so far. What could not be written stays noted."""
-        await to_the_end(self._flush())
+        await super().flush()
         if self._untold:
             why, self._untold = self._untold, ""
             await self.log(
                 Level.ALARM, "corrections", f"soundings are rejected: {why}. Send a tide table that covers them"
             )
 
-    async def _flush(self) -> None:
-        async with self.writing:
-            soundings, self._soundings = self._soundings, []
-            scans, self._scans = self._scans, []
-            positions, self._positions = self._positions, []
-            statuses, self._statuses = self._statuses, []
-            telemetry, self._telemetry = self._telemetry, []
-            lines, self._lines = self._lines, []
-            if not (soundings or scans or positions or statuses or telemetry or lines):
-                return
-            told = [self.line(Level(line.level), line.kind, line.message, **line.data) for line in lines]
-            try:
-                async with self._database.writing() as session:
-                    gated, new = await self._store(session, soundings)
-                    _, seen = await self.take_scans(scans, session)
-                    await mission_queries.add_positions(session, positions)
-                    await telemetry_queries.add(session, telemetry)
-                    for row, line in zip(told, lines, strict=True):
-                        row.time = line.time
-                    session.add_all(told)
-                    for report in statuses:
-                        await mission_queries.set_waypoint_status(
-                            session, self._mission_id, report.step, report.vehicle, report.status, report.reason, now()
-                        )
-            except BaseException:
-                self._soundings[:0] = soundings
-                self._scans[:0] = scans
-                self._positions[:0] = positions
-                self._statuses[:0] = statuses
-                self._telemetry[:0] = telemetry
-                self._lines[:0] = lines
-                raise
+    async def _store(self, noted: Sequence[Noted], session: AsyncSession) -> Committed:
+        gated, new = await self._store_soundings(session, _of(SoundingReport, noted))
+        _, seen = await self.take_scans(_of(ScanReport, noted), session)
+        positions = [position_row(self._mission_id, report) for report in _of(VehicleReport, noted)]
+        await mission_queries.add_positions(session, positions)
+        samples = [{"mission_id": self._mission_id} | asdict(sample) for sample in _of(VehicleSample, noted)]
+        await telemetry_queries.add(session, samples)
+        # Rows of a transaction that failed cannot be written again.
+        rows = [_copy(row) for row in _of(EventRow, noted)]
+        session.add_all(rows)
+        for report in _of(WaypointReport, noted):
+            await mission_queries.set_waypoint_status(
+                session, self._mission_id, report.step, report.vehicle, report.status, report.reason, now()
+            )
+
+        def committed() -> None:
             self._count(gated, new)
             seen()
-            for row in told:
+            for row in rows:
                 self.tell(row)
+
+        return committed
 
     async def take_scans(
         self, reports: Sequence[ScanReport], session: AsyncSession
-    ) -> tuple[list[ItemVerdict], Callable[[], None]]:
+    ) -> tuple[list[ItemVerdict], Committed]:
         """Store scans in the caller's transaction; the caller holds ``writing``.
 
         Returns
@@ -198,7 +175,7 @@ class Journal:
 
     async def take(
         self, reports: Sequence[SoundingReport], session: AsyncSession, *, gate: Gate | None = None
-    ) -> tuple[list[ItemVerdict], Callable[[], None]]:
+    ) -> tuple[list[ItemVerdict], Committed]:
         """Store soundings in the caller's transaction; the caller holds ``writing``.
 
         ``gate`` judges them in place of the mission's own.
@@ -207,7 +184,7 @@ class Journal:
         -------
         The verdicts in the order of the reports, and what to call once the transaction has committed.
         """
-        gated, new = await self._store(session, reports, gate)
+        gated, new = await self._store_soundings(session, reports, gate)
         return await made_of(gated, _verdicts, gated, new), lambda: self._count(gated, new)
 
     async def log(self, level: Level, kind: str, message: str, **data: Any) -> None:
@@ -215,15 +192,7 @@ class Journal:
 
         Where the database cannot be written the line is noted like a sounding: nobody who has to tell something waits.
         """
-        row = self.line(level, kind, message, **data)
-        if self._lines or self.storage.trouble:
-            self.note_line(row)
-            return
-        try:
-            await self.write(row)
-        except Exception as error:
-            self.storage.note(error)
-            self.note_line(self.line(level, kind, message, **data))
+        await self.log_all([self.line(level, kind, message, **data)])
 
     async def log_all(self, rows: Sequence[EventRow]) -> None:
         """Write lines of the mission's log together and show them; what cannot be written is noted, as by :meth:`log`.
@@ -233,36 +202,27 @@ class Journal:
         rows
             Made by :meth:`line`.
         """
-        if self._lines or self.storage.trouble:
-            for row in rows:
-                self.note_line(row)
+        if self.storage.trouble or _of(EventRow, self._noted):
+            self._note(*rows)
             return
-        copies = [(row.time, self.line(Level(row.level), row.kind, row.message, **row.data)) for row in rows]
+        copies = [_copy(row) for row in rows]
         try:
-            await to_the_end(self._add_all(rows))
+            await to_the_end(self._add(*rows))
         except Exception as error:
             self.storage.note(error)
-            # Rows of a transaction that failed cannot be written again.
-            for time, row in copies:
-                row.time = time
-                self.note_line(row)
+            self._note(*copies)
             return
         for row in rows:
             self.tell(row)
-
-    async def _add_all(self, rows: Sequence[EventRow]) -> None:
-        async with self._database.writing() as session:
-            session.add_all(rows)
-
-    def note_line(self, row: EventRow) -> None:
-        """Note a line; it is written within a moment, or when that is possible again."""
-        self._lines.append(row)
-        self._start_pump()
 
     async def write(self, row: EventRow) -> None:
         """Write a line now and show it; raises when that cannot be."""
         await to_the_end(self._add(row))
         self.tell(row)
+
+    async def _add(self, *rows: EventRow) -> None:
+        async with self._database.writing() as session:
+            session.add_all(rows)
 
     def _note_trouble(self, message: str) -> None:
         self.note_line(self.line(Level.ALARM, "storage", message))
@@ -278,9 +238,9 @@ class Journal:
         log.info("mission event", **(row.data | said))
         self._broadcaster.publish(EventMessage(event=event_view(row)))
 
-    async def _add(self, row: EventRow) -> None:
-        async with self._database.writing() as session:
-            session.add(row)
+    def tell_of_missing_level(self) -> None:
+        """Write into the log again, once, when no water level is known for soundings."""
+        self._told_of_missing_level = False
 
     async def count_again(self, read: Callable[[], Awaitable[Counts]]) -> None:
         """Let ``read`` take up what another process has written, while nothing is written here."""
@@ -288,61 +248,27 @@ class Journal:
         async with self.writing:
             self.counts = await read()
 
-    def abandon(self) -> None:
-        """Forget what is left: the mission is another process's."""
-        self._soundings, self._scans, self._positions, self._statuses = [], [], [], []
-        self._telemetry, self._lines = [], []
-
-    async def close(self) -> None:
-        """Write what is left and stop."""
-        if self._pump is not None:
-            self._pump.cancel()
-            await asyncio.gather(self._pump, return_exceptions=True)
-        try:
-            await self.flush()
-        except Exception as error:
-            self.storage.note(error)
-            log.error(
-                "what was heard last is lost, it could not be written",
-                mission=self._mission_id,
-                soundings=len(self._soundings),
-                why=self.storage.trouble,
-            )
-
-    def _start_pump(self) -> None:
-        if self._pump is None or self._pump.done():
-            self._pump = asyncio.create_task(self._flush_soon())
-
-    async def _flush_soon(self) -> None:
-        while any((self._soundings, self._scans, self._positions, self._statuses, self._telemetry, self._lines)):
-            await asyncio.sleep(FLUSH_PERIOD_S)
-            try:
-                await self.storage.done(self.flush)
-            except MissionElsewhereError:
-                return  # nothing more is ours to write
-            except Exception:
-                log.exception("could not write to the database, trying again", mission=self._mission_id)
-                await asyncio.sleep(RETRY_S)
-
-    async def _store(
+    async def _store_soundings(
         self, session: AsyncSession, reports: Sequence[SoundingReport], gate: Gate | None = None
-    ) -> tuple[list[GatedSounding], set[sounding_queries.Identity]]:
+    ) -> tuple[list[PlacedSounding], set[sounding_queries.Identity]]:
         gated, rows = await made_of(reports, self._gated, reports, gate or self._gate)
         return gated, await sounding_queries.insert_new(session, rows)
 
-    def _gated(self, reports: Sequence[SoundingReport], gate: Gate) -> tuple[list[GatedSounding], list[dict[str, Any]]]:
+    def _gated(
+        self, reports: Sequence[SoundingReport], gate: Gate
+    ) -> tuple[list[PlacedSounding], list[dict[str, Any]]]:
         """Return soundings as the gate judges them, and how they are stored."""
         gated, received = gate.check(reports), now()
         return gated, [_row(self._mission_id, self.step, received, item) for item in gated if _storable(item)]
 
-    def _count(self, gated: Sequence[GatedSounding], new: set[sounding_queries.Identity]) -> None:
+    def _count(self, gated: Sequence[PlacedSounding], new: set[sounding_queries.Identity]) -> None:
         first = {_identity(item.report): item for item in reversed(gated) if _storable(item)}
         fresh = [item for identity, item in first.items() if identity in new]
         accepted = [item for item in reversed(fresh) if item.accepted]
         rejected = len(fresh) - len(accepted)
         no_level = next((item.reason for item in fresh if item.reason.startswith(NO_LEVEL)), "")
-        if no_level and not self.told_of_missing_level:
-            self.told_of_missing_level, self._untold = True, no_level.removeprefix(NO_LEVEL)
+        if no_level and not self._told_of_missing_level:
+            self._told_of_missing_level, self._untold = True, no_level.removeprefix(NO_LEVEL)
         self.counts = Counts(self.counts.accepted + len(accepted), self.counts.rejected + rejected)
         metrics.SOUNDINGS.labels(Verdict.ACCEPTED).inc(len(accepted))
         metrics.SOUNDINGS.labels(Verdict.REJECTED).inc(rejected)
@@ -386,11 +312,21 @@ def event_view(row: EventRow) -> EventView:
     )
 
 
+def _of(kind: type[T], noted: Sequence[Noted]) -> list[T]:
+    return [item for item in noted if isinstance(item, kind)]
+
+
+def _copy(row: EventRow) -> EventRow:
+    return EventRow(
+        mission_id=row.mission_id, time=row.time, level=row.level, kind=row.kind, message=row.message, data=row.data
+    )
+
+
 def _identity(report: SoundingReport) -> sounding_queries.Identity:
     return report.vehicle, report.time_s, report.beam
 
 
-def _verdicts(gated: Sequence[GatedSounding], new: set[sounding_queries.Identity]) -> list[ItemVerdict]:
+def _verdicts(gated: Sequence[PlacedSounding], new: set[sounding_queries.Identity]) -> list[ItemVerdict]:
     """Return the verdicts on soundings of which those in ``new`` were stored."""
     left = set(new)
     verdicts = []
@@ -406,7 +342,7 @@ def _verdicts(gated: Sequence[GatedSounding], new: set[sounding_queries.Identity
     return verdicts
 
 
-def _storable(item: GatedSounding) -> bool:
+def _storable(item: PlacedSounding) -> bool:
     # NaN and infinity have no place in a database column that is summed later; the verdict still goes out.
     report = item.report
     place = report.footprint
@@ -421,7 +357,7 @@ def _storable(item: GatedSounding) -> bool:
     )
 
 
-def _row(mission_id: str, step: int, received: Any, item: GatedSounding) -> dict[str, Any]:
+def _row(mission_id: str, step: int, received: Any, item: PlacedSounding) -> dict[str, Any]:
     report = item.report
     geometry = report.beam_geometry
     return {

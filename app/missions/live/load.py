@@ -57,11 +57,10 @@ async def take_up(
         await loop.run_in_executor(executor, tracking_warm_up)
         async with database.reading() as session:
             await live.ranges.load(session, step)
-    await live.whole.show(stored, imported=prior, ended=live.header.state in ENDED)
+    await live.whole.show(stored, imported, imported=prior, ended=live.header.state in ENDED)
     if search is not None:
         await _take_up_search(live, search)
-    live.reference_m = reference
-    live.whole.imports_noticed = imported
+    live.show_reference(reference)
     await live.trails.newest()
     live.journal.travelled_m = live.trails.length_m
     if step is not None:

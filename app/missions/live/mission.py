@@ -1,10 +1,10 @@
 """The side of a mission that lives in memory: its map, its journal, its vehicles' reports and its watchers."""
 
 import asyncio
-import math
 from collections.abc import Callable
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
+from datetime import datetime
 from functools import partial
 from typing import Any, TypeVar
 
@@ -58,7 +58,6 @@ from app.missions.views.targets import TargetView
 from app.storage import events as event_queries
 from app.storage import soundings as sounding_queries
 from app.storage.database import Database
-from app.storage.group_commit import Grouped
 from app.storage.models import MissionRow
 from app.storage.single_flight import Shared
 
@@ -68,6 +67,7 @@ RISES = "rises"
 log = structlog.get_logger(__name__)
 
 Made = TypeVar("Made")
+Part = TypeVar("Part")
 
 
 @dataclass
@@ -105,7 +105,9 @@ class LiveMission:
         self.header = Header(MissionState(row.state), row.reason, row.created_at, row.updated_at, row.elapsed_s)
         self.frame: LocalFrame = spec.frame()
         self.area = spec.local_area()
-        self.team = Team()
+        self.hub = hub
+        """All links, those to its vehicles among them."""
+        self.team = Team(hub.capabilities)
         self.broadcaster = Broadcaster()
         self.builder = builder or builder_of(spec)
         self.margin_m = 2 * spec.limits.max_step_m
@@ -123,16 +125,20 @@ class LiveMission:
         self.search = search
         """What a mission of kind search knows of its site."""
         take_scans = None if self.search is None else partial(take, self.search, row.id, self.changed.set)
-        self.journal = Journal(database, row.id, self.gate, counts, self.broadcaster, self._take_soundings, take_scans)
-        self.journal.on_trouble = self.publish_summary
+        self.journal = Journal(
+            database,
+            row.id,
+            self.gate,
+            counts,
+            self.broadcaster,
+            self._take_soundings,
+            self.publish_summary,
+            take_scans,
+        )
         self.whole = SoundingStore(database, row.id, self.builder, self.journal)
         """All its soundings, and its map as it is stored."""
         self.ranges = RangeJournal(database, row.id, Tracking(spec, self.frame), self.journal, time_scale)
         """Ranges to moving targets, and what they tell."""
-        self.intake: Grouped[Any, Any] | None = None
-        """Batches of measurements that wait to be stored together."""
-        self.keys_looked_at_s = -math.inf
-        """When old idempotency keys were last forgotten, by the loop's clock."""
         self.correcting = asyncio.Lock()
         """Held while corrections change, one after the other."""
         self.halted = False
@@ -150,8 +156,16 @@ class LiveMission:
         self.telling = LiveFeed(self.broadcaster, self.vehicles.all, targets, self.search_progress)
         self._time_scale = time_scale
         self._executor = executor
+        self._parts: dict[Callable[[LiveMission], Any], Any] = {}
         self.notice_imports = Shared(self._notice_imports)
         """Take up the soundings of logs that the command line imported while this process had the mission."""
+
+    def part(self, kind: Callable[["LiveMission"], Part]) -> Part:
+        """Return the mission's own object of a class, made of the mission when it is first asked for."""
+        if kind not in self._parts:
+            self._parts[kind] = kind(self)
+        found: Part = self._parts[kind]
+        return found
 
     def make_gate(self) -> Gate:
         """Return a gate with the mission's corrections, which has seen no sounding yet."""
@@ -169,12 +183,45 @@ class LiveMission:
         async def read() -> Counts:
             async with self.database.reading() as session:
                 counted = await sounding_queries.counts(session, self.id)
-            self.whole.changed()
-            self.whole.imports_noticed = newest
+            self.whole.changed(newest_import=newest)
             return Counts(counted.get("accepted", 0), counted.get("rejected", 0))
 
         await self.journal.count_again(read)
         self.publish_summary()
+
+    @property
+    def running(self) -> bool:
+        """Whether its step loop goes on in this process."""
+        return self.running_since_s is not None
+
+    def set_off(self) -> None:
+        """Let the step loop begin: it engages every vehicle anew."""
+        self.header.state = MissionState.RUNNING
+        self.halted = False
+        for member in self.team:
+            member.engaged = False
+            member.refusal = ""
+
+    def enter(self, state: MissionState, reason: str, changed_at: datetime | None = None) -> None:
+        """Be in a state from now on; ``changed_at``: since when, once that is committed."""
+        self.header.state, self.header.reason = state, reason
+        if changed_at is not None:
+            self.header.updated_at = changed_at
+        self.changed.set()
+        self.publish_summary()
+
+    def recorrect(self, spec: MissionSpec, corrections: Corrections, counts: Counts) -> None:
+        """Correct soundings anew, as the database has them now; the caller holds the journal's ``writing``."""
+        self.spec = spec
+        self.gate.corrections = corrections
+        self.recount(counts)
+        self.journal.tell_of_missing_level()
+        self.revision += 1
+
+    def recount(self, counts: Counts) -> None:
+        """Note that stored soundings changed, of which there are so many now."""
+        self.journal.counts = counts
+        self.whole.changed()
 
     def halt(self) -> None:
         """Keep the step loop from sending anything more, and wake everyone who waits for a waypoint."""

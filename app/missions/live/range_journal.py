@@ -4,26 +4,22 @@ A range counts once it is committed, like a sounding. What vehicles post may hav
 taken at their word that their clock shows Unix seconds. Others are those of :mod:`app.missions.live.vehicle_times`.
 """
 
-import asyncio
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
-import structlog
 from sqlalchemy.ext.asyncio import AsyncSession
 
 from app.missions.clock import now
-from app.missions.errors import MissionElsewhereError
 from app.missions.fleet.interface import Position, RangeReport
-from app.missions.live.db_retry import RETRY_S
 from app.missions.live.journal import Journal
 from app.missions.live.vehicle_times import VehicleTimes
+from app.missions.live.write_behind import Committed, WriteBehind
 from app.missions.targets.filters import Arrived, Judged, Tracking
 from app.missions.views.mission import Level
 from app.missions.views.soundings import ItemVerdict, Verdict
 from app.storage import target_ranges as range_queries
 from app.storage.database import Database
 from app.storage.models import StepRow
-from app.storage.uncancellable import to_the_end
 
 GATHER_S = 0.3
 """How long ranges are gathered before they are judged: those of several vehicles come in any order."""
@@ -31,12 +27,8 @@ GATHER_S = 0.3
 AHEAD_S = 60.0
 """A range that is newer than its vehicle's newest report by more than this has a wrong time."""
 
-log = structlog.get_logger(__name__)
 
-Committed = Callable[[], None]
-
-
-class RangeJournal:
+class RangeJournal(WriteBehind[Arrived]):
     """Takes one mission's ranges in.
 
     Parameters
@@ -52,20 +44,14 @@ class RangeJournal:
     def __init__(
         self, database: Database, mission_id: str, tracking: Tracking, journal: Journal, time_scale: float
     ) -> None:
+        super().__init__(database, mission_id, journal.storage, GATHER_S)
         self.tracking = tracking
         self.times = VehicleTimes(time_scale, lambda: now().timestamp())
         self.last_id = 0
         """Of the stored ranges the last one that the filters know."""
-        self._database = database
-        self._mission_id = mission_id
         self._journal = journal
         self._time_scale = time_scale
-        self._noted: list[Arrived] = []
         self._strangers: set[str] = set()
-        self._telling: set[asyncio.Task[Any]] = set()
-        self._pump: asyncio.Task[None] | None = None
-        self.writing = asyncio.Lock()
-        """Held while ranges are judged and stored, so that filters and database agree."""
 
     async def load(self, session: AsyncSession, step: StepRow | None) -> None:
         """Take the filters up where they were: as the last step kept them, and what came after it."""
@@ -106,8 +92,7 @@ class RangeJournal:
             return
         if not too_new(report, newest_s):
             self.times.heard(report.vehicle, report.time_s if newest_s is None else newest_s)
-            self._noted.append(Arrived(report, self.times.of(report.vehicle, report.time_s)))
-            self._start_pump()
+            self._note(Arrived(report, self.times.of(report.vehicle, report.time_s)))
 
     def posted(self, report: RangeReport, newest_s: float) -> Arrived:
         """Return a range that a vehicle posted with its time; ``newest_s``: of its batch, by the vehicle's clock."""
@@ -149,60 +134,15 @@ class RangeJournal:
 
         return [_item(verdicts.get(i)) for i in range(len(arrived))], committed
 
-    async def flush(self) -> None:
-        """Judge and write everything noted so far. What could not be written stays noted."""
-        if self._noted:
-            await to_the_end(self._flush())
-
-    async def _flush(self) -> None:
-        async with self.writing:
-            noted, self._noted = self._noted, []
-            try:
-                async with self._database.writing() as session:
-                    _, committed = await self.take(noted, session)
-            except BaseException:
-                self._noted[:0] = noted
-                raise
-            committed()
-
-    def abandon(self) -> None:
-        """Forget what is left: the mission is another process's."""
-        self._noted.clear()
-
-    async def close(self) -> None:
-        """Write what is left and stop."""
-        if self._pump is not None:
-            self._pump.cancel()
-            await asyncio.gather(self._pump, return_exceptions=True)
-        try:
-            await self.flush()
-        except Exception as error:
-            self._journal.storage.note(error)
-            log.error("ranges are lost, they could not be written", mission=self._mission_id, ranges=len(self._noted))
-
-    def _start_pump(self) -> None:
-        if self._pump is None or self._pump.done():
-            self._pump = asyncio.create_task(self._flush_soon())
-
-    async def _flush_soon(self) -> None:
-        while self._noted:
-            await asyncio.sleep(GATHER_S)
-            try:
-                await self._journal.storage.done(self.flush)
-            except MissionElsewhereError:
-                return  # nothing more is ours to write
-            except Exception:
-                log.exception("could not write ranges to the database, trying again", mission=self._mission_id)
-                await asyncio.sleep(RETRY_S)
+    async def _store(self, noted: Sequence[Arrived], session: AsyncSession) -> Committed:
+        return (await self.take(noted, session))[1]
 
     def _tell_once(self, report: RangeReport, stranger: str) -> None:
         if report.target in self._strangers or not self.tracking:
             return
         self._strangers.add(report.target)
         message = f"{report.vehicle} ranged to something that nobody asked about: {stranger}"
-        told = self._journal.log(Level.WARNING, "target", message, vehicle=report.vehicle)
-        self._telling.add(task := asyncio.create_task(told))
-        task.add_done_callback(self._telling.discard)
+        self._journal.note_line(self._journal.line(Level.WARNING, "target", message, vehicle=report.vehicle))
 
     def _identity(self, report: RangeReport) -> range_queries.Identity:
         return self.tracking.name_of(report.target) or "", report.vehicle, report.time_s

@@ -49,11 +49,13 @@ class SoundingStore:
         self.imports_noticed = 0
         """The newest log line of an import whose soundings are counted."""
 
-    async def show(self, stored: Stored, *, imported: bool, ended: bool) -> None:
+    async def show(self, stored: Stored, newest_import: int, *, imported: bool, ended: bool) -> None:
         """Begin with the stored map, if there is one; the soundings stay at rest when nothing is missing in it.
 
+        ``newest_import``: the log's line of the newest import that is counted.
         ``imported``: the mission has soundings from elsewhere. The map of a mission that ``ended`` is a thorough one.
         """
+        self.imports_noticed = newest_import
         row = stored.row
         if row is not None:
             try:
@@ -74,11 +76,13 @@ class SoundingStore:
         """Return the step that a map is of: a stored one is of its own, every other of the present one."""
         return self._shown_step if built is self._shown else step
 
-    def changed(self) -> None:
+    def changed(self, newest_import: int | None = None) -> None:
         """Read all soundings again before the next map: those in the database are not those in memory any more.
 
+        ``newest_import``: the log's line of the newest import that is counted, if that changed.
         The caller holds the journal's ``writing``, or nothing was counted since the change was committed.
         """
+        self.imports_noticed = newest_import if newest_import is not None else self.imports_noticed
         self._builder.arrivals.expect()
 
     async def complete(self) -> None:

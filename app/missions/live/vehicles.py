@@ -7,10 +7,9 @@ from app.mapping.georeference import LocalFrame
 from app.missions.clock import now
 from app.missions.fleet.hub import FleetHub
 from app.missions.fleet.interface import LinkState, Position, VehicleInfo
-from app.missions.live.position_quality import position_quality
-from app.missions.spec.mission import MissionSpec, VehicleKind
+from app.missions.spec.mission import MissionSpec, SurfacePolicy
 from app.missions.team import Member, Team
-from app.missions.views.mission import VehicleView
+from app.missions.views.mission import PositionQuality, VehicleView
 
 
 class VehicleViews:
@@ -89,7 +88,7 @@ class VehicleViews:
                 "speed_mps": rounded(report.speed_mps, 3),
                 "battery_pct": rounded(report.battery_pct, 2),
                 "position_sd_m": rounded(report.position_sd_m, 3),
-                "localization": position_quality(report.position_sd_m, self._spec.surface_policy),
+                "localization": _position_quality(report.position_sd_m, self._spec.surface_policy),
             }
         )
 
@@ -101,8 +100,19 @@ class VehicleViews:
         return known[1]
 
 
+def _position_quality(sd_m: float | None, policy: SurfacePolicy | None) -> PositionQuality:
+    """Return how good a position of this deviation is by the mission's policy."""
+    if sd_m is None:
+        return PositionQuality.UNTOLD
+    if policy is None:
+        return PositionQuality.STATED
+    if sd_m <= policy.until_sd_m:
+        return PositionQuality.GOOD
+    return PositionQuality.FADING if sd_m <= policy.max_position_sd_m else PositionQuality.POOR
+
+
 def _reason(member: Member, info: VehicleInfo) -> str:
-    launched = member.spec.kind is VehicleKind.SIM and info.state is LinkState.UNKNOWN and member.report is not None
+    launched = member.capabilities.simulated and info.state is LinkState.UNKNOWN and member.report is not None
     # Nothing is to be done about a simulated vehicle that was put away with its mission.
     return member.refusal or ("" if launched else info.reason)
 

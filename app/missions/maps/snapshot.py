@@ -1,21 +1,22 @@
-"""A mission's map as it leaves the service: where it lies, what its depths mean, and its JSON."""
+"""A mission's map as it leaves the service: where it lies, what its depths mean, how good it is, and its JSON."""
 
 from collections.abc import Collection
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
 
 from app.arrays import FloatArray
+from app.mapping.compare import difference
 from app.mapping.georeference import LocalFrame
 from app.mapping.layers import Layer, LayerSource
 from app.mapping.products.overlay import overlay_corners
-from app.mapping.s44 import Order
+from app.mapping.s44 import Order, conformity
 from app.mapping.vertical import VerticalDatum
 from app.missions.maps.builder import BuiltMap
 from app.missions.maps.live_grid import LiveCells, LiveGrid
 from app.missions.spec.mission import MissionSpec
-from app.missions.views.map import MapView
+from app.missions.views.map import ConformityView, DifferenceView, MapView, QualityView
 from imc_bridge.printable import printable
 
 NOT_MADE = 0
@@ -125,3 +126,30 @@ def _nullable(layer: FloatArray) -> list[list[float | None]]:
     rounded = np.round(layer, 3).astype(object)
     rounded[~np.isfinite(layer)] = None
     return rounded.tolist()  # type: ignore[no-any-return]
+
+
+def quality_of(snapshot: MapSnapshot) -> QualityView:
+    """Return every order's share of cells; ``difference`` is null without a reference grid that the map meets."""
+    bathymetry = snapshot.built.map
+    common_sd_m = snapshot.facts.common_sd_m
+    found = [
+        conformity(bathymetry.depth_m, bathymetry.sd_m, bathymetry.sounded, order, common_sd_m=common_sd_m)
+        for order in Order
+    ]
+    return QualityView(
+        version=snapshot.version,
+        vertical_datum=snapshot.facts.vertical_datum.statement,
+        common_sd_m=common_sd_m,
+        tvu=[ConformityView(**asdict(one)) for one in found],
+        difference=_difference(snapshot),
+    )
+
+
+def _difference(snapshot: MapSnapshot) -> DifferenceView | None:
+    if snapshot.reference_m is None:
+        return None
+    try:
+        found = difference(snapshot.built.map.depth_m, snapshot.reference_m)
+    except ValueError:
+        return None
+    return DifferenceView(**asdict(found))

@@ -1,15 +1,23 @@
-"""What a mission did, step by step, for replay and charts."""
+"""What a mission did: its steps, its log, and what its vehicles told and measured; where it is long, page by page."""
 
-from app.missions.errors import MapNotReadyError
+from collections.abc import Sequence
+
+from app.missions.errors import TargetNotFoundError
+from app.missions.live.journal import event_view
 from app.missions.live.mission import LiveMission
-from app.missions.live.sounding_store import accepted
-from app.missions.maps.builder import BuiltMap
-from app.missions.maps.snapshot import MapSnapshot
-from app.missions.views.mission import StepView, WaypointView
+from app.missions.views.mission import EventView, Level, StepView, WaypointView
+from app.missions.views.soundings import Verdict
+from app.missions.views.targets import TargetRangePage, TargetRangeView
+from app.missions.views.telemetry import TelemetryView, telemetry_view
+from app.storage import events as event_queries
 from app.storage import missions as mission_queries
+from app.storage import soundings as sounding_queries
+from app.storage import target_ranges as range_queries
+from app.storage import telemetry as telemetry_queries
+from app.storage.models import SoundingRow
 
 
-async def steps_after(live: LiveMission, after: int, limit: int) -> list[StepView]:
+async def steps_after(live: LiveMission, after: int = 0, limit: int = 1000) -> list[StepView]:
     """Return up to ``limit`` steps with a number above ``after``, each with its waypoints as they ended."""
     async with live.database.reading() as session:
         steps = await mission_queries.steps_after(session, live.id, after, limit)
@@ -33,19 +41,62 @@ async def steps_after(live: LiveMission, after: int, limit: int) -> list[StepVie
     ]
 
 
-async def map_at_step(live: LiveMission, step: int) -> MapSnapshot:
-    """Return the map that the soundings until the end of a step make. Raises MapNotReadyError without any."""
-    if live.builder.newest is None or live.builder.stale or live.builder.arrivals.at_rest:
-        await live.build_map()
-    found = await accepted(live.database, live.id, 0, until_step=step)
-    newest = live.builder.newest
-    if newest is None:
-        raise MapNotReadyError("no sounding was accepted, so there is no map", "choose a later step")
-    try:
-        bathymetry = await live.in_thread(live.builder.as_of, found.table)
-    except ValueError:
-        raise MapNotReadyError(
-            f"no sounding was accepted until the end of step {step}", "choose a later step"
-        ) from None
-    built = BuiltMap(newest.version, len(found.table), bathymetry, newest.digest)
-    return MapSnapshot(live.facts, built, step, live.reference_m, live.revision)
+async def events_after(live: LiveMission, after: int = 0, limit: int = 1000) -> list[EventView]:
+    """Return up to ``limit`` lines of the log with an id above ``after``, oldest first."""
+    async with live.database.reading() as session:
+        rows = await event_queries.events_after(session, live.id, after, limit)
+    return [event_view(row) for row in rows]
+
+
+async def write_note(live: LiveMission, text: str, actor: str) -> EventView:
+    """Keep an operator's words in the log."""
+    row = live.journal.line(Level.INFO, "note", text, actor=actor)
+    await live.journal.write(row)
+    return event_view(row)
+
+
+async def telemetry_of(live: LiveMission, points: int) -> TelemetryView:
+    """Return what the vehicles told of themselves, at about ``points`` moments at most."""
+    await live.journal.flush()
+    async with live.database.reading() as session:
+        rows = await telemetry_queries.samples(session, live.id, points)
+    return telemetry_view(rows)
+
+
+async def soundings_of(live: LiveMission) -> Sequence[SoundingRow]:
+    """Return every sounding, rejected ones included, in the order they came."""
+    await live.journal.flush()
+    async with live.database.reading() as session:
+        return await sounding_queries.all_soundings(session, live.id)
+
+
+async def target_ranges_page(
+    live: LiveMission, target: str | None = None, after: int = 0, limit: int = 200
+) -> TargetRangePage:
+    """Return a page of the ranges. Raises TargetNotFoundError for a target that the mission does not have."""
+    names = list(live.ranges.tracking.specs)
+    if target is not None and target not in names:
+        there = ", ".join(names) or "it has none"
+        raise TargetNotFoundError(f"{target!r} is not a target of this mission", f"Those that are: {there}")
+    await live.ranges.flush()
+    async with live.database.reading() as session:
+        rows = await range_queries.ranges_after(session, live.id, after, limit + 1, target)
+    items = [
+        TargetRangeView(
+            id=row.id,
+            target=row.target,
+            vehicle=row.vehicle,
+            time_s=row.time_s,
+            received_at=row.received_at,
+            step=row.step,
+            source=row.source,
+            range_m=row.range_m,
+            lat_deg=row.lat_deg,
+            lon_deg=row.lon_deg,
+            depth_m=row.depth_m,
+            used=row.verdict == Verdict.ACCEPTED,
+            reason=row.reason,
+        )
+        for row in rows[:limit]
+    ]
+    return TargetRangePage(items=items, next_after=items[-1].id if len(rows) > limit else None)

@@ -2,7 +2,6 @@
 
 import asyncio
 import uuid
-from concurrent.futures import Executor
 from typing import Any
 
 import numpy as np
@@ -20,6 +19,7 @@ from app.missions.errors import ConflictError, ImportNotFoundError, InvalidReque
 from app.missions.live.mission import LiveMission
 from app.missions.operations.reading import Reader
 from app.missions.operations.uploads import Upload
+from app.missions.running.final_maps import FinalMaps
 from app.missions.states import ENDED
 from app.missions.views.imports import ImportOptions, ImportView, ReferenceView
 from app.missions.views.mission import Level
@@ -47,13 +47,13 @@ class Imports:
     ----------
     reader
         Reads them.
-    executor
-        Where what takes long is computed.
+    maps
+        Shows at once what was imported; while a mission runs its next step does.
     """
 
-    def __init__(self, reader: Reader, executor: Executor) -> None:
+    def __init__(self, reader: Reader, maps: FinalMaps) -> None:
         self._reader = reader
-        self._executor = executor
+        self._maps = maps
         # Held while something is stored or taken away, not while a file is read.
         self._storing = asyncio.Lock()
 
@@ -79,8 +79,7 @@ class Imports:
             if known is not None:
                 return known
             found = await self._reader.read(upload, kind, "soundings", _place(live), _read_options(options))
-            loop = asyncio.get_running_loop()
-            kept, merged = await loop.run_in_executor(self._executor, _kept, live, found.values)
+            kept, merged = await live.in_thread(_kept, live, found.values)
             if not len(kept):
                 wrong = "none of its depths lies near the mission's area"
                 raise InvalidRequestError("file", wrong, "check file and crs")
@@ -122,11 +121,17 @@ class Imports:
                 live.builder.arrivals.replace_prior(prior)
         live.changed.set()
         live.publish_summary()
+        self._show(live)
         return view
+
+    def _show(self, live: LiveMission) -> None:
+        if not live.running:
+            self._maps.take_up(live)
 
     async def delete(self, live: LiveMission, import_id: str, actor: str) -> None:
         """Take an import back. Raises ImportNotFoundError."""
         filename = await to_the_end(self._take_away(live, import_id))
+        self._show(live)
         await live.journal.log(Level.INFO, "import", f"import of {filename} taken back by {actor}", actor=actor)
 
     async def _take_away(self, live: LiveMission, import_id: str) -> str:

@@ -68,6 +68,26 @@ class Tally:
         self.last_s = time_s if self.last_s is None else max(self.last_s, time_s)
 
 
+async def import_log(
+    live: LiveMission,
+    settings: ServiceSettings,
+    path: Path,
+    *,
+    vehicle: str | None = None,
+    actor: str,
+    progress: Progress | None = None,
+) -> LogImportView:
+    """Take in a vehicle's own log; importing it again, also after a crash, stores nothing twice.
+
+    Raises
+    ------
+    InvalidRequestError
+        When the file is no log of a vehicle, or does not tell which one's.
+    """
+    work = await asyncio.to_thread(LogImport, live, settings, path, vehicle)
+    return await work.run(actor=actor, progress=progress)
+
+
 class LogImport:
     """The import of one log into one mission.
 

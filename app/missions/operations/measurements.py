@@ -14,13 +14,10 @@ from sqlalchemy.ext.asyncio import AsyncSession
 from app.mapping.georeference import LocalFrame
 from app.missions.clock import now
 from app.missions.errors import ConflictError, InvalidRequestError
-from app.missions.fleet.hub import FleetHub
 from app.missions.fleet.interface import BeamGeometry, Position, RangeReport, SoundingReport, VehicleReport
-from app.missions.fleet.links.rest import RestFleetLink
 from app.missions.large_batches import each_of, made_of
 from app.missions.live.mission import LiveMission
 from app.missions.soundings.measurement import Measurement
-from app.missions.spec.mission import VehicleKind
 from app.missions.states import MissionState
 from app.missions.targets.filters import Arrived
 from app.missions.views.soundings import BatchVerdict, ItemVerdict, Verdict, batch_verdict
@@ -42,8 +39,6 @@ _Answer = tuple[str, BatchVerdict]
 
 async def measure(
     live: LiveMission,
-    hub: FleetHub,
-    rest: RestFleetLink,
     items: Sequence[Measurement],
     *,
     idempotency_key: str | None = None,
@@ -66,10 +61,7 @@ async def measure(
     ranges = _ranges(live, items, strangers)
     key = _Key.of(sender, idempotency_key) if idempotency_key is not None else None
     batch = _Batch(items, key, digest, strangers, reports, ranges)
-    if live.intake is None:
-        live.intake = Grouped(partial(_take, live, hub, rest), lambda batch: bool(batch.ranges))
-    answer: BatchVerdict = await live.intake(batch)
-    return answer
+    return await live.part(_Intake).group(batch)
 
 
 def _looked_through(
@@ -116,31 +108,45 @@ class _Batch:
         return [item for i, item in enumerate(self.items) if not self.strangers[i]]
 
 
-async def _take(
-    live: LiveMission, hub: FleetHub, rest: RestFleetLink, batches: Sequence[_Batch]
-) -> list[BatchVerdict | Exception]:
-    """Store batches in one transaction: many vehicles that post at the same time wait for the disk once."""
-    keys = {name for batch in batches if batch.key for name in (batch.key.stored, batch.key.before) if name}
-    async with live.journal.writing, live.ranges.writing, live.database.writing() as session:
-        rows = await sounding_queries.answers_to(session, live.id, keys)
-        known = _answers(batches, {row.key: (row.digest, BatchVerdict.model_validate(row.answer)) for row in rows})
-        fresh = _first_of_each(batches, known)
-        stored, committed = await _store(live, [batches[i] for i in fresh], session)
-        await _forget_old_keys(live, session)
-    for work in committed:
-        work()
-    answers = dict(zip(fresh, stored, strict=True))
-    known |= {key.stored: (batches[i].digest, answers[i]) for i in fresh if (key := batches[i].key) is not None}
-    results: list[BatchVerdict | Exception] = [
-        answers.get(i) or _again(batch, known) for i, batch in enumerate(batches)
-    ]
-    for batch, result in zip(batches, results, strict=True):
-        if isinstance(result, BatchVerdict):
-            # The first answer may have got lost together with the process that knew where the vehicle is.
-            await _hear(hub, rest, batch.known, only_unknown=result.replayed)
-    # Where the vehicle is, and whether it arrived, is on disk as well before it is answered.
-    await live.journal.flush()
-    return results
+class _Intake:
+    """One mission's batches on their way to the disk."""
+
+    def __init__(self, live: LiveMission) -> None:
+        self._live = live
+        self._keys_looked_at_s = -math.inf
+        self.group: Grouped[_Batch, BatchVerdict] = Grouped(self._take, lambda batch: bool(batch.ranges))
+
+    async def _take(self, batches: Sequence[_Batch]) -> list[BatchVerdict | Exception]:
+        """Store batches in one transaction: many vehicles that post at the same time wait for the disk once."""
+        live = self._live
+        keys = {name for batch in batches if batch.key for name in (batch.key.stored, batch.key.before) if name}
+        async with live.journal.writing, live.ranges.writing, live.database.writing() as session:
+            rows = await sounding_queries.answers_to(session, live.id, keys)
+            known = _answers(batches, {row.key: (row.digest, BatchVerdict.model_validate(row.answer)) for row in rows})
+            fresh = _first_of_each(batches, known)
+            stored, committed = await _store(live, [batches[i] for i in fresh], session)
+            await self._forget_old_keys(session)
+        for work in committed:
+            work()
+        answers = dict(zip(fresh, stored, strict=True))
+        known |= {key.stored: (batches[i].digest, answers[i]) for i in fresh if (key := batches[i].key) is not None}
+        results: list[BatchVerdict | Exception] = [
+            answers.get(i) or _again(batch, known) for i, batch in enumerate(batches)
+        ]
+        for batch, result in zip(batches, results, strict=True):
+            if isinstance(result, BatchVerdict):
+                # The first answer may have got lost together with the process that knew where the vehicle is.
+                await _hear(live, batch.known, only_unknown=result.replayed)
+        # Where the vehicle is, and whether it arrived, is on disk as well before it is answered.
+        await live.journal.flush()
+        return results
+
+    async def _forget_old_keys(self, session: AsyncSession) -> None:
+        """Once an hour forget keys that nobody sends again; a sounding is known without them, too."""
+        moment = asyncio.get_running_loop().time()
+        if moment - self._keys_looked_at_s >= LOOK_AT_KEYS_S:
+            self._keys_looked_at_s = moment
+            await sounding_queries.forget_answers(session, self._live.id, now() - KEYS_KEPT, LOG_KEY)
 
 
 def _answers(batches: Sequence[_Batch], rows: Mapping[str, _Answer]) -> dict[str, _Answer]:
@@ -184,14 +190,6 @@ def _again(batch: _Batch, known: Mapping[str, _Answer]) -> BatchVerdict | Confli
     )
 
 
-async def _forget_old_keys(live: LiveMission, session: AsyncSession) -> None:
-    """Once an hour forget keys that nobody sends again; a sounding is known without them, too."""
-    moment = asyncio.get_running_loop().time()
-    if moment - live.keys_looked_at_s >= LOOK_AT_KEYS_S:
-        live.keys_looked_at_s = moment
-        await sounding_queries.forget_answers(session, live.id, now() - KEYS_KEPT, LOG_KEY)
-
-
 async def _store(
     live: LiveMission, batches: Sequence[_Batch], session: AsyncSession
 ) -> tuple[list[BatchVerdict], list[Callable[[], None]]]:
@@ -222,24 +220,27 @@ async def _store(
     return answers, then
 
 
-async def _hear(
-    hub: FleetHub, rest: RestFleetLink, items: Sequence[Measurement], *, only_unknown: bool = False
-) -> None:
-    """Tell the link where vehicles are; ``only_unknown``: of those only whose place it does not know."""
-    known: set[str] = set()
-    if only_unknown:
-        names = {item.vehicle for item in items}
-        known = {name for name in names if hub.info((VehicleKind.REST, name)).report is not None}
-    fresh = [item for item in items if item.vehicle not in known]
-    await each_of(fresh, lambda item: rest.heard(_vehicle_report(item)))
+async def _hear(live: LiveMission, items: Sequence[Measurement], *, only_unknown: bool = False) -> None:
+    """Tell the links where vehicles are; ``only_unknown``: of those only whose place they do not know."""
+    links = {}
+    for name in {item.vehicle for item in items}:
+        # One that left meanwhile was still heard.
+        member = live.team.get(name) or live.team.left[name]
+        link = live.hub.polled.get(member.spec.kind)
+        if link is not None and not (only_unknown and live.hub.info(member.key).report is not None):
+            links[name] = link
+    fresh = [item for item in items if item.vehicle in links]
+    await each_of(fresh, lambda item: links[item.vehicle].heard(_vehicle_report(item)))
 
 
 def _stranger(live: LiveMission, item: Measurement, *, near: bool) -> str:
     member = live.team.get(item.vehicle)
     if member is None:
         return f"vehicle: {item.vehicle!r} takes no part in this mission"
-    if member.spec.kind is not VehicleKind.REST:
-        return f"vehicle: {item.vehicle!r} is of kind {member.spec.kind}; only vehicles of kind rest post measurements"
+    if member.spec.kind not in live.hub.polled:
+        polled = " or ".join(live.hub.polled)
+        words = f"is of kind {member.spec.kind}; only vehicles of kind {polled} post measurements"
+        return f"vehicle: {item.vehicle!r} {words}"
     return ("" if near else _impossible_place(item, live.frame)) or _useless_range(item, live)
 
 

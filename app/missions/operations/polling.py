@@ -5,15 +5,13 @@ from collections.abc import Callable
 
 from app.missions.errors import ConflictError, VehicleNotFoundError
 from app.missions.fleet.interface import WaypointStatus
-from app.missions.fleet.links.rest import RestFleetLink
 from app.missions.live.mission import LiveMission
-from app.missions.spec.mission import VehicleKind
 from app.missions.states import MissionState
 from app.missions.views.mission import WaypointView
 
 
 async def waypoint(
-    live: LiveMission, rest: RestFleetLink, vehicle: str, *, after_step: int | None = None, timeout_s: float = 0.0
+    live: LiveMission, vehicle: str, *, after_step: int | None = None, timeout_s: float = 0.0
 ) -> WaypointView | None:
     """Return a vehicle's waypoint when it is newer than ``after_step``, waiting for it; None when none came.
 
@@ -21,11 +19,12 @@ async def waypoint(
     """
     member = live.team.get(vehicle)
     if member is None:
-        rest.told_to_stop(vehicle, live.id)
+        for polled in live.hub.polled.values():
+            polled.told_to_stop(vehicle, live.id)
         raise VehicleNotFoundError(
             f"vehicle {vehicle!r} takes no part in this mission", "stop; nothing more comes from here for it"
         )
-    polls = member.spec.kind is VehicleKind.REST
+    link = live.hub.polled.get(member.spec.kind)
     after = -1 if after_step is None else after_step
 
     def newer() -> WaypointView | None:
@@ -42,18 +41,18 @@ async def waypoint(
     def settled() -> bool:
         return newer() is not None or must_stop()
 
-    if polls:
-        rest.has_waypoint(vehicle, after)
+    if link is not None:
+        link.has_waypoint(vehicle, after)
     await _wait_watching(live, settled, timeout_s)
     if must_stop():
-        if polls:
-            rest.told_to_stop(vehicle, live.id)
+        if link is not None:
+            link.told_to_stop(vehicle, live.id)
         state = live.header.state if live.team.get(vehicle) is not None else "without this vehicle"
         state = "ending" if state is MissionState.RUNNING else state
         raise ConflictError(f"the mission is {state}: stop and hold", "ask again after it was started or resumed")
     found = newer()
-    if found is not None and polls:
-        rest.has_waypoint(vehicle, found.step)
+    if found is not None and link is not None:
+        link.has_waypoint(vehicle, found.step)
         return live.waypoints.of(vehicle)
     return found
 

@@ -1,8 +1,6 @@
 """Changing a mission's corrections: every stored sounding is corrected anew from its raw values."""
 
-import asyncio
 from collections.abc import Sequence
-from concurrent.futures import Executor
 from functools import partial
 from typing import Any
 
@@ -42,19 +40,17 @@ def corrections_view(live: LiveMission) -> CorrectionsView:
     )
 
 
-async def set_tide(live: LiveMission, executor: Executor, tide: TideCorrection, actor: str) -> None:
+async def set_tide(live: LiveMission, tide: TideCorrection, actor: str) -> CorrectionsView:
     """Change level, datum and table, or nothing when the table cannot be read (InvalidRequestError)."""
     table: TideTable | None = None
     row: TideTableRow | None = None
     if tide.table is not None:
-        parse = partial(parse_tid, tide.table, name=tide.table_name)
         try:
-            table = await asyncio.get_running_loop().run_in_executor(executor, parse)
+            table = await live.in_thread(partial(parse_tid, tide.table, name=tide.table_name))
         except TideTableError as error:
             raise InvalidRequestError("table", str(error), "correct that line and send the whole table again") from None
         row = TideTableRow(mission_id=live.id, name=table.name, text=tide.table)
     plain = Tide.model_validate(tide.model_dump(exclude={"table", "table_name"}))
-    spec = live.spec.model_copy(update={"tide": plain})
 
     async def store(session: AsyncSession) -> None:
         known = await session.get(TideTableRow, live.id)
@@ -64,21 +60,25 @@ async def set_tide(live: LiveMission, executor: Executor, tide: TideCorrection, 
         if row is not None:
             session.add(row)
 
-    await _recorrect(live, executor, spec, table, store)
+    async with live.correcting:
+        await _recorrect(live, live.spec.model_copy(update={"tide": plain}), table, store)
     what = f"tide table {table.name}" if table is not None else f"a constant level of {plain.level_m:+.2f} m"
     await live.journal.log(Level.INFO, "corrections", f"tide corrected by {what}, set by {actor}", actor=actor)
+    return corrections_view(live)
 
 
-async def set_sound_speed(live: LiveMission, executor: Executor, sound_speed: SoundSpeed | None, actor: str) -> None:
+async def set_sound_speed(live: LiveMission, sound_speed: SoundSpeed | None, actor: str) -> CorrectionsView:
     """Change the sound speed profile; None: the sonars' own ranges are taken."""
 
     async def store(_session: AsyncSession) -> None:
         pass
 
-    spec = live.spec.model_copy(update={"sound_speed": sound_speed})
-    await _recorrect(live, executor, spec, live.gate.corrections.table, store)
+    async with live.correcting:
+        spec = live.spec.model_copy(update={"sound_speed": sound_speed})
+        await _recorrect(live, spec, live.gate.corrections.table, store)
     words = "sound speed is not corrected" if sound_speed is None else f"sound speed: {sound_speed.source or 'profile'}"
     await live.journal.log(Level.INFO, "corrections", f"{words}, set by {actor}", actor=actor)
+    return corrections_view(live)
 
 
 def check_level_is_known(live: LiveMission) -> None:
@@ -89,17 +89,14 @@ def check_level_is_known(live: LiveMission) -> None:
         raise ConflictError(why, "send a table that covers today, or a constant level: PUT /api/v1/missions/{id}/tide")
 
 
-async def _recorrect(
-    live: LiveMission, executor: Executor, spec: MissionSpec, table: TideTable | None, store: Any
-) -> None:
+async def _recorrect(live: LiveMission, spec: MissionSpec, table: TideTable | None, store: Any) -> None:
     corrections = Corrections(live.frame, spec.tide, table=table, sound_speed=spec.sound_speed)
-    loop = asyncio.get_running_loop()
     async with live.journal.writing:
         # Nothing else changes soundings meanwhile. Computing may have to wait for a thread, and the database's turn is
         # for all missions, whose stops are written, too.
         async with live.database.reading() as session:
             rows = await sounding_queries.all_soundings(session, live.id)
-        changes = await loop.run_in_executor(executor, recorrected, rows, corrections, live.gate)
+        changes = await live.in_thread(recorrected, rows, corrections, live.gate)
         async with live.database.writing() as session:
             if changes:
                 await session.execute(update(SoundingRow), changes)
@@ -110,12 +107,7 @@ async def _recorrect(
             await stored_maps.forget(session, live.id)
             counted = await sounding_queries.counts(session, live.id)
         # Committed: from here on nothing waits until all of it holds.
-        live.spec = spec
-        live.gate.corrections = corrections
-        live.journal.counts = Counts(counted.get("accepted", 0), counted.get("rejected", 0))
-        live.whole.changed()
-        live.journal.told_of_missing_level = False
-        live.revision += 1
+        live.recorrect(spec, corrections, Counts(counted.get("accepted", 0), counted.get("rejected", 0)))
     live.changed.set()
     live.publish_summary()
 

@@ -22,7 +22,12 @@ Doubts = dict[int, str]
 
 
 async def soundings_page(
-    live: LiveMission, states: Sequence[SoundingState], vehicle: str | None, after: int, limit: int
+    live: LiveMission,
+    states: Sequence[SoundingState],
+    *,
+    vehicle: str | None = None,
+    after: int = 0,
+    limit: int = 200,
 ) -> SoundingPage:
     """Return up to ``limit`` soundings in any of the states with an id above ``after``, in the order they came."""
     await live.journal.flush()
@@ -41,7 +46,7 @@ async def soundings_page(
     )
 
 
-async def rule(live: LiveMission, sounding_id: int, ruling: Ruling, note: str, actor: str) -> SoundingView:
+async def rule(live: LiveMission, sounding_id: int, ruling: Ruling, *, note: str = "", actor: str) -> SoundingView:
     """Restore a sounding or reject it; the map is that of the new choice when this returns. Raw values stay.
 
     Raises
@@ -92,8 +97,7 @@ async def _store(live: LiveMission, sounding_id: int, ruling: Ruling, note: str,
         await stored_maps.forget(session, live.id)
     # To count all of them again takes seconds where there are millions.
     counts, more = live.journal.counts, int(row.verdict == Verdict.ACCEPTED) - int(was_accepted)
-    live.journal.counts = Counts(counts.accepted + more, counts.rejected - more)
-    live.whole.changed()
+    live.recount(Counts(counts.accepted + more, counts.rejected - more))
     return line
 
 

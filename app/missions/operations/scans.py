@@ -6,10 +6,11 @@ from collections.abc import Sequence
 from app.missions.errors import ConflictError, InvalidRequestError
 from app.missions.fleet.interface import Position, ScanReport
 from app.missions.live.mission import LiveMission
+from app.missions.search.progress import grid_view
 from app.missions.search.scan_schema import Scan
 from app.missions.search.state import Search
-from app.missions.spec.mission import VehicleKind
 from app.missions.states import MissionState
+from app.missions.views.search import SearchGridView
 from app.missions.views.soundings import BatchVerdict, ItemVerdict, Verdict, batch_verdict
 
 MAX_SCANS = 1000
@@ -55,12 +56,18 @@ def search_of(live: LiveMission) -> Search:
     return live.search
 
 
+def search_grid(live: LiveMission, after: int | None = None) -> SearchGridView | None:
+    """Return a search's site as known now; None when nothing is newer than ``after``. Raises ConflictError."""
+    search = search_of(live)
+    return None if after is not None and search.version <= after else grid_view(search, live.id, live.frame)
+
+
 def _stranger(live: LiveMission, vehicle: str) -> str:
     member = live.team.get(vehicle)
     if member is None:
         return f"vehicle: {vehicle!r} takes no part in this mission"
-    if member.spec.kind is VehicleKind.SIM:
-        return f"vehicle: {vehicle!r} is simulated and scans by itself"
+    if member.capabilities.scans:
+        return f"vehicle: {vehicle!r} scans by itself"
     return ""
 
 

@@ -5,28 +5,24 @@ from collections.abc import Iterator
 import numpy as np
 
 from app.exploration.site_search.ground import UNREACHED, Ground
-from app.missions.fleet.hub import FleetHub
 from app.missions.live.mission import LiveMission
 from app.missions.live.vehicles import local_place
 from app.missions.search.course import FIRST_PACE
 from app.missions.search.state import Search
-from app.missions.spec.mission import MissionSpec, VehicleKind
+from app.missions.spec.mission import MissionSpec
 from app.missions.views.mission import CheckStatus, CheckView
 
 OK, NOTE, WARNING, PROBLEM = CheckStatus.OK, CheckStatus.NOTE, CheckStatus.WARNING, CheckStatus.PROBLEM
 
-DUNE_CIRCLES_M = 15.0
-"""From this distance on DUNE circles about a reference in place of going straight to it."""
 
-
-def search_checks(live: LiveMission, hub: FleetHub) -> Iterator[CheckView]:
+def search_checks(live: LiveMission) -> Iterator[CheckView]:
     """Return the lines of the checklist that only a search has; none for other missions."""
     search = live.search
     if search is None:
         return
     yield _ways(search, live.spec)
     for member in live.team:
-        report = member.report or hub.info(member.key).report
+        report = member.report or live.hub.info(member.key).report
         place = None if report is None else local_place(live.frame, report.position)
         if place is not None:
             away_m = search.way_to_entry_m(np.array(place))
@@ -38,7 +34,7 @@ def search_checks(live: LiveMission, hub: FleetHub) -> Iterator[CheckView]:
                 message=f"{away_m:.0f} m from it",
                 remedy="Bring it to the entry: it is not sent where nobody has looked" if far else "",
             )
-        if member.spec.kind is not VehicleKind.SIM:
+        if not member.capabilities.scans:
             seen = place is not None and search.knows(np.array(place))
             yield CheckView(
                 id=f"scans.{member.name}",
@@ -47,12 +43,13 @@ def search_checks(live: LiveMission, hub: FleetHub) -> Iterator[CheckView]:
                 message="they come" if seen else "none tells yet what is around it; the search waits for one",
                 remedy="" if seen else f"Let it post to /api/v1/missions/{live.id}/scans",
             )
-        if member.spec.kind is VehicleKind.IMC and search.spec.safety_m < DUNE_CIRCLES_M:
+        circles_m = member.capabilities.circles_m
+        if search.spec.safety_m < circles_m:
             yield CheckView(
                 id=f"circles.{member.name}",
                 title=f"Room for {member.name}",
                 status=WARNING,
-                message=f"DUNE circles within {DUNE_CIRCLES_M:g} m of its waypoints unless the vehicle hovers; "
+                message=f"it circles within {circles_m:g} m of its waypoints unless it can hover; "
                 f"search.safety_m is {search.spec.safety_m:g} m",
                 remedy="Make search.safety_m larger, or be sure that the vehicle can stand still",
             )

@@ -7,13 +7,11 @@ from shapely.geometry import MultiPolygon, Point, Polygon
 from shapely.ops import unary_union
 
 from app.missions.clock import now
-from app.missions.fleet.hub import FleetHub
 from app.missions.fleet.interface import LinkState
 from app.missions.live.mission import LiveMission
 from app.missions.live.vehicles import local_place
 from app.missions.preflight.search import search_checks
 from app.missions.safety import WAITING_CIRCLE_M
-from app.missions.spec.mission import VehicleKind
 from app.missions.team import Member
 from app.missions.views.mission import BatteryState, CheckStatus, CheckView, PreflightView
 
@@ -24,18 +22,18 @@ OK, NOTE, WARNING, PROBLEM = CheckStatus.OK, CheckStatus.NOTE, CheckStatus.WARNI
 _BATTERIES = {BatteryState.OK: OK, BatteryState.LOW: WARNING, BatteryState.CRITICAL: PROBLEM}
 
 
-def preflight(live: LiveMission, hub: FleetHub) -> PreflightView:
+def preflight(live: LiveMission) -> PreflightView:
     """Return what stands before the start of a mission."""
     checks = [
-        *_vehicles(live, hub),
-        *_batteries(live, hub),
-        *_places(live, hub),
+        *_vehicles(live),
+        *_batteries(live),
+        *_places(live),
         *_depths(live),
         *_room(live),
         *_waiting(live),
         *_water_level(live),
         *_known_bottom(live),
-        *search_checks(live, hub),
+        *search_checks(live),
         *([_duration(live)] if live.search is None else []),
     ]
     return PreflightView(ready=all(check.status is not PROBLEM for check in checks), checks=checks)
@@ -48,15 +46,15 @@ def expected_s(live: LiveMission) -> float:
     return left * min(spec.limits.max_step_m / spec.speed_mps, spec.step_deadline_s)
 
 
-def _vehicles(live: LiveMission, hub: FleetHub) -> Iterator[CheckView]:
+def _vehicles(live: LiveMission) -> Iterator[CheckView]:
     if not list(live.team):
         yield CheckView(
             id="vehicles", title="Vehicles", status=PROBLEM, message="no vehicle takes part", remedy="Add a vehicle"
         )
     for member in live.team:
-        info = hub.info(member.key)
+        info = live.hub.info(member.key)
         title = f"Link to {member.name}"
-        owner = hub.claimed_by(member.key)
+        owner = live.hub.claimed_by(member.key)
         if owner not in (None, live.id):
             yield CheckView(
                 id=f"link.{member.name}",
@@ -67,10 +65,10 @@ def _vehicles(live: LiveMission, hub: FleetHub) -> Iterator[CheckView]:
             )
             continue
         status, message, remedy = OK, f"{info.state}".replace("_", " "), ""
-        if member.spec.kind is VehicleKind.SIM:
+        if member.capabilities.simulated:
             message = "simulated inside the service, starts with the mission"
         elif info.state not in (LinkState.READY, LinkState.ENGAGED):
-            must = member.spec.kind is VehicleKind.IMC
+            must = member.capabilities.ready_before_start
             status = PROBLEM if must else WARNING
             message = info.reason or message
             remedy = (
@@ -81,12 +79,12 @@ def _vehicles(live: LiveMission, hub: FleetHub) -> Iterator[CheckView]:
         yield CheckView(id=f"link.{member.name}", title=title, status=status, message=message, remedy=remedy)
 
 
-def _batteries(live: LiveMission, hub: FleetHub) -> Iterator[CheckView]:
+def _batteries(live: LiveMission) -> Iterator[CheckView]:
     for member in live.team:
-        report = member.report or hub.info(member.key).report
+        report = member.report or live.hub.info(member.key).report
         level = report.battery_pct if report is not None else None
         if level is None:
-            if member.spec.kind is not VehicleKind.SIM:
+            if not member.capabilities.simulated:
                 yield CheckView(
                     id=f"battery.{member.name}",
                     title=f"Battery of {member.name}",
@@ -105,11 +103,11 @@ def _batteries(live: LiveMission, hub: FleetHub) -> Iterator[CheckView]:
         )
 
 
-def _places(live: LiveMission, hub: FleetHub) -> Iterator[CheckView]:
+def _places(live: LiveMission) -> Iterator[CheckView]:
     area = Polygon(live.area)
     zones = [Polygon(live.spec.to_local(zone)) for zone in live.spec.keep_out]
     for member in live.team:
-        place = _place(live, hub, member)
+        place = _place(live, member)
         if place is None:
             continue
         distance = area.distance(place)
@@ -135,8 +133,8 @@ def _places(live: LiveMission, hub: FleetHub) -> Iterator[CheckView]:
             yield CheckView(id=name, title=title, status=OK, message=words)
 
 
-def _place(live: LiveMission, hub: FleetHub, member: Member) -> Point | None:
-    report = member.report or hub.info(member.key).report
+def _place(live: LiveMission, member: Member) -> Point | None:
+    report = member.report or live.hub.info(member.key).report
     if report is None:
         return None
     place = local_place(live.frame, report.position)

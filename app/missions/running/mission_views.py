@@ -1,14 +1,18 @@
 """What is answered about missions, and about vehicles that take part in none."""
 
+import inspect
 from collections.abc import AsyncIterator, Sequence
+from contextlib import asynccontextmanager
 
+from app.exploration.planner.options import PlannerOptions
+from app.exploration.planners import PLANNERS
 from app.missions.fleet.interface import StopReceipt, VehicleInfo
 from app.missions.live.broadcast import Subscription
 from app.missions.live.mission import LiveMission
 from app.missions.running.supervisor import receipt
 from app.missions.spec.mission import VehicleKind
 from app.missions.views.messages import LiveMessage, SnapshotMessage
-from app.missions.views.mission import ActionView, MissionView, StopView, VehicleView
+from app.missions.views.mission import ActionView, MissionView, PlannerView, StopView, VehicleView
 from app.storage import events as event_queries
 
 
@@ -31,7 +35,15 @@ def action_view(live: LiveMission, stops: Sequence[StopReceipt]) -> ActionView:
     return ActionView(mission=live.summary(), stops=[StopView(**receipt(stop)) for stop in stops])
 
 
-async def snapshot_message(live: LiveMission) -> SnapshotMessage:
+@asynccontextmanager
+async def watched(live: LiveMission) -> AsyncIterator[AsyncIterator[LiveMessage]]:
+    """Yield live messages, the first of them a snapshot. A watcher that is too slow loses only positions."""
+    with live.broadcaster.subscribe() as subscription:
+        live.telling.start()
+        yield _beginning_with(await _snapshot_message(live), subscription)
+
+
+async def _snapshot_message(live: LiveMission) -> SnapshotMessage:
     """Return everything that is needed to draw the picture of a mission."""
     tracks = await live.trails.newest()
     async with live.database.reading() as session:
@@ -45,7 +57,7 @@ async def snapshot_message(live: LiveMission) -> SnapshotMessage:
     )
 
 
-async def beginning_with(first: LiveMessage, rest: Subscription) -> AsyncIterator[LiveMessage]:
+async def _beginning_with(first: LiveMessage, rest: Subscription) -> AsyncIterator[LiveMessage]:
     """Yield the first message, then all that follow."""
     yield first
     async for message in rest:
@@ -70,3 +82,13 @@ def idle_vehicle_view(info: VehicleInfo) -> VehicleView:
         speed_mps=report.speed_mps if report else None,
         battery_pct=report.battery_pct if report else None,
     )
+
+
+def planner_views() -> list[PlannerView]:
+    """Return the planners that a mission may name."""
+    options = PlannerOptions.model_json_schema()
+    return [PlannerView(name=name, summary=_summary(kind), options=options) for name, kind in PLANNERS.items()]
+
+
+def _summary(kind: type[object]) -> str:
+    return (inspect.getdoc(kind) or "").partition("\n\n")[0].replace("\n", " ")

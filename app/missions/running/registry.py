@@ -5,14 +5,14 @@ from collections.abc import Awaitable, Callable, Iterator
 from concurrent.futures import Executor
 
 import structlog
-from sqlalchemy import select
+from sqlalchemy import delete, select
 
-from app.missions.errors import MissionElsewhereError, MissionNotFoundError
+from app.missions.errors import ConflictError, MissionElsewhereError, MissionNotFoundError
 from app.missions.fleet.hub import FleetHub
 from app.missions.live.load import take_up
 from app.missions.live.mission import LiveMission
 from app.missions.running.final_maps import FinalMaps
-from app.missions.running.ownership import Ownership
+from app.missions.running.ownership import AT_SEA, Ownership
 from app.missions.states import ENDED
 from app.missions.views.mission import MissionSummary
 from app.storage.database import Database
@@ -123,14 +123,24 @@ class MissionRegistry:
             if self._ownership is not None:
                 await self._ownership.release([live.id])
 
-    async def forget(self, mission_id: str) -> None:
-        """Let go of a mission that was deleted, without writing anything more."""
-        self._left.pop(mission_id, None)
-        live = self._live.pop(mission_id, None)
-        if live is not None:
+    async def delete(self, live: LiveMission) -> None:
+        """Remove a mission with everything that belongs to it. What was measured is kept: then ConflictError."""
+        if live.header.state in AT_SEA:
+            raise ConflictError(f"the mission is {live.header.state}", "finish or abort it first")
+        measured = live.journal.counts.accepted + live.journal.counts.rejected
+        if live.header.step or measured:
+            raise ConflictError(
+                f"the mission took {live.header.step} steps and has {measured} soundings: what was measured is kept",
+                "leave it in the list; only missions in which nothing was measured can be deleted",
+            )
+        self._maps.forget(live.id)
+        async with live.database.writing() as session:
+            await session.execute(delete(MissionRow).where(MissionRow.id == live.id))
+        self._left.pop(live.id, None)
+        if self._live.pop(live.id, None) is not None:
             live.abandon("the mission was deleted")
         if self._ownership is not None:
-            await self._ownership.release([mission_id])
+            await self._ownership.release([live.id])
 
     async def close(self) -> None:
         """Write down what is left."""

@@ -72,11 +72,7 @@ class MissionSupervisor:
 
     def run(self, live: LiveMission) -> None:
         """Begin the step loop."""
-        live.header.state = MissionState.RUNNING
-        live.halted = False
-        for member in live.team:
-            member.engaged = False
-            member.refusal = ""
+        live.set_off()
         runner = Runner(live, self._hub, self._executor, self._time_scale)
         self.runs[live.id] = asyncio.create_task(self._supervise(live, runner.run), name=f"mission {live.id}")
 
@@ -134,10 +130,7 @@ class MissionSupervisor:
             return
         self._unwritten[live.id] = written
         written.add_done_callback(partial(self._forget_unwritten, live.id))
-        live.header.state = state
-        live.header.reason = f"{reason}: {NOT_WRITTEN}" if reason else NOT_WRITTEN
-        live.changed.set()
-        live.publish_summary()
+        live.enter(state, f"{reason}: {NOT_WRITTEN}" if reason else NOT_WRITTEN)
 
     def _forget_unwritten(self, mission_id: str, done: asyncio.Task[None]) -> None:
         if self._unwritten.get(mission_id) is done:
@@ -287,11 +280,7 @@ class MissionSupervisor:
                 await check(session)
             await mission_queries.set_state(session, live.id, state, reason, changed_at)
             session.add(line)
-        live.header.state = state
-        live.header.reason = reason
-        live.header.updated_at = changed_at
-        live.changed.set()
-        live.publish_summary()
+        live.enter(state, reason, changed_at)
         live.journal.tell(line)
 
 

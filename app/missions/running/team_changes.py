@@ -59,6 +59,11 @@ class TeamChanges:
             raise VehicleNotFoundError(f"vehicle {name!r} has not left this mission", f"those that have: {gone}")
         await self.join(live, member.spec, actor)
 
+    async def take_out(self, live: LiveMission, name: str, actor: str) -> None:
+        """Stop a vehicle and take it out of the mission. Raises VehicleNotFoundError, ConflictError."""
+        refuse_ended(live, "keeps its vehicles")
+        await self.stop_one(live, name, actor)
+
     async def stop_one(self, live: LiveMission, name: str, actor: str) -> list[StopReceipt]:
         """Stop a vehicle and take it out of the mission; once that has ended it stays in it and is told once more.
 
@@ -76,7 +81,7 @@ class TeamChanges:
                 )
             if live.header.state in ENDED:
                 return [await self._stop_again(live, member)]
-            return await self._take_out(live, member, actor)
+            return await self._leave(live, member, actor)
 
     async def _stop_again(self, live: LiveMission, member: Member) -> StopReceipt:
         owner = self._hub.claimed_by(member.key)
@@ -87,7 +92,7 @@ class TeamChanges:
             )
         return await self._supervisor.stop_vehicle(live, member)
 
-    async def _take_out(self, live: LiveMission, member: Member, actor: str) -> list[StopReceipt]:
+    async def _leave(self, live: LiveMission, member: Member, actor: str) -> list[StopReceipt]:
         stops: list[StopReceipt] = []
         at = now()
         # As with a mission: a vehicle does not wait for a slow disk.

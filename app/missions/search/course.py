@@ -73,11 +73,9 @@ class Course:
 
     def barred(self, member: Member) -> bool:
         """Return whether something stands on what is left of a vehicle's leg by what is known now."""
-        if member.order is None or member.report is None:
+        if member.target_m is None or member.report is None:
             return False
-        position = member.order.position
-        east, north = self.frame.to_local(np.array(position.lat_deg), np.array(position.lon_deg))
-        here, end = member.place_m(self.frame), np.array([float(east), float(north)])
+        here, end = member.place_m(self.frame), member.target_m
         left_m = float(np.hypot(*(end - here)))
         return left_m > self.spec.arrival_radius_m and not self.search.clear(here, end)
 

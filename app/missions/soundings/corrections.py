@@ -19,20 +19,31 @@ NO_LEVEL = "tide: "
 
 
 @dataclass(frozen=True, slots=True)
-class Corrected:
-    """A sounding in the local frame; ``reason`` says why it has no place or depth, empty when it has both.
+class PlacedSounding:
+    """A sounding in the local frame with its corrected depth, beside the report as it came.
 
     Attributes
     ----------
     level_m
         Water level that was subtracted, None where there is none for its time.
+    reason
+        Why it has no place or depth, or may not enter the map; empty when it may.
+    sd_m
+        Standard deviation of the depth; 0 as long as the gate has given it none.
     """
 
+    report: SoundingReport
     east_m: float = 0.0
     north_m: float = 0.0
     depth_m: float = 0.0
     level_m: float | None = None
     reason: str = ""
+    sd_m: float = 0.0
+
+    @property
+    def accepted(self) -> bool:
+        """Whether it may enter the map."""
+        return not self.reason
 
 
 class Corrections:
@@ -85,7 +96,7 @@ class Corrections:
                 level = float(self.table.levels_m.min())
         return level - self._tide.datum_offset_m
 
-    def apply(self, reports: Sequence[SoundingReport]) -> list[Corrected]:
+    def apply(self, reports: Sequence[SoundingReport]) -> list[PlacedSounding]:
         """Return one result per report, in their order. Every number in a report is finite."""
         if not reports:
             return []
@@ -96,15 +107,15 @@ class Corrections:
         results = []
         for report, place, moved, bottom, level in zip(reports, places, shift, depth, levels, strict=True):
             if isinstance(place, str):
-                results.append(Corrected(reason=place))
+                results.append(PlacedSounding(report, reason=place))
                 continue
             east, north = place[0] + float(moved[0]), place[1] + float(moved[1])
             if not np.isfinite(level):
                 why = self.table.why_not(report.time_s) if self.table is not None else ""
-                results.append(Corrected(east, north, float(bottom), None, NO_LEVEL + why))
+                results.append(PlacedSounding(report, east, north, float(bottom), None, NO_LEVEL + why))
                 continue
             below = float(bottom) - float(level) + self._tide.datum_offset_m
-            results.append(Corrected(east, north, below, float(level)))
+            results.append(PlacedSounding(report, east, north, below, float(level)))
         return results
 
     def _levels(self, reports: Sequence[SoundingReport]) -> NDArray[np.float64]:

@@ -2,13 +2,13 @@
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import replace
 
 import shapely
 from shapely.geometry import Polygon
 
 from app.missions.fleet.interface import SoundingReport
-from app.missions.soundings.corrections import Corrected, Corrections
+from app.missions.soundings.corrections import Corrections, PlacedSounding
 
 MAX_OCEAN_DEPTH_M = 11_100.0
 MAX_VEHICLE_SPEED_MPS = 6.0
@@ -20,27 +20,6 @@ MAX_SD_M = 1000.0
 
 JUMP_ALLOWANCE_M = 10.0
 """A GPS fix at the surface may correct the position by this much at once."""
-
-
-@dataclass(frozen=True, slots=True)
-class GatedSounding:
-    """A sounding in the local frame with its corrected depth; ``reason`` is empty when it was accepted.
-
-    ``level_m`` is the water level that was subtracted, None where none is known.
-    """
-
-    report: SoundingReport
-    east_m: float
-    north_m: float
-    depth_m: float
-    sd_m: float
-    reason: str
-    level_m: float | None = None
-
-    @property
-    def accepted(self) -> bool:
-        """Whether it may enter the map."""
-        return not self.reason
 
 
 class Gate:
@@ -66,24 +45,23 @@ class Gate:
         self._last: dict[str, tuple[float, float, float]] = {}
         shapely.prepare(self._zone)
 
-    def check(self, reports: Iterable[SoundingReport]) -> list[GatedSounding]:
+    def check(self, reports: Iterable[SoundingReport]) -> list[PlacedSounding]:
         """Return one result per report, in their order; depths are corrected, the report stays raw."""
         listed = [(report, implausible_value(report)) for report in reports]
-        corrected = iter(self.corrections.apply([report for report, reason in listed if not reason]))
+        placed = iter(self.corrections.apply([report for report, reason in listed if not reason]))
         return [
-            _refused(report, reason) if reason else self._check_corrected(report, next(corrected))
-            for report, reason in listed
+            PlacedSounding(report, reason=reason) if reason else self._check(next(placed)) for report, reason in listed
         ]
 
-    def _check_corrected(self, report: SoundingReport, found: Corrected) -> GatedSounding:
-        sd = report.depth_sd_m if report.depth_sd_m is not None else self.deviation_m(report.range_m)
-        east, north = found.east_m, found.north_m
+    def _check(self, found: PlacedSounding) -> PlacedSounding:
+        report = found.report
+        sd_m = report.depth_sd_m if report.depth_sd_m is not None else self.deviation_m(report.range_m)
         if found.reason:
-            return GatedSounding(report, east, north, found.depth_m, sd, found.reason)
-        reason = self.outside(east, north) or self._jump(report, east, north)
+            return replace(found, sd_m=sd_m)
+        reason = self.outside(found.east_m, found.north_m) or self._jump(found)
         if not reason:
-            self._last[report.vehicle] = (report.time_s, east, north)
-        return GatedSounding(report, east, north, found.depth_m, sd, reason, found.level_m)
+            self._last[report.vehicle] = (report.time_s, found.east_m, found.north_m)
+        return replace(found, sd_m=sd_m, reason=reason)
 
     def deviation_m(self, range_m: float) -> float:
         """Return the standard deviation of a range for which the vehicle states none."""
@@ -98,12 +76,13 @@ class Gate:
             f"{self._margin_m:g} m outside the area"
         )
 
-    def _jump(self, report: SoundingReport, east: float, north: float) -> str:
+    def _jump(self, found: PlacedSounding) -> str:
+        report = found.report
         last = self._last.get(report.vehicle)
         if last is None:
             return ""
         time_s, last_east, last_north = last
-        distance = math.hypot(east - last_east, north - last_north)
+        distance = math.hypot(found.east_m - last_east, found.north_m - last_north)
         # Footprints of slanted beams lie beside the vehicle, by at most about the range.
         allowed = JUMP_ALLOWANCE_M + report.range_m + MAX_VEHICLE_SPEED_MPS * abs(report.time_s - time_s)
         if distance <= allowed:
@@ -112,11 +91,6 @@ class Gate:
             f"position: jumped {distance:.1f} m in {abs(report.time_s - time_s):.1f} s; "
             f"at most {allowed:.1f} m is plausible"
         )
-
-
-def _refused(report: SoundingReport, reason: str) -> GatedSounding:
-    """Return the result for a sounding that has no place and no depth."""
-    return GatedSounding(report, 0.0, 0.0, 0.0, 0.0, reason)
 
 
 def implausible_value(report: SoundingReport) -> str:

@@ -9,6 +9,7 @@ from app.missions.errors import ConflictError
 from app.missions.fleet.hub import FleetHub
 from app.missions.fleet.interface import (
     FleetEvent,
+    LinkCapabilities,
     LinkState,
     Position,
     VehicleRefusedError,
@@ -18,7 +19,8 @@ from app.missions.fleet.interface import (
 from app.missions.fleet.links.rest import RestFleetLink
 from app.missions.fleet.links.sim import SimFleetLink
 from app.missions.settings import SimulationSettings
-from app.missions.spec.mission import VehicleKind
+from app.missions.spec.mission import VehicleKind, VehicleSpec
+from app.missions.team import Team
 from tests.support.missions.specs import LAT, LON
 
 A = (VehicleKind.REST, "a")
@@ -91,6 +93,22 @@ async def test_vehicles_of_a_kind_that_is_switched_off_are_refused_with_a_remedy
     receipt = await hub.stop(key)
     assert not receipt.acknowledged
     assert "switched off" in receipt.detail
+
+
+async def test_a_link_says_itself_what_its_vehicles_can_do() -> None:
+    class Craft(RestFleetLink):
+        kind = "imc"
+        capabilities = LinkCapabilities(simulated=True, circles_m=7.0)
+
+    hub = FleetHub([Craft(), RestFleetLink()])
+    team = Team(hub.capabilities)
+    members = [team.join(VehicleSpec(name=kind, kind=VehicleKind(kind)), 0) for kind in ("imc", "rest", "neptus")]
+    assert [member.capabilities.circles_m for member in members] == [7.0, 0.0, 0.0]
+    assert "launched when its mission starts" in hub.info(members[0].key).reason
+    assert "never heard of" in hub.info(members[1].key).reason
+    # Nobody comes over a link that is switched off: no mission may wait for that.
+    assert [member.capabilities.ready_before_start for member in members] == [False, False, True]
+    assert list(hub.polled) == [VehicleKind.IMC, VehicleKind.REST]
 
 
 async def test_one_links_trouble_does_not_keep_the_others_from_closing() -> None:

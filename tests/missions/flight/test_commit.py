@@ -41,7 +41,7 @@ async def test_the_guard_gets_the_bottom_below_the_surface(
     tide = {"level_m": level_m, "datum_offset_m": offset_m, "source": "gauge"}
     spec = sim_spec("a", tide=tide)
     mission = (await service.create(spec)).id
-    live = await service._get(mission)
+    live = await service.get(mission)
     table = None if table_m is None else a_table(table_m)
     level = Corrections(live.frame, spec.tide, table=table).water_level_m(now().timestamp())
     constraints = make_constraints(spec)

@@ -10,10 +10,11 @@ from app.missions.fleet.interface import LinkState, VehicleRefusedError
 from app.missions.flight import step_loop
 from app.missions.flight.commit import StepCommit
 from app.missions.flight.decision import Decision, decide
+from app.missions.operations.history import events_after
 from app.missions.service import MissionService
-from app.missions.states import Action, MissionState
+from app.missions.states import MissionState
 from app.storage import missions as mission_queries
-from tests.support.missions.harbour import sim_spec, until_state
+from tests.support.missions.harbour import act, sim_spec, until_state, view_of
 from tests.support.waiting import until
 
 REASON = "leaves no safe depth"
@@ -32,12 +33,12 @@ async def test_a_step_in_which_every_order_is_refused_does_not_count(
 
     monkeypatch.setattr(step_loop, "decide", refusing)
     mission = (await service.create(sim_spec(steps=3))).id
-    await service.act(mission, Action.START, actor="Ana")
+    await act(service, mission, "start", actor="Ana")
     await until(lambda: asked >= 4, "it was decided again and again")
-    view = await service.mission(mission)
+    view = await view_of(service, mission)
     assert view.progress.step == 0
     assert REASON in view.reason
-    told = [event for event in await service.events(mission) if REASON in event.message]
+    told = [event for event in await events_after(await service.get(mission)) if REASON in event.message]
     assert [event.level for event in told] == ["alarm"], "it is told once"
     spoilt = False
     view = await until_state(service, mission, MissionState.FINISHED)
@@ -60,7 +61,7 @@ async def test_a_step_that_every_vehicle_turns_down_is_sent_again(
 
     monkeypatch.setattr(FleetHub, "order", refusing)
     mission = (await service.create(sim_spec(steps=2))).id
-    await service.act(mission, Action.START, actor="Ana")
+    await act(service, mission, "start", actor="Ana")
     view = await until_state(service, mission, MissionState.FINISHED)
     assert refused == 4
     async with service._database.reading() as session:
@@ -81,7 +82,7 @@ async def test_a_waypoint_that_is_committed_while_the_link_is_away_is_sent(
 
     monkeypatch.setattr(StepCommit, "commit", committed_in_a_gap)
     mission = (await service.create(sim_spec(steps=2, step_deadline_s=200))).id
-    await service.act(mission, Action.START, actor="Ana")
+    await act(service, mission, "start", actor="Ana")
     await until_state(service, mission, MissionState.FINISHED)
     async with service._database.reading() as session:
         steps = [await mission_queries.waypoints_of_step(session, mission, number) for number in (1, 2)]

@@ -12,11 +12,11 @@ from pydantic import ValidationError
 from sqlalchemy import select
 
 from app.missions.flight.decision import Decision, Place, make_constraints
-from app.missions.states import Action, MissionState
+from app.missions.states import MissionState
 from app.storage.database import Database
 from app.storage.models import EventRow, WaypointRow
 from tests.support.missions.decisions import decide_for, place
-from tests.support.missions.harbour import Harbour, sim_spec, until_state
+from tests.support.missions.harbour import Harbour, act, sim_spec, until_state
 from tests.support.missions.specs import make_spec
 
 POLICY: dict[str, Any] = {"surface_policy": {"max_position_sd_m": 3.0, "good_position_sd_m": 0.5}}
@@ -100,7 +100,7 @@ async def test_a_running_mission_brings_its_vehicles_up_and_down_again(harbour: 
     service = await harbour.reopen(simulation={"drift_m2ps": 0.05})
     spec = sim_spec("a", steps=12, surface_policy={"max_position_sd_m": 1.0, "good_position_sd_m": 0.4})
     mission = await service.create(spec)
-    await service.act(mission.id, Action.START, actor="Ana")
+    await act(service, mission.id, "start", actor="Ana")
     await until_state(service, mission.id, MissionState.FINISHED)
     async with database.reading() as session:
         rows = (

@@ -11,11 +11,12 @@ from app.missions.errors import ConflictError, InvalidRequestError
 from app.missions.forecast import request
 from app.missions.forecast.floor import Floor, floors_of
 from app.missions.forecast.simulate import Flown, Forecast, forecast
+from app.missions.operations.history import steps_after
 from app.missions.service import MissionService
 from app.missions.spec.mission import MissionSpec
-from app.missions.states import Action, MissionState
+from app.missions.states import MissionState
 from app.missions.team import Team
-from tests.support.missions.harbour import sim_spec, until_state
+from tests.support.missions.harbour import act, sim_spec, until_state
 from tests.support.missions.specs import make_spec
 from tests.support.waiting import until
 
@@ -33,17 +34,19 @@ async def test_a_forecast_is_near_what_comes_and_says_what_it_assumes(
     monkeypatch.setattr(request, "BUDGET_S", 600.0)
     monkeypatch.setattr(request, "PATIENCE_S", 600.0)
     spec = lines()
-    before = await service.forecast(spec)
+    before = await service.forecaster.of_description(spec)
     assert before.steps == before.steps_simulated == before.steps_flown == 8
     assert before.floors > 3
     assert before.coverage_pct_range.low <= before.coverage_pct <= before.coverage_pct_range.high
     mission = (await service.create(spec)).id
-    assert (await service.forecast_of(mission)).duration_s == pytest.approx(before.duration_s, rel=0.05)
-    await service.act(mission, Action.START, actor="Ana")
+    assert (await service.forecaster.of_mission(await service.get(mission))).duration_s == pytest.approx(
+        before.duration_s, rel=0.05
+    )
+    await act(service, mission, "start", actor="Ana")
     await until_state(service, mission, MissionState.FINISHED)
     # Between its waypoints: on a slow machine vehicles of this speed circle for long until they get the next one.
     ways: dict[str, list[tuple[float, float, float]]] = {}
-    for step in await service.steps(mission):
+    for step in await steps_after(await service.get(mission)):
         for w in step.waypoints:
             ways.setdefault(w.vehicle, []).append((w.east_m, w.north_m, w.depth_m))
     legs = sum(float(np.linalg.norm(np.diff(way, axis=0), axis=1).sum()) for way in ways.values())
@@ -54,14 +57,14 @@ async def test_a_forecast_is_near_what_comes_and_says_what_it_assumes(
     assert 0 <= before.coverage_pct <= 100
     assert any("guess" in words for words in before.assumptions)
     with pytest.raises(ConflictError, match="nothing before it"):
-        await service.forecast_of(mission)
+        await service.forecaster.of_mission(await service.get(mission))
 
 
 async def test_what_cannot_be_foretold_is_refused_and_nothing_is_stored(service: MissionService) -> None:
     with pytest.raises(InvalidRequestError, match="no vehicle"):
-        await service.forecast(make_spec(vehicles=[]))
+        await service.forecaster.of_description(make_spec(vehicles=[]))
     with pytest.raises(InvalidRequestError, match="no planner"):
-        await service.forecast(make_spec(planner={"name": "oracle"}))
+        await service.forecaster.of_description(make_spec(planner={"name": "oracle"}))
     assert await service.missions() == []
 
 
@@ -76,7 +79,7 @@ async def test_one_who_leaves_ends_the_simulation(service: MissionService, monke
         raise RuntimeError("nobody waits")
 
     monkeypatch.setattr(request, "forecast", endless)
-    asked = asyncio.create_task(service.forecast(lines()))
+    asked = asyncio.create_task(service.forecaster.of_description(lines()))
     await until(begun.is_set, "it is begun")
     asked.cancel()
     await until(ended.is_set, "it ends")

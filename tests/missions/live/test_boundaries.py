@@ -6,16 +6,17 @@ import pytest
 from app.missions.fleet.links.sim import Launch, SimFleetLink
 from app.missions.flight.decision import make_constraints
 from app.missions.live.boundaries import Boundaries
+from app.missions.operations.history import events_after
+from app.missions.preflight.survey import preflight
 from app.missions.safety import WAITING_CIRCLE_M
 from app.missions.service import MissionService
 from app.missions.settings import SimulationSettings
 from app.missions.spec.mission import Sensor, VehicleKind
-from app.missions.states import Action
 from app.missions.views.mission import CheckStatus, EventView, Level
 from simulator.seafloors import generate
 from simulator.sensors import SensorKind, SonarNoise
 from simulator.world import SimulatedVehicle
-from tests.support.missions.harbour import Rover
+from tests.support.missions.harbour import Rover, act, view_of
 from tests.support.missions.specs import LAT, LON, lon_lat, make_spec, rectangle
 from tests.support.waiting import until
 
@@ -88,7 +89,7 @@ async def test_the_checklist_warns_of_a_margin_that_waiting_vehicles_overstep(
 ) -> None:
     limits = {"max_step_m": 8, "keep_out_margin_m": margin_m}
     mission = await service.create(make_spec(100, keep_out=[rectangle(40, 40, 60, 60)], limits=limits))
-    checks = {check.id: check for check in (await service.preflight(mission.id)).checks}
+    checks = {check.id: check for check in (preflight(await service.get(mission.id))).checks}
     assert ("waiting" in checks) is warned
     if warned:
         assert checks["waiting"].status is CheckStatus.WARNING
@@ -99,20 +100,20 @@ async def test_a_vehicle_reported_in_a_zone_is_an_alarm_of_its_mission(service: 
     mission = (await service.create(spec)).id
     rover = Rover(service, mission, "a", 10, 10)
     await rover.post()
-    await service.act(mission, Action.START, actor="Ana")
+    await act(service, mission, "start", actor="Ana")
 
     async def post_at(east_m: float, north_m: float) -> None:
         lon, lat = lon_lat(east_m, north_m)
         await rover.post(lat_deg=lat, lon_deg=lon)
 
     async def lines() -> list[EventView]:
-        return [line for line in await service.events(mission) if line.kind == "boundary"]
+        return [line for line in await events_after(await service.get(mission)) if line.kind == "boundary"]
 
     await post_at(50, 50)
     await until(lines, "the entry is in the log")
     [line] = await lines()
     assert (line.level, line.data["vehicle"], line.data["zone"]) == (Level.ALARM, "a", 1)
-    [view] = (await service.mission(mission)).vehicles
+    [view] = (await view_of(service, mission)).vehicles
     assert view.breach == "in keep-out zone 1"
     await post_at(30, 50)
 
@@ -120,9 +121,9 @@ async def test_a_vehicle_reported_in_a_zone_is_an_alarm_of_its_mission(service: 
         return len(await lines()) == 2
 
     await until(ended, "its end is in the log")
-    [view] = (await service.mission(mission)).vehicles
+    [view] = (await view_of(service, mission)).vehicles
     assert view.breach == ""
-    await service.act(mission, Action.ABORT, actor="Ana")
+    await act(service, mission, "abort", actor="Ana")
 
 
 async def test_simulated_vehicles_of_another_mission_are_launched_anew(service: MissionService) -> None:

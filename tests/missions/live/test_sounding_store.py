@@ -9,12 +9,14 @@ from app.missions.live import sounding_store
 from app.missions.maps.builder import MapBuilder
 from app.missions.maps.codec import pack, unpack
 from app.missions.maps.queue import MapQueue, Replacement
+from app.missions.operations.measurements import measure
+from app.missions.operations.mission_maps import newest_map
+from app.missions.operations.review import rule, soundings_page
 from app.missions.service import MissionService
-from app.missions.states import Action
 from app.missions.views.soundings import Ruling, SoundingState
 from app.storage.database import Database
 from app.storage.models import StoredMapRow
-from tests.support.missions.harbour import Harbour
+from tests.support.missions.harbour import Harbour, act, view_of
 from tests.support.missions.maps import AREA, built_of, soundings
 from tests.support.missions.measured import measured
 from tests.support.missions.specs import make_spec
@@ -32,8 +34,8 @@ def arrivals(service: MissionService, mission: str) -> MapQueue:
 async def mapped(service: MissionService, count: int = 80) -> str:
     """A mission that was mapped: soundings on a slope, one of them wrong."""
     mission = (await service.create(make_spec())).id
-    await service.measure(mission, measured(count))
-    await service.map(mission)
+    await measure(await service.get(mission), measured(count))
+    await newest_map(await service.get(mission), service.maps)
     return mission
 
 
@@ -96,37 +98,40 @@ def test_released_soundings_leave_the_map_and_its_doubts() -> None:
 
 async def test_a_mission_opens_without_its_soundings_and_takes_them_up_with_the_next(harbour: Harbour) -> None:
     mission = await mapped(harbour.service)
-    before = await harbour.service.map(mission)
-    doubts = await harbour.service.review(mission, [SoundingState.DOUBTED])
+    before = await newest_map(await harbour.service.get(mission), harbour.service.maps)
+    doubts = await soundings_page(await harbour.service.get(mission), [SoundingState.DOUBTED])
     await harbour.reopen()
     service = harbour.service
-    after = await service.map(mission)
+    after = await newest_map(await service.get(mission), service.maps)
     assert (after.built.digest, after.built.soundings) == (before.built.digest, before.built.soundings)
     assert arrivals(service, mission).at_rest
-    progress = (await service.mission(mission)).progress
+    progress = (await view_of(service, mission)).progress
     assert (progress.soundings, progress.rejected) == (80, 1)
-    assert [(item.id, item.reason) for item in (await service.review(mission, [SoundingState.DOUBTED])).items] == [
-        (item.id, item.reason) for item in doubts.items
-    ]
+    assert [
+        (item.id, item.reason)
+        for item in (await soundings_page(await service.get(mission), [SoundingState.DOUBTED])).items
+    ] == [(item.id, item.reason) for item in doubts.items]
     item = measured(90)[-2]
-    await service.measure(mission, [item])
-    assert (await service.map(mission)).built.soundings == 81
-    assert (await service.mission(mission)).progress.soundings == 81
+    await measure(await service.get(mission), [item])
+    assert (await newest_map(await service.get(mission), service.maps)).built.soundings == 81
+    assert (await view_of(service, mission)).progress.soundings == 81
 
 
 async def test_a_ruling_drops_the_stored_map_at_once(harbour: Harbour, database: Database) -> None:
     mission = await mapped(harbour.service)
     await harbour.reopen()
     service = harbour.service
-    (doubted,) = (await service.review(mission, [SoundingState.DOUBTED])).items
+    (doubted,) = (await soundings_page(await service.get(mission), [SoundingState.DOUBTED])).items
     assert await stored(database, mission) is not None
-    await service.rule(mission, doubted.id, Ruling.REJECTED)
+    await rule(await service.get(mission), doubted.id, Ruling.REJECTED, actor="operator")
     assert await stored(database, mission) is None
-    made = await service.map(mission)
-    progress = (await service.mission(mission)).progress
+    made = await newest_map(await service.get(mission), service.maps)
+    progress = (await view_of(service, mission)).progress
     assert (made.built.soundings, progress.soundings, progress.rejected) == (79, 79, 2)
     await harbour.reopen()
-    assert (await harbour.service.map(mission)).built.digest == made.built.digest
+    assert (
+        await newest_map(await harbour.service.get(mission), harbour.service.maps)
+    ).built.digest == made.built.digest
 
 
 async def test_soundings_that_another_process_stored_are_found(harbour: Harbour, database: Database) -> None:
@@ -134,15 +139,15 @@ async def test_soundings_that_another_process_stored_are_found(harbour: Harbour,
     await harbour.reopen()
     kept = await stored(database, mission)
     assert kept is not None
-    await harbour.service.measure(mission, [measured(90)[-2]])
+    await measure(await harbour.service.get(mission), [measured(90)[-2]])
     async with database.writing() as session:
         # As if the process had been killed before it stored the map of all 81.
         await session.merge(kept)
     live = harbour.service._registry._live[mission]
     live.whole._kept = live.builder.newest
     await harbour.reopen()
-    assert (await harbour.service.mission(mission)).progress.soundings == 81
-    assert (await harbour.service.map(mission)).built.soundings == 81
+    assert (await view_of(harbour.service, mission)).progress.soundings == 81
+    assert (await newest_map(await harbour.service.get(mission), harbour.service.maps)).built.soundings == 81
 
 
 async def test_many_soundings_leave_memory_when_the_mission_has_ended(
@@ -150,24 +155,26 @@ async def test_many_soundings_leave_memory_when_the_mission_has_ended(
 ) -> None:
     monkeypatch.setattr(sounding_store, "TOO_MANY_TO_HOLD", 50)
     mission = await mapped(harbour.service)
-    await harbour.service.act(mission, Action.START, actor="test")
-    await harbour.service.act(mission, Action.ABORT, actor="test")
-    last = await harbour.service.map(mission)
-    await harbour.service._maps.last(mission)
+    await act(harbour.service, mission, "start", actor="test")
+    await act(harbour.service, mission, "abort", actor="test")
+    last = await newest_map(await harbour.service.get(mission), harbour.service.maps)
+    await harbour.service.maps.last(mission)
     assert last.built.thorough
     assert arrivals(harbour.service, mission).at_rest
-    assert (await harbour.service.map(mission)).built.digest == last.built.digest
-    assert (await harbour.service.map(mission)).built.soundings == 80
+    assert (
+        await newest_map(await harbour.service.get(mission), harbour.service.maps)
+    ).built.digest == last.built.digest
+    assert (await newest_map(await harbour.service.get(mission), harbour.service.maps)).built.soundings == 80
 
 
 async def test_a_stored_map_that_is_damaged_is_made_anew(harbour: Harbour, database: Database) -> None:
     mission = await mapped(harbour.service)
-    before = await harbour.service.map(mission)
+    before = await newest_map(await harbour.service.get(mission), harbour.service.maps)
     await harbour.close()
     async with database.writing() as session:
         row = await session.get_one(StoredMapRow, mission)
         row.content = row.content[:-100]
     await harbour.open()
-    after = await harbour.service.map(mission)
+    after = await newest_map(await harbour.service.get(mission), harbour.service.maps)
     assert after.built.soundings == before.built.soundings
     np.testing.assert_allclose(after.built.map.depth_m, before.built.map.depth_m, atol=0.1)

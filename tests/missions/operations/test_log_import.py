@@ -13,6 +13,9 @@ import pytest
 
 from app.missions.errors import InvalidRequestError
 from app.missions.operations import log_import
+from app.missions.operations.history import events_after
+from app.missions.operations.log_import import import_log
+from app.missions.operations.mission_maps import newest_map
 from app.missions.service import MissionService
 from app.missions.settings import ServiceSettings
 from app.missions.views.soundings import LogImportView
@@ -21,6 +24,7 @@ from app.storage.database import Database
 from tests.support.commands import COMMAND, environment
 from tests.support.databases import query
 from tests.support.imc import log_writer as writer
+from tests.support.missions.harbour import view_of
 from tests.support.missions.specs import make_spec, rectangle
 
 PINGS = 300
@@ -56,7 +60,7 @@ def small_batches(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 async def take(service: MissionService, mission_id: str, log: Path, **options: Any) -> LogImportView:
-    return await service.import_log(mission_id, log, actor="tester", **options)
+    return await import_log(await service.get(mission_id), service.settings, log, actor="tester", **options)
 
 
 async def test_a_log_becomes_soundings_a_track_a_map_and_a_line_in_the_log(
@@ -75,12 +79,12 @@ async def test_a_log_becomes_soundings_a_track_a_map_and_a_line_in_the_log(
     for time_s, _, verdict, depth in rows:
         if verdict == "accepted":
             assert depth == pytest.approx(writer.bottom_m(writer.SPEED_MPS * (time_s - writer.START_S)), abs=1e-3)
-    assert (await service.map(mission.id)).built.soundings == view.soundings
-    track = (await service.tracks(mission.id))[writer.NAME]
+    assert (await newest_map(await service.get(mission.id), service.maps)).built.soundings == view.soundings
+    track = (await (await service.get(mission.id)).trails.newest())[writer.NAME]
     latitudes = [lat for _, lat, _ in track]
     assert latitudes == sorted(latitudes)
     assert (latitudes[-1] - latitudes[0]) * 111_000 > 20
-    events = await service.events(mission.id)
+    events = await events_after(await service.get(mission.id))
     assert events[-1].kind == "import"
     assert events[-1].data["soundings"] == view.soundings
 
@@ -90,14 +94,14 @@ async def test_a_log_imported_again_changes_nothing(
 ) -> None:
     mission = await service.create(make_spec())
     first = await take(service, mission.id, log)
-    before = stored(database_url, "*"), points(database_url), await service.events(mission.id)
+    before = stored(database_url, "*"), points(database_url), await events_after(await service.get(mission.id))
     again = await take(service, mission.id, log)
     assert again == first.model_copy(update={"known": True})
     # The same records in another file: known one by one.
     plain = writer.write(tmp_path / "Data.lsf", writer.survey(PINGS))
     assert (await take(service, mission.id, plain)).duplicate == PINGS
     assert stored(database_url, "*") == before[0]
-    assert (await service.mission(mission.id)).progress.soundings == first.soundings
+    assert (await view_of(service, mission.id)).progress.soundings == first.soundings
 
 
 @pytest.mark.usefixtures("small_batches")
@@ -136,7 +140,7 @@ async def test_an_import_that_failed_anywhere_goes_on_where_it_was(
             for m in (whole, broken)
         ]
         assert rows[0] == rows[1]
-    assert (await later.mission(broken.id)).progress.soundings == straight.soundings
+    assert (await view_of(later, broken.id)).progress.soundings == straight.soundings
     await later.shutdown()
 
 
@@ -146,18 +150,18 @@ async def test_a_running_service_notices_what_another_process_imported(
     mission = await service.create(make_spec())
     half = writer.write(log.with_name("half.lsf"), writer.survey(60))
     await take(service, mission.id, half)
-    version = (await service.map(mission.id)).built.version
+    version = (await newest_map(await service.get(mission.id), service.maps)).built.version
     settings = make_settings()
     store = Database(settings.database_url)
     beside = MissionService(settings, store)
     view = await take(beside, mission.id, log)
     await beside.shutdown()
     await store.close()
-    snapshot = await service.map(mission.id)
+    snapshot = await newest_map(await service.get(mission.id), service.maps)
     assert snapshot.built.soundings == view.soundings + 60
     assert snapshot.built.version > version
-    assert (await service.mission(mission.id)).progress.soundings == view.soundings + 60
-    assert (await service.map(mission.id)).built is snapshot.built, "noticed once"
+    assert (await view_of(service, mission.id)).progress.soundings == view.soundings + 60
+    assert (await newest_map(await service.get(mission.id), service.maps)).built is snapshot.built, "noticed once"
 
 
 async def test_live_telemetry_of_the_same_dive_is_not_stored_twice(

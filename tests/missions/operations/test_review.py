@@ -7,18 +7,23 @@ import numpy as np
 import pytest
 
 from app.missions.errors import ConflictError, SoundingNotFoundError
+from app.missions.operations.history import events_after
+from app.missions.operations.measurements import measure
+from app.missions.operations.mission_maps import newest_map
+from app.missions.operations.recorrection import set_tide
+from app.missions.operations.review import rule, soundings_page
+from app.missions.running.mission_views import watched
 from app.missions.service import MissionService
 from app.missions.soundings.measurement import Measurement
-from app.missions.states import Action
 from app.missions.views.soundings import Ruling, SoundingState
-from tests.support.missions.harbour import CLOCK_S, Harbour
+from tests.support.missions.harbour import CLOCK_S, Harbour, act, view_of
 from tests.support.missions.measured import NOT_USED, measured
 from tests.support.missions.specs import lon_lat, make_spec
 from tests.support.waiting import until
 
 
 async def depth_at(service: MissionService, mission: str, item: Measurement) -> float:
-    snapshot = await service.map(mission)
+    snapshot = await newest_map(await service.get(mission), service.maps)
     east, north = snapshot.facts.frame.to_local(item.lat_deg, item.lon_deg)
     grid = snapshot.built.map.grid
     return float(snapshot.built.map.depth_m[int(north / grid.cell_m), int(east / grid.cell_m)])
@@ -27,9 +32,9 @@ async def depth_at(service: MissionService, mission: str, item: Measurement) -> 
 async def test_what_is_not_in_the_map_is_listed_with_the_reason_page_by_page(service: MissionService) -> None:
     mission = (await service.create(make_spec())).id
     items = measured()
-    await service.measure(mission, items)
-    await service.map(mission)
-    page = await service.review(mission, NOT_USED)
+    await measure(await service.get(mission), items)
+    await newest_map(await service.get(mission), service.maps)
+    page = await soundings_page(await service.get(mission), NOT_USED)
     states = {item.state: item for item in page.items}
     assert page.total == 2
     assert set(states) == {SoundingState.DOUBTED, SoundingState.REJECTED}
@@ -39,13 +44,13 @@ async def test_what_is_not_in_the_map_is_listed_with_the_reason_page_by_page(ser
     used = [item async for item in _all_pages(service, mission, SoundingState.USED)]
     assert used == sorted(used)
     assert len(used) == 79
-    assert (await service.review(mission, NOT_USED, vehicle="b")).total == 0
+    assert (await soundings_page(await service.get(mission), NOT_USED, vehicle="b")).total == 0
 
 
 async def _all_pages(service: MissionService, mission: str, state: SoundingState) -> AsyncIterator[Any]:
     after: int | None = 0
     while after is not None:
-        page = await service.review(mission, [state], after=after, limit=30)
+        page = await soundings_page(await service.get(mission), [state], after=after, limit=30)
         for item in page.items:
             yield item.id
         after = page.next_after
@@ -55,30 +60,32 @@ async def test_a_restored_sounding_bends_the_map_at_once_and_after_a_restart(har
     service = harbour.service
     mission = (await service.create(make_spec())).id
     items = measured()
-    await service.measure(mission, items)
+    await measure(await service.get(mission), items)
     assert await depth_at(service, mission, items[40]) == pytest.approx(8.15, abs=0.3)
-    doubted = (await service.review(mission, [SoundingState.DOUBTED])).items[0]
-    before = await service.mission(mission)
+    doubted = (await soundings_page(await service.get(mission), [SoundingState.DOUBTED])).items[0]
+    before = await view_of(service, mission)
 
-    restored = await service.rule(mission, doubted.id, Ruling.RESTORED, note="a mast, seen by divers", actor="Ana")
+    restored = await rule(
+        await service.get(mission), doubted.id, Ruling.RESTORED, note="a mast, seen by divers", actor="Ana"
+    )
     assert restored.state is SoundingState.RESTORED
     assert (restored.range_m, restored.raw_depth_m) == (doubted.range_m, doubted.raw_depth_m)
     assert await depth_at(service, mission, items[40]) < 7.0
-    line = (await service.events(mission))[-1]
+    line = (await events_after(await service.get(mission)))[-1]
     assert (line.kind, line.data["actor"], line.data["sounding"]) == ("sounding", "Ana", doubted.id)
     assert "a mast, seen by divers" in line.message
     assert "standard deviations" in line.data["before"]
 
     service = await harbour.reopen()
     assert await depth_at(service, mission, items[40]) < 7.0
-    withdrawn = await service.rule(mission, doubted.id, Ruling.REJECTED, actor="Rui")
+    withdrawn = await rule(await service.get(mission), doubted.id, Ruling.REJECTED, actor="Rui")
     assert withdrawn.state is SoundingState.WITHDRAWN
     assert await depth_at(service, mission, items[40]) == pytest.approx(8.15, abs=0.3)
-    progress = (await service.mission(mission)).progress
+    progress = (await view_of(service, mission)).progress
     assert (progress.soundings, progress.rejected) == (before.progress.soundings - 1, before.progress.rejected + 1)
-    events = len(await service.events(mission))
-    await service.rule(mission, doubted.id, Ruling.REJECTED, actor="Rui")
-    assert len(await service.events(mission)) == events
+    events = len(await events_after(await service.get(mission)))
+    await rule(await service.get(mission), doubted.id, Ruling.REJECTED, actor="Rui")
+    assert len(await events_after(await service.get(mission))) == events
 
 
 async def test_a_sounding_that_the_gate_refused_counts_when_restored_and_stays_through_corrections(
@@ -87,13 +94,15 @@ async def test_a_sounding_that_the_gate_refused_counts_when_restored_and_stays_t
     from app.missions.views.corrections import TideCorrection
 
     mission = (await service.create(make_spec())).id
-    await service.measure(mission, measured(wrong=None))
-    refused = (await service.review(mission, [SoundingState.REJECTED])).items[0]
-    restored = await service.rule(mission, refused.id, Ruling.RESTORED, actor="Ana")
+    await measure(await service.get(mission), measured(wrong=None))
+    refused = (await soundings_page(await service.get(mission), [SoundingState.REJECTED])).items[0]
+    restored = await rule(await service.get(mission), refused.id, Ruling.RESTORED, actor="Ana")
     assert restored.depth_m == pytest.approx(11.0)
-    corrected = await service.set_tide(mission, TideCorrection(level_m=1.0, source="gauge"))
+    corrected = await set_tide(
+        await service.get(mission), TideCorrection(level_m=1.0, source="gauge"), actor="operator"
+    )
     assert (corrected.accepted, corrected.rejected) == (81, 0)
-    again = (await service.review(mission, [SoundingState.RESTORED])).items[0]
+    again = (await soundings_page(await service.get(mission), [SoundingState.RESTORED])).items[0]
     assert (again.depth_m, again.raw_depth_m) == (pytest.approx(10.0), pytest.approx(11.0))
 
 
@@ -101,37 +110,37 @@ async def test_what_has_no_depth_cannot_be_restored(service: MissionService) -> 
     mission = (await service.create(make_spec())).id
     lon, lat = lon_lat(5, 5)
     bad = Measurement(vehicle="a", time_s=CLOCK_S, lat_deg=lat, lon_deg=lon, depth_m=2, range_m=-3)
-    await service.measure(mission, [bad])
-    refused = (await service.review(mission, NOT_USED)).items[0]
+    await measure(await service.get(mission), [bad])
+    refused = (await soundings_page(await service.get(mission), NOT_USED)).items[0]
     assert (refused.depth_m, refused.range_m) == (None, -3)
     with pytest.raises(ConflictError, match="range_m: -3 is not positive"):
-        await service.rule(mission, refused.id, Ruling.RESTORED)
+        await rule(await service.get(mission), refused.id, Ruling.RESTORED, actor="operator")
     with pytest.raises(SoundingNotFoundError):
-        await service.rule(mission, refused.id + 1, Ruling.RESTORED)
+        await rule(await service.get(mission), refused.id + 1, Ruling.RESTORED, actor="operator")
     other = (await service.create(make_spec())).id
     with pytest.raises(SoundingNotFoundError):
-        await service.rule(other, refused.id, Ruling.REJECTED)
+        await rule(await service.get(other), refused.id, Ruling.REJECTED, actor="operator")
 
 
 async def test_a_mission_that_is_taken_up_has_its_map_without_being_asked_for_it(harbour: Harbour) -> None:
     service = harbour.service
     mission = (await service.create(make_spec())).id
-    await service.measure(mission, measured())
-    await service.act(mission, Action.START, actor="Ana")
-    await service.act(mission, Action.FINISH, actor="Ana")
+    await measure(await service.get(mission), measured())
+    await act(service, mission, "start", actor="Ana")
+    await act(service, mission, "finish", actor="Ana")
 
     async def mapped() -> bool:
-        return bool((await service.mission(mission)).progress.coverage_pct)
+        return bool((await view_of(service, mission)).progress.coverage_pct)
 
     await until(mapped, "the last map was made by itself")
-    shown = (await service.mission(mission)).progress
+    shown = (await view_of(service, mission)).progress
 
     service = await harbour.reopen()
     await service.missions()
     await until(mapped, "the map was made by itself")
-    progress = (await service.mission(mission)).progress
+    progress = (await view_of(service, mission)).progress
     assert progress.coverage_pct == pytest.approx(shown.coverage_pct, abs=2)
-    async with service.subscribe(mission) as messages:
+    async with watched(await service.get(mission)) as messages:
         snapshot = await anext(messages)
     assert snapshot.map_version > 0
 
@@ -141,7 +150,7 @@ async def test_missions_that_left_memory_are_listed_as_they_were(harbour: Harbou
     ids = []
     for number in range(11):
         mission = (await service.create(make_spec(name=f"Quay {number}"))).id
-        await service.act(mission, Action.ABORT, actor="Ana")
+        await act(service, mission, "abort", actor="Ana")
         ids.append(mission)
     first = await service.missions()
     assert [m.id for m in first] == ids[::-1]
@@ -151,14 +160,14 @@ async def test_missions_that_left_memory_are_listed_as_they_were(harbour: Harbou
 
 
 async def test_the_map_of_an_earlier_step_is_that_of_the_soundings_until_then(service: MissionService) -> None:
-    from app.missions.operations.history import map_at_step
+    from app.missions.operations.mission_maps import map_at_step
 
     mission = (await service.create(make_spec())).id
-    await service.measure(mission, measured()[:30])
-    live = await service._get(mission)
+    await measure(await service.get(mission), measured()[:30])
+    live = await service.get(mission)
     live.set_step(1, None, {})
-    await service.measure(mission, measured())
-    whole = await service.map(mission)
+    await measure(await service.get(mission), measured())
+    whole = await newest_map(await service.get(mission), service.maps)
     early = await map_at_step(live, 0)
     assert early.built.soundings == 30
     assert early.built.map.count.sum() == 30

@@ -7,12 +7,13 @@ from contextlib import AsyncExitStack
 import pytest
 
 from app.missions.errors import ConflictError, MissionElsewhereError
+from app.missions.operations.history import events_after
 from app.missions.service import MissionService
 from app.missions.settings import ServiceSettings
-from app.missions.states import Action, MissionState
+from app.missions.states import MissionState
 from app.missions.views.mission import Level
 from tests.support.databases import Databases, query
-from tests.support.missions.harbour import Harbour, sim_spec, until_state, until_step
+from tests.support.missions.harbour import Harbour, act, sim_spec, until_state, until_step, view_of
 from tests.support.missions.specs import make_spec
 from tests.support.waiting import until
 
@@ -41,7 +42,7 @@ async def test_a_mission_is_its_first_askers(two: tuple[Harbour, Harbour]) -> No
     one, other = [await harbour.open() for harbour in two]
     mission = await one.create(make_spec())
     with pytest.raises(MissionElsewhereError):
-        await other.mission(mission.id)
+        await view_of(other, mission.id)
     peer = await other.process.owner(mission.id)
     assert peer is not None
     assert peer.secret == one.process.secret
@@ -54,9 +55,9 @@ async def test_running_missions_go_to_whoever_is_left(two: tuple[Harbour, Harbou
     one, other = [await harbour.open() for harbour in two]
     missions = [(await one.create(sim_spec(f"v{k}", steps=500))).id for k in range(3)]
     for mission in missions:
-        await one.act(mission, Action.START, actor="Ana")
+        await act(one, mission, "start", actor="Ana")
         await until_step(one, mission, 1)
-    before = {mission: (await one.mission(mission)).progress.step for mission in missions}
+    before = {mission: (await view_of(one, mission)).progress.step for mission in missions}
     await two[0].close()
     for mission in missions:
 
@@ -65,7 +66,7 @@ async def test_running_missions_go_to_whoever_is_left(two: tuple[Harbour, Harbou
 
         await until(taken_up, "the other process has it")
         await until_step(other, mission, before[mission] + 1)
-        assert (await other.act(mission, Action.ABORT, actor="Ben")).mission.state is MissionState.ABORTED
+        assert (await act(other, mission, "abort", actor="Ben")).mission.state is MissionState.ABORTED
 
 
 def query_owner(harbour: Harbour, mission: str) -> set[int]:
@@ -77,32 +78,32 @@ async def test_a_vehicle_cannot_be_led_by_two_processes(two: tuple[Harbour, Harb
     one, other = [await harbour.open() for harbour in two]
     first = await one.create(make_spec(vehicles=[{"name": "a", "kind": "rest"}]))
     second = await other.create(make_spec(vehicles=[{"name": "a", "kind": "rest"}]))
-    await one.act(first.id, Action.START, actor="Ana")
+    await act(one, first.id, "start", actor="Ana")
     with pytest.raises(ConflictError, match=first.id):
-        await other.act(second.id, Action.START, actor="Ben")
-    assert (await other.mission(second.id)).state is MissionState.READY
-    await one.act(first.id, Action.ABORT, actor="Ana")
-    await other.act(second.id, Action.START, actor="Ben")
+        await act(other, second.id, "start", actor="Ben")
+    assert (await view_of(other, second.id)).state is MissionState.READY
+    await act(one, first.id, "abort", actor="Ana")
+    await act(other, second.id, "start", actor="Ben")
     third = await one.create(make_spec(vehicles=[{"name": "b", "kind": "rest"}]))
-    await one.act(third.id, Action.START, actor="Ana")
+    await act(one, third.id, "start", actor="Ana")
     with pytest.raises(ConflictError, match=second.id):
-        await one.add_vehicle(third.id, second.spec.vehicles[0])
-    assert [vehicle.name for vehicle in (await one.mission(third.id)).vehicles] == ["b"]
+        await one.team_changes.join(await one.get(third.id), second.spec.vehicles[0], actor="operator")
+    assert [vehicle.name for vehicle in (await view_of(one, third.id)).vehicles] == ["b"]
 
 
 async def test_a_process_that_was_taken_for_dead_writes_nothing_and_lets_go(two: tuple[Harbour, Harbour]) -> None:
     one = await two[0].open()
     mission = await one.create(sim_spec(steps=500))
-    await one.act(mission.id, Action.START, actor="Ana")
+    await act(one, mission.id, "start", actor="Ana")
     await until_step(one, mission.id, 1)
-    live = await one._get(mission.id)
+    live = await one.get(mission.id)
     await asyncio.to_thread(query, two[0].database.url, "delete from processes")
     with pytest.raises(MissionElsewhereError):
         await live.journal.log(Level.INFO, "note", "never written")
     await until(lambda: live not in list(one._registry), "it let go of it")
     # It is a new member now, and as nobody else took the mission up, it does so itself.
     await until_state(one, mission.id, MissionState.RUNNING)
-    assert "never written" not in [event.message for event in await one.events(mission.id)]
+    assert "never written" not in [event.message for event in await events_after(await one.get(mission.id))]
 
 
 async def test_a_database_that_goes_away_for_a_while_stops_the_vehicles_until_it_is_back(
@@ -113,14 +114,14 @@ async def test_a_database_that_goes_away_for_a_while_stops_the_vehicles_until_it
     try:
         service = await harbour.open()
         mission = await service.create(sim_spec(steps=500))
-        await service.act(mission.id, Action.START, actor="Ana")
+        await act(service, mission.id, "start", actor="Ana")
         await until_step(service, mission.id, 2)
         query(url, "select pg_terminate_backend(pid) from pg_stat_activity where pid <> pg_backend_pid()")
         await until(lambda: mission.id not in service._runs, "its vehicles are stopped")
         await until(lambda: mission.id in service._runs, "they go on")
-        step = (await service.mission(mission.id)).progress.step
+        step = (await view_of(service, mission.id)).progress.step
         await until_step(service, mission.id, step + 1)
-        told = [event.message for event in await service.events(mission.id) if event.kind == "resumed"]
+        told = [event.message for event in await events_after(await service.get(mission.id)) if event.kind == "resumed"]
         assert any("out of reach" in words for words in told)
     finally:
         await harbour.close()
@@ -132,6 +133,6 @@ async def test_a_guest_that_only_looks_takes_nothing(
     one = await two[0].open()
     mission = await one.create(make_spec())
     guest = MissionService(make_settings(database_url=two[0].database.url), two[0].database)
-    assert (await guest.mission(mission.id)).id == mission.id
+    assert (await guest.get(mission.id)).id == mission.id
     await guest.shutdown()
     assert query_owner(two[0], mission.id) == {one.process.number}

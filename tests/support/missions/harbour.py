@@ -7,12 +7,15 @@ from collections.abc import Callable
 from typing import Any
 
 from app.missions.errors import ConflictError, VehicleNotFoundError
+from app.missions.operations.measurements import measure
+from app.missions.operations.polling import waypoint
+from app.missions.running.mission_views import mission_view
 from app.missions.service import MissionService
 from app.missions.settings import ServiceSettings
 from app.missions.soundings.measurement import Measurement
 from app.missions.spec.mission import MissionSpec
-from app.missions.states import MissionState
-from app.missions.views.mission import MissionView
+from app.missions.states import Action, MissionState
+from app.missions.views.mission import ActionView, MissionView
 from app.storage.database import Database
 from tests.support.missions.specs import lon_lat, spec_json
 from tests.support.waiting import until
@@ -51,24 +54,34 @@ def sim_spec(*names: str, **changes: Any) -> MissionSpec:
     return MissionSpec.model_validate(spec_json(**({"vehicles": vehicles} | changes)))
 
 
+async def view_of(service: MissionService, mission_id: str) -> MissionView:
+    return mission_view(await service.get(mission_id))
+
+
+async def act(
+    service: MissionService, mission_id: str, action: str, *, actor: str = "Ana", note: str = ""
+) -> ActionView:
+    return await service.act(await service.get(mission_id), Action(action), actor=actor, note=note)
+
+
 async def state_of(service: MissionService, mission_id: str) -> MissionState:
-    return (await service.mission(mission_id)).state
+    return (await view_of(service, mission_id)).state
 
 
 async def until_state(service: MissionService, mission_id: str, state: MissionState) -> MissionView:
     async def there() -> bool:
         now = await state_of(service, mission_id)
         ended = now in (MissionState.FAILED, MissionState.ABORTED, MissionState.FINISHED)
-        assert now is state or not ended, (now, (await service.mission(mission_id)).reason)
+        assert now is state or not ended, (now, (await view_of(service, mission_id)).reason)
         return now is state
 
     await until(there, f"the mission is {state}")
-    return await service.mission(mission_id)
+    return await view_of(service, mission_id)
 
 
 async def until_step(service: MissionService, mission_id: str, step: int) -> None:
     async def there() -> bool:
-        view = await service.mission(mission_id)
+        view = await view_of(service, mission_id)
         assert view.state is not MissionState.FAILED, view.reason
         return view.progress.step >= step
 
@@ -102,12 +115,14 @@ class Rover:
         return Measurement.model_validate(values | changes)
 
     async def post(self, **changes: Any) -> None:
-        await self.service.measure(self.mission_id, [self.item(**changes)])
+        await measure(await self.service.get(self.mission_id), [self.item(**changes)])
 
     async def poll(self, timeout_s: float = 1.0) -> bool:
         """One round; whether a waypoint came."""
         after = self.steps[-1] if self.steps else None
-        found = await self.service.waypoint(self.mission_id, self.name, after_step=after, timeout_s=timeout_s)
+        found = await waypoint(
+            await self.service.get(self.mission_id), self.name, after_step=after, timeout_s=timeout_s
+        )
         if found is None:
             return False
         self.steps.append(found.step)

@@ -9,11 +9,13 @@ from app.api.limits import Limits
 from app.api.peers import is_own_user
 from app.api.tokens import Role, TokenStore
 from app.missions.fleet.links.neptus import gateway_settings
+from app.missions.operations.history import events_after
 from app.missions.service import MissionService
 from app.missions.settings import ServiceSettings
 from app.missions.views.mission import MissionView
 from app.storage.database import Database
 from imc_bridge.neptus import Area
+from tests.support.missions.harbour import view_of
 from tests.support.neptus.panel import Auv, Floor, RealPanel
 
 ROWS, COLS = 60, 50
@@ -64,8 +66,8 @@ class Gateway:
     async def mission(self, name: str = SESSION) -> MissionView:
         found = [summary for summary in await self.service.missions() if summary.name == name]
         assert len(found) == 1
-        return await self.service.mission(found[0].id)
+        return await view_of(self.service, found[0].id)
 
     async def log(self, kind: str, name: str = SESSION) -> list[str]:
         mission = await self.mission(name)
-        return [event.message for event in await self.service.events(mission.id) if event.kind == kind]
+        return [event.message for event in await events_after(await self.service.get(mission.id)) if event.kind == kind]

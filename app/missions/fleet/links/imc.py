@@ -8,8 +8,11 @@ from app.missions import metrics
 from app.missions.errors import InvalidRequestError
 from app.missions.fleet.interface import (
     BeamGeometry,
+    Deployment,
     EventSink,
     FleetEvent,
+    FleetLink,
+    LinkCapabilities,
     LinkReport,
     LinkState,
     Position,
@@ -56,6 +59,8 @@ _UNENGAGED = {
     NodeState.LOST: LinkState.LOST,
     NodeState.EXPECTED_OFFLINE: LinkState.EXPECTED_OFFLINE,
 }
+DUNE_CIRCLES_M = 15.0
+"""From this distance on DUNE circles about a reference in place of going straight to it."""
 MAX_CORNERS = 24
 """Of an area that are shown to other consoles."""
 _SILENT = frozenset({NodeState.LOST, NodeState.EXPECTED_OFFLINE})
@@ -71,18 +76,16 @@ def bridge_settings(settings: ImcSettings, time_scale: float) -> BridgeSettings:
     return BridgeSettings(**settings.model_dump(exclude={"enabled"}), time_scale=time_scale)
 
 
-class ImcFleetLink:
+class ImcFleetLink(FleetLink):
     """The fleet interface over IMC/UDP; see :class:`app.missions.fleet.interface.FleetLink` for its contract."""
+
+    kind = "imc"
+    capabilities = LinkCapabilities(ready_before_start=True, circles_m=DUNE_CIRCLES_M)
 
     def __init__(self, settings: BridgeSettings) -> None:
         self._bridge = Bridge(settings)
         self._sink: EventSink = lambda _event: None
         self._led: dict[str, tuple[Guidance, str]] = {}
-
-    @property
-    def kind(self) -> str:
-        """``imc``."""
-        return "imc"
 
     async def start(self, sink: EventSink) -> None:
         """Bind the ports and listen.
@@ -110,14 +113,20 @@ class ImcFleetLink:
             if node.is_vehicle and (not wanted or node.name in wanted)
         ]
 
-    def lead(self, vehicle: str, guidance: str, gateway: str | None) -> None:
-        """Say how a vehicle shall be led from its next engagement on, as its mission describes it."""
-        self._led[vehicle] = Guidance(guidance), gateway or ""
-        self._bridge.want(vehicle)
-        if gateway:
-            self._bridge.want(gateway)
+    def deploy(self, deployment: Deployment) -> None:
+        """Lead a vehicle from its next engagement on as its mission describes it, whose area other consoles show."""
+        vehicle = deployment.vehicle
+        self._led[vehicle.name] = Guidance(vehicle.guidance), vehicle.gateway or ""
+        self._bridge.want(vehicle.name)
+        if vehicle.gateway:
+            self._bridge.want(vehicle.gateway)
+        self._show_area(deployment.mission.name, deployment.mission.area.ring)
 
-    def show_area(self, mission: str, ring: Sequence[tuple[float, float]]) -> None:
+    def withdraw(self, deployment: Deployment) -> None:
+        """Take the mission's area off other consoles."""
+        self._show_area(deployment.mission.name, ())
+
+    def _show_area(self, mission: str, ring: Sequence[tuple[float, float]]) -> None:
         """Show a mission's area on other consoles' maps, corner by corner: (longitude, latitude); empty: no longer."""
         board = self._bridge.board
         for name in [name for name in board.marks if name.startswith(f"{mission} corner ")]:

@@ -15,6 +15,7 @@ from typing import Any
 from app.missions import safety
 from app.missions.fleet.interface import (
     EventSink,
+    LinkCapabilities,
     LinkState,
     Position,
     SoundingReport,
@@ -122,6 +123,7 @@ class NeptusFleetLink(VisitedLink):
     """Sessions of the gateway as a :class:`app.missions.fleet.interface.FleetLink`."""
 
     kind = "neptus"
+    capabilities = LinkCapabilities(keeps_depth=True)
 
     def __init__(self, settings: NeptusSettings, keeper: SessionKeeper) -> None:
         super().__init__(settings.lost_after_s)

@@ -8,6 +8,7 @@ import asyncio
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from typing import Self
 
 from app.missions.fleet.interface import (
     EventSink,
@@ -33,16 +34,18 @@ class _Poller(Visitor):
 
 
 class RestFleetLink(VisitedLink):
-    """The fleet interface for vehicles that poll.
-
-    The mission service calls ``heard``, ``has_waypoint`` and ``told_to_stop`` as requests come in.
-    """
+    """The fleet interface for vehicles that poll."""
 
     kind = "rest"
 
     def __init__(self, *, lost_after_s: float = 30.0) -> None:
         super().__init__(lost_after_s)
         self._pollers: dict[str, _Poller] = {}
+
+    @property
+    def polled_vehicles(self) -> Self:
+        """The link itself: ``heard``, ``has_waypoint`` and ``told_to_stop`` are called as requests come in."""
+        return self
 
     async def start(self, sink: EventSink) -> None:
         """Begin; events go to ``sink``."""

@@ -11,8 +11,11 @@ import structlog
 from app.missions.clock import now
 from app.missions.fleet.interface import (
     BeamGeometry,
+    Deployment,
     EventSink,
     FleetEvent,
+    FleetLink,
+    LinkCapabilities,
     LinkReport,
     LinkState,
     Position,
@@ -160,7 +163,7 @@ class _Swimmer:
         self.body.go_to(east, north, depth_m, order.speed_mps, arrival_radius_m=order.arrival_radius_m)
 
 
-class SimFleetLink:
+class SimFleetLink(FleetLink):
     """The fleet interface for vehicles simulated in this process.
 
     Parameters
@@ -170,6 +173,7 @@ class SimFleetLink:
     """
 
     kind = "sim"
+    capabilities = LinkCapabilities(simulated=True, scans=True)
 
     def __init__(self, settings: SimulationSettings, time_scale: float) -> None:
         self._settings = settings
@@ -193,6 +197,40 @@ class SimFleetLink:
         if self._task is not None:
             self._task.cancel()
             await asyncio.gather(self._task, return_exceptions=True)
+
+    def deploy(self, deployment: Deployment) -> None:
+        """Launch a vehicle where its mission has it begin."""
+        vehicle, mission, world = deployment.vehicle, deployment.mission, deployment.world()
+        frame, size = mission.frame(), mission.local_area().max(axis=0)
+        launch = Launch(
+            vehicle=vehicle.name,
+            mission_id=deployment.mission_id,
+            sensor=vehicle.sensor,
+            south_west=(frame.origin_lat_deg, frame.origin_lon_deg),
+            width_m=float(size[0]),
+            height_m=float(size[1]),
+            start=(vehicle.start[1], vehicle.start[0]) if vehicle.start is not None else deployment.berth(),
+            noise=mission.sounding_noise,
+            targets=tuple(mission.targets),
+            ranging=RangingNoise(
+                relative_sd=mission.tracking.range_noise,
+                sd_m=mission.tracking.range_sd_m,
+                hearing_m=mission.tracking.hearing_m or math.inf,
+            ),
+            lookout=None
+            if world is None or mission.search is None
+            else Lookout(world, mission.search.scanner.reach_m, mission.search.scanner.resolution_deg),
+        )
+        try:
+            self.launch(launch)
+        except ValueError as error:
+            raise VehicleRefusedError(vehicle.name, f"cannot be launched: {error}", "change its start") from error
+
+    def withdraw(self, deployment: Deployment) -> None:
+        """Put a vehicle away, unless another mission has it."""
+        there = self._swimmers.get(deployment.vehicle.name)
+        if there is not None and there.mission_id == deployment.mission_id:
+            self.put_away(deployment.vehicle.name)
 
     def launch(self, launch: Launch) -> None:
         """Bring a vehicle into the world; nothing happens when it is there already for the same mission.

@@ -1,12 +1,13 @@
 """What links have in common whose vehicles come to us: their states and waypoints as events, and who fell silent."""
 
 import asyncio
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Iterable
 from dataclasses import dataclass
 
 from app.missions.fleet.interface import (
     EventSink,
+    FleetLink,
     LinkReport,
     LinkState,
     VehicleReport,
@@ -30,7 +31,7 @@ class Visitor:
     status: WaypointStatus | None = None
 
 
-class VisitedLink(ABC):
+class VisitedLink(FleetLink):
     """Keeps the visitors' states and tells of every change.
 
     Parameters

@@ -17,8 +17,11 @@ import pytest
 
 from app.api.tokens import Role, TokenStore
 from app.missions.fleet.links.neptus import GATHER_S, gateway_settings
+from app.missions.operations.history import soundings_of
+from app.missions.operations.mission_maps import newest_map
 from app.missions.settings import NeptusSettings
-from app.missions.states import Action, MissionState
+from app.missions.states import MissionState
+from tests.support.missions.harbour import act, view_of
 from tests.support.neptus.gateway import COLS, ROWS, SESSION, Gateway
 from tests.support.waiting import until
 
@@ -167,13 +170,13 @@ async def test_an_unmodified_panel_maps_an_area_step_by_step(gateway: Gateway) -
     assert mission.progress.step == 6
     assert mission.progress.soundings >= 6 * 4
     assert mission.progress.rejected == 0
-    built = (await gateway.service.map(mission.id)).built.map
+    built = (await newest_map(await gateway.service.get(mission.id), gateway.service.maps)).built.map
     area = gateway_settings(gateway.settings.neptus).conventions.area
-    for row in await gateway.service.soundings(mission.id):
+    for row in await soundings_of(await gateway.service.get(mission.id)):
         cell = area.to_cells(row.lat_deg, row.lon_deg)
         assert row.depth_m == pytest.approx(bottom_m(*cell), abs=1e-3)
     assert np.nanmin(built.depth_m) > 8.0
-    stops = (await gateway.service.act(mission.id, Action.FINISH, actor="tester")).stops
+    stops = (await act(gateway.service, mission.id, "finish", actor="tester")).stops
     assert not any(stop.acknowledged for stop in stops), "the panel cannot be stopped from here, and that is said"
     assert "press STOP" in stops[0].detail
     late = await asyncio.to_thread(panel.send)
@@ -186,14 +189,14 @@ async def test_a_paused_mission_answers_nothing_and_a_resumed_one_goes_on(gatewa
     await asyncio.to_thread(panel.connect)
     await panel.fly()
     mission = await gateway.mission()
-    await gateway.service.act(mission.id, Action.PAUSE, actor="tester")
+    await act(gateway.service, mission.id, "pause", actor="tester")
     there = panel.places
     assert (await asyncio.to_thread(panel.send)).startswith("226")
     await asyncio.sleep(GATHER_S * 2)
     answer = await asyncio.to_thread(panel.read)
     assert answer is not None
     assert answer["timeStep"] < panel.time_step, "the panel waits, and its vehicles stay where they are"
-    await gateway.service.act(mission.id, Action.RESUME, actor="tester")
+    await act(gateway.service, mission.id, "resume", actor="tester")
     await panel.await_answer()
     await panel.fly()
     assert panel.places != there
@@ -212,7 +215,7 @@ async def test_waypoints_are_sent_fetched_and_reached_in_that_order(gateway: Gat
 
 
 async def _statuses(gateway: Gateway, mission_id: str, wanted: set[str]) -> bool:
-    view = await gateway.service.mission(mission_id)
+    view = await view_of(gateway.service, mission_id)
     return {str(waypoint.status) for waypoint in view.waypoints} == wanted
 
 
@@ -455,7 +458,7 @@ async def test_the_panels_sparse_map_is_used_as_it_was_set_up(
         await asyncio.to_thread(panel.connect, f"{ROWS} {COLS} 1 0 0\n\n{chr(10).join([line] * ROWS)}\n".encode())
         await panel.fly()
         mission = await gateway.mission()
-        rows = [r for r in await gateway.service.soundings(mission.id) if r.source == "neptus prior map"]
+        rows = [r for r in await soundings_of(await gateway.service.get(mission.id)) if r.source == "neptus prior map"]
         assert len(rows) == ROWS
         assert {row.depth_m for row in rows} == {depth}
         assert {row.verdict for row in rows} == {"accepted"}

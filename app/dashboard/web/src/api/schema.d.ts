@@ -5321,10 +5321,10 @@ export interface operations {
             query?: never;
             header?: never;
             path: {
-                /** @description The mission's id */
-                mission_id: string;
                 /** @description The vehicle's name */
                 name: string;
+                /** @description The mission's id */
+                mission_id: string;
             };
             cookie?: never;
         };
@@ -5526,10 +5526,10 @@ export interface operations {
             query?: never;
             header?: never;
             path: {
-                /** @description The mission's id */
-                mission_id: string;
                 /** @description The vehicle's name */
                 name: string;
+                /** @description The mission's id */
+                mission_id: string;
             };
             cookie?: never;
         };
@@ -5605,10 +5605,10 @@ export interface operations {
             query?: never;
             header?: never;
             path: {
-                /** @description The mission's id */
-                mission_id: string;
                 /** @description The vehicle's name */
                 name: string;
+                /** @description The mission's id */
+                mission_id: string;
             };
             cookie?: never;
         };
@@ -6033,10 +6033,10 @@ export interface operations {
             };
             header?: never;
             path: {
-                /** @description The mission's id */
-                mission_id: string;
                 /** @description The vehicle's name */
                 name: string;
+                /** @description The mission's id */
+                mission_id: string;
             };
             cookie?: never;
         };
@@ -6708,10 +6708,10 @@ export interface operations {
             query?: never;
             header?: never;
             path: {
-                /** @description The mission's id */
-                mission_id: string;
                 /** @description The import's id */
                 import_id: string;
+                /** @description The mission's id */
+                mission_id: string;
             };
             cookie?: never;
         };
@@ -7435,10 +7435,10 @@ export interface operations {
             };
             header?: never;
             path: {
-                /** @description The mission's id */
-                mission_id: string;
                 /** @description One of tif, nc, bag, xyz, csv, geojson, kml, png */
                 format: string;
+                /** @description The mission's id */
+                mission_id: string;
             };
             cookie?: never;
         };
@@ -7523,10 +7523,10 @@ export interface operations {
             };
             header?: never;
             path: {
-                /** @description The mission's id */
-                mission_id: string;
                 /** @description One of csv, xyz, geojson */
                 format: string;
+                /** @description The mission's id */
+                mission_id: string;
             };
             cookie?: never;
         };
@@ -7606,10 +7606,10 @@ export interface operations {
             };
             header?: never;
             path: {
-                /** @description The mission's id */
-                mission_id: string;
                 /** @description One of geojson, kml, gpx */
                 format: string;
+                /** @description The mission's id */
+                mission_id: string;
             };
             cookie?: never;
         };
@@ -7802,10 +7802,10 @@ export interface operations {
             query?: never;
             header?: never;
             path: {
-                /** @description The mission's id */
-                mission_id: string;
                 /** @description The sounding's id */
                 sounding_id: number;
+                /** @description The mission's id */
+                mission_id: string;
             };
             cookie?: never;
         };
@@ -7930,10 +7930,10 @@ export interface operations {
             query?: never;
             header?: never;
             path: {
-                /** @description The mission's id */
-                mission_id: string;
                 /** @description The sounding's id */
                 sounding_id: number;
+                /** @description The mission's id */
+                mission_id: string;
             };
             cookie?: never;
         };

@@ -1,0 +1,116 @@
+"""A mission's map as it is asked for: the newest, the one of a step, what changed in it, and the files made of it."""
+
+import asyncio
+from collections.abc import Sequence
+
+from app.mapping.products.tracks import Track, TrackPoint
+from app.missions.clock import now
+from app.missions.errors import MapNotReadyError
+from app.missions.live.mission import LiveMission
+from app.missions.live.sounding_store import accepted
+from app.missions.maps.builder import BuiltMap
+from app.missions.maps.products import (
+    MAP,
+    SEARCH,
+    SOUNDINGS,
+    TRACKS,
+    Material,
+    Product,
+    ProductOptions,
+    make_product,
+    product_kind,
+)
+from app.missions.maps.snapshot import MapSnapshot
+from app.missions.operations.history import soundings_of
+from app.missions.operations.scans import search_of
+from app.missions.running.final_maps import FinalMaps
+from app.missions.settings import ProviderSettings
+from app.storage import missions as mission_queries
+
+
+async def newest_map(live: LiveMission, maps: FinalMaps, *, patient: bool = True) -> MapSnapshot:
+    """Return the newest map. Raises MapNotReadyError when there is no sounding yet.
+
+    Without being ``patient``: an older one, if there is one, while a newer one is being made.
+    """
+    built = live.builder.newest
+    if not patient and built is not None and maps.busy(live.id):
+        return live.snapshot(built)
+    await maps.last(live.id)
+    await live.notice_imports()
+    built = live.builder.newest
+    if built is None or (live.builder.stale and not live.running):
+        built = await live.build_map()
+    if built is None:
+        raise MapNotReadyError(
+            "no sounding was accepted yet, so there is no map", "start the mission or post measurements"
+        )
+    return live.snapshot(built)
+
+
+async def map_at_step(live: LiveMission, step: int) -> MapSnapshot:
+    """Return the map that the soundings until the end of a step make. Raises MapNotReadyError without any."""
+    if live.builder.newest is None or live.builder.stale or live.builder.arrivals.at_rest:
+        await live.build_map()
+    found = await accepted(live.database, live.id, 0, until_step=step)
+    newest = live.builder.newest
+    if newest is None:
+        raise MapNotReadyError("no sounding was accepted, so there is no map", "choose a later step")
+    try:
+        bathymetry = await live.in_thread(live.builder.as_of, found.table)
+    except ValueError:
+        raise MapNotReadyError(
+            f"no sounding was accepted until the end of step {step}", "choose a later step"
+        ) from None
+    built = BuiltMap(newest.version, len(found.table), bathymetry, newest.digest)
+    return MapSnapshot(live.facts, built, step, live.reference_m, live.revision)
+
+
+async def map_tiles(
+    live: LiveMission, maps: FinalMaps, run: str, since: str, further: Sequence[str] = (), step: int | None = None
+) -> bytes:
+    """Return what changed in the map; see ``TileCache.changes``. ``step``: the map as it was at that step's end.
+
+    ``run`` tells this process from others, whose versions begin at 1, too.
+    """
+    snapshot = None
+    if step is not None:
+        snapshot = await map_at_step(live, step)
+    elif live.running:
+        # Not with the planning threads, which a decision may keep for seconds.
+        snapshot = await asyncio.to_thread(live.live_snapshot)
+    if snapshot is None:
+        snapshot = await newest_map(live, maps, patient=False)
+    tag = f"{run}.{snapshot.tag}" + ("" if step is None else f"@{step}")
+    return await live.tiles.answer(snapshot, tag, since, tuple(sorted(set(further))))
+
+
+async def export(
+    live: LiveMission, maps: FinalMaps, provider: ProviderSettings, name: str, options: ProductOptions | None = None
+) -> Product:
+    """Return a product file of the mission, a key of ``PRODUCTS``.
+
+    Raises
+    ------
+    InvalidRequestError, MapNotReadyError, ConflictError
+        For an unknown kind or options that cannot be; where the map is needed and there is none yet; where the
+        mission would have to be a search.
+    """
+    needs = product_kind(name).needs
+    material = Material(
+        facts=live.facts,
+        created=now(),
+        provider=provider.named(),
+        map=await newest_map(live, maps) if MAP in needs else None,
+        soundings=await soundings_of(live) if SOUNDINGS in needs else (),
+        tracks=await _track_lines(live) if TRACKS in needs else (),
+        search=search_of(live) if SEARCH in needs else None,
+    )
+    return await live.in_thread(make_product, name, material, options or ProductOptions())
+
+
+async def _track_lines(live: LiveMission) -> list[Track]:
+    await live.journal.flush()
+    async with live.database.reading() as session:
+        found = await mission_queries.track_points(session, live.id)
+    return [Track(name, [TrackPoint(*point) for point in points]) for name, points in found.items()]
