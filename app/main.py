@@ -46,7 +46,7 @@ from app.api.connections import Sockets, is_shared_host, patient_http
 from app.api.forwarding import ForwardingMiddleware, PeerMiddleware
 from app.api.health import health_router
 from app.api.intake import Intakes
-from app.api.limits import LimitMiddleware, Limits
+from app.api.limits import LimitMiddleware, RequestLimits
 from app.api.middleware import RequestMiddleware
 from app.api.peers import is_own_user
 from app.api.quotas import Shares
@@ -84,7 +84,7 @@ def create_app(settings: Settings | None = None, *, port: int | None = None) -> 
     that is not the port of the settings.
     """
     settings = settings or load_settings()
-    limits = Limits(settings.max_requests_per_s, settings.max_failed_logins)
+    limits = RequestLimits(settings.max_requests_per_s, settings.max_failed_logins)
     if not structlog.is_configured():
         logs.configure(settings.log_level, settings.log_format)
 

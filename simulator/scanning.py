@@ -8,7 +8,7 @@ import numpy as np
 
 from simulator.arrays import FloatArray
 from simulator.obstacles import ObstacleWorld
-from simulator.world import Place
+from simulator.world import LocalPosition
 
 HULL_M = 0.4
 """Half the length of the hull: closer than that to an obstacle is a collision."""
@@ -69,7 +69,7 @@ class Scanning:
         self._period_s = period_s
         self._next_s = start_s
 
-    def step(self, time_s: float, true: Place) -> Scan | None:
+    def step(self, time_s: float, true: LocalPosition) -> Scan | None:
         """Return a scan when one is due; notes whether the vehicle touches anything at its true place."""
         here = np.array([true.east_m, true.north_m])
         self.collided = self.collided or float(self.world.clearance_m(here[None])[0]) < HULL_M

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from simulator.terrain import Terrain
-from simulator.world import Place
+from simulator.world import LocalPosition
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,14 +76,14 @@ class Target:
         """What modems call it by."""
         return self.spec.name
 
-    def at(self, time_s: float) -> Place:
+    def at(self, time_s: float) -> LocalPosition:
         """Where it is at a time of the vehicles' clock."""
         spec = self.spec
         way_m = spec.speed_mps * max(0.0, time_s - self._start_s)
         east = _reflected(spec.start[0] + way_m * math.sin(spec.heading_rad), self._terrain.width_m)
         north = _reflected(spec.start[1] + way_m * math.cos(spec.heading_rad), self._terrain.height_m)
         floor_m = self._terrain.depth_at_point(east, north)
-        return Place(east, north, min(spec.start[2], floor_m) if math.isfinite(floor_m) else spec.start[2])
+        return LocalPosition(east, north, min(spec.start[2], floor_m) if math.isfinite(floor_m) else spec.start[2])
 
 
 class Ranging:
@@ -112,7 +112,7 @@ class Ranging:
         # A modem asks one after the other: the answers of one period do not come at once.
         self._due_s = [start_s + (k + 1) * noise.period_s / max(len(targets), 1) for k in range(len(targets))]
 
-    def step(self, time_s: float, here: Place) -> list[tuple[str, float]]:
+    def step(self, time_s: float, here: LocalPosition) -> list[tuple[str, float]]:
         """Return the ranges, by target, that were measured until ``time_s`` from a true place."""
         found = []
         for k, target in enumerate(self._targets):
@@ -124,7 +124,7 @@ class Ranging:
                 found.append((target.name, measured))
         return found
 
-    def _measure(self, there: Place, here: Place) -> float | None:
+    def _measure(self, there: LocalPosition, here: LocalPosition) -> float | None:
         noise, rng = self._noise, self._rng
         true_m = math.dist((there.east_m, there.north_m, there.depth_m), (here.east_m, here.north_m, here.depth_m))
         lost, false, relative, absolute = rng.random(), rng.random(), rng.standard_normal(), rng.standard_normal()

@@ -96,7 +96,7 @@ class Motion:
 
 
 @dataclass(frozen=True, slots=True)
-class Target:
+class SteeringTarget:
     """Where to go: a place, a speed, and either a depth or an altitude above the bottom."""
 
     east_m: float
@@ -129,13 +129,13 @@ class Vehicle:
         self.limits = limits or VehicleLimits()
         self.current = current
         self.guidance = Guidance.IDLE
-        self.target: Target | None = None
+        self.target: SteeringTarget | None = None
         self._leaving = False
         self.loiter_radius_m = self.limits.loiter_radius_m
         self.clockwise = True
         self.distance_m = 0.0
 
-    def goto(self, target: Target) -> None:
+    def goto(self, target: SteeringTarget) -> None:
         """Head straight for a target."""
         if target != self.target:
             self._leaving = False
@@ -203,7 +203,7 @@ class Vehicle:
         self.distance_m += math.hypot(m.ve_mps, m.vn_mps, m.vd_mps) * STEP_S
         return hit
 
-    def _hovering_speed(self, target: Target, cruise_mps: float, error_m: tuple[float, float]) -> float:
+    def _hovering_speed(self, target: SteeringTarget, cruise_mps: float, error_m: tuple[float, float]) -> float:
         """Return the speed of a vehicle that turns before it goes, brakes in time and stays where it arrived."""
         m = self.motion
         de, dn = target.east_m - m.east_m - error_m[0], target.north_m - m.north_m - error_m[1]
@@ -213,7 +213,7 @@ class Vehicle:
         ahead = math.cos(wrap(math.atan2(de, dn) - m.heading_rad))
         return min(cruise_mps, math.sqrt(self.limits.acceleration_mps2 * left_m)) * (ahead if ahead > AHEAD else 0.0)
 
-    def _turn_rate(self, target: Target, east_m: float, north_m: float) -> float:
+    def _turn_rate(self, target: SteeringTarget, east_m: float, north_m: float) -> float:
         de, dn = target.east_m - east_m, target.north_m - north_m
         course = math.atan2(de, dn)
         if self.limits.hovers:
@@ -254,7 +254,7 @@ class Vehicle:
         cross = east * math.cos(course) - north * math.sin(course)
         return course - math.asin(max(-0.95, min(0.95, cross / speed)))
 
-    def _pitch(self, target: Target, bottom_m: float) -> float:
+    def _pitch(self, target: SteeringTarget, bottom_m: float) -> float:
         m, lim = self.motion, self.limits
         wanted = target.z_m
         if target.by_altitude:

@@ -15,13 +15,13 @@ import numpy as np
 from simulator.navigation import Navigation
 from simulator.sensors import SensorKind, Sonar, SonarNoise, to_local_frame
 from simulator.terrain import Terrain
-from simulator.vehicle import STEP_S, Guidance, Motion, Target, Vehicle, VehicleLimits
+from simulator.vehicle import STEP_S, Guidance, Motion, SteeringTarget, Vehicle, VehicleLimits
 
 log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class LocalPosition:
     """A position in the local frame; depth positive down."""
 
     east_m: float
@@ -34,7 +34,7 @@ class Place:
 
 
 @dataclass(frozen=True, slots=True)
-class Measurement:
+class BeamReturn:
     """One return of one beam.
 
     Attributes
@@ -58,12 +58,12 @@ class Measurement:
     source: str
     beam: int
     range_m: float
-    position: Place
+    position: LocalPosition
     heading_rad: float
     pitch_rad: float
     roll_rad: float
-    footprint: Place | None
-    true_position: Place
+    footprint: LocalPosition | None
+    true_position: LocalPosition
 
     @property
     def valid(self) -> bool:
@@ -87,8 +87,8 @@ class VehicleState:
     """
 
     time_s: float
-    position: Place
-    true_position: Place
+    position: LocalPosition
+    true_position: LocalPosition
     heading_rad: float
     pitch_rad: float
     roll_rad: float
@@ -172,7 +172,7 @@ class SimulatedVehicle:
             swath_rad=swath_rad,
             swath_beams=swath_beams,
         )
-        self.collisions: list[tuple[float, Place]] = []
+        self.collisions: list[tuple[float, LocalPosition]] = []
         """Time and place of every contact with the bottom (one entry per contact, not per step)."""
         self._arrival_radius_m = 0.0
         self._touching = False
@@ -187,17 +187,17 @@ class SimulatedVehicle:
         return bool(self.collisions)
 
     @property
-    def true_position(self) -> Place:
+    def true_position(self) -> LocalPosition:
         """Where it is."""
         m = self.vehicle.motion
-        return Place(m.east_m, m.north_m, m.depth_m)
+        return LocalPosition(m.east_m, m.north_m, m.depth_m)
 
     @property
-    def position(self) -> Place:
+    def position(self) -> LocalPosition:
         """Where it believes to be (depth comes from a pressure sensor and is true)."""
         m = self.vehicle.motion
         de, dn = self.navigation.error_m
-        return Place(m.east_m + de, m.north_m + dn, m.depth_m)
+        return LocalPosition(m.east_m + de, m.north_m + dn, m.depth_m)
 
     @property
     def bottom_m(self) -> float:
@@ -259,14 +259,14 @@ class SimulatedVehicle:
             raise ValueError(f"{self.name}: target {values} holds a value that is not finite")
         self._arrival_radius_m = arrival_radius_m
         self.vehicle.loiter_radius_m = loiter_radius_m or self.vehicle.limits.loiter_radius_m
-        self.vehicle.goto(Target(east_m, north_m, depth_m, speed_mps, by_altitude))
+        self.vehicle.goto(SteeringTarget(east_m, north_m, depth_m, speed_mps, by_altitude))
 
     def stop(self) -> None:
         """Motor off: the vehicle floats up."""
         self.vehicle.idle()
         self.vehicle.target = None
 
-    def advance(self, dt_s: float) -> list[Measurement]:
+    def advance(self, dt_s: float) -> list[BeamReturn]:
         """Let simulated time pass and return what was measured, in time order.
 
         Whole steps of 0.1 s are integrated; a remainder is kept for the next call.
@@ -274,7 +274,7 @@ class SimulatedVehicle:
         if not (math.isfinite(dt_s) and dt_s >= 0.0):
             raise ValueError(f"{self.name}: dt_s is {dt_s}; it must be a time of 0 or more seconds")
         self._pending_s += dt_s
-        out: list[Measurement] = []
+        out: list[BeamReturn] = []
         while self._pending_s >= STEP_S - 1e-9:
             self._pending_s -= STEP_S
             if self.step():
@@ -314,7 +314,7 @@ class SimulatedVehicle:
             return True
         return False
 
-    def measure(self) -> list[Measurement]:
+    def measure(self) -> list[BeamReturn]:
         """One ping now: a measurement per beam."""
         m = self.vehicle.motion
         ranges = self.sonar.ping(self.terrain, m)
@@ -327,10 +327,12 @@ class SimulatedVehicle:
         out = []
         for beam, (r, (de, dn, dd)) in enumerate(zip(ranges.tolist(), directions.tolist(), strict=True)):
             footprint = (
-                Place(here.east_m + r * de, here.north_m + r * dn, here.depth_m + r * dd) if math.isfinite(r) else None
+                LocalPosition(here.east_m + r * de, here.north_m + r * dn, here.depth_m + r * dd)
+                if math.isfinite(r)
+                else None
             )
             out.append(
-                Measurement(
+                BeamReturn(
                     vehicle=self.name,
                     time_s=self.time_s,
                     source=source,

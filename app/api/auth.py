@@ -10,7 +10,7 @@ from fastapi import Depends, Security
 from fastapi.security import HTTPBearer
 from starlette.requests import HTTPConnection
 
-from app.api.limits import Limits, host_of
+from app.api.limits import RequestLimits, host_of
 from app.api.peers import OWN_USER
 from app.api.problems import ProblemError
 from app.api.processes import vouched_for
@@ -114,7 +114,7 @@ async def until_unwelcome(connection: HTTPConnection, state: EdgeState) -> None:
 
 
 async def console_log_in(
-    tokens: TokenStore, limits: Limits, password: str, host: str, *, own_user: bool, insecure: bool = False
+    tokens: TokenStore, limits: RequestLimits, password: str, host: str, *, own_user: bool, insecure: bool = False
 ) -> str | None:
     """Return the name of an operator who logs in with a token as password; None: not let in.
 

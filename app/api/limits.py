@@ -60,7 +60,7 @@ class Buckets:
         return min(self._size, level + (self._clock() - at) * self._per_s)
 
 
-class Limits:
+class RequestLimits:
     """What every request is held against; shared by middleware, authentication and the Neptus gateway.
 
     Parameters
@@ -148,7 +148,7 @@ def _digest(token: str) -> str:
 class LimitMiddleware:
     """Answers 429 to whoever asks too often, before anything else is done for him."""
 
-    def __init__(self, app: ASGIApp, limits: Limits) -> None:
+    def __init__(self, app: ASGIApp, limits: RequestLimits) -> None:
         self.app = app
         self.limits = limits
 

@@ -11,7 +11,7 @@ from fastapi import Depends
 from starlette.requests import HTTPConnection
 
 from app.api.audit_log import AuditLog
-from app.api.limits import Limits, host_of, network_of
+from app.api.limits import RequestLimits, host_of, network_of
 from app.api.metrics import LIVE_VIEWERS
 from app.api.problems import ProblemError
 from app.api.processes import PeerClients
@@ -37,7 +37,7 @@ class EdgeState:
     settings: Settings
     service: MissionService
     tokens: TokenStore
-    limits: Limits
+    limits: RequestLimits
     audit: AuditLog
     sessions: SessionStore
     stopping: asyncio.Event = field(default_factory=asyncio.Event)

@@ -19,7 +19,7 @@ from app.exploration.rollout.planner import RolloutPlanner
 from app.exploration.site_search import SearchTask
 from app.exploration.site_search.cao import CaoSearch, SpsaSearch
 from app.exploration.site_search.frontier import FrontierSearch
-from app.exploration.site_search.random_flights import RandomSearch
+from app.exploration.site_search.random_flights import RandomFlights
 
 PLANNERS: dict[str, type[PlannerBase]] = {
     planner.name: planner
@@ -27,7 +27,7 @@ PLANNERS: dict[str, type[PlannerBase]] = {
 }
 
 SEARCHERS: dict[str, type[PlannerBase]] = {
-    planner.name: planner for planner in (FrontierSearch, CaoSearch, SpsaSearch, RandomSearch)
+    planner.name: planner for planner in (FrontierSearch, CaoSearch, SpsaSearch, RandomFlights)
 }
 """The planners of search missions, by the same names: what is called rollout there goes for the best views."""
 

@@ -11,7 +11,7 @@ from imc_bridge.neptus.gateway import (
     SessionKeeper,
     SessionRefusedError,
 )
-from imc_bridge.neptus.values import Area, CellSounding, Conventions, Place, StepData
+from imc_bridge.neptus.values import Area, CellPosition, CellSounding, Conventions, StepData
 
 __all__ = [
     "Area",
@@ -19,7 +19,7 @@ __all__ = [
     "Conventions",
     "GatewaySettings",
     "NeptusGateway",
-    "Place",
+    "CellPosition",
     "Restored",
     "SessionKeeper",
     "SessionRefusedError",

@@ -37,7 +37,7 @@ log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True)
-class Upload:
+class FtpUpload:
     """A file as it came. ``folder`` is a session's name for what lies in its folder, else empty."""
 
     user: str
@@ -64,7 +64,7 @@ class FtpCalls:
     is_own_user: Callable[[socket.socket], bool]
     log_in: Callable[[str, str, str, bool], str | None]
     make: Callable[[str, str, str], str]
-    receive: Callable[[Upload], str]
+    receive: Callable[[FtpUpload], str]
     knows: Callable[[str], bool]
 
 
@@ -194,7 +194,7 @@ class _Transfer(DTPHandler):  # type: ignore[misc]
         file = self.file_obj
         if not self._closed and self.transfer_finished and isinstance(file, _Incoming) and not file.closed:
             channel = self.cmd_channel
-            upload = Upload(channel.principal, channel.remote_ip, file.folder, file.name, file.getvalue())
+            upload = FtpUpload(channel.principal, channel.remote_ip, file.folder, file.name, file.getvalue())
             problem = channel.calls.receive(upload)
             if problem:
                 channel.refusal = problem

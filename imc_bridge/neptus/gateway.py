@@ -12,10 +12,10 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import Any, Protocol
 
-from imc_bridge.neptus.ftp import FtpCalls, FtpEndpoint, LogInRefusedError, Upload
+from imc_bridge.neptus.ftp import FtpCalls, FtpEndpoint, FtpUpload, LogInRefusedError
 from imc_bridge.neptus.http import HttpEndpoint, listening_socket
 from imc_bridge.neptus.protocol import NeptusDataError, count_vehicles, read_map, read_session, read_step, write_actions
-from imc_bridge.neptus.values import Area, Conventions, Place, StepData
+from imc_bridge.neptus.values import Area, CellPosition, Conventions, StepData
 from imc_bridge.network.transport import PortInUseError
 
 MAX_SESSIONS = 100
@@ -108,7 +108,7 @@ class _Session:
     time_step: int = 0
     pairs: bool = False
     answered: int = 0
-    places: list[Place] = field(default_factory=list)
+    places: list[CellPosition] = field(default_factory=list)
     """Of the last answer."""
     last: StepData | None = None
     polls_since_s: float = 0.0
@@ -202,7 +202,7 @@ class NeptusGateway:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
 
-    def answer(self, session: str, time_step: int, places: list[Place]) -> None:
+    def answer(self, session: str, time_step: int, places: list[CellPosition]) -> None:
         """Lay out where the vehicles shall go, in the panel's order; nothing happens for an unknown session."""
         known = self._sessions.get(session)
         if known is not None:
@@ -291,7 +291,7 @@ class NeptusGateway:
     def _make(self, user: str, host: str, session: str) -> str:
         return self._say(self._make_session(user, host, session))
 
-    def _receive(self, upload: Upload) -> str:
+    def _receive(self, upload: FtpUpload) -> str:
         return self._say(self._take(upload))
 
     def _say(self, work: Coroutine[Any, Any, None]) -> str:
@@ -330,7 +330,7 @@ class NeptusGateway:
         while len(self._sessions) > MAX_SESSIONS:
             del self._sessions[next(iter(self._sessions))]
 
-    async def _take(self, upload: Upload) -> None:
+    async def _take(self, upload: FtpUpload) -> None:
         session, what = _meant(upload)
         known = self._sessions.get(session)
         if known is None:
@@ -348,14 +348,14 @@ class NeptusGateway:
                 await self._keeper.refused(session, f"{upload.name} was refused: {refused}")
                 raise
 
-    async def _take_begin(self, known: _Session, upload: Upload) -> None:
+    async def _take_begin(self, known: _Session, upload: FtpUpload) -> None:
         if known.vehicles:
             raise SessionRefusedError(f"session {known.name} has begun already: press RENEW for another one")
         vehicles = read_session(upload.content, known.name)
         await self._keeper.begin(known.name, vehicles, upload.user, upload.host)
         known.vehicles = vehicles
 
-    async def _take_step(self, known: _Session, upload: Upload) -> None:
+    async def _take_step(self, known: _Session, upload: FtpUpload) -> None:
         if not known.vehicles:
             # Its own file was lost, which the panel does not know.
             vehicles = await asyncio.to_thread(count_vehicles, upload.content, known.name)
@@ -374,17 +374,17 @@ class NeptusGateway:
         await self._keeper.step(data, upload.user, upload.host, answered=data.time_step <= known.answered)
         known.time_step, known.last = data.time_step, data
 
-    async def _take_map(self, known: _Session, upload: Upload) -> None:
+    async def _take_map(self, known: _Session, upload: FtpUpload) -> None:
         cells = await asyncio.to_thread(read_map, upload.content)
         await self._keeper.prior_map(known.name, cells)
 
 
-_Taking = Callable[[NeptusGateway, _Session, Upload], Coroutine[Any, Any, None]]
+_Taking = Callable[[NeptusGateway, _Session, FtpUpload], Coroutine[Any, Any, None]]
 DATA_END = "_Data.txt"
 SESSION_END = ".txt"
 
 
-def _meant(upload: Upload) -> tuple[str, _Taking]:
+def _meant(upload: FtpUpload) -> tuple[str, _Taking]:
     """Return the session that an upload is of, and what takes it."""
     if upload.folder:
         return upload.folder, NeptusGateway._take_map

@@ -11,7 +11,7 @@ from typing import Any
 import orjson
 
 from imc_bridge.neptus import samples as sampling
-from imc_bridge.neptus.values import Area, Bottom, CellSounding, Conventions, Place, StepData
+from imc_bridge.neptus.values import Area, Bottom, CellPosition, CellSounding, Conventions, StepData
 
 SESSION_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,47}")
 MAX_VEHICLES = 20
@@ -109,7 +109,7 @@ def read_step(
     )
 
 
-def write_actions(session: str, time_step: int, places: list[Place], area: Area, *, pairs: bool) -> bytes:
+def write_actions(session: str, time_step: int, places: list[CellPosition], area: Area, *, pairs: bool) -> bytes:
     """One line of JSON, as the panel reads it: ``{SessionID, timeStep, Location[n][3]}``."""
     locations = [
         [round(place.row), round(place.col)]
@@ -185,7 +185,7 @@ def _table(record: dict[str, Any], field: str, length: int, widths: tuple[int, .
     return [_numbers(value, f"{field}[{index}]", width) for index, value in enumerate(values)]
 
 
-def _place(values: list[float], index: int, area: Area) -> Place:
+def _place(values: list[float], index: int, area: Area) -> CellPosition:
     row, col = values[0], values[1]
     if not (0.0 <= row <= area.rows and 0.0 <= col <= area.cols):
         raise NeptusDataError(
@@ -193,13 +193,13 @@ def _place(values: list[float], index: int, area: Area) -> Place:
             f"row {row:g}, column {col:g} lies outside the area of {area.rows} rows and {area.cols} columns",
         )
     if len(values) == 2:
-        return Place(row, col, 0.0)
+        return CellPosition(row, col, 0.0)
     if not 0.0 <= values[2] <= area.max_depth_m + 1.0:
         raise NeptusDataError(
             f"Location[{index}]",
             f"height {values[2]:g} must be from 0 to {area.max_depth_m:g}, counted from that depth upwards",
         )
-    return Place(row, col, area.depth_of(values[2]))
+    return CellPosition(row, col, area.depth_of(values[2]))
 
 
 def _samples(record: dict[str, Any], area: Area, refused: Counter[str]) -> list[CellSounding]:
@@ -229,7 +229,7 @@ def _samples(record: dict[str, Any], area: Area, refused: Counter[str]) -> list[
 
 
 def _bottoms(
-    record: dict[str, Any], places: list[tuple[Place, bool]], conventions: Conventions
+    record: dict[str, Any], places: list[tuple[CellPosition, bool]], conventions: Conventions
 ) -> tuple[tuple[Bottom | None, ...], list[str]]:
     """Return the bottom under each vehicle, None where it is not known, and why it is not."""
     area = conventions.area
@@ -246,7 +246,7 @@ def _bottoms(
     return tuple(bottoms), reasons
 
 
-def _under(index: int, place: Place, bottom: Bottom) -> CellSounding:
+def _under(index: int, place: CellPosition, bottom: Bottom) -> CellSounding:
     """Return the `Bathymeter` of a vehicle as a sounding."""
     return CellSounding(
         bottom.row, bottom.col, place.depth_m, bottom.depth_m, "neptus bathymeter", index, depth_sd_m=bottom.sd_m

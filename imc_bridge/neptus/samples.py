@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from imc_bridge.neptus.values import Bottom, CellSounding, Place
+from imc_bridge.neptus.values import Bottom, CellPosition, CellSounding
 
 FloatArray = NDArray[np.float64]
 
@@ -40,7 +40,7 @@ ASSUMED_SLANT = math.cos(math.radians(22.5))
 SLANT_TOLERANCE = 0.03
 
 
-def owners(samples: Sequence[CellSounding], now: Sequence[Place], cell_m: float) -> list[int]:
+def owners(samples: Sequence[CellSounding], now: Sequence[CellPosition], cell_m: float) -> list[int]:
     """Return the index of each sample's vehicle: from one to the next a vehicle moves and dives little.
 
     Samples come in the order in which they were taken, so they are followed back from where the vehicles are now.
@@ -71,7 +71,7 @@ def owners(samples: Sequence[CellSounding], now: Sequence[Place], cell_m: float)
     return found[::-1]
 
 
-def exact_depths(places: Sequence[Place], samples: Sequence[CellSounding]) -> list[tuple[Place, bool]]:
+def exact_depths(places: Sequence[CellPosition], samples: Sequence[CellSounding]) -> list[tuple[CellPosition, bool]]:
     """Return the places with the vehicles' depths as their newest samples have them, and whether they have one.
 
     The panel cuts the depth of a place to whole metres, not that of a sample.

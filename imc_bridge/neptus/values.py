@@ -18,7 +18,7 @@ SampleRule = Literal["checked", "off"]
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class CellPosition:
     """Where a vehicle is: row and column in cells, depth in metres."""
 
     row: float
@@ -124,7 +124,7 @@ class StepData:
 
     session: str
     time_step: int
-    places: tuple[Place, ...]
+    places: tuple[CellPosition, ...]
     soundings: tuple[CellSounding, ...]
     refused: Counter[str]
     bottoms: tuple[Bottom | None, ...] = ()

@@ -35,7 +35,7 @@ GREATEST_M = 20_000.0
 
 
 @dataclass(frozen=True, slots=True)
-class Ping:
+class RangePing:
     """One range that awaits the vehicle's state."""
 
     time_s: float
@@ -68,8 +68,8 @@ class RangeGate:
         self.vehicle = vehicle
         self.accepted = 0
         self.refused = 0
-        self._pending: deque[Ping] = deque(maxlen=MAX_PENDING)
-        self._last: deque[Ping] = deque(maxlen=REMEMBERED)
+        self._pending: deque[RangePing] = deque(maxlen=MAX_PENDING)
+        self._last: deque[RangePing] = deque(maxlen=REMEMBERED)
 
     def clear(self) -> None:
         """Forget what is pending, as after a jump of the vehicle's clock."""
@@ -85,7 +85,7 @@ class RangeGate:
         if not target or not math.isfinite(range_m) or not 0.0 < range_m <= GREATEST_M:
             self.refused += 1
             return
-        ping = Ping(float(message.timestamp), target, range_m, name)
+        ping = RangePing(float(message.timestamp), target, range_m, name)
         if any(_same(ping, other) for other in self._last):
             return
         self._last.append(ping)
@@ -119,7 +119,7 @@ class RangeGate:
             )
 
 
-def _same(ping: Ping, other: Ping) -> bool:
+def _same(ping: RangePing, other: RangePing) -> bool:
     if ping.target != other.target:
         return False
     repeated = ping.source == other.source and ping.time_s == other.time_s

@@ -9,7 +9,7 @@ import imcpy
 
 from simulator.dune.follow_reference import ARRIVAL_TIME_S, DEFAULT_SPEED_MPS
 from simulator.geodesy import LocalFrame
-from simulator.vehicle import Target
+from simulator.vehicle import SteeringTarget
 from simulator.world import SimulatedVehicle
 
 LEAST_RADIUS_M = 10.0
@@ -56,7 +56,7 @@ class ElevatorManeuver:
         else:
             self._centre = frame.to_local(math.degrees(spec.lat), math.degrees(spec.lon))
             self._phase = _Phase.GO_TO
-            vehicle.vehicle.goto(Target(*self._centre, float(spec.start_z), self._speed_mps))
+            vehicle.vehicle.goto(SteeringTarget(*self._centre, float(spec.start_z), self._speed_mps))
 
     def failure(self, now_s: float) -> tuple[str, bool] | None:
         """Why the maneuver fails now, None while it goes on; the flag as in FollowReference."""
@@ -79,5 +79,5 @@ class ElevatorManeuver:
         return self._phase is _Phase.DONE
 
     def _circle(self) -> None:
-        self._vehicle.vehicle.goto(Target(*self._centre, self._end_m, self._speed_mps))
+        self._vehicle.vehicle.goto(SteeringTarget(*self._centre, self._end_m, self._speed_mps))
         self._vehicle.vehicle.loiter(self._radius_m, clockwise=self._clockwise)

@@ -9,7 +9,7 @@ from enum import IntEnum
 import imcpy
 
 from simulator.geodesy import LocalFrame
-from simulator.vehicle import Target
+from simulator.vehicle import SteeringTarget
 from simulator.world import SimulatedVehicle
 
 HORIZONTAL_TOLERANCE_M = 15.0
@@ -206,7 +206,7 @@ class FollowReference:
         if self.state is State.HOVER or order.speed_mps == 0.0:
             craft.idle()
             return
-        target = Target(order.east_m, order.north_m, order.z_m, order.speed_mps, order.by_altitude)
+        target = SteeringTarget(order.east_m, order.north_m, order.z_m, order.speed_mps, order.by_altitude)
         craft.goto(target)
         if self.state is not State.GOTO:
             craft.loiter(abs(order.radius_m), clockwise=order.radius_m >= 0.0)

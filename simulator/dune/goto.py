@@ -8,7 +8,7 @@ import imcpy
 
 from simulator.dune.follow_reference import ARRIVAL_TIME_S, DEFAULT_SPEED_MPS
 from simulator.geodesy import LocalFrame
-from simulator.vehicle import Target
+from simulator.vehicle import SteeringTarget
 from simulator.world import SimulatedVehicle
 
 
@@ -33,7 +33,7 @@ class GotoManeuver:
         by_altitude = int(spec.z_units) == int(imcpy.ZUnits.ALTITUDE)
         in_metres = int(spec.speed_units) == int(imcpy.SpeedUnits.METERS_PS)
         speed = float(spec.speed) if in_metres else DEFAULT_SPEED_MPS
-        vehicle.vehicle.goto(Target(self._east_m, self._north_m, float(spec.z), speed, by_altitude))
+        vehicle.vehicle.goto(SteeringTarget(self._east_m, self._north_m, float(spec.z), speed, by_altitude))
 
     def failure(self, now_s: float) -> tuple[str, bool] | None:
         """Why the maneuver fails now, None while it goes on; the flag as in FollowReference."""

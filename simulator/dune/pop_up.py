@@ -12,7 +12,7 @@ from simulator.dune.follow_reference import ARRIVAL_TIME_S, DEFAULT_SPEED_MPS
 from simulator.dune.station_keeping import StationKeepingManeuver
 from simulator.geodesy import LocalFrame
 from simulator.navigation import SURFACE_DEPTH_M
-from simulator.vehicle import Target
+from simulator.vehicle import SteeringTarget
 from simulator.world import SimulatedVehicle
 
 RADIUS_M = 15.0
@@ -59,7 +59,7 @@ class PopUpManeuver:
             self._part = self._elevator(0.0, now_s)
         else:
             self._phase = _Phase.GO_TO
-            vehicle.vehicle.goto(Target(*self._place, float(spec.z), self._speed_mps))
+            vehicle.vehicle.goto(SteeringTarget(*self._place, float(spec.z), self._speed_mps))
 
     def failure(self, now_s: float) -> tuple[str, bool] | None:
         """Nothing makes it fail."""

@@ -8,7 +8,7 @@ import imcpy
 
 from simulator.dune.follow_reference import ARRIVAL_TIME_S, DEFAULT_SPEED_MPS
 from simulator.geodesy import LocalFrame
-from simulator.vehicle import Target
+from simulator.vehicle import SteeringTarget
 from simulator.world import SimulatedVehicle
 
 LEAST_RADIUS_M = 10.0
@@ -66,4 +66,4 @@ class StationKeepingManeuver:
         return self._vehicle.position.horizontal_distance_m(*self._place)
 
     def _move(self, depth_m: float) -> None:
-        self._vehicle.vehicle.goto(Target(*self._place, depth_m, self._speed_mps))
+        self._vehicle.vehicle.goto(SteeringTarget(*self._place, depth_m, self._speed_mps))

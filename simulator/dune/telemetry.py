@@ -12,7 +12,7 @@ import imcpy
 from simulator.geodesy import LocalFrame
 from simulator.navigation import SURFACE_DEPTH_M
 from simulator.sensors import DVL_TILT_RAD
-from simulator.world import Measurement, SimulatedVehicle
+from simulator.world import BeamReturn, SimulatedVehicle
 
 GPS_VALIDITY = 511
 ALTITUDE_FILTER_S = 1.0
@@ -111,7 +111,7 @@ class Telemetry:
         message.medium = kinds.UNDERWATER if submerged else kinds.WATER
         return message
 
-    def distance(self, measurement: Measurement) -> imcpy.Distance:
+    def distance(self, measurement: BeamReturn) -> imcpy.Distance:
         """One beam's range.
 
         The device's rotation is the beam's direction: theta from the bow (-90 degrees is down), then psi
@@ -150,7 +150,7 @@ class Telemetry:
         message.range = range_m
         return message
 
-    def sonar_data(self, swath: Sequence[Measurement], swath_rad: float, max_range_m: float) -> imcpy.SonarData:
+    def sonar_data(self, swath: Sequence[BeamReturn], swath_rad: float, max_range_m: float) -> imcpy.SonarData:
         """One multibeam ping in IMC's format: count, start angle, flags, 16-bit ranges (0 for no return)."""
         message = imcpy.SonarData()
         message.type = imcpy.SonarData.TypeEnum.MULTIBEAM

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from app.api import limits
-from app.api.limits import Buckets, Limits, network_of
+from app.api.limits import Buckets, RequestLimits, network_of
 from app.api.tokens import DIGESTS_READ_AGAIN_S, Principal, Role, TokenStore
 from app.main import Server
 from app.settings import Settings
@@ -41,7 +41,7 @@ def test_nobody_gets_more_than_the_rate_and_one_bucket(pauses: list[float], per_
 
 def test_any_number_of_clients_is_remembered_in_bounded_memory(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(limits, "MAX_CLIENTS", 50)
-    held = Limits(1.0, 3)
+    held = RequestLimits(1.0, 3)
     for number in range(400):
         held.wait_s(None, f"10.0.{number // 256}.{number % 256}")
         held.log_in(f"bf_{number}", f"10.0.{number // 256}.{number % 256}", good=number % 2 == 0)

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from simulator.vehicle import STEP_S, Guidance, Motion, Target, Vehicle, VehicleLimits, wrap
+from simulator.vehicle import STEP_S, Guidance, Motion, SteeringTarget, Vehicle, VehicleLimits, wrap
 
 NO_ERROR = (0.0, 0.0)
 DEEP = 100.0
@@ -22,7 +22,7 @@ def fly(vehicle: Vehicle, seconds: int, bottom: Any = DEEP, error: Any = NO_ERRO
     return track
 
 
-def distance(vehicle: Vehicle, target: Target) -> float:
+def distance(vehicle: Vehicle, target: SteeringTarget) -> float:
     return math.hypot(vehicle.motion.east_m - target.east_m, vehicle.motion.north_m - target.north_m)
 
 
@@ -40,7 +40,7 @@ def test_the_limits_are_never_exceeded(
 ) -> None:
     limits = VehicleLimits()
     vehicle = Vehicle(Motion(heading_rad=heading), limits)
-    vehicle.goto(Target(east, north, z, speed))
+    vehicle.goto(SteeringTarget(east, north, z, speed))
     if loiter:
         vehicle.loiter()
     track = fly(vehicle, 60)
@@ -63,7 +63,7 @@ def test_the_limits_are_never_exceeded(
 )
 def test_every_target_is_passed_closely(east: float, north: float, heading: float, current: Any) -> None:
     vehicle = Vehicle(Motion(heading_rad=heading), current=current)
-    target = Target(east, north, 3.0)
+    target = SteeringTarget(east, north, 3.0)
     vehicle.goto(target)
     nearest = math.inf
     for _ in range(1800):
@@ -76,7 +76,7 @@ def test_every_target_is_passed_closely(east: float, north: float, heading: floa
 
 def test_it_flies_straight_in_a_cross_current() -> None:
     vehicle = Vehicle(current=(0.3, 0.0))
-    vehicle.goto(Target(0.0, 200.0, 2.0))
+    vehicle.goto(SteeringTarget(0.0, 200.0, 2.0))
     track = fly(vehicle, 120)
     assert max(abs(p[0]) for p in track) < 3.0, "it crabs instead of being set aside"
 
@@ -84,7 +84,7 @@ def test_it_flies_straight_in_a_cross_current() -> None:
 @pytest.mark.parametrize("asked", [1.0, 1.2, 1.5])
 def test_it_keeps_speed_and_depth(asked: float) -> None:
     vehicle = Vehicle()
-    vehicle.goto(Target(0.0, 1000.0, 4.0, asked))
+    vehicle.goto(SteeringTarget(0.0, 1000.0, 4.0, asked))
     track = fly(vehicle, 90)
     for p in track[-200:]:
         assert p[5] == pytest.approx(asked, abs=0.01)
@@ -94,7 +94,7 @@ def test_it_keeps_speed_and_depth(asked: float) -> None:
 
 def test_it_keeps_altitude_over_a_slope() -> None:
     vehicle = Vehicle()
-    vehicle.goto(Target(0.0, 1000.0, 3.0, 1.2, by_altitude=True))
+    vehicle.goto(SteeringTarget(0.0, 1000.0, 3.0, 1.2, by_altitude=True))
     for _ in range(1500):
         bottom = 8.0 + 0.05 * vehicle.motion.north_m
         vehicle.step(NO_ERROR, bottom)
@@ -105,7 +105,7 @@ def test_it_keeps_altitude_over_a_slope() -> None:
 @pytest.mark.parametrize("radius", [5.0, 7.5, 20.0])
 def test_it_circles_around_a_reached_target(radius: float, clockwise: bool) -> None:
     vehicle = Vehicle()
-    target = Target(30.0, 20.0, 3.0)
+    target = SteeringTarget(30.0, 20.0, 3.0)
     vehicle.goto(target)
     vehicle.loiter(radius, clockwise=clockwise)
     fly(vehicle, 120)
@@ -132,7 +132,7 @@ def test_without_motor_it_drifts_with_the_current() -> None:
 
 def test_the_bottom_stops_it() -> None:
     vehicle = Vehicle()
-    vehicle.goto(Target(0.0, 500.0, 20.0))
+    vehicle.goto(SteeringTarget(0.0, 500.0, 20.0))
     hits = [vehicle.step(NO_ERROR, 6.0) for _ in range(600)]
     assert any(hits)
     assert vehicle.motion.depth_m == 6.0
@@ -140,7 +140,7 @@ def test_the_bottom_stops_it() -> None:
 
 def test_it_steers_by_where_it_believes_to_be() -> None:
     vehicle = Vehicle()
-    target = Target(0.0, 60.0, 2.0)
+    target = SteeringTarget(0.0, 60.0, 2.0)
     vehicle.goto(target)
     nearest = math.inf
     for _ in range(900):

@@ -8,7 +8,7 @@ import typer
 
 from app.estimation import Sensor
 from app.evaluation.explore.run import EXPLORERS, OSARSES, run_explore
-from app.evaluation.explore.team_changes import TeamChanges, parse_changes
+from app.evaluation.explore.team_changes import TeamSchedule, parse_changes
 from app.evaluation.explore.world import COM_RANGE, ExploreScenario
 from app.evaluation.runs.command import (
     Jobs,
@@ -123,7 +123,7 @@ def explore(
         )
     sea_floor = terrain_of(terrain)
     count = _landmark_count(landmarks)
-    changes = TeamChanges(_changes(lose, "--lose"), _changes(join, "--join"))
+    changes = TeamSchedule(_changes(lose, "--lose"), _changes(join, "--join"))
     runs = []
     trained = model_of(model)
     for name in names:

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from app.evaluation.explore.report import Report
 from app.evaluation.explore.run import OSARSES
-from app.evaluation.explore.setups import HISTORY_EVERY, Section
+from app.evaluation.explore.setups import HISTORY_EVERY, ReportSection
 from app.evaluation.runs.summary import spread
 
 DPI = 110
@@ -36,7 +36,7 @@ def draw(report: Report, folder: Path) -> dict[str, str]:
     return pictures
 
 
-def _bars(report: Report, section: Section, terrains: Sequence[str]) -> Figure:
+def _bars(report: Report, section: ReportSection, terrains: Sequence[str]) -> Figure:
     """Remaining landmarks of every row, with 95 % intervals."""
     figure = _figure(2 * PANEL[0], 0.7 + 0.16 * len(section.rows) * len(terrains) + 0.14 * len(section.rows))
     axes = figure.subplots()
@@ -61,7 +61,7 @@ def _bars(report: Report, section: Section, terrains: Sequence[str]) -> Figure:
     return figure
 
 
-def _curves(report: Report, section: Section, terrains: Sequence[str]) -> Figure:
+def _curves(report: Report, section: ReportSection, terrains: Sequence[str]) -> Figure:
     """Remaining landmarks over the steps, a panel per terrain, with 95 % intervals."""
     across = min(COLUMNS, len(terrains))
     down = math.ceil(len(terrains) / across)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from app.evaluation.explore.run import OSARSES
-from app.evaluation.explore.setups import Section, Setup, run_key
+from app.evaluation.explore.setups import ReportSection, Setup, run_key
 from app.evaluation.runs.summary import spread
 
 Runs = Mapping[str, Mapping[str, Any]]
@@ -32,7 +32,7 @@ class Report:
     """
 
     runs: Runs
-    sections: Sequence[Section]
+    sections: Sequence[ReportSection]
     terrains: Sequence[str]
     missing: Sequence[str]
     seeds: Sequence[int]
@@ -45,7 +45,7 @@ class Report:
         keys = (run_key(setup, terrain, seed, self.steps) for seed in self.seeds)
         return [self.runs[key] for key in keys if key in self.runs]
 
-    def terrains_of(self, section: Section) -> Sequence[str]:
+    def terrains_of(self, section: ReportSection) -> Sequence[str]:
         """Return the names of the terrains that a section uses."""
         return self.terrains[: section.terrains]
 
@@ -72,7 +72,7 @@ def markdown(report: Report) -> str:
     return "\n".join(lines)
 
 
-def _section(report: Report, section: Section) -> list[str]:
+def _section(report: Report, section: ReportSection) -> list[str]:
     terrains = report.terrains_of(section)
     lines = [f"## {section.title}", "", section.text + _seeds_of(report, section), ""]
     if section.name in report.pictures:
@@ -92,7 +92,7 @@ def _section(report: Report, section: Section) -> list[str]:
     return lines + _improvements(report, section)
 
 
-def _improvements(report: Report, section: Section) -> list[str]:
+def _improvements(report: Report, section: ReportSection) -> list[str]:
     """Return AURO15's percentages: by how much CAO leaves less than OSARSES(C), of what OSARSES(C) leaves."""
     tried = [(label, setup) for label, setup in section.rows if setup.planner == OSARSES]
     free = [(label, setup) for label, setup in section.rows if setup.planner != OSARSES]
@@ -146,7 +146,7 @@ def _mean(values: Sequence[float], digits: int) -> str:
     return f"{s.mean:.{digits}f}" + (f" ± {s.ci95:.{digits}f}" if len(values) > 1 else "")
 
 
-def _seeds_of(report: Report, section: Section) -> str:
+def _seeds_of(report: Report, section: ReportSection) -> str:
     """Say how many seeds stand behind a table where that is not the same everywhere."""
     numbers = {len(report.of(setup, t)) for _, setup in section.rows for t in report.terrains_of(section)}
     low, high = min(numbers), max(numbers)

@@ -8,7 +8,7 @@ import orjson
 
 from app.estimation import Sensor
 from app.evaluation.explore.run import OSARSES, run_explore
-from app.evaluation.explore.team_changes import TeamChanges
+from app.evaluation.explore.team_changes import TeamSchedule
 from app.evaluation.explore.world import ExploreScenario
 from app.evaluation.runs.jobs import Progress
 from app.exploration.core.objective import TERMS, Terms
@@ -60,7 +60,7 @@ class Setup:
             steps,
             seed,
             keep_out_fraction=self.keep_out,
-            changes=TeamChanges(self.lost, self.joining),
+            changes=TeamSchedule(self.lost, self.joining),
             line_of_sight=self.line_of_sight,
             capacity=self.capacity,
         )
@@ -74,7 +74,7 @@ class Setup:
 
 
 @dataclass(frozen=True)
-class Section:
+class ReportSection:
     """One table of the report.
 
     Attributes
@@ -99,14 +99,14 @@ class Section:
     published: dict[str, str] = field(default_factory=dict)
 
 
-def sections(steps: int, *, quick: bool = False) -> tuple[Section, ...]:
+def sections(steps: int, *, quick: bool = False) -> tuple[ReportSection, ...]:
     """Return the report's tables for runs of ``steps`` steps; the quick ones leave out what takes long."""
     change = max(1, steps // 10)
     many = 5 if quick else 50
     three, ten = Setup("cao"), Setup("cao", robots=10)
     tries = tuple(sorted({0, 5, many}))
     return (
-        Section(
+        ReportSection(
             "table1",
             "AURO15 table 1: the plain objective J deadlocks",
             "OSARSES judged by J alone. Remaining landmarks after the last step.",
@@ -123,7 +123,7 @@ def sections(steps: int, *, quick: bool = False) -> tuple[Section, ...]:
                 "OSARSES(50), every cell": "85 / 86.3 % (70 tries)",
             },
         ),
-        Section(
+        ReportSection(
             "figure2",
             "AURO15 figure 2: what each term is worth",
             f"OSARSES({many}) judged by J and the named terms. The paper gives bars and says that J1 brings "
@@ -137,7 +137,7 @@ def sections(steps: int, *, quick: bool = False) -> tuple[Section, ...]:
             {"J": "85-92 %", "J + J1 + J2 + J3": "1.8 % (Map #1, 500 tries)"},
         ),
         *(
-            Section(
+            ReportSection(
                 f"figure{number}",
                 f"AURO15 figure {number}: {cao.robots} vehicles",
                 "OSARSES(C) really tries C moves per step, which no vehicle can; the others try none. The paper's CAO "
@@ -174,7 +174,7 @@ def sections(steps: int, *, quick: bool = False) -> tuple[Section, ...]:
                 (6, ten, {"CAO, polynomial, 1100 landmarks": "80.2 / 71.4 % better than OSARSES(0)"}),
             )
         ),
-        Section(
+        ReportSection(
             "planners",
             "Planners against the formation lawnmower",
             "t99: first step with at most 1 % remaining. The lawnmower flies under the same constraints, waits for its "
@@ -182,7 +182,7 @@ def sections(steps: int, *, quick: bool = False) -> tuple[Section, ...]:
             _planner_rows(Setup("cao")),
         ),
         *(
-            Section(name, title, text, _planner_rows(setup, USEFUL))
+            ReportSection(name, title, text, _planner_rows(setup, USEFUL))
             for name, title, text, setup in (
                 (
                     "keep-out",
@@ -278,7 +278,7 @@ def run_key(setup: Setup, terrain: str, seed: int, steps: int) -> str:
 
 
 def jobs_of(
-    chosen: Sequence[Section], terrains: Sequence[Terrain], seeds: Sequence[int], steps: int
+    chosen: Sequence[ReportSection], terrains: Sequence[Terrain], seeds: Sequence[int], steps: int
 ) -> Iterator[TableJob]:
     """Yield every run once, seed by seed, so that an interrupted evaluation has whole seeds."""
     seen: set[str] = set()

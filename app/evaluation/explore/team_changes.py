@@ -17,7 +17,7 @@ DRAWS = 3000
 
 
 @dataclass(frozen=True)
-class TeamChanges:
+class TeamSchedule:
     """Which vehicles leave and how many join, and when; vehicles are numbered from 1 in the order of their joining.
 
     Attributes

@@ -18,7 +18,7 @@ SILENT_AFTER = 5
 """Steps without a report after which the planner no longer counts on a vehicle."""
 
 
-class Team(Protocol):
+class TeamModel(Protocol):
     """The vehicles of a :class:`World` with their knowledge and the planner's."""
 
     @property

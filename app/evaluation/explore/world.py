@@ -11,7 +11,7 @@ import numpy as np
 from app.arrays import BoolArray, FloatArray, IntArray
 from app.estimation import LandmarkEstimator, Landmarks, RangeSensor, in_sight, landmark_sets
 from app.evaluation.explore.keep_out import draw_keep_out
-from app.evaluation.explore.team_changes import TeamChanges, launch_site
+from app.evaluation.explore.team_changes import TeamSchedule, launch_site
 from app.exploration.communication.messages import MAX_LANDMARKS
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.constraints import Constraints, inside_area
@@ -26,7 +26,7 @@ DEEPEST, SHALLOWEST = 1.0, 0.2
 CEILING = -1.0
 START_HEIGHT = 0.2
 START_CORNER, START_SPREAD = -0.8, 0.1
-NO_CHANGES = TeamChanges()
+NO_CHANGES = TeamSchedule()
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,7 +120,7 @@ class ExploreScenario:
     com_range: float = COM_RANGE
     sensor: RangeSensor = RangeSensor()  # noqa: RUF009 - frozen
     keep_out_fraction: float = 0.0
-    changes: TeamChanges = NO_CHANGES
+    changes: TeamSchedule = NO_CHANGES
     line_of_sight: bool = False
     capacity: int | None = None
     message_loss: float = 0.0

@@ -55,7 +55,7 @@ YARDSTICKS = {
 TEAMS = (2, 5, 10)
 
 
-class ReportJob(Job, Protocol):
+class ExperimentJob(Job, Protocol):
     """One piece of the report."""
 
     @property

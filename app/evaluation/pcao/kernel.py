@@ -36,7 +36,7 @@ class Physics(NamedTuple):
     unit: float
 
 
-class Known(NamedTuple):
+class KnownLandmarks(NamedTuple):
     """What is known of the landmarks: estimated depth, its variance, looks, whether in A, and by which vehicle."""
 
     depth: FloatArray
@@ -93,7 +93,7 @@ def sense(
     truth: FloatArray,
     positions: FloatArray,
     headings: FloatArray,
-    known: Known,
+    known: KnownLandmarks,
     visible: BoolArray,
     rng: np.random.Generator,
 ) -> None:
@@ -143,7 +143,7 @@ def move(
 
 
 @njit(cache=True, nogil=True)
-def error_squared(p: Physics, known: Known) -> float:
+def error_squared(p: Physics, known: KnownLandmarks) -> float:
     """Return Omega'Omega of eq. (6), of the landmarks' deviations as footnote 4 says; at most the prior's each."""
     total, most = 0.0, p.prior_sd * p.prior_sd
     for i in range(len(known.variance)):
@@ -152,9 +152,9 @@ def error_squared(p: Physics, known: Known) -> float:
 
 
 @njit(cache=True, nogil=True)
-def unknown(m: int) -> Known:
+def unknown(m: int) -> KnownLandmarks:
     """Return m landmarks that are still unseen."""
-    return Known(
+    return KnownLandmarks(
         np.full(m, np.nan),
         np.full(m, np.inf),
         np.zeros(m, dtype=np.int64),

@@ -36,7 +36,7 @@ class Optimiser(ABC):
                 self.best, self.best_score = parameters, score
 
 
-class RandomSearch(Optimiser):
+class RandomOptimiser(Optimiser):
     """A random P every time (RS of the paper)."""
 
     def ask(self) -> list[FloatArray]:
@@ -104,7 +104,7 @@ class CmaEs(Optimiser):
         self._es.tell(self._raw, [score + 1e-3 * m for score, m in zip(scores, moved, strict=True)])
 
 
-METHODS: dict[str, type[Optimiser]] = {"pcao": Pcao, "cma": CmaEs, "random": RandomSearch}
+METHODS: dict[str, type[Optimiser]] = {"pcao": Pcao, "cma": CmaEs, "random": RandomOptimiser}
 """The optimisers by the names of ``bathyfleet train --method``."""
 
 

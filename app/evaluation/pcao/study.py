@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from app.evaluation.pcao.experiments import MAPS, OTHERS, CurveJob, FlightJob, ReportJob, flights, teams
+from app.evaluation.pcao.experiments import MAPS, OTHERS, CurveJob, ExperimentJob, FlightJob, flights, teams
 from app.evaluation.pcao.report import Findings
 from app.evaluation.pcao.terrains import sea_floor
 from app.exploration.pcao.model import PcaoModel
@@ -55,7 +55,7 @@ class Study:
         return [self.maps[paper.title] for paper in MAPS if paper.training and paper.title in self.maps]
 
     @cached_property
-    def parts(self) -> dict[str, list[ReportJob]]:
+    def parts(self) -> dict[str, list[ExperimentJob]]:
         """The runs of each part; those of table II follow from the curves."""
         scale = (self.landmarks, self.steps)
         others = [terrain for terrain in map(self.at_hand, OTHERS) if terrain is not None]
@@ -89,7 +89,7 @@ class Study:
             ]  # fmt: skip
         return result
 
-    def jobs(self, parts: Sequence[str], runs: Mapping[str, Run] | None = None) -> list[ReportJob]:
+    def jobs(self, parts: Sequence[str], runs: Mapping[str, Run] | None = None) -> list[ExperimentJob]:
         """Return the runs of some parts; with the ``runs`` that there are, those of table II too."""
         wanted = [job for part in PARTS if part in parts for job in self.parts[part]]
         return wanted if runs is None else [*wanted, *self.table2(runs)]
@@ -97,7 +97,7 @@ class Study:
     def findings(self, runs: Mapping[str, Run]) -> Findings:
         """Return the runs that there are of all parts."""
 
-        def there(jobs: Sequence[ReportJob]) -> list[Run]:
+        def there(jobs: Sequence[ExperimentJob]) -> list[Run]:
             return [runs[job.key] for job in jobs if job.key in runs]
 
         every = {part: there(self.parts[part]) for part in PARTS}

@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 
 from app.arrays import BoolArray, FloatArray, IntArray
-from app.evaluation.pcao.kernel import Known, Physics, error_squared, move, sense, unknown
+from app.evaluation.pcao.kernel import KnownLandmarks, Physics, error_squared, move, sense, unknown
 
 SE, SPSA, FDSA = 0, 1, 2
 PERTURBATION, DECAY = 0.5, 0.101
@@ -24,7 +24,7 @@ def tries_per_step(method: int, candidates: int, robots: int) -> int:
 
 @njit(cache=True, nogil=True)
 def _progress(
-    positions: FloatArray, points: FloatArray, known: Known, visible: BoolArray, credited: FloatArray
+    positions: FloatArray, points: FloatArray, known: KnownLandmarks, visible: BoolArray, credited: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return |A_j|, J1_j, J2_j without switches as rows of (3, n), and J3_j, (n,)."""
     n, m = visible.shape
@@ -73,7 +73,7 @@ def _progress(
 
 
 @njit(cache=True, nogil=True)
-def _credits(known: Known, n: int) -> FloatArray:
+def _credits(known: KnownLandmarks, n: int) -> FloatArray:
     credited = np.zeros(n)
     for i in range(len(known.credited)):
         if known.credited[i] >= 0:
@@ -90,7 +90,7 @@ def _try(
     headings: FloatArray,
     moves: FloatArray,
     way: FloatArray,
-    known: Known,
+    known: KnownLandmarks,
     history: FloatArray,
     visible: BoolArray,
     rng: np.random.Generator,
@@ -99,7 +99,7 @@ def _try(
     n = len(positions)
     there, heading, going = positions.copy(), headings.copy(), moves.copy()
     move(raster, p, there, heading, going, way)
-    after = Known(
+    after = KnownLandmarks(
         known.depth.copy(), known.variance.copy(), known.looks.copy(), known.accurate.copy(), known.credited.copy()
     )
     before = known.accurate.sum()

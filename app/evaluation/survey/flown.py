@@ -9,7 +9,7 @@ from app.exploration.lines.lawnmower import lawnmower_routes
 from app.mapping.types import Soundings
 from simulator.sensors import SonarNoise
 from simulator.terrain import Terrain
-from simulator.world import Measurement, SimulatedVehicle
+from simulator.world import BeamReturn, SimulatedVehicle
 
 ARRIVAL_RADIUS_M = 3.0
 """A corner counts as reached within this distance, as in missions."""
@@ -44,7 +44,7 @@ def fly_lawnmower(
             )
             for i, (start, stream) in enumerate(zip(starts_m, rng.spawn(len(starts_m)), strict=True))
         ]
-        measured: list[Measurement] = []
+        measured: list[BeamReturn] = []
         finished = True
         for vehicle, route, start in zip(vehicles, routes, starts_m, strict=True):
             done, heard = _fly(vehicle, route, float(start[2]), distance_m)
@@ -58,9 +58,9 @@ def fly_lawnmower(
 
 def _fly(
     vehicle: SimulatedVehicle, route: FloatArray, depth_m: float, distance_m: float
-) -> tuple[bool, list[Measurement]]:
+) -> tuple[bool, list[BeamReturn]]:
     """Follow a route (k, 2) for at most a distance; return whether its end was reached, and the soundings."""
-    heard: list[Measurement] = []
+    heard: list[BeamReturn] = []
     for east, north in route:
         vehicle.go_to(float(east), float(north), depth_m, SPEED_MPS, arrival_radius_m=ARRIVAL_RADIUS_M)
         while not vehicle.arrived:
@@ -70,7 +70,7 @@ def _fly(
     return True, heard
 
 
-def _soundings(measured: list[Measurement], relative_noise: float) -> Soundings:
+def _soundings(measured: list[BeamReturn], relative_noise: float) -> Soundings:
     found = [(m.footprint, m.range_m) for m in measured if m.footprint is not None]
     places = np.array([(p.east_m, p.north_m, p.depth_m) for p, _ in found]).reshape(-1, 3)
     sd = np.maximum(relative_noise * np.array([r for _, r in found]), LEAST_SD_M)

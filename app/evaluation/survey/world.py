@@ -200,7 +200,7 @@ def rmse_m(estimate: BathymetricMap, terrain: Terrain) -> tuple[float, float]:
 
 
 @dataclass(frozen=True)
-class Track:
+class SurveyTrack:
     """A survey that was flown: positions after every step (steps + 1, vehicles, 3), soundings and planning times."""
 
     positions_m: FloatArray
@@ -219,7 +219,7 @@ def fly_planner(
     options: PlannerOptions,
     progress: Callable[[int], None] = lambda step: None,
     known: Belief | None = None,
-) -> Track:
+) -> SurveyTrack:
     """Run the closed loop: belief from the default map, planner, legs, soundings.
 
     ``progress`` is called every step. An oracle is given ``known`` instead of what it has sounded.
@@ -269,7 +269,7 @@ def fly_planner(
         positions = proposal.positions
         history.append(positions)
         progress(step)
-    return Track(np.array(history), log.soundings, np.array(times))
+    return SurveyTrack(np.array(history), log.soundings, np.array(times))
 
 
 def fly_routes(

@@ -9,7 +9,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from app.evaluation.runs.summary import spread
-from app.evaluation.track.setups import HISTORY_EVERY, Experiment, ReportJob
+from app.evaluation.track.setups import HISTORY_EVERY, Experiment, TrackReportJob
 
 DPI = 110
 SIZE = (9.2, 3.4)
@@ -17,7 +17,7 @@ PANELS = (("history", "landmarks remaining, %"), ("error", "norm of the landmark
 
 
 def draw(
-    jobs: Sequence[ReportJob], runs: Mapping[str, Mapping[str, Any]], chosen: Sequence[Experiment], folder: Path
+    jobs: Sequence[TrackReportJob], runs: Mapping[str, Mapping[str, Any]], chosen: Sequence[Experiment], folder: Path
 ) -> dict[str, str]:
     """Write one picture per experiment that has runs into ``folder``; return its name -> file name."""
     folder.mkdir(parents=True, exist_ok=True)

@@ -7,7 +7,7 @@ import numpy as np
 
 from app.evaluation.runs.summary import spread
 from app.evaluation.track.consistency import Consistency
-from app.evaluation.track.setups import HISTORY_EVERY, Experiment, ReportJob
+from app.evaluation.track.setups import HISTORY_EVERY, Experiment, TrackReportJob
 
 Run = Mapping[str, Any]
 
@@ -40,7 +40,7 @@ PUBLISHED = {
 
 
 def markdown(
-    jobs: Sequence[ReportJob],
+    jobs: Sequence[TrackReportJob],
     runs: Mapping[str, Run],
     chosen: Sequence[Experiment],
     facts: Mapping[str, str],
@@ -71,7 +71,7 @@ def markdown(
     return "\n".join([*lines, *_consistency(filters)])
 
 
-def _of(jobs: Sequence[ReportJob], runs: Mapping[str, Run], setup: str, planner: str) -> list[Run]:
+def _of(jobs: Sequence[TrackReportJob], runs: Mapping[str, Run], setup: str, planner: str) -> list[Run]:
     keys = [job.key for job in jobs if job.setup == setup and job.planner == planner]
     return [runs[key] for key in keys if key in runs]
 

@@ -157,7 +157,7 @@ class TrackJob:
 
 
 @dataclass(frozen=True)
-class ReportJob(TrackJob):
+class TrackReportJob(TrackJob):
     """One run for the report: with its key, histories thinned."""
 
     def run(self, progress: Progress) -> dict[str, Any]:
@@ -170,13 +170,13 @@ class ReportJob(TrackJob):
 
 def report_jobs(
     chosen: Sequence[Experiment], terrain: Terrain, seeds: Sequence[int], rollouts: int = ROLLOUTS
-) -> Iterator[ReportJob]:
+) -> Iterator[TrackReportJob]:
     """Yield every run, seed by seed, so that an interrupted evaluation has whole seeds."""
     options = PlannerOptions(rollouts=rollouts)
     for seed in seeds:
         for experiment in chosen:
             where = terrain if experiment.on_terrain else None
             for planner in experiment.planners:
-                yield ReportJob(
+                yield TrackReportJob(
                     experiment.name, planner, replace(experiment.scenario, terrain=where, seed=seed), options
                 )

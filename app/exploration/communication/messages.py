@@ -83,7 +83,7 @@ class Entries:
 
 
 @dataclass(frozen=True)
-class Report:
+class StatusReport:
     """Vehicle to station: where the vehicle is, (3,), and what it has learned."""
 
     step: int
@@ -94,7 +94,7 @@ class Report:
 
 
 @dataclass(frozen=True)
-class Order:
+class MoveOrder:
     """Station to vehicle: its next waypoint (3,), vehicles in its reachable exploration area, what others have learned.
 
     ``neighbours`` (m,) are numbers of vehicles, ``neighbour_positions`` (m, 3) where they are.
@@ -150,14 +150,14 @@ class WireFormat:
         """Standard deviations above this arrive as infinite."""
         return float(self.accuracy_sd_m * 2.0 ** ((_SD_TOP - 1 - _SD_ONE) / _SD_PER_OCTAVE))
 
-    def encode_report(self, report: Report) -> bytes:
+    def encode_report(self, report: StatusReport) -> bytes:
         """Return the message; ``HEADER_BYTES + ENTRY_BYTES * len(entries)`` bytes."""
         head = self._header(
             0, report.acknowledges, 0, report.vehicle, report.step, report.position, len(report.entries)
         )
         return head + self._pack_entries(report.entries)
 
-    def encode_order(self, order: Order) -> bytes:
+    def encode_order(self, order: MoveOrder) -> bytes:
         """Return the message, ``NEIGHBOUR_BYTES`` longer than a report for every neighbour."""
         m = len(order.neighbours)
         if m > MAX_NEIGHBOURS:
@@ -169,17 +169,17 @@ class WireFormat:
         )
         return head + self._pack_entries(order.entries) + others
 
-    def decode_report(self, message: bytes) -> Report:
+    def decode_report(self, message: bytes) -> StatusReport:
         """Return what was encoded. Raises MessageError for anything else."""
         acknowledges, _, vehicle, step, position, entries, _ = self._open(message, 0)
-        return Report(step, vehicle, position, acknowledges, entries)
+        return StatusReport(step, vehicle, position, acknowledges, entries)
 
-    def decode_order(self, message: bytes) -> Order:
+    def decode_order(self, message: bytes) -> MoveOrder:
         """Return what was encoded. Raises MessageError for anything else."""
         acknowledges, m, vehicle, step, waypoint, entries, rest = self._open(message, 1)
         rows = np.frombuffer(rest, np.uint8).reshape(m, NEIGHBOUR_BYTES)
         positions = np.array([self._unpack_position(row[1:].tobytes()) for row in rows]).reshape(m, 3)
-        return Order(step, vehicle, waypoint, acknowledges, rows[:, 0].astype(np.int64), positions, entries)
+        return MoveOrder(step, vehicle, waypoint, acknowledges, rows[:, 0].astype(np.int64), positions, entries)
 
     def _header(
         self, direction: int, acknowledges: bool, m: int, vehicle: int, step: int, position: FloatArray, k: int

@@ -13,8 +13,8 @@ from app.exploration.communication.messages import (
     MAX_NEIGHBOURS,
     STEPS,
     Entries,
-    Order,
-    Report,
+    MoveOrder,
+    StatusReport,
     WireFormat,
 )
 from app.exploration.communication.selection import fill, reachable
@@ -158,7 +158,7 @@ class StationNode:
             if member.heard_at == self._count - 1 and member.waypoint is not None:
                 member.position = member.waypoint  # until it says otherwise
 
-    def receive(self, message: bytes) -> Report:
+    def receive(self, message: bytes) -> StatusReport:
         """Take in a vehicle's report; one that comes late or twice changes nothing."""
         report = self._wire.decode_report(message)
         n = len(self._xy)
@@ -224,7 +224,7 @@ class StationNode:
         member.waypoint = np.asarray(waypoint, dtype=np.float64)
         member.sent = self._choose(number, member)
         return self._wire.encode_order(
-            Order(
+            MoveOrder(
                 member.step,
                 number,
                 waypoint,

@@ -6,7 +6,7 @@ import numpy as np
 
 from app.arrays import BoolArray, FloatArray, IntArray
 from app.estimation import LandmarkEstimator, Landmarks
-from app.exploration.communication.messages import MAX_ENTRIES, STEPS, Entries, Order, Report, WireFormat
+from app.exploration.communication.messages import MAX_ENTRIES, STEPS, Entries, MoveOrder, StatusReport, WireFormat
 from app.exploration.communication.selection import distance_to_receivers, fill
 from app.exploration.communication.shared import Contribution, fuse
 
@@ -97,9 +97,9 @@ class VehicleNode:
             self._done[self._sent],
         )
         acknowledges, self._heard = self._heard, False
-        return self._wire.encode_report(Report(step % STEPS, self.number, position, acknowledges, entries))
+        return self._wire.encode_report(StatusReport(step % STEPS, self.number, position, acknowledges, entries))
 
-    def receive(self, message: bytes) -> Order:
+    def receive(self, message: bytes) -> MoveOrder:
         """Take in the station's answer to the last report, and return it."""
         order = self._wire.decode_order(message)
         if order.vehicle != self.number:

@@ -11,7 +11,7 @@ import numpy as np
 from numba import njit
 
 from app.arrays import FloatArray, IntArray
-from app.exploration.rollout.floor import Floor, sample
+from app.exploration.rollout.floor import FloorEstimate, sample
 
 WORTH_OF_EARLY = 2.5
 """What the sum over time of the part that remains counts, against a step more in the end: early gains are surer."""
@@ -91,7 +91,7 @@ class Task(NamedTuple):
     """What plans are judged by: what is to be done, over which floor, by which rules, in how many steps."""
 
     work: Work
-    floor: Floor
+    floor: FloorEstimate
     rules: Rules
     horizon: float
 
@@ -265,7 +265,9 @@ def _keep_links(at: FloatArray, chain: IntArray, com_range: float) -> None:
 
 
 @njit(cache=True, nogil=True)
-def fly_step(at: FloatArray, plan: Plan, k: int, count: int, floor: Floor, rules: Rules, out: FloatArray) -> int:
+def fly_step(
+    at: FloatArray, plan: Plan, k: int, count: int, floor: FloorEstimate, rules: Rules, out: FloatArray
+) -> int:
     """Fly one step from ``at`` (n_vehicles, 3) into ``out``; return the index of the next waypoint to be reached."""
     n = len(at)
     step = rules.step_m * (1.0 - 1e-9)

@@ -35,7 +35,7 @@ HELD_NEAR = 0.3
 """How far the height that a vehicle holds by its altimeter says something of the floor, in visibilities."""
 
 
-class Floor(NamedTuple):
+class FloorEstimate(NamedTuple):
     """Rasters over the area; the first row is the southernmost, the first column the westernmost.
 
     Attributes
@@ -72,7 +72,7 @@ def estimate_floor(
     clearance_m: float,
     unknown_m: float,
     held_m: float = 0.0,
-) -> Floor:
+) -> FloorEstimate:
     """Estimate the floor from a belief.
 
     Parameters
@@ -119,7 +119,7 @@ def estimate_floor(
     around = bottom.at(np.stack([east, north], axis=-1) + shifts)
     limit = np.minimum(limit, np.where(np.isnan(around), np.inf, around).min(axis=0) - clearance_m)
     _keep_above(limit, east, north, felt_m, clearance_m + margin_m(visibility_m, clearance_m))
-    return Floor(
+    return FloorEstimate(
         float(low[0]), float(low[1]), float(cell), depth, smooth, np.minimum(_envelope(limit, cell), depth - held_m)
     )
 
@@ -138,7 +138,7 @@ def _from_neighbours(
 
 
 @njit(cache=True, nogil=True)
-def let_stay(floor: Floor, positions: FloatArray, height_m: float, reach_m: float) -> None:
+def let_stay(floor: FloorEstimate, positions: FloatArray, height_m: float, reach_m: float) -> None:
     """Lower the estimate in place where vehicles at ``positions`` (n, 3) are closer to it than their altimeters allow.
 
     A vehicle that holds its height above the sea floor need not climb because an estimate says that it is too low.
@@ -183,7 +183,7 @@ def sample(raster: FloatArray, west: float, south: float, cell: float, x: float,
 
 
 @njit(cache=True, nogil=True)
-def fill_depths(xyz: FloatArray, floor: Floor) -> None:
+def fill_depths(xyz: FloatArray, floor: FloorEstimate) -> None:
     """Give points (n, 3) whose depth is not known (NaN) the floor's."""
     for k in range(len(xyz)):
         if np.isnan(xyz[k, 2]):

@@ -11,7 +11,7 @@ from app.exploration.core.bottom import Bottom
 from app.exploration.core.problem import Situation
 from app.exploration.planner.options import PlannerOptions
 from app.exploration.rollout.flight import Rules
-from app.exploration.rollout.floor import HELD_NEAR, Floor, estimate_floor, fill_depths, let_stay, margin_m
+from app.exploration.rollout.floor import HELD_NEAR, FloorEstimate, estimate_floor, fill_depths, let_stay, margin_m
 from app.exploration.rollout.free_space import Free, clear_ways, settle_waypoint
 from app.exploration.rollout.independent_routes import (
     Routes,
@@ -26,7 +26,7 @@ from app.exploration.rollout.independent_routes import (
     trace,
 )
 from app.exploration.rollout.local_search import DRAWS
-from app.exploration.rollout.points import Points, make_points
+from app.exploration.rollout.points import LandmarkPoints, make_points
 from app.exploration.rollout.sectors import sectors
 
 ROOM = 48
@@ -73,7 +73,7 @@ class ApartMission:
     """Everything about a step that routes are judged by."""
 
     def __init__(
-        self, team: Situation, free_part: FloatArray, floor: Floor, free: Free, rules: Rules, height_m: float,
+        self, team: Situation, free_part: FloatArray, floor: FloorEstimate, free: Free, rules: Rules, height_m: float,
         lower_m: float, accuracy_sd_m: float, rng: np.random.Generator,
     ) -> None:  # fmt: skip
         belief = team.belief
@@ -87,7 +87,7 @@ class ApartMission:
         xyz = np.column_stack([belief.xy_m, belief.depth_m])[row]
         fill_depths(xyz, floor)
         total = len(belief.accurate) * len(row) / len(open_)
-        self._points: Points = make_points(
+        self._points: LandmarkPoints = make_points(
             xyz, belief, row, accuracy_sd_m, self._area, rules.visibility_m, BUCKETS, total
         )
 

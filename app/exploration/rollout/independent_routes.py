@@ -11,10 +11,10 @@ from numba import njit
 
 from app.arrays import FloatArray, IntArray
 from app.exploration.rollout.flight import PER_WAYPOINT, SINKING, WORTH_OF_EARLY, Plan, Rules, advance
-from app.exploration.rollout.floor import Floor, sample
+from app.exploration.rollout.floor import FloorEstimate, sample
 from app.exploration.rollout.free_space import Free, clear_ways, settle_waypoint
 from app.exploration.rollout.local_search import change
-from app.exploration.rollout.points import Points, lacks, look_whole
+from app.exploration.rollout.points import LandmarkPoints, lacks, look_whole
 
 ALL_LEFT = 10_000.0
 """Steps charged for leaving every landmark over: one of a thousand is worth a way of ten steps."""
@@ -56,7 +56,9 @@ def route_of(routes: Routes, i: int) -> Plan:
 
 
 @njit(cache=True, nogil=True)
-def fly_alone(at: FloatArray, plan: Plan, k: int, count: int, floor: Floor, rules: Rules, out: FloatArray) -> int:
+def fly_alone(
+    at: FloatArray, plan: Plan, k: int, count: int, floor: FloorEstimate, rules: Rules, out: FloatArray
+) -> int:
     """Fly one vehicle's step from ``at`` (1, 3) into ``out``; return the index of the next waypoint to be reached.
 
     It goes as far along its route as its climb or descent leaves of the step.
@@ -109,7 +111,7 @@ def no_paths(vehicles: int, horizon: int) -> Paths:
 
 
 @njit(cache=True, nogil=True)
-def trace(start: FloatArray, i: int, routes: Routes, floor: Floor, rules: Rules, paths: Paths) -> None:
+def trace(start: FloatArray, i: int, routes: Routes, floor: FloorEstimate, rules: Rules, paths: Paths) -> None:
     """Fly the route of vehicle ``i`` from its place in ``start`` (n_vehicles, 3), into its row of ``paths``."""
     at, after = start[i : i + 1].copy(), np.empty((1, 3))
     plan, count, k, t = route_of(routes, i), routes.counts[i], 0, 0
@@ -123,7 +125,13 @@ def trace(start: FloatArray, i: int, routes: Routes, floor: Floor, rules: Rules,
 
 @njit(cache=True, nogil=True)
 def judge(
-    paths: Paths, free_part: FloatArray, waypoints: int, points: Points, rules: Rules, bound: float, left: FloatArray
+    paths: Paths,
+    free_part: FloatArray,
+    waypoints: int,
+    points: LandmarkPoints,
+    rules: Rules,
+    bound: float,
+    left: FloatArray,
 ) -> float:
     """Return the score of a team's paths in steps; less is better, inf as soon as it cannot be better than ``bound``.
 
@@ -189,8 +197,8 @@ class RoutesTask(NamedTuple):
 
     start: FloatArray
     free_part: FloatArray
-    points: Points
-    floor: Floor
+    points: LandmarkPoints
+    floor: FloorEstimate
     rules: Rules
 
 

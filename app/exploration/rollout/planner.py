@@ -35,7 +35,7 @@ from app.exploration.rollout.flight import (
     make_work,
     new_checkpoints,
 )
-from app.exploration.rollout.floor import Floor, estimate_floor, fill_depths, margin_m
+from app.exploration.rollout.floor import FloorEstimate, estimate_floor, fill_depths, margin_m
 from app.exploration.rollout.free_space import Free, clear_ways, free_space, settle_waypoint
 from app.exploration.rollout.independent_mission import WORTH, apart_mission
 from app.exploration.rollout.initial_plans import Backbone, backbones, with_team
@@ -292,7 +292,7 @@ class _Mission:
         clearance = constraints.min_altitude_m
         self._height = max(HEIGHT * visibility, clearance + margin_m(visibility, clearance), constraints.lowest_m)
         unknown = min(constraints.max_depth_m, float(team.positions[:, 2].max()) + self._height)
-        self._floor: Floor = estimate_floor(
+        self._floor: FloorEstimate = estimate_floor(
             belief, bottom, felt_m, constraints.area, visibility, clearance, unknown, constraints.lowest_m
         )
         self._free = free

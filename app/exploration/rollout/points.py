@@ -22,7 +22,7 @@ SURELY = 0.8
 """Part of the accuracy threshold that flights must come below: estimates come out a little worse than the bound."""
 
 
-class Points(NamedTuple):
+class LandmarkPoints(NamedTuple):
     """Landmarks still to be done.
 
     Attributes
@@ -43,7 +43,7 @@ class Points(NamedTuple):
 def make_points(
     xyz: FloatArray, belief: Belief, row: NDArray[np.int64], accuracy_sd_m: float, area: FloatArray, sight_m: float,
     buckets: int, total: float,
-) -> Points:  # fmt: skip
+) -> LandmarkPoints:  # fmt: skip
     """Return the landmarks ``row`` (m,) of a belief, presumed at ``xyz`` (m, 3), as flights look at them.
 
     ``total`` is how many there are in all, done ones included, of which these are a fair sample.
@@ -55,7 +55,7 @@ def make_points(
     information[seen] = np.linalg.inv(belief.covariance_m2[row[seen]] + 1e-12 * np.eye(3))
     work, order = make_work(xyz, np.ones(len(row)), area, sight_m / buckets, 0.0, total, 1.0)
     six = information[order][:, (0, 0, 0, 1, 1, 2), (0, 1, 2, 1, 2, 2)]
-    return Points(work, np.ascontiguousarray(six.T), (SURELY * accuracy_sd_m) ** 2)
+    return LandmarkPoints(work, np.ascontiguousarray(six.T), (SURELY * accuracy_sd_m) ** 2)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -75,7 +75,14 @@ def lacks(information: FloatArray, m: int, variance: float) -> float:
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def look_whole(
-    x: float, y: float, z: float, points: Points, reach: float, noise: float, information: FloatArray, done: BoolArray
+    x: float,
+    y: float,
+    z: float,
+    points: LandmarkPoints,
+    reach: float,
+    noise: float,
+    information: FloatArray,
+    done: BoolArray,
 ) -> int:
     """Add what a vehicle sees at (x, y, z) to ``information`` (6, m); return how many landmarks that completes."""
     work = points.work

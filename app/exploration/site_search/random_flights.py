@@ -13,7 +13,7 @@ EXPONENT = 2.0
 TRIES = 32
 
 
-class RandomSearch(SearchPlanner):
+class RandomFlights(SearchPlanner):
     """Goes straight for a length drawn from a power law, or until something is ahead, then in another direction."""
 
     name: ClassVar[str] = "random"

@@ -10,7 +10,7 @@ from app.arrays import FloatArray
 from app.exploration.core.constraints import Constraints
 from app.exploration.core.routes import FreeSpace, fly
 from app.exploration.lines.lattice import Sweep, even_lines, longer_axis_rad, most_lines
-from app.exploration.survey.value import Nodes, Objective, make_nodes, plan_value
+from app.exploration.survey.value import Nodes, SurveyObjective, make_nodes, plan_value
 
 MARGIN_M = 0.5
 FAR_M = 1e6
@@ -109,7 +109,7 @@ def _best_share(
     inside = (u >= strip.low_u) & (u <= strip.high_u)
     mine = make_nodes(nodes.en_m[inside], nodes.weight[inside])
     unknown = np.full(len(mine.x), np.inf)
-    objective = Objective(step_m, steps, scale_m, power, 0.0, FAR_M)
+    objective = SurveyObjective(step_m, steps, scale_m, power, 0.0, FAR_M)
     affordable = most_lines(lambda n: _steps(sweep, start, strip, n, step_m) <= steps)
     best: tuple[float, Share] | None = None
     for n in {max(1, affordable - 1), affordable, affordable + 1}:

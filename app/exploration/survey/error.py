@@ -40,7 +40,7 @@ MOST_DOUBTS = 0.01
 
 
 @dataclass(frozen=True)
-class Raster:
+class RoughnessRaster:
     """Landmarks put on a grid: ``cell`` (n,) is the place of each in the flattened ``shape``."""
 
     shape: tuple[int, int]
@@ -48,7 +48,7 @@ class Raster:
     cell_m: float
 
     @classmethod
-    def of(cls, xy_m: FloatArray) -> "Raster":
+    def of(cls, xy_m: FloatArray) -> "RoughnessRaster":
         """Return the raster for landmarks at ``xy_m`` (n, 2), its cells as wide as they are apart."""
         distance = np.asarray(cKDTree(xy_m).query(xy_m, k=2)[0])
         cell_m = max(float(np.median(distance[:, 1])), float(np.ptp(xy_m, axis=0).max()) / 200.0, 1e-9)
@@ -81,7 +81,7 @@ def expected_roughness(belief: Belief, distance_m: FloatArray, spacing_m: float)
     known = np.isfinite(belief.depth_m) & np.isfinite(belief.sd_m)
     if known.sum() < 9:
         return np.ones(len(belief.xy_m))
-    raster = Raster.of(belief.xy_m)
+    raster = RoughnessRaster.of(belief.xy_m)
     if min(raster.shape) < 3:
         return np.ones(len(belief.xy_m))
     depth, variance = (raster.fill(np.where(known, v, np.nan)) for v in (belief.depth_m, belief.sd_m**2))

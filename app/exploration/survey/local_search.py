@@ -8,7 +8,7 @@ from numba import njit
 from app.arrays import BoolArray, FloatArray, IntArray
 from app.exploration.core.constraints import Region
 from app.exploration.core.geometry import enters, leaves, signed_distance
-from app.exploration.survey.value import Nodes, Objective, expected_error, lower_to_route
+from app.exploration.survey.value import Nodes, SurveyObjective, expected_error, lower_to_route
 
 DRAWS = 6
 """Random numbers that one change uses."""
@@ -206,7 +206,7 @@ def _left(d2: FloatArray, after: FloatArray, weight: FloatArray, scale_m: float,
 def improve(
     d2: FloatArray,
     nodes: Nodes,
-    objective: Objective,
+    objective: SurveyObjective,
     starts: FloatArray,
     headings: FloatArray,
     begin: Plan,

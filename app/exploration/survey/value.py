@@ -50,7 +50,7 @@ class Nodes(NamedTuple):
         return np.column_stack([self.x, self.y])
 
 
-class Objective(NamedTuple):
+class SurveyObjective(NamedTuple):
     """How a plan is judged: the largest leg, legs per vehicle, l and p as above, and what a reversal costs.
 
     Nodes farther than ``reach_m`` from all soundings count as quite unknown.
@@ -137,7 +137,7 @@ def lower_to_segment(d2: FloatArray, nodes: Nodes, ax: float, ay: float, bx: flo
 def lower_to_route(
     d2: FloatArray,
     nodes: Nodes,
-    objective: Objective,
+    objective: SurveyObjective,
     start: FloatArray,
     heading: float,
     route: FloatArray,
@@ -197,7 +197,7 @@ def turning(vertices: FloatArray, n: int, heading: float) -> float:
 def plan_value(
     d2: FloatArray,
     nodes: Nodes,
-    objective: Objective,
+    objective: SurveyObjective,
     starts: FloatArray,
     headings: FloatArray,
     vias: FloatArray,
@@ -229,7 +229,7 @@ def plan_value(
 def values_after_first_leg(
     d2: FloatArray,
     nodes: Nodes,
-    objective: Objective,
+    objective: SurveyObjective,
     starts: FloatArray,
     headings: FloatArray,
     targets: FloatArray,
@@ -244,7 +244,7 @@ def values_after_first_leg(
     c, n, _ = targets.shape
     out = np.empty((c, 2))
     courses = np.empty(n)
-    rest = Objective(
+    rest = SurveyObjective(
         objective.step,
         objective.steps - 1,
         objective.scale_m,
@@ -274,6 +274,6 @@ def values_after_first_leg(
 def warm_up() -> None:
     """Compile what values plans, or load it from the cache of an earlier start."""
     one, two = np.zeros(1), np.zeros((1, 1, 2))
-    nodes, objective = make_nodes(two[0], one), Objective(1.0, 1, 1.0, 2.0, 0.0, 1.0)
+    nodes, objective = make_nodes(two[0], one), SurveyObjective(1.0, 1, 1.0, 2.0, 0.0, 1.0)
     counts = np.zeros((1, 1), dtype=np.int64)
     values_after_first_leg(one, nodes, objective, two[0], one, two, two[None], counts)

@@ -9,10 +9,10 @@ import json
 import sys
 from typing import Any
 
-from app.mapping.readers.confinement import LAYERS, Limits, confine, limit
+from app.mapping.readers.confinement import LAYERS, ResourceLimits, confine, limit
 from app.mapping.readers.types import UNCONFINED, UNUSABLE, ReadError
 
-LIMITS = Limits(memory_bytes=4 * 2**30, cpu_s=120, file_bytes=2**30)
+LIMITS = ResourceLimits(memory_bytes=4 * 2**30, cpu_s=120, file_bytes=2**30)
 
 
 def main(layers: tuple[str, ...] = LAYERS) -> int:

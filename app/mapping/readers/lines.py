@@ -16,14 +16,14 @@ MAX_TEXT_BYTES = 512 * 2**20
 
 
 @dataclass(frozen=True)
-class Block:
+class LineBlock:
     """Whole lines without their ends; ``first`` is the number of the first one, from 1."""
 
     first: int
     lines: list[str]
 
 
-def blocks(file: BinaryIO, *, packed: bool) -> Iterator[Block]:
+def blocks(file: BinaryIO, *, packed: bool) -> Iterator[LineBlock]:
     """Yield a text's lines; blocks in which there is nothing are left out.
 
     Raises
@@ -45,7 +45,7 @@ def blocks(file: BinaryIO, *, packed: bool) -> Iterator[Block]:
     yield from _block(rest.splitlines(), first)
 
 
-def _block(lines: list[bytes], first: int) -> Iterator[Block]:
+def _block(lines: list[bytes], first: int) -> Iterator[LineBlock]:
     if first - 1 + len(lines) > MAX_LINES:
         raise ReadError("file", f"it has more than {MAX_LINES} lines", "split or thin the file")
     if not any(lines):
@@ -54,7 +54,7 @@ def _block(lines: list[bytes], first: int) -> Iterator[Block]:
         raise _too_long(first + next(i for i, line in enumerate(lines) if len(line) > MAX_LINE_BYTES))
     text = b"\n".join(lines)
     try:
-        yield Block(first, text.decode().split("\n"))
+        yield LineBlock(first, text.decode().split("\n"))
     except UnicodeDecodeError as error:
         number = first + text.count(b"\n", 0, error.start)
         raise ReadError(f"line {number}", "it is not text in UTF-8", "send numbers as plain text") from None

@@ -21,7 +21,7 @@ from app.mapping.readers.types import (
     MAX_SOUNDINGS,
     MIN_DEPTH_M,
     MIN_SD_M,
-    Place,
+    MapExtent,
     Points,
     Positive,
     Raster,
@@ -52,7 +52,7 @@ class Placed:
     notes: list[str]
 
 
-def place_soundings(content: Points | Raster, options: ReadOptions, place: Place) -> Placed:
+def place_soundings(content: Points | Raster, options: ReadOptions, place: MapExtent) -> Placed:
     """Return the soundings near the mission's grid with depth and standard deviation.
 
     Of a grid finer than the map's the mean of each cell is taken, of a coarser one every cell.
@@ -85,7 +85,7 @@ def place_soundings(content: Points | Raster, options: ReadOptions, place: Place
     return Placed(Soundings(east, north, depth, _deviations(sd, depth, options, notes)), found, notes)
 
 
-def place_reference(content: Points | Raster, options: ReadOptions, place: Place) -> tuple[FloatArray, list[str]]:
+def place_reference(content: Points | Raster, options: ReadOptions, place: MapExtent) -> tuple[FloatArray, list[str]]:
     """Return a file's depths at the cells of the mission's grid, (rows, cols), NaN where it says nothing.
 
     A grid is interpolated linearly, or averaged where it is finer than the map; soundings are averaged in each cell.
@@ -171,7 +171,7 @@ def _crs(found: "pyproj.CRS | str | None", options: ReadOptions, notes: list[str
     return crs
 
 
-def _to_local(x: FloatArray, y: FloatArray, crs: pyproj.CRS | None, place: Place) -> tuple[FloatArray, FloatArray]:
+def _to_local(x: FloatArray, y: FloatArray, crs: pyproj.CRS | None, place: MapExtent) -> tuple[FloatArray, FloatArray]:
     if crs is None:
         return x, y
     horizontal = crs.sub_crs_list[0] if crs.is_compound else crs
@@ -199,7 +199,7 @@ def _no_way() -> ReadError:
 
 
 def _cells(
-    raster: Raster, depth: FloatArray, options: ReadOptions, place: Place, notes: list[str]
+    raster: Raster, depth: FloatArray, options: ReadOptions, place: MapExtent, notes: list[str]
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     crs = _crs(raster.crs, options, notes)
     rows, cols = depth.shape
@@ -232,7 +232,7 @@ def _positions(raster: Raster, col: ArrayLike, row: ArrayLike) -> tuple[FloatArr
     return a * col + b * row + c, d * col + e * row + f
 
 
-def _resampled(raster: Raster, values: FloatArray, crs: pyproj.CRS | None, place: Place, grid: Grid) -> FloatArray:
+def _resampled(raster: Raster, values: FloatArray, crs: pyproj.CRS | None, place: MapExtent, grid: Grid) -> FloatArray:
     """Return values at a grid's cells; means of the source's cells where these are smaller."""
     frame = rasterio.crs.CRS.from_wkt(place.frame.crs.to_wkt())
     source = frame

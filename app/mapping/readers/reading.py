@@ -8,7 +8,7 @@ from app.arrays import FloatArray
 from app.mapping.georeference import LocalFrame
 from app.mapping.readers.files import read_file
 from app.mapping.readers.placing import place_reference, place_soundings
-from app.mapping.readers.types import Place, ReadOptions
+from app.mapping.readers.types import MapExtent, ReadOptions
 from app.mapping.types import Grid
 
 
@@ -27,7 +27,7 @@ def place_file(file: BinaryIO, task: dict[str, Any], out: BinaryIO) -> dict[str,
     ReadError
         When the file cannot be used.
     """
-    place = Place(LocalFrame(*task["origin"]), Grid(**task["grid"]), task["margin_m"])
+    place = MapExtent(LocalFrame(*task["origin"]), Grid(**task["grid"]), task["margin_m"])
     options = ReadOptions(**task["options"])
     content = read_file(file, task["kind"])
     if task["what"] == "reference":

@@ -8,7 +8,7 @@ import numpy as np
 import pyproj
 
 from app.arrays import FloatArray
-from app.mapping.readers.lines import Block, blocks
+from app.mapping.readers.lines import LineBlock, blocks
 from app.mapping.readers.types import LOCAL, MAX_SOUNDINGS, Points, Positive, ReadError
 
 NAMES = {
@@ -119,7 +119,7 @@ def _layout(line: str, number: int) -> _Layout | None:
     return _Layout({"x": 0, "y": 1, "z": 2}, _separator(bare), named=False)
 
 
-def _taken(block: Block, begin: int, layout: _Layout) -> tuple[list[str], list[int]]:
+def _taken(block: LineBlock, begin: int, layout: _Layout) -> tuple[list[str], list[int]]:
     """Return a block's lines from ``begin`` on that are soundings to be taken, and their numbers."""
     lines, numbers = [], []
     for number, line in enumerate(block.lines[begin:], start=block.first + begin):

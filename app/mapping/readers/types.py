@@ -63,7 +63,7 @@ class ReadOptions:
 
 
 @dataclass(frozen=True)
-class Place:
+class MapExtent:
     """Where the mission maps: its frame, its grid, and how far outside that still helps."""
 
     frame: LocalFrame

@@ -15,7 +15,7 @@ from app.mapping.georeference import LocalFrame
 from app.mapping.readers.endings import NETCDF, PACKED, TEXT
 from app.mapping.readers.files import read_file
 from app.mapping.readers.placing import place_reference, place_soundings
-from app.mapping.readers.types import Place, ReadError, ReadOptions
+from app.mapping.readers.types import MapExtent, ReadError, ReadOptions
 from app.mapping.types import Grid
 
 _ROWS = 8
@@ -43,7 +43,7 @@ def warm_up(task: dict[str, Any]) -> None:
         # BAG is HDF5, and the other grids go through GDAL as this one does.
         read_file(io.BytesIO(_netcdf(frame)), NETCDF[0])
         kind, content = ".tif", _geotiff(frame)
-    place = Place(frame, _GRID, _GRID.cell_m)
+    place = MapExtent(frame, _GRID, _GRID.cell_m)
     found = read_file(io.BytesIO(content), kind)
     place_reference(found, _OPTIONS, place)
     place_soundings(found, _OPTIONS, place)

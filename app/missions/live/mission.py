@@ -48,7 +48,7 @@ from app.missions.soundings.corrections import Corrections
 from app.missions.soundings.gate import Gate
 from app.missions.spec.mission import MissionSpec
 from app.missions.states import ENDED, MissionState
-from app.missions.targets.filters import Tracking
+from app.missions.targets.filters import TargetFilters
 from app.missions.targets.views import target_views
 from app.missions.team import Member, Team
 from app.missions.views.messages import StateMessage
@@ -71,7 +71,7 @@ Part = TypeVar("Part")
 
 
 @dataclass
-class Header:
+class MissionHeader:
     """A mission's state as last committed."""
 
     state: MissionState
@@ -102,7 +102,7 @@ class LiveMission:
     ) -> None:
         self.id = row.id
         self.spec = spec
-        self.header = Header(MissionState(row.state), row.reason, row.created_at, row.updated_at, row.elapsed_s)
+        self.header = MissionHeader(MissionState(row.state), row.reason, row.created_at, row.updated_at, row.elapsed_s)
         self.frame: LocalFrame = spec.frame()
         self.area = spec.local_area()
         self.hub = hub
@@ -137,7 +137,7 @@ class LiveMission:
         )
         self.whole = SoundingStore(database, row.id, self.builder, self.journal)
         """All its soundings, and its map as it is stored."""
-        self.ranges = RangeJournal(database, row.id, Tracking(spec, self.frame), self.journal, time_scale)
+        self.ranges = RangeJournal(database, row.id, TargetFilters(spec, self.frame), self.journal, time_scale)
         """Ranges to moving targets, and what they tell."""
         self.correcting = asyncio.Lock()
         """Held while corrections change, one after the other."""

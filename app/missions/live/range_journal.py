@@ -14,7 +14,7 @@ from app.missions.fleet.interface import Position, RangeReport
 from app.missions.live.journal import Journal
 from app.missions.live.vehicle_times import VehicleTimes
 from app.missions.live.write_behind import Committed, WriteBehind
-from app.missions.targets.filters import Arrived, Judged, Tracking
+from app.missions.targets.filters import Arrived, Judged, TargetFilters
 from app.missions.views.mission import Level
 from app.missions.views.soundings import ItemVerdict, Verdict
 from app.storage import target_ranges as range_queries
@@ -42,7 +42,7 @@ class RangeJournal(WriteBehind[Arrived]):
     """
 
     def __init__(
-        self, database: Database, mission_id: str, tracking: Tracking, journal: Journal, time_scale: float
+        self, database: Database, mission_id: str, tracking: TargetFilters, journal: Journal, time_scale: float
     ) -> None:
         super().__init__(database, mission_id, journal.storage, GATHER_S)
         self.tracking = tracking

@@ -11,7 +11,7 @@ from shapely.geometry import Polygon
 from sqlalchemy import select
 
 from app.mapping.readers.endings import ending
-from app.mapping.readers.types import Place, ReadError, ReadOptions
+from app.mapping.readers.types import MapExtent, ReadError, ReadOptions
 from app.mapping.supersoundings import merge_soundings
 from app.mapping.types import Soundings
 from app.missions.clock import now
@@ -221,8 +221,8 @@ def _refuse_ended(live: LiveMission) -> None:
         raise ConflictError(f"the mission is {live.header.state} and takes no more soundings", "create a new mission")
 
 
-def _place(live: LiveMission) -> Place:
-    return Place(live.frame, live.builder.grid, live.margin_m)
+def _place(live: LiveMission) -> MapExtent:
+    return MapExtent(live.frame, live.builder.grid, live.margin_m)
 
 
 def _read_options(options: ImportOptions) -> ReadOptions:

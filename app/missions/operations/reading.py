@@ -24,7 +24,7 @@ from app.mapping.readers.types import (
     MIN_DEPTH_M,
     UNCONFINED,
     UNUSABLE,
-    Place,
+    MapExtent,
     ReadOptions,
 )
 from app.missions.errors import ImportUnavailableError, InvalidRequestError
@@ -109,7 +109,7 @@ class Reader:
             self._turn.release()
 
     async def read(
-        self, upload: Upload, kind: str, what: Literal["soundings", "reference"], place: Place, options: ReadOptions
+        self, upload: Upload, kind: str, what: Literal["soundings", "reference"], place: MapExtent, options: ReadOptions
     ) -> Found:
         """Read a file, within a :meth:`turn`.
 

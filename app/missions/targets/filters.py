@@ -73,7 +73,7 @@ class Judged:
 
 
 @dataclass(frozen=True, slots=True)
-class Known:
+class TargetKnowledge:
     """What is known of one target: its filter at ``at_s``, and how its ranges fared."""
 
     track: TargetTrack = field(default_factory=TargetTrack.unknown)
@@ -85,7 +85,7 @@ class Known:
     last_refusal: str = ""
 
 
-class Tracking:
+class TargetFilters:
     """The filters of a mission's targets.
 
     Parameters
@@ -106,7 +106,7 @@ class Tracking:
             target.name: _estimator(target, spec, area.min(axis=0), area.max(axis=0)) for target in spec.targets
         }
         self._blur = np.full(3, self._spec.range_sd_m**2)
-        self.known: Mapping[str, Known] = {name: Known() for name in self.specs}
+        self.known: Mapping[str, TargetKnowledge] = {name: TargetKnowledge() for name in self.specs}
 
     def __bool__(self) -> bool:
         return bool(self.specs)
@@ -122,7 +122,7 @@ class Tracking:
         names = ", ".join(self._by_call) or "it has none"
         return f"target: {called!r} is not among the targets of this mission ({names})"
 
-    def judge(self, arrived: Iterable[Arrived]) -> tuple[list[Judged], Mapping[str, Known]]:
+    def judge(self, arrived: Iterable[Arrived]) -> tuple[list[Judged], Mapping[str, TargetKnowledge]]:
         """Return verdicts on ranges to the mission's targets, and what would then be known; nothing changes yet."""
         known = dict(self.known)
         verdicts = []
@@ -132,11 +132,11 @@ class Tracking:
             verdicts.append(Judged(one, name, reason))
         return verdicts, known
 
-    def adopt(self, known: Mapping[str, Known]) -> None:
+    def adopt(self, known: Mapping[str, TargetKnowledge]) -> None:
         """Make it what is known, once the ranges that it came from are stored for good."""
         self.known = known
 
-    def _judge(self, name: str, known: Known, arrived: Arrived) -> tuple[Known, str]:
+    def _judge(self, name: str, known: TargetKnowledge, arrived: Arrived) -> tuple[TargetKnowledge, str]:
         report = arrived.report
         reason = self.implausible(report)
         if not reason and arrived.at_s < known.at_s - LATEST_S:
@@ -199,7 +199,7 @@ class Tracking:
             blur[:2] += sd**2
         return np.array([float(east), float(north), place.depth_m]), blur
 
-    def _ahead(self, name: str, known: Known, at_s: float) -> TargetTrack:
+    def _ahead(self, name: str, known: TargetKnowledge, at_s: float) -> TargetTrack:
         """Return a filter foretold for a time; one that may be anywhere by then is begun anew."""
         if not known.track.known:
             return known.track
@@ -261,7 +261,7 @@ class Tracking:
             last_id = int(state["last_id"])
         except (KeyError, TypeError, AttributeError) as error:
             raise ValueError(f"memory of targets lacks or garbles a field: {error}") from error
-        self.known = {name: Known() for name in self.specs} | known
+        self.known = {name: TargetKnowledge() for name in self.specs} | known
         return last_id
 
     def replay(self, arrived: Sequence[Arrived]) -> None:
@@ -293,7 +293,7 @@ def in_the_water(track: TargetTrack, top_m: float, bottom_m: float) -> TargetTra
     )
 
 
-def _known(state: Mapping[str, Any]) -> Known:
+def _known(state: Mapping[str, Any]) -> TargetKnowledge:
     track = TargetTrack(
         np.array(state["means"], dtype=np.float64).reshape(-1, 6),
         np.array(state["covariances"], dtype=np.float64).reshape(-1, 6, 6),
@@ -301,7 +301,7 @@ def _known(state: Mapping[str, Any]) -> Known:
         unease=float(state["unease"]),
     )
     at_s = -math.inf if state["at_s"] is None else float(state["at_s"])
-    return Known(
+    return TargetKnowledge(
         track, at_s, int(state["used"]), int(state["rejected"]), int(state["echoes"]), str(state["last_refusal"])
     )
 

@@ -9,7 +9,7 @@ from shapely.geometry import Polygon
 from app.arrays import FloatArray
 from app.estimation.targets import TargetTrack
 from app.mapping.georeference import LocalFrame
-from app.missions.targets.filters import Known, Tracking
+from app.missions.targets.filters import TargetFilters, TargetKnowledge
 from app.missions.views.targets import EllipseView, TargetState, TargetView
 
 PROBABILITY = 0.95
@@ -17,7 +17,7 @@ _SCALE = math.sqrt(-2.0 * math.log(1.0 - PROBABILITY))
 
 
 def target_views(
-    tracking: Tracking, frame: LocalFrame, area: FloatArray, now_s: float, pursuers: dict[str, str]
+    tracking: TargetFilters, frame: LocalFrame, area: FloatArray, now_s: float, pursuers: dict[str, str]
 ) -> list[TargetView]:
     """Return every target foretold for now; ``pursuers`` are the vehicles that went after targets, by target."""
     if not tracking.known:
@@ -31,8 +31,8 @@ def target_views(
 
 def _view(
     name: str,
-    known: Known,
-    tracking: Tracking,
+    known: TargetKnowledge,
+    tracking: TargetFilters,
     track: TargetTrack,
     frame: LocalFrame,
     polygon: Polygon,

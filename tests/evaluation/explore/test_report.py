@@ -7,7 +7,7 @@ from typer.testing import CliRunner, Result
 
 from app.evaluation.cli import evaluate_app
 from app.evaluation.explore.report import Report, markdown
-from app.evaluation.explore.setups import Section, Setup, TableJob, jobs_of, run_key, sections
+from app.evaluation.explore.setups import ReportSection, Setup, TableJob, jobs_of, run_key, sections
 from app.evaluation.explore.terrains import report_terrains
 from app.evaluation.runs.store import Results
 from simulator.seafloors import generate
@@ -27,7 +27,7 @@ def run_of(
     return key, {"remaining_pct": remaining, "t99": t99, "broken_constraints": broken, "history": [remaining] * 100}
 
 
-def report_of(runs: list[Any], section: Section, seeds: tuple[int, ...] = (0, 1, 2)) -> Report:
+def report_of(runs: list[Any], section: ReportSection, seeds: tuple[int, ...] = (0, 1, 2)) -> Report:
     return Report(dict(runs), [section], ["here"], [], seeds, 500, {"command": "`this`"}, {})
 
 
@@ -100,7 +100,7 @@ def test_the_report_states_means_intervals_and_how_many_reached_the_goal() -> No
     runs = [
         run_of(setup, k, remaining=r, t99=t, broken=b) for k, (r, t, b) in enumerate([(0.5, 200, 1), (0.7, 220, 3)])
     ]
-    section = Section("planners", "Planners", "Text.", (("CAO", setup), ("other", Setup("random"))))
+    section = ReportSection("planners", "Planners", "Text.", (("CAO", setup), ("other", Setup("random"))))
     text = markdown(report_of([*runs, run_of(setup, 2, remaining=3.0, t99=None, broken=2)], section))
     assert "| CAO | 1.40 ± 3.45 |" in text
     assert "| CAO | 210 ± 127 (2 of 3) |" in text
@@ -112,7 +112,7 @@ def test_the_report_states_means_intervals_and_how_many_reached_the_goal() -> No
 def test_improvements_are_relative_to_what_the_yardstick_leaves() -> None:
     ours, theirs = Setup("cao"), Setup("osarses", 5)
     rows = (("OSARSES(5), 1100 landmarks", theirs), ("CAO, map, 1100 landmarks", ours))
-    section = Section("figure5", "Figure", "Text.", rows, published={"CAO, map, 1100 landmarks": "about 17 %"})
+    section = ReportSection("figure5", "Figure", "Text.", rows, published={"CAO, map, 1100 landmarks": "about 17 %"})
     text = markdown(report_of([run_of(ours, 0, remaining=17.6), run_of(theirs, 0, remaining=23.2)], section, (0,)))
     assert "| CAO, map, 1100 landmarks over OSARSES(5) | 24.1 |" in text
     assert "| CAO, map, 1100 landmarks | 17.60 | about 17 % |" in text

@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 
 from app.evaluation.explore.run import ExploreRun, run_explore
-from app.evaluation.explore.team_changes import TeamChanges
+from app.evaluation.explore.team_changes import TeamSchedule
 from app.evaluation.explore.world import CubeTerrain, ExploreScenario, World
 from app.exploration.core.constraints import inside_area
 from app.exploration.planner.options import PlannerOptions
 from simulator.seafloors import generate
 from simulator.terrain import Terrain
 
-NO_CHANGES = TeamChanges()
+NO_CHANGES = TeamSchedule()
 
 
 @pytest.fixture(scope="module")
@@ -20,7 +20,7 @@ def smooth() -> Terrain:
 
 
 def run(
-    terrain: Terrain, planner: str, steps: int = 120, seed: int = 0, changes: TeamChanges = NO_CHANGES, **options: Any
+    terrain: Terrain, planner: str, steps: int = 120, seed: int = 0, changes: TeamSchedule = NO_CHANGES, **options: Any
 ) -> ExploreRun:
     scenario = ExploreScenario(terrain, landmarks=300, steps=steps, seed=seed, changes=changes)
     return run_explore(scenario, planner, PlannerOptions(**options))
@@ -97,7 +97,7 @@ def test_vehicles_never_touch_the_true_bottom(smooth: Terrain) -> None:
 
 @pytest.mark.parametrize("planner", ["cao", "lawnmower", "random", "rollout", "osarses"])
 def test_a_lost_vehicle_does_not_stall_the_others(smooth: Terrain, planner: str) -> None:
-    result = run(smooth, planner, steps=40, changes=TeamChanges(lost=((2, 10),)), tries=2)
+    result = run(smooth, planner, steps=40, changes=TeamSchedule(lost=((2, 10),)), tries=2)
     assert result.history[-1] < result.history[10]
 
 
@@ -107,8 +107,8 @@ def test_a_lost_vehicle_does_not_stall_the_others(smooth: Terrain, planner: str)
     [
         {},
         {"keep_out_fraction": 0.15},
-        {"changes": TeamChanges(lost=((2, 30),))},
-        {"changes": TeamChanges(joining=((1, 30),))},
+        {"changes": TeamSchedule(lost=((2, 30),))},
+        {"changes": TeamSchedule(joining=((1, 30),))},
         {"robots": 2},
         {"robots": 8},
     ],
@@ -131,7 +131,7 @@ def test_rollouts_finish_before_the_lawnmower(smooth: Terrain) -> None:
 
 
 def test_vehicles_keep_their_numbers_when_others_leave_and_join(smooth: Terrain) -> None:
-    changes = TeamChanges(lost=((1, 2), (4, 3)), joining=((2, 2),))
+    changes = TeamSchedule(lost=((1, 2), (4, 3)), joining=((2, 2),))
     world = World(ExploreScenario(smooth, landmarks=300, changes=changes))
     third = world.positions[2]
     teams = []
@@ -151,7 +151,7 @@ def test_vehicles_keep_their_numbers_when_others_leave_and_join(smooth: Terrain)
 @pytest.mark.parametrize("seed", range(5))
 def test_a_newcomer_is_launched_within_range_of_a_team_member_at_its_height(smooth: Terrain, seed: int) -> None:
     scenario = ExploreScenario(
-        smooth, landmarks=10, seed=seed, changes=TeamChanges(joining=((1, 1),)), keep_out_fraction=0.15
+        smooth, landmarks=10, seed=seed, changes=TeamSchedule(joining=((1, 1),)), keep_out_fraction=0.15
     )
     world = World(scenario)
     heights = world.cube.depth_at(world.positions[:, :2]) - world.positions[:, 2]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from app.evaluation.explore.run import ExploreRun, run_explore
-from app.evaluation.explore.team_changes import TeamChanges
+from app.evaluation.explore.team_changes import TeamSchedule
 from app.evaluation.explore.teams import SILENT_AFTER, LimitedTeam, UnlimitedTeam
 from app.evaluation.explore.world import ExploreScenario, World
 from app.exploration.planner.options import PlannerOptions
@@ -83,7 +83,7 @@ def test_a_silent_vehicle_stays_and_is_left_out_until_it_is_heard_again(smooth: 
 
 
 def test_a_vehicle_that_is_lost_is_missed_after_a_while_and_a_new_one_takes_part_at_once(smooth: Terrain) -> None:
-    world, team = limited(smooth, changes=TeamChanges(lost=((2, 3),), joining=((1, 3),)))
+    world, team = limited(smooth, changes=TeamSchedule(lost=((2, 3),), joining=((1, 3),)))
     noise, there = np.random.default_rng(1), []
     for step in range(1, SILENT_AFTER + 5):
         world.change_team(step)

@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 from app.cli import app
 from app.estimation import Landmarks, landmark_sets
 from app.estimation.beams import Attitude, Multibeam
-from app.evaluation.pcao.kernel import Known, floor_at, fly, meets, unknown
+from app.evaluation.pcao.kernel import KnownLandmarks, floor_at, fly, meets, unknown
 from app.evaluation.pcao.optimisers import METHODS, regressors, step_size
 from app.evaluation.pcao.scoring import LocalScorer
 from app.evaluation.pcao.task import TrainingTask
@@ -79,7 +79,7 @@ def test_the_tries_are_judged_by_the_objective(floor: SeaFloor) -> None:
     credited = np.where(accurate, rng.integers(0, n, m), -1)
     visible = (rng.random((n, m)) < 0.2) & (looks > 0)
     positions = np.column_stack([rng.uniform(-1, 1, (n, 2)), np.full(n, 0.2)])
-    known = Known(depth, np.where(looks > 0, 0.01, np.inf), looks, accurate, credited)
+    known = KnownLandmarks(depth, np.where(looks > 0, 0.01, np.inf), looks, accurate, credited)
     progress, J3 = _progress(positions, points, known, visible, _credits(known, n))
     landmarks = Landmarks(points[:, :2], depth, known.variance, looks, accurate, credited)
     expected = objective(

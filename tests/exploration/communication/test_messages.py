@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.exploration.communication import Entries, MessageError, Order, Report, WireFormat
+from app.exploration.communication import Entries, MessageError, MoveOrder, StatusReport, WireFormat
 
 AREA = np.array([[-1.0, -0.75], [1.0, -0.75], [1.0, 0.75], [-1.0, 0.75]])
 WIRE = WireFormat.around(AREA, -1.0, 1.0, accuracy_sd_m=0.02)
@@ -26,7 +26,7 @@ def entries(draw: Any, at_most: int = 20) -> Any:
     )
 
 
-reports = st.builds(Report, st.integers(0, 65535), st.integers(0, 255), coordinates, st.booleans(), entries())
+reports = st.builds(StatusReport, st.integers(0, 65535), st.integers(0, 255), coordinates, st.booleans(), entries())
 
 
 @st.composite
@@ -35,7 +35,7 @@ def orders(draw: Any) -> Any:
     near = draw(st.lists(coordinates, min_size=m, max_size=m))
     numbers = np.array(draw(st.lists(st.integers(0, 255), min_size=m, max_size=m)), dtype=np.int64)
     step, count, place, last = draw(st.tuples(st.integers(0, 65535), st.integers(0, 255), coordinates, st.booleans()))
-    return Order(step, count, place, last, numbers, np.array(near).reshape(m, 3), draw(entries()))
+    return MoveOrder(step, count, place, last, numbers, np.array(near).reshape(m, 3), draw(entries()))
 
 
 def assert_same(sent: Any, got: Any) -> None:
@@ -52,8 +52,8 @@ def ten_entries() -> Any:
 
 
 def test_header_and_ten_entries_take_64_bytes() -> None:
-    assert len(WIRE.encode_report(Report(1, 2, np.zeros(3), True, ten_entries()))) == 64
-    order = Order(1, 2, np.zeros(3), True, np.array([3]), np.zeros((1, 3)), ten_entries())
+    assert len(WIRE.encode_report(StatusReport(1, 2, np.zeros(3), True, ten_entries()))) == 64
+    order = MoveOrder(1, 2, np.zeros(3), True, np.array([3]), np.zeros((1, 3)), ten_entries())
     assert len(WIRE.encode_order(order)) == 64 + 10
 
 
@@ -95,7 +95,7 @@ def test_garbage_is_refused_or_read_but_never_crashes(message: imcpy.Message) ->
 
 
 def test_messages_cut_short_or_of_the_other_direction_are_refused() -> None:
-    message = WIRE.encode_report(Report(1, 2, np.zeros(3), True, ten_entries()))
+    message = WIRE.encode_report(StatusReport(1, 2, np.zeros(3), True, ten_entries()))
     with pytest.raises(MessageError, match="63 bytes where the header announces 64"):
         WIRE.decode_report(message[:-1])
     with pytest.raises(MessageError, match="13 bytes are fewer"):
@@ -106,7 +106,7 @@ def test_messages_cut_short_or_of_the_other_direction_are_refused() -> None:
 
 def test_what_lies_out_of_range_saturates() -> None:
     far = Entries(np.array([1]), np.array([7.0]), np.array([1e-6]), np.array([True]))
-    got = WIRE.decode_report(WIRE.encode_report(Report(1, 2, np.array([9.0, -9.0, 0.0]), False, far)))
+    got = WIRE.decode_report(WIRE.encode_report(StatusReport(1, 2, np.array([9.0, -9.0, 0.0]), False, far)))
     np.testing.assert_allclose(got.position[:2], [1.2, -0.9])
     assert got.entries.depth_m[0] == pytest.approx(1.2)
     assert got.entries.sd_m[0] == pytest.approx(0.005)
@@ -115,7 +115,7 @@ def test_what_lies_out_of_range_saturates() -> None:
 def test_a_deviation_too_large_to_send_arrives_as_infinite() -> None:
     sd = np.array([WIRE.largest_sd_m, 1.01 * WIRE.largest_sd_m, np.inf])
     sent = Entries(np.arange(3), np.zeros(3), sd, np.zeros(3, dtype=np.bool_))
-    got = WIRE.decode_report(WIRE.encode_report(Report(1, 2, np.zeros(3), False, sent)))
+    got = WIRE.decode_report(WIRE.encode_report(StatusReport(1, 2, np.zeros(3), False, sent)))
     assert np.isfinite(got.entries.sd_m).tolist() == [True, False, False]
 
 
@@ -125,4 +125,4 @@ def test_a_deviation_too_large_to_send_arrives_as_infinite() -> None:
 def test_what_does_not_fit_is_named(vehicle: Any, index: Any, count: int, named: Any) -> None:
     sent = Entries(np.full(count, index), np.zeros(count), np.ones(count), np.zeros(count, dtype=np.bool_))
     with pytest.raises(MessageError, match=named):
-        WIRE.encode_report(Report(1, vehicle, np.zeros(3), False, sent))
+        WIRE.encode_report(StatusReport(1, vehicle, np.zeros(3), False, sent))

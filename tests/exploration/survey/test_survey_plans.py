@@ -16,7 +16,7 @@ from app.exploration.planner.options import PlannerOptions
 from app.exploration.planners import create_planner
 from app.exploration.survey.error import MOST_DOUBTS, SECOND_LOOK, with_second_looks
 from app.exploration.survey.local_search import DRAWS, Plan, Search, improve
-from app.exploration.survey.value import Objective, lower_to_segment, make_nodes, plan_value
+from app.exploration.survey.value import SurveyObjective, lower_to_segment, make_nodes, plan_value
 from simulator.seafloors import generate
 from tests.support.situations import make_situation
 
@@ -101,7 +101,7 @@ def test_vehicles_do_not_linger_at_the_corners_of_a_keep_out_zone(planner: Any) 
 def test_searching_never_worsens_a_plan_and_says_truly_what_it_is_worth() -> None:
     nodes = nodes_of(1)
     starts, headings = np.array([[2.0, 2.0], [7.0, 2.0]]), np.full(2, np.nan)
-    objective = Objective(5.0, 60, 15.0, 2.0, 0.002, 60.0)
+    objective = SurveyObjective(5.0, 60, 15.0, 2.0, 0.002, 60.0)
     d2 = np.full(len(nodes.x), np.inf)
     vias = np.zeros((2, 40, 2))
     vias[:, :2] = [[[20.0, 90.0], [40.0, 10.0]], [[70.0, 90.0], [90.0, 10.0]]]

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from imcpy.coordinates import WGS84
 
-from imc_bridge.neptus import Area, Conventions, Place
+from imc_bridge.neptus import Area, CellPosition, Conventions
 from imc_bridge.neptus.protocol import NeptusDataError, read_map, read_session, read_step, write_actions
 from imc_bridge.neptus.values import StepData
 
@@ -109,7 +109,7 @@ def test_an_altitude_that_the_vehicle_does_not_know_is_no_sounding() -> None:
 
 
 def test_answers_are_one_line_with_heights_for_depths() -> None:
-    places = [Place(10.25, 20.5, 1.5), Place(0, 80, 3.0)]
+    places = [CellPosition(10.25, 20.5, 1.5), CellPosition(0, 80, 3.0)]
     line = write_actions(SESSION, 7, places, AREA, pairs=False)
     assert line.count(b"\n") == 1
     assert json.loads(line) == {
@@ -124,7 +124,7 @@ def test_a_panel_of_2013_gets_whole_cells_because_it_can_read_nothing_else() -> 
     data = step(json.dumps(record).encode())
     assert data.pairs
     assert data.soundings == (), "it sends what its own map says, which is no measurement"
-    assert b"." not in write_actions(SESSION, 1, [Place(10.4, 11.6, 2.0)], AREA, pairs=True)
+    assert b"." not in write_actions(SESSION, 1, [CellPosition(10.4, 11.6, 2.0)], AREA, pairs=True)
 
 
 @pytest.mark.parametrize(

@@ -24,14 +24,14 @@ from app.mapping.readers.endings import ending
 from app.mapping.readers.files import read_file
 from app.mapping.readers.placing import place_reference, place_soundings
 from app.mapping.readers.text import read_text
-from app.mapping.readers.types import Place, Points, Raster, ReadError, ReadOptions
+from app.mapping.readers.types import MapExtent, Points, Raster, ReadError, ReadOptions
 from app.mapping.s44 import NORMAL_95, Order
 from app.mapping.types import BathymetricMap, Grid, Soundings
 from app.mapping.vertical import VerticalDatum
 
 FRAME = LocalFrame(41.1850, -8.7040)
 GRID = Grid(0.0, 0.0, 2.0, 20, 25)
-PLACE = Place(FRAME, GRID, margin_m=6.0)
+PLACE = MapExtent(FRAME, GRID, margin_m=6.0)
 UTM = pyproj.CRS.from_epsg(32629)
 SD = ReadOptions(sd_m=0.3)
 
@@ -258,7 +258,7 @@ def test_whatever_text_comes_it_is_read_or_refused(text: str) -> None:
 @pytest.mark.terrains
 def test_real_soundings_of_a_harbour_are_read(terrains: Path) -> None:
     content = read_path(terrains / "leixoes_west_soundings.csv.gz")
-    wide = Place(FRAME, Grid(-5000.0, -5000.0, 10.0, 1000, 1000), margin_m=0.0)
+    wide = MapExtent(FRAME, Grid(-5000.0, -5000.0, 10.0, 1000, 1000), margin_m=0.0)
     found = place_soundings(content, SD, wide)
     assert found.found == 6354
     assert len(found.soundings) > 1000

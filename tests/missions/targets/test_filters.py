@@ -12,7 +12,7 @@ from pydantic import ValidationError
 
 from app.missions.fleet.interface import Position, RangeReport
 from app.missions.spec.mission import MissionSpec
-from app.missions.targets.filters import ECHOES, LATEST_S, Arrived, Tracking
+from app.missions.targets.filters import ECHOES, LATEST_S, Arrived, TargetFilters
 from app.missions.targets.views import ellipse, target_views
 from app.missions.views.targets import TargetState, TargetView
 from tests.support.missions.specs import FRAME, lon_lat, make_spec
@@ -26,9 +26,9 @@ def spec_with(**changes: Any) -> MissionSpec:
     return make_spec(60.0, **(values | changes))
 
 
-def tracking(**changes: Any) -> Tracking:
+def tracking(**changes: Any) -> TargetFilters:
     spec = spec_with(**changes)
-    return Tracking(spec, spec.frame())
+    return TargetFilters(spec, spec.frame())
 
 
 def report(east: float, north: float, depth: float, range_m: float, **changes: Any) -> RangeReport:
@@ -48,13 +48,13 @@ def around(count: int, begin_s: float = 100.0, target: np.ndarray = TAG) -> list
     return [heard(place, begin_s + k, target) for k, place in enumerate(places)]
 
 
-def told(tracks: Tracking, ranges: list[Arrived]) -> list[str]:
+def told(tracks: TargetFilters, ranges: list[Arrived]) -> list[str]:
     judged, known = tracks.judge(ranges)
     tracks.adopt(known)
     return [one.reason for one in judged]
 
 
-def view_of(tracks: Tracking, name: str = "tag-1", now_s: float = 160.0) -> TargetView:
+def view_of(tracks: TargetFilters, name: str = "tag-1", now_s: float = 160.0) -> TargetView:
     (found,) = [v for v in target_views(tracks, FRAME, spec_with().local_area(), now_s, {}) if v.name == name]
     return found
 

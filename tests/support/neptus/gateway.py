@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from app.api.auth import console_log_in
-from app.api.limits import Limits
+from app.api.limits import RequestLimits
 from app.api.peers import is_own_user
 from app.api.tokens import Role, TokenStore
 from app.missions.fleet.links.neptus import gateway_settings
@@ -39,7 +39,7 @@ class Gateway:
 
         async def log_in(password: str, host: str, own_user: bool) -> str | None:
             judge = self.door or console_log_in
-            return await judge(store, Limits(0, 1000), password, host, own_user=own_user)
+            return await judge(store, RequestLimits(0, 1000), password, host, own_user=own_user)
 
         self.service = MissionService(self.settings, self.database, log_in, is_own_user=is_own_user)
         await self.service.startup()

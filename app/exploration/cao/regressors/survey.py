@@ -29,7 +29,7 @@ from app.exploration.planner.options import PlannerOptions
 from app.exploration.survey.backbone import MARGIN_M, backbone
 from app.exploration.survey.error import expected_roughness, with_second_looks
 from app.exploration.survey.local_search import DRAWS, Plan, Search, improve
-from app.exploration.survey.value import Nodes, Objective, make_nodes, plan_value, values_after_first_leg
+from app.exploration.survey.value import Nodes, SurveyObjective, make_nodes, plan_value, values_after_first_leg
 
 AtCruise = Callable[[Situation, Bottom, FloatArray], FloatArray]
 
@@ -113,7 +113,9 @@ class SurveyRegressors:
         roughness = expected_roughness(team.belief, distance, self._spacing)
         self._nodes = thin_nodes(team, with_second_looks(roughness, team, self._spacing))
         self._scale = max(team.belief.correlation_length_m, self._spacing)
-        self._objective = Objective(self._step_m, self._steps, self._scale, POWER, TURN_PENALTY, REACH * self._spacing)
+        self._objective = SurveyObjective(
+            self._step_m, self._steps, self._scale, POWER, TURN_PENALTY, REACH * self._spacing
+        )
         self._d2 = np.asarray(tree.query(self._nodes.en_m)[0]) ** 2
         self._reference = float(len(self._nodes.x))
 

@@ -27,7 +27,7 @@ NICENESS = 10
 
 
 @dataclass(frozen=True)
-class Limits:
+class ResourceLimits:
     """What the process may use up at most."""
 
     memory_bytes: int
@@ -35,7 +35,7 @@ class Limits:
     file_bytes: int
 
 
-def limit(limits: Limits) -> None:
+def limit(limits: ResourceLimits) -> None:
     """Bound this process, put others before it, and let it end with the process that started it."""
     parent = os.getppid()
     prctl(PR_SET_PDEATHSIG, signal.SIGKILL)

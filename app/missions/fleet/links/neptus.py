@@ -30,11 +30,11 @@ from app.missions.fleet.links.visiting import VisitedLink, Visitor
 from app.missions.settings import NeptusSettings
 from imc_bridge.neptus import (
     Area,
+    CellPosition,
     CellSounding,
     Conventions,
     GatewaySettings,
     NeptusGateway,
-    Place,
     SessionKeeper,
     StepData,
 )
@@ -76,9 +76,9 @@ def gateway_settings(settings: NeptusSettings) -> GatewaySettings:
 class _Craft(Visitor):
     depth_m: float = 0.0
     """At which the panel sends it, whatever it is told."""
-    place: Place | None = None
+    place: CellPosition | None = None
     published: bool = False
-    sent_to: Place | None = None
+    sent_to: CellPosition | None = None
     """Where the last answer sent it."""
     refused_step: int = 0
     """The panel's step in which it was given an order that is not safe at its depth."""
@@ -397,11 +397,11 @@ class NeptusFleetLink(VisitedLink):
             fleet.timer = None
         if fleet.pending is None:
             return
-        places: list[Place] = []
+        places: list[CellPosition] = []
         for craft in fleet.crafts:
             if craft.order is not None:
                 position = craft.order.position
-                place: Place | None = Place(
+                place: CellPosition | None = CellPosition(
                     *self.gateway.area.to_cells(position.lat_deg, position.lon_deg), position.depth_m
                 )
             else:

@@ -43,7 +43,7 @@ from simulator.targets import TargetSpec as SimulatedTarget
 from simulator.terrain import Terrain
 from simulator.terrain_files import load_terrain
 from simulator.vehicle import BOAT, STEP_S
-from simulator.world import Measurement, Place, SimulatedVehicle
+from simulator.world import BeamReturn, LocalPosition, SimulatedVehicle
 
 TICK_S = 0.05
 PIECE_S = 2.0
@@ -139,7 +139,7 @@ class _Swimmer:
         self.reported_s = -math.inf
         self.report: VehicleReport | None = None
 
-    def position(self, place: Place) -> Position:
+    def position(self, place: LocalPosition) -> Position:
         lat, lon = self.terrain.frame.to_geodetic(place.east_m, place.north_m)
         return Position(lat, lon, place.depth_m)
 
@@ -406,12 +406,12 @@ def _simulated(target: TargetSpec, terrain: Terrain) -> SimulatedTarget:
     return SimulatedTarget(target.called, place, math.radians(asked.course_deg), asked.speed_mps)
 
 
-def _lived(swimmer: _Swimmer, passed_s: float) -> tuple[list[Measurement], list[FleetEvent]]:
+def _lived(swimmer: _Swimmer, passed_s: float) -> tuple[list[BeamReturn], list[FleetEvent]]:
     """Let time pass; one that looks round does so on its way, and not only where it is in the end."""
     scanning, body = swimmer.scanning, swimmer.body
     if scanning is None:
         return body.advance(passed_s), []
-    measurements: list[Measurement] = []
+    measurements: list[BeamReturn] = []
     scans: list[FleetEvent] = []
     while passed_s > 0.0 and not scanning.collided:
         measurements += body.advance(min(passed_s, STEP_S))
@@ -451,7 +451,7 @@ def _ranges(swimmer: _Swimmer) -> list[FleetEvent]:
     ]
 
 
-def _sounding(swimmer: _Swimmer, measurement: Measurement) -> SoundingReport:
+def _sounding(swimmer: _Swimmer, measurement: BeamReturn) -> SoundingReport:
     if measurement.footprint is None:
         raise ValueError("a measurement without a return has no footprint")
     sonar = swimmer.position(measurement.position)
