@@ -324,7 +324,7 @@ class Checkpoints(NamedTuple):
     state: FloatArray
 
 
-class Flown(NamedTuple):
+class FlownPlan(NamedTuple):
     """A plan with its flight; ``left_need`` (m,) is what the landmarks lack in the end."""
 
     plan: Plan

@@ -4,7 +4,7 @@ import numpy as np
 from numba import njit
 
 from app.arrays import FloatArray
-from app.exploration.rollout.flight import Flown, Plan, Rules, Task, Work, fly_plan
+from app.exploration.rollout.flight import FlownPlan, Plan, Rules, Task, Work, fly_plan
 from app.exploration.rollout.free_space import Free, clear_ways, insert, settle_waypoint
 
 DRAWS = 8
@@ -240,7 +240,7 @@ def change(
 
 @njit(cache=True, nogil=True)
 def improve(
-    flown: Flown, count: int, score: float, trial: Flown, draws: FloatArray, task: Task, free: Free, link: float
+    flown: FlownPlan, count: int, score: float, trial: FlownPlan, draws: FloatArray, task: Task, free: Free, link: float
 ) -> tuple[int, float]:
     """Try one change per row of ``draws`` and keep those that better the score.
 

@@ -24,7 +24,7 @@ from app.exploration.planner.base import PlannerBase, settle
 from app.exploration.planner.options import PlannerOptions
 from app.exploration.rollout.flight import (
     Checkpoints,
-    Flown,
+    FlownPlan,
     Plan,
     Rules,
     Task,
@@ -92,7 +92,7 @@ LEAST_FREE = 0.1
 class _Best:
     """A plan with its flight."""
 
-    flown: Flown
+    flown: FlownPlan
     count: int
     score: float
 
@@ -363,7 +363,7 @@ class _Mission:
         begin(checkpoints, self._start, self._work)
         left_need = np.empty(len(self._work.need))
         score = fly_plan(checkpoints, 0, plan, count, self._task, np.inf, left_need, checkpoints)
-        return _Best(Flown(plan, checkpoints, left_need), count, float(score))
+        return _Best(FlownPlan(plan, checkpoints, left_need), count, float(score))
 
     def fresh_starts(self, most: int) -> list[_Best]:
         """Return the best of the sweeps over what is left."""
@@ -404,7 +404,7 @@ class _Mission:
         """Try a number of changes; the plan is improved in place."""
         n = len(self._start)
         like = best.flown.plan
-        trial = Flown(
+        trial = FlownPlan(
             Plan(np.zeros_like(like.at_m), np.zeros(ROOM), like.chain),
             new_checkpoints(ROOM, n, len(self._work.need)),
             np.empty(len(self._work.need)),

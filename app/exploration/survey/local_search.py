@@ -23,7 +23,7 @@ RELOCATE = 0.95
 leaves out a section."""
 
 
-class Plan(NamedTuple):
+class ViaPoints(NamedTuple):
     """Via points of every vehicle.
 
     Attributes
@@ -41,7 +41,7 @@ class Plan(NamedTuple):
     locked: IntArray
 
 
-class Search(NamedTuple):
+class PlanSearch(NamedTuple):
     """How plans are changed.
 
     Attributes
@@ -63,7 +63,7 @@ class Search(NamedTuple):
 
 
 @njit(cache=True, nogil=True)
-def _insert(plan: Plan, starts: FloatArray, x: float, y: float, luck: float, changed: BoolArray) -> None:
+def _insert(plan: ViaPoints, starts: FloatArray, x: float, y: float, luck: float, changed: BoolArray) -> None:
     """Insert a via point where it lengthens a route least."""
     v, at = _cheapest(plan, starts, x, y, luck)
     if v < 0:
@@ -79,7 +79,7 @@ def _insert(plan: Plan, starts: FloatArray, x: float, y: float, luck: float, cha
 
 
 @njit(cache=True, nogil=True)
-def _remove(plan: Plan, j: int, at: int, changed: BoolArray) -> None:
+def _remove(plan: ViaPoints, j: int, at: int, changed: BoolArray) -> None:
     vias = plan.vias[j]
     for k in range(at, plan.counts[j] - 1):
         vias[k, 0] = vias[k + 1, 0]
@@ -89,7 +89,7 @@ def _remove(plan: Plan, j: int, at: int, changed: BoolArray) -> None:
 
 
 @njit(cache=True, nogil=True)
-def _cheapest(plan: Plan, starts: FloatArray, x: float, y: float, luck: float) -> tuple[int, int]:
+def _cheapest(plan: ViaPoints, starts: FloatArray, x: float, y: float, luck: float) -> tuple[int, int]:
     """Return the vehicle and place where a via point lengthens a route least; ``luck`` in [0, 1) blurs the choice."""
     vias = plan.vias
     best = np.inf
@@ -130,7 +130,13 @@ def _reverse(vias: FloatArray, a: int, b: int) -> None:
 
 @njit(cache=True, nogil=True)
 def _change(
-    plan: Plan, starts: FloatArray, nodes: Nodes, running: FloatArray, spread: float, r: FloatArray, changed: BoolArray
+    plan: ViaPoints,
+    starts: FloatArray,
+    nodes: Nodes,
+    running: FloatArray,
+    spread: float,
+    r: FloatArray,
+    changed: BoolArray,
 ) -> None:
     """Change a plan as the random numbers ``r`` (DRAWS,) say; ``running`` is what :func:`_left` returned."""
     kind = r[0]
@@ -209,8 +215,8 @@ def improve(
     objective: SurveyObjective,
     starts: FloatArray,
     headings: FloatArray,
-    begin: Plan,
-    search: Search,
+    begin: ViaPoints,
+    search: PlanSearch,
     draws: FloatArray,
 ) -> tuple[FloatArray, IntArray, float]:
     """Change the plan at random, keeping changes that lower :func:`~app.exploration.survey.value.plan_value`.
@@ -234,7 +240,7 @@ def improve(
     scale, power, weight = objective.scale_m, objective.power, nodes.weight
     vertices = np.empty((objective.steps + 2, 2))
     current, current_counts = begin.vias.copy(), begin.counts.copy()
-    plan = Plan(begin.vias.copy(), begin.counts.copy(), begin.locked)
+    plan = ViaPoints(begin.vias.copy(), begin.counts.copy(), begin.locked)
     after = np.full((n, m), np.inf)
     turns = np.zeros(n)
     for v in range(n):

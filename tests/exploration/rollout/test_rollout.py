@@ -12,7 +12,7 @@ from app.exploration.core.bottom_contacts import FeltBottom
 from app.exploration.core.constraints import Constraints
 from app.exploration.core.problem import Belief
 from app.exploration.rollout.flight import (
-    Flown,
+    FlownPlan,
     Plan,
     Rules,
     Task,
@@ -164,7 +164,7 @@ def test_the_search_never_worsens_a_plan_and_reports_its_true_score(seed: int, z
     before, left, checkpoints = flown(start, plan, count, work, floor)
     trial, scratch = copied(plan), new_checkpoints(ROOM, len(start), len(work.need))
     draws = np.random.default_rng(seed).random((150, DRAWS))
-    best, tried = Flown(plan, checkpoints, left), Flown(trial, scratch, left.copy())
+    best, tried = FlownPlan(plan, checkpoints, left), FlownPlan(trial, scratch, left.copy())
     count, score = improve(best, count, before, tried, draws, Task(work, floor, RULES, 400.0), free, LINK)
     assert score <= before
     again, _, _ = flown(start, plan, count, work, floor)

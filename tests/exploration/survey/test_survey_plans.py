@@ -15,7 +15,7 @@ from app.exploration.core.routes import CORNER_TOLERANCE, fly, next_waypoint
 from app.exploration.planner.options import PlannerOptions
 from app.exploration.planners import create_planner
 from app.exploration.survey.error import MOST_DOUBTS, SECOND_LOOK, with_second_looks
-from app.exploration.survey.local_search import DRAWS, Plan, Search, improve
+from app.exploration.survey.local_search import DRAWS, PlanSearch, ViaPoints, improve
 from app.exploration.survey.value import SurveyObjective, lower_to_segment, make_nodes, plan_value
 from simulator.seafloors import generate
 from tests.support.situations import make_situation
@@ -108,9 +108,9 @@ def test_searching_never_worsens_a_plan_and_says_truly_what_it_is_worth() -> Non
     counts, locked = np.array([2, 2]), np.array([1, 0])
     before = plan_value(d2, nodes, objective, starts, headings, vias, counts)
     draws = np.random.default_rng(0).random((1500, DRAWS))
-    search = Search(5.0, Constraints(SQUARE).region, 0.5, 0.01)
+    search = PlanSearch(5.0, Constraints(SQUARE).region, 0.5, 0.01)
     after, after_counts, value = improve(
-        d2, nodes, objective, starts, headings, Plan(vias, counts, locked), search, draws
+        d2, nodes, objective, starts, headings, ViaPoints(vias, counts, locked), search, draws
     )
     assert value < 0.9 * before
     assert value == pytest.approx(plan_value(d2, nodes, objective, starts, headings, after, after_counts))

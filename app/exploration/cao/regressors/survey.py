@@ -28,7 +28,7 @@ from app.exploration.planner.base import vehicle_rng
 from app.exploration.planner.options import PlannerOptions
 from app.exploration.survey.backbone import MARGIN_M, backbone
 from app.exploration.survey.error import expected_roughness, with_second_looks
-from app.exploration.survey.local_search import DRAWS, Plan, Search, improve
+from app.exploration.survey.local_search import DRAWS, PlanSearch, ViaPoints, improve
 from app.exploration.survey.value import Nodes, SurveyObjective, make_nodes, plan_value, values_after_first_leg
 
 AtCruise = Callable[[Situation, Bottom, FloatArray], FloatArray]
@@ -244,9 +244,9 @@ class SurveyRegressors:
         rng = np.random.default_rng([self._seed, 1, which])
         roomy = np.zeros((len(vias), vias.shape[1] + 32, 2))
         roomy[:, : vias.shape[1]] = vias
-        search = Search(self._spacing, constraints.region, MARGIN_M, HEAT)
+        search = PlanSearch(self._spacing, constraints.region, MARGIN_M, HEAT)
         return improve(
-            self._d2, self._nodes, self._objective, self._en, self._headings, Plan(roomy, counts, locked), search,
+            self._d2, self._nodes, self._objective, self._en, self._headings, ViaPoints(roomy, counts, locked), search,
             rng.random((self._options.search, DRAWS)),
         )  # fmt: skip
 
