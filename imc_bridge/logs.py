@@ -1,7 +1,7 @@
 """A vehicle's own log (``Data.lsf``, ``Data.lsf.gz``) as the soundings and positions that were measured.
 
 An LSF file is IMC packets one after another. DUNE writes everything into it that passes on board, at the full rates:
-what radio never carried while the vehicle was under water is here. The same gate as for live telemetry judges it.
+what radio never carried while the vehicle was under water is here. The same intake as for live telemetry judges it.
 """
 
 from __future__ import annotations
@@ -222,8 +222,8 @@ class VehicleLog:
             message = self._decoder.message(packet)
             if message is not None:
                 yield from self._counted(_take(node, header, message))
-        yield from self._counted(node.gate.resolve(node.history, node.position_sd_m()))
-        yield from self._counted(node.gate.give_up())
+        yield from self._counted(node.intake.resolve(node.history, node.position_sd_m()))
+        yield from self._counted(node.intake.give_up())
 
     def _counted(self, events: Iterator[LogEvent]) -> Iterator[LogEvent]:
         for event in events:
@@ -240,9 +240,9 @@ def _take(node: Node, header: Header, message: Message) -> Iterator[LogEvent]:
             report = node.take_state(message)
             if isinstance(report, StateReport):
                 yield report
-            yield from node.gate.resolve(node.history, node.position_sd_m())
+            yield from node.intake.resolve(node.history, node.position_sd_m())
         case "Distance":
-            refused = offer_distance(node.gate, node.entity_name(header.src_ent), message)
+            refused = offer_distance(node.intake, node.entity_name(header.src_ent), message)
             if refused is not None:
                 yield refused
         case "NavigationUncertainty":

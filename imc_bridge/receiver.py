@@ -333,7 +333,7 @@ class Hearing:
             if wall - self._state_reported.get(node.imc_id, float("-inf")) >= 1.0 / self._settings.state_events_per_s:
                 self._state_reported[node.imc_id] = wall
                 self._tell(report)
-        for result in node.gate.resolve(node.history, node.position_sd_m()):
+        for result in node.intake.resolve(node.history, node.position_sd_m()):
             if control is not None and isinstance(result, Sounding):
                 control.guard.add(result.time_s, result.lat_deg, result.lon_deg, result.bottom_depth_m, now)
             self._tell(result)
@@ -341,6 +341,6 @@ class Hearing:
             self._tell(measured)
 
     def _take_distance(self, node: Node, message: Message) -> None:
-        refused = offer_distance(node.gate, node.entity_name(int(message.src_ent)), message)
+        refused = offer_distance(node.intake, node.entity_name(int(message.src_ent)), message)
         if refused is not None:
             self._tell(refused)

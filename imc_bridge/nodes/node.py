@@ -19,13 +19,13 @@ from imc_bridge.network.codec import Message
 from imc_bridge.network.discovery import MAX_NAME, Announcement
 from imc_bridge.network.text_fields import text
 from imc_bridge.network.transport import Address
-from imc_bridge.nodes.plausibility import PlaceGate, Step
+from imc_bridge.nodes.plausibility import PlausiblePlace, Step
 from imc_bridge.nodes.refusals import Refused
 from imc_bridge.nodes.vehicle_clock import Tick, VehicleClock
 from imc_bridge.printable import printable
 from imc_bridge.settings import BridgeSettings
-from imc_bridge.telemetry.ranges import RangeGate
-from imc_bridge.telemetry.soundings import SoundingGate, StateHistory, StateSample, beam_table
+from imc_bridge.telemetry.ranges import RangeIntake
+from imc_bridge.telemetry.soundings import SoundingIntake, StateHistory, StateSample, beam_table
 
 UNCERTAINTY_VALID_S = 10.0
 SUBMERGED_DEPTH_M = 0.3
@@ -170,10 +170,10 @@ class Node:
         self.medium: int | None = None
         self.battery_pct: float | None = None
         self.history = StateHistory()
-        self.places = PlaceGate()
+        self.places = PlausiblePlace()
         self.report: StateReport | None = None
-        self.gate = SoundingGate(name, beam_table(settings.altimeter), settings.max_range_m)
-        self.ranges = RangeGate(name)
+        self.intake = SoundingIntake(name, beam_table(settings.altimeter), settings.max_range_m)
+        self.ranges = RangeIntake(name)
         self._uncertainty: tuple[float, float] | None = None
         self._settings = settings
         self._latest: dict[str, float] = {}
@@ -266,7 +266,7 @@ class Node:
             self._latest.clear()
             self.places.clear()
             self.history.clear()
-            self.gate.clear()
+            self.intake.clear()
             self.ranges.clear()
             self._uncertainty = None
         return tick

@@ -27,7 +27,7 @@ class Step(Enum):
     """It really is elsewhere; nothing lies between the places."""
 
 
-class PlaceGate:
+class PlausiblePlace:
     """Judges the positions of one vehicle, in the order in which they arrive."""
 
     def __init__(self) -> None:

@@ -61,7 +61,7 @@ def read_range(name: str, message: Message) -> tuple[str, float] | None:
             return None
 
 
-class RangeGate:
+class RangeIntake:
     """One vehicle's ranges: what cannot be one is dropped and counted, the others wait for the state around them."""
 
     def __init__(self, vehicle: str) -> None:

@@ -217,7 +217,7 @@ class Ping:
     lever_arm_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
-class SoundingGate:
+class SoundingIntake:
     """Turns one vehicle's Distances into soundings, or into refusals with their reason.
 
     Parameters
@@ -333,8 +333,8 @@ class SoundingGate:
         return SoundingRefused(self.vehicle, time_s, source, range_m, reason)
 
 
-def offer_distance(gate: SoundingGate, source: str | None, message: Message) -> SoundingRefused | None:
-    """Hand a Distance of the entity named ``source`` to its vehicle's gate."""
+def offer_distance(intake: SoundingIntake, source: str | None, message: Message) -> SoundingRefused | None:
+    """Hand a Distance of the entity named ``source`` to its vehicle's intake."""
     lever_arm = (0.0, 0.0, 0.0)
     for device in message.location:
         # The wire lets any message stand where a DeviceState belongs.
@@ -342,4 +342,4 @@ def offer_distance(gate: SoundingGate, source: str | None, message: Message) -> 
             lever_arm = (float(device.x), float(device.y), float(device.z))
         break
     valid = message.validity == imcpy.Distance.ValidityEnum.VALID
-    return gate.offer(message.timestamp, source, valid, float(message.value), lever_arm)
+    return intake.offer(message.timestamp, source, valid, float(message.value), lever_arm)

@@ -149,7 +149,7 @@ class ScanReport:
 
 @dataclass(frozen=True, slots=True)
 class WaypointOrder:
-    """One waypoint for one vehicle, checked by the safety gate before it reaches a link.
+    """One waypoint for one vehicle, checked by :mod:`app.missions.safety` before it reaches a link.
 
     ``lead`` lies on the leg's line beyond the waypoint, as far as the area and the keep-out zones allow. Vehicles that
     leave off flying straight well before their target (DUNE circles from 15 m on) are sent there to pass the waypoint

@@ -7,7 +7,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from app.arrays import FloatArray
-from imc_bridge.nodes.plausibility import ALLOWANCE_M, CONFIRM_S, CONFIRMATIONS, EARTH_M, FASTEST_MPS, PlaceGate, Step
+from imc_bridge.nodes.plausibility import (
+    ALLOWANCE_M,
+    CONFIRM_S,
+    CONFIRMATIONS,
+    EARTH_M,
+    FASTEST_MPS,
+    PlausiblePlace,
+    Step,
+)
 from imc_bridge.telemetry.soundings import StateSample
 
 LAT = math.radians(41.0)
@@ -19,7 +27,7 @@ def at(time_s: float, north_m: float, depth_m: float = 2.0, lon_rad: float = -0.
 
 @given(st.lists(st.tuples(st.floats(0.1, 5.0), st.floats(-1.0, 1.0)), max_size=50))
 def test_vehicle_that_swims_is_always_believed(moves: FloatArray) -> None:
-    gate, time_s, north_m = PlaceGate(), 0.0, 0.0
+    gate, time_s, north_m = PlausiblePlace(), 0.0, 0.0
     for seconds, part in moves:
         time_s += seconds
         north_m += part * FASTEST_MPS * seconds
@@ -28,7 +36,7 @@ def test_vehicle_that_swims_is_always_believed(moves: FloatArray) -> None:
 
 @pytest.mark.parametrize("away", [{"north_m": 500.0}, {"north_m": 0.0, "depth_m": 90.0}])
 def test_forged_positions_among_its_own_are_never_believed(away: dict[str, float]) -> None:
-    gate = PlaceGate()
+    gate = PlausiblePlace()
     for k in range(100):
         assert gate.take(at(0.5 * k, 0.5 * k)) is Step.GOOD
         for j in range(10):
@@ -36,7 +44,7 @@ def test_forged_positions_among_its_own_are_never_believed(away: dict[str, float
 
 
 def test_place_that_is_confirmed_and_never_contradicted_is_believed() -> None:
-    gate = PlaceGate()
+    gate = PlausiblePlace()
     gate.take(at(0.0, 0.0))
     steps = [gate.take(at(0.5 + CONFIRM_S / 2 * k, 500.0)) for k in range(CONFIRMATIONS + 1)]
     assert steps == [Step.DOUBTFUL] * (CONFIRMATIONS - 1) + [Step.MOVED, Step.GOOD]
@@ -44,12 +52,12 @@ def test_place_that_is_confirmed_and_never_contradicted_is_believed() -> None:
 
 
 def test_fix_after_a_dive_is_believed_at_once() -> None:
-    gate = PlaceGate()
+    gate = PlausiblePlace()
     gate.take(at(0.0, 0.0))
     assert gate.take(at(0.1, ALLOWANCE_M)) is Step.GOOD
 
 
 def test_date_line_is_no_jump() -> None:
-    gate = PlaceGate()
+    gate = PlausiblePlace()
     gate.take(at(0.0, 0.0, lon_rad=math.pi))
     assert gate.take(at(0.5, 0.0, lon_rad=-math.pi)) is Step.GOOD

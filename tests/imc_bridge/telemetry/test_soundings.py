@@ -13,7 +13,7 @@ from app.arrays import FloatArray
 from imc_bridge.events import Sounding, SoundingRefused
 from imc_bridge.telemetry.soundings import (
     Beam,
-    SoundingGate,
+    SoundingIntake,
     StateHistory,
     StateSample,
     beam_table,
@@ -117,7 +117,7 @@ class Gate:
     """A gate with states at whole seconds, sinking 1 m/s while going north at 1 m/s."""
 
     def __init__(self) -> None:
-        self.gate = SoundingGate("v", beam_table("vertical"), 200.0)
+        self.intake = SoundingIntake("v", beam_table("vertical"), 200.0)
         self.history = StateHistory()
         for t in range(4):
             self.add_state(float(t))
@@ -126,12 +126,12 @@ class Gate:
         self.history.add(state(t, depth_m=t, north_m=t))
 
     def resolve(self) -> list[Any]:
-        return list(self.gate.resolve(self.history, 0.3))
+        return list(self.intake.resolve(self.history, 0.3))
 
 
 def test_sounding_takes_the_state_at_its_own_time() -> None:
     g = Gate()
-    assert g.gate.offer(1.5, "Altimeter", True, 10.0) is None
+    assert g.intake.offer(1.5, "Altimeter", True, 10.0) is None
     (sounding,) = g.resolve()
     assert isinstance(sounding, Sounding)
     assert sounding.bottom_depth_m == pytest.approx(11.5)
@@ -142,7 +142,7 @@ def test_sounding_takes_the_state_at_its_own_time() -> None:
 
 def test_sounding_waits_for_the_state_after_it() -> None:
     g = Gate()
-    g.gate.offer(3.4, "Altimeter", True, 10.0)
+    g.intake.offer(3.4, "Altimeter", True, 10.0)
     assert g.resolve() == []
     g.add_state(4.0)
     (sounding,) = g.resolve()
@@ -163,31 +163,31 @@ def test_sounding_waits_for_the_state_after_it() -> None:
 )
 def test_bad_ranges_are_refused_with_their_reason(source: str | None, valid: bool, range_m: float, reason: str) -> None:
     g = Gate()
-    refused = g.gate.offer(1.5, source, valid, range_m)
+    refused = g.intake.offer(1.5, source, valid, range_m)
     assert isinstance(refused, SoundingRefused)
     assert reason in refused.reason
-    assert g.gate.refused.total() == 1
+    assert g.intake.refused.total() == 1
     assert g.resolve() == []
 
 
 def test_forward_looking_echo_sounder_is_ignored() -> None:
     g = Gate()
-    assert g.gate.offer(1.5, "Echo Sounder", True, 10.0) is None
+    assert g.intake.offer(1.5, "Echo Sounder", True, 10.0) is None
     assert g.resolve() == []
-    assert g.gate.ignored["Echo Sounder"] == 1
+    assert g.intake.ignored["Echo Sounder"] == 1
 
 
 def test_repeated_distance_is_refused_and_a_late_one_is_not() -> None:
     g = Gate()
-    assert g.gate.offer(1.5, "Altimeter", True, 10.0) is None
-    assert g.gate.offer(1.5, "Altimeter", True, 10.0).reason == "repeated"
-    assert g.gate.offer(1.2, "Altimeter", True, 10.0) is None
+    assert g.intake.offer(1.5, "Altimeter", True, 10.0) is None
+    assert g.intake.offer(1.5, "Altimeter", True, 10.0).reason == "repeated"
+    assert g.intake.offer(1.2, "Altimeter", True, 10.0) is None
     assert len(g.resolve()) == 2
 
 
 def test_distance_in_a_gap_of_the_states_is_refused() -> None:
     g = Gate()
-    g.gate.offer(5.0, "Altimeter", True, 10.0)
+    g.intake.offer(5.0, "Altimeter", True, 10.0)
     g.add_state(30.0)
     (refused,) = g.resolve()
     assert isinstance(refused, SoundingRefused)
@@ -196,5 +196,5 @@ def test_distance_in_a_gap_of_the_states_is_refused() -> None:
 
 def test_distance_without_a_later_state_is_given_up_in_bounded_memory() -> None:
     g = Gate()
-    refusals = [g.gate.offer(10.0 + k, "Altimeter", True, 5.0) for k in range(300)]
+    refusals = [g.intake.offer(10.0 + k, "Altimeter", True, 5.0) for k in range(300)]
     assert sum(r is not None for r in refusals) == 300 - 256
