@@ -24,14 +24,14 @@ def test_one_file_that_is_being_made_keeps_no_other_from_being_fetched(page: Pag
     service.act(mission, "start")
     show(page, mission)
     by_id(page, "toggle-files").click()
-    expect(by_id(page, "file-map.tif")).to_be_enabled()
+    expect(by_id(page, "file-tif")).to_be_enabled()
     held: list[Route] = []
     page.route("**/soundings.csv", held.append)
     by_id(page, "file-soundings.csv").click()
     expect(by_id(page, "making")).to_contain_text("being made")
     expect(by_id(page, "file-soundings.csv")).to_be_disabled()
     with page.expect_download() as download:
-        by_id(page, "file-map.tif").click()
+        by_id(page, "file-tif").click()
     assert download.value.suggested_filename.endswith(".tif")
     with page.expect_download() as late:
         held[0].continue_()
