@@ -26,7 +26,11 @@ def test_one_file_that_is_being_made_keeps_no_other_from_being_fetched(page: Pag
     by_id(page, "toggle-files").click()
     expect(by_id(page, "file-tif")).to_be_enabled()
     held: list[Route] = []
-    page.route("**/soundings.csv", held.append)
+
+    def hold(route: Route) -> None:
+        held.append(route)
+
+    page.route("**/soundings.csv", hold)
     by_id(page, "file-soundings.csv").click()
     expect(by_id(page, "making")).to_contain_text("being made")
     expect(by_id(page, "file-soundings.csv")).to_be_disabled()
