@@ -22,7 +22,7 @@ class _Part(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
 
-class MixingBlock(_Part):
+class Block(_Part):
     """The blocks of P of one mixing signal; both symmetric, with eigenvalues between e1 and e2."""
 
     horizontal: Matrix = Field(description=f"{N_VECTORS} x {N_VECTORS}, in the order of state.vectors")
@@ -70,12 +70,12 @@ class PcaoModel(_Part):
     state: StateDefinition = StateDefinition()
     e1: float = Field(default=E1, gt=0, allow_inf_nan=False)
     e2: float = Field(default=E2, gt=0, allow_inf_nan=False)
-    P: tuple[MixingBlock, ...] = Field(min_length=L, max_length=L, description="One block per mixing signal")
+    P: tuple[Block, ...] = Field(min_length=L, max_length=L, description="One block per mixing signal")
     training: Training = Training()
 
     @field_validator("P")
     @classmethod
-    def _has_the_right_shape(cls, P: tuple[MixingBlock, ...]) -> tuple[MixingBlock, ...]:
+    def _has_the_right_shape(cls, P: tuple[Block, ...]) -> tuple[Block, ...]:
         for number, block in enumerate(P):
             for name, matrix, size in (
                 ("horizontal", block.horizontal, N_VECTORS), ("vertical", block.vertical, N_FIGURES),
@@ -103,7 +103,7 @@ class PcaoModel(_Part):
         """Return the model of a controller's free entries (SIZE,)."""
         parts = [tuple(tuple(float(x) for x in row) for row in block) for block in blocks(parameters)]
         pairs = zip(parts[0::2], parts[1::2], strict=True)
-        return cls(P=tuple(MixingBlock(horizontal=h, vertical=v) for h, v in pairs), training=training)
+        return cls(P=tuple(Block(horizontal=h, vertical=v) for h, v in pairs), training=training)
 
     @property
     def parameters(self) -> FloatArray:

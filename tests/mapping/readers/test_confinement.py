@@ -16,7 +16,7 @@ from tests.support.paths import PROJECT
 PROCESS = r"""
 import ctypes, json, os, socket, sys, threading
 from pathlib import Path
-from app.mapping.readers.confinement import Limits, confine, limit
+from app.mapping.readers.confinement import ResourceLimits, confine, limit
 
 layers, folder, ordinary = sys.argv[1].split(","), Path(sys.argv[2]), sys.argv[3] == "ordinary"
 secret, table = folder / "secret", folder / "tables" / "table"
@@ -25,7 +25,7 @@ inherited = os.open(secret, os.O_RDONLY)
 os.set_inheritable(inherited, True)
 listening = socket.create_server(("127.0.0.1", 0))
 port = listening.getsockname()[1]
-limit(Limits(2 << 30, 60, 1 << 16))
+limit(ResourceLimits(2 << 30, 60, 1 << 16))
 if ordinary and os.geteuid() == 0:
     os.setresgid(65534, 65534, 65534)
     os.setresuid(65534, 65534, 65534)
@@ -160,7 +160,7 @@ def test_a_process_with_threads_is_not_taken_for_confined() -> None:
 )
 def test_memory_files_and_descriptors_are_bounded(work: str, sign: str, tmp_path: Path) -> None:
     code = (
-        "from app.mapping.readers.confinement import *; import os; limit(Limits(2 << 30, 60, 1 << 16));"
+        "from app.mapping.readers.confinement import *; import os; limit(ResourceLimits(2 << 30, 60, 1 << 16));"
         f"assert os.nice(0) >= 10; here = os.getcwd(); confine([], [], ['none']); os.chdir(here); {work}"
     )
     ended = subprocess.run(
@@ -176,7 +176,7 @@ def test_memory_files_and_descriptors_are_bounded(work: str, sign: str, tmp_path
 
 def test_the_process_ends_with_the_one_that_started_it(tmp_path: Path) -> None:
     child = (
-        "import sys, time; from app.mapping.readers.confinement import *; limit(Limits(2 << 30, 60, 1 << 16));"
+        "import sys, time; from app.mapping.readers.confinement import *; limit(ResourceLimits(2 << 30, 60, 1 << 16));"
         "confine([], []); sys.stdout.write('ready\\n'); sys.stdout.flush(); time.sleep(100)"
     )
     parent = (
