@@ -58,3 +58,33 @@ def test_what_an_earlier_start_compiled_is_not_compiled_again() -> None:
         assert len(list(folder.glob("bathyfleet-*.compiled"))) == len(PARTS)
     finally:
         compiled._beside.clear()
+
+
+KERNEL = """
+from typing import NamedTuple
+import numba
+from sizes import {name}
+
+@numba.njit(cache=True)
+def area(size):
+    return size.width * size.height
+"""
+SIZES = """
+from typing import NamedTuple
+
+class {name}(NamedTuple):
+    width: float
+    height: float
+"""
+
+
+def test_code_compiled_for_names_of_an_earlier_version_is_compiled_again(tmp_path: Path) -> None:
+    for name in ("Size", "Extent"):  # the class has another name in the next version, the function is as it was
+        (tmp_path / "sizes.py").write_text(SIZES.format(name=name))
+        (tmp_path / "kernel.py").write_text(KERNEL.format(name="*"))
+        os.utime(tmp_path / "kernel.py", (1, 1))
+        program = f"import app.exploration, kernel, sizes; print(kernel.area(sizes.{name}(2.0, 3.0)))"
+        variables = os.environ | {"PYTHONPATH": f"{tmp_path}:{PROJECT}", "NUMBA_CACHE_DIR": str(tmp_path / "compiled")}
+        command = [sys.executable, "-B", "-c", program]
+        ended = subprocess.run(command, env=variables, capture_output=True, text=True, timeout=120, check=False)
+        assert ended.stdout.strip() == "6.0", ended.stderr

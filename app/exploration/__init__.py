@@ -4,5 +4,7 @@
 ``planners`` their names: adding one is a class derived from ``planner.base.PlannerBase`` and a line there.
 """
 
+import app.compiled_index  # noqa: F401 - before anything compiled is imported
+
 DEFAULT_PLANNER = "cao"
 """Of surveys, unless an operator asks for another one."""
