@@ -8,6 +8,7 @@ import structlog
 from app.compiled import wait_for_compiling
 from app.estimation import Sensor, SingleBeam
 from app.exploration.planners import warm_up_planner
+from app.exploration.survey.local_search import warm_up as warm_up_search
 from app.mapping.gp import warm_up as warm_up_maps
 from app.missions.spec.mission import PlannerSpec
 
@@ -53,12 +54,18 @@ class Compilation:
 
     def _begin_maps(self) -> None:
         try:
-            begun = self._executor.submit(warm_up_maps)
+            begun = self._executor.submit(_warm_up_later)
         except RuntimeError:  # the service ends
             self._maps.cancel()
             return
         begun.add_done_callback(_log_failure)
         begun.add_done_callback(lambda _: self._maps.set_result(None))
+
+
+def _warm_up_later() -> None:
+    """Compile what maps need, and what a survey's plan is improved with when the first pass is over."""
+    warm_up_maps()
+    warm_up_search()
 
 
 def _warm_up(name: str, sensor: Sensor) -> None:

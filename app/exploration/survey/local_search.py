@@ -6,9 +6,9 @@ import numpy as np
 from numba import njit
 
 from app.arrays import BoolArray, FloatArray, IntArray
-from app.exploration.core.constraints import Region
+from app.exploration.core.constraints import Constraints, Region
 from app.exploration.core.geometry import enters, leaves, signed_distance
-from app.exploration.survey.value import Nodes, SurveyObjective, expected_error, lower_to_route
+from app.exploration.survey.value import Nodes, SurveyObjective, expected_error, lower_to_route, make_nodes
 
 DRAWS = 6
 """Random numbers that one change uses."""
@@ -288,3 +288,13 @@ def improve(
                 trial[v] = after[v]
                 trial_turns[v] = turns[v]
     return best, best_counts, best_value
+
+
+def warm_up() -> None:
+    """Compile what improves plans, or load it from the cache of an earlier start."""
+    square = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+    places, one, none = np.full((1, 2), 0.5), np.ones(1), np.zeros(1, dtype=np.int64)
+    plan = ViaPoints(np.zeros((1, 1, 2)), none, none)
+    search = PlanSearch(1.0, Constraints(square).region, 0.0, 0.0)
+    objective = SurveyObjective(1.0, 1, 1.0, 2.0, 0.0, 1.0)
+    improve(one, make_nodes(places, one), objective, places, one, plan, search, np.zeros((1, DRAWS)))

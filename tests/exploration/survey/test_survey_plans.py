@@ -15,7 +15,7 @@ from app.exploration.core.routes import CORNER_TOLERANCE, fly, next_waypoint
 from app.exploration.planner.options import PlannerOptions
 from app.exploration.planners import create_planner
 from app.exploration.survey.error import MOST_DOUBTS, SECOND_LOOK, with_second_looks
-from app.exploration.survey.local_search import DRAWS, PlanSearch, ViaPoints, improve
+from app.exploration.survey.local_search import DRAWS, PlanSearch, ViaPoints, improve, warm_up
 from app.exploration.survey.value import SurveyObjective, lower_to_segment, make_nodes, plan_value
 from simulator.seafloors import generate
 from tests.support.situations import make_situation
@@ -118,6 +118,13 @@ def test_searching_never_worsens_a_plan_and_says_truly_what_it_is_worth() -> Non
     for j in range(2):
         route = after[j, : after_counts[j]]
         assert ((route >= 0.5 - 1e-9) & (route <= 99.5 + 1e-9)).all()
+
+
+def test_what_improves_plans_is_compiled_before_a_mission_needs_it() -> None:
+    warm_up()
+    compiled = set(improve.signatures)
+    fly_planner(SurveyScenario(generate("reef", 1), 2, 60, 10.0, "step"), "cao", PlannerOptions(search=50))
+    assert set(improve.signatures) == compiled
 
 
 def test_doubted_soundings_raise_the_weight_around_them_unless_they_are_many() -> None:
