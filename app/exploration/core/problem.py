@@ -4,12 +4,12 @@ All positions are metres in one local Cartesian frame: columns ``east_m, north_m
 Arrays are never modified by the receiver.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 import numpy as np
 
-from app.arrays import BoolArray, FloatArray
+from app.arrays import BoolArray, FloatArray, IntArray
 from app.exploration.core.constraints import Constraints
 from app.exploration.core.dynamic import Localization, Targets
 from app.exploration.core.search_task import SearchTask
@@ -80,6 +80,11 @@ class Situation:
         Soundings that the map leaves out because their neighbours contradict them: a fish, or a rock.
     search : SearchTask or None
         What a search mission is about; the belief then says nothing.
+    moving : (n_vehicles,) or None
+        Which vehicles get a leg now; None: all. The others have enough legs: their rows of ``positions`` are where the
+        last of these ends, and a proposal leaves them there.
+    left_m : (n_vehicles,) or None
+        How far each may still fly from its position; None: the remaining steps, each as long as a step may be.
     """
 
     step: int
@@ -94,6 +99,25 @@ class Situation:
     localization: Localization | None = None
     doubtful_en_m: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
     search: SearchTask | None = None
+    moving: BoolArray | None = None
+    left_m: FloatArray | None = None
+
+    @property
+    def moves(self) -> BoolArray:
+        """Which vehicles get a leg now, (n_vehicles,)."""
+        return np.ones(len(self.vehicles), dtype=np.bool_) if self.moving is None else self.moving
+
+    def of(self, rows: IntArray) -> "Situation":
+        """Return the situation of some of the vehicles only, in the order of ``rows``."""
+        return replace(
+            self,
+            vehicles=tuple(self.vehicles[i] for i in rows),
+            positions=np.asarray(self.positions, dtype=np.float64)[rows],
+            headings_rad=np.asarray(self.headings_rad, dtype=np.float64)[rows],
+            localization=None if self.localization is None else self.localization.of(rows),
+            moving=None if self.moving is None else self.moving[rows],
+            left_m=None if self.left_m is None else self.left_m[rows],
+        )
 
 
 @dataclass(frozen=True)

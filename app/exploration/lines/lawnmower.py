@@ -49,6 +49,7 @@ class LawnmowerPlanner(PlannerBase):
     """Follows the lines; a vehicle that leaves hands on its rest, one that joins takes half of the longest rest."""
 
     name: ClassVar[str] = "lawnmower"
+    plans_for_all = True
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
@@ -69,14 +70,14 @@ class LawnmowerPlanner(PlannerBase):
         following = np.empty((len(cuts), len(team.vehicles)), dtype=np.int64)
         for k, cut in enumerate(cuts):
             for i, name in enumerate(team.vehicles):
-                route = self._routes[name]
+                route = self._routes[name] if team.moves[i] else self._routes[name][:0]
                 x, y = team.positions[i, :2]
                 targets[k, i, 0], targets[k, i, 1], following[k, i] = next_waypoint(
                     x, y, route, 0, len(route), step, cut
                 )
         positions, which = settle(team, bottom, self._at_cruise(team, bottom, targets))
         for i, name in enumerate(team.vehicles):
-            if np.hypot(*(positions[i, :2] - targets[which, i])) < 1e-6:
+            if team.moves[i] and np.hypot(*(positions[i, :2] - targets[which, i])) < 1e-6:
                 self._routes[name] = self._routes[name][following[which, i] :]
         return Proposal(positions, 0.0, {"left_m": float(sum(self._left(team, i) for i in range(len(positions))))})
 

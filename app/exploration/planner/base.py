@@ -6,7 +6,6 @@ from dataclasses import replace
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from app.arrays import FloatArray
 from app.estimation import RangeSensor, Sensor
@@ -30,6 +29,9 @@ class PlannerBase(ABC):
     runs_errands: ClassVar[bool] = True
     """Whether single vehicles leave the plan for targets and the surface; see :mod:`app.exploration.core.detours`."""
 
+    plans_for_all: bool = False
+    """Whether its plan needs to know of vehicles that get no leg now."""
+
     def __init__(self, options: PlannerOptions, sensor: Sensor) -> None:
         self.options = options
         self.sensor = sensor
@@ -43,13 +45,7 @@ class PlannerBase(ABC):
             return Proposal(np.zeros((0, 3)), 0.0)
         order = sorted(range(len(situation.vehicles)), key=lambda i: situation.vehicles[i])
         inverse = np.argsort(order)
-        team = replace(
-            situation,
-            vehicles=tuple(situation.vehicles[i] for i in order),
-            positions=np.asarray(situation.positions, dtype=np.float64)[order],
-            headings_rad=np.asarray(situation.headings_rad, dtype=np.float64)[order],
-            localization=None if situation.localization is None else situation.localization.of(np.array(order)),
-        )
+        team = situation.of(np.array(order))
         for name, depth in zip(team.vehicles, team.positions[:, 2], strict=True):
             wish = self.options.cruise_depth_m
             self._cruise.setdefault(name, float(depth if wish is None else wish))
@@ -64,10 +60,10 @@ class PlannerBase(ABC):
         # Bathymeter missions rise along their legs instead; see app.missions.flight.decision.
         localization = None if self._surveys else team.localization
         if not self.runs_errands or (team.targets is None and localization is None):
-            return self._decide(team, bottom, seed)
+            return self._decide_for_moving(team, bottom, seed)
         errands = self._errands.assign(team.vehicles, team.positions, team.targets, localization)
         if not errands:
-            return self._decide(team, bottom, seed)
+            return self._decide_for_moving(team, bottom, seed)
         rows = {errand.vehicle: team.vehicles.index(errand.vehicle) for errand in errands}
         positions, objective, terms = team.positions.copy(), 0.0, {}
         if np.isfinite(team.constraints.com_range_m):  # no vehicle may go alone
@@ -77,10 +73,12 @@ class PlannerBase(ABC):
         else:
             rest = np.array([i for i in range(len(team.vehicles)) if i not in rows.values()], dtype=np.int64)
             if len(rest):
-                proposal = self._decide(part_of(team, rest), bottom, seed)
+                proposal = self._decide_for_moving(team.of(rest), bottom, seed)
                 positions[rest], objective, terms = proposal.positions, proposal.objective, proposal.terms
             for errand in errands:
-                positions[rows[errand.vehicle]] = self._go(team, bottom, positions, rows[errand.vehicle], errand)
+                row = rows[errand.vehicle]
+                if team.moves[row]:
+                    positions[row] = self._go(team, bottom, positions, row, errand)
         named = {errand.vehicle: errand.target for errand in errands}
         return Proposal(positions, objective, {**terms, "errands": float(len(errands))}, named)
 
@@ -99,6 +97,18 @@ class PlannerBase(ABC):
             team.localization,
             at_cruise if self._surveys else None,
         )
+
+    def _decide_for_moving(self, team: Situation, bottom: Bottom, seed: int) -> Proposal:
+        """Decide for the vehicles that get a leg; the others stay where theirs end."""
+        moves = team.moves
+        if not moves.any():
+            return Proposal(team.positions.copy(), 0.0)
+        if moves.all() or self.plans_for_all:
+            return self._decide(team, bottom, seed)
+        proposal = self._decide(team.of(np.flatnonzero(moves)), bottom, seed)
+        wish = team.positions.copy()
+        wish[moves] = proposal.positions
+        return replace(proposal, positions=settle(team, bottom, wish[None])[0])
 
     @abstractmethod
     def _decide(self, team: Situation, bottom: Bottom, seed: int) -> Proposal:
@@ -136,17 +146,6 @@ class PlannerBase(ABC):
         """Give targets (..., n_vehicles, 2) the vehicles' cruise depths, clear of the bottom: (..., n_vehicles, 3)."""
         wish = np.array([self._cruise[name] for name in team.vehicles])
         return at_depth(team.constraints, bottom, team.positions, en_m, wish)
-
-
-def part_of(team: Situation, rows: NDArray[np.int64]) -> Situation:
-    """Return the situation of some of the vehicles only."""
-    return replace(
-        team,
-        vehicles=tuple(team.vehicles[i] for i in rows),
-        positions=team.positions[rows],
-        headings_rad=team.headings_rad[rows],
-        localization=None if team.localization is None else team.localization.of(rows),
-    )
 
 
 def vehicle_rng(seed: int, vehicle: str) -> np.random.Generator:

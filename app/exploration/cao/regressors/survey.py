@@ -140,7 +140,7 @@ class SurveyRegressors:
             return self._at_cruise(team, self._bottom, np.array(targets))
         legs = [self._legs_of(i, alpha) for i in range(n)]
         for i, name in enumerate(team.vehicles):
-            if self._coarse[name] > 0:
+            if self._coarse[name] > 0 or not team.moves[i]:
                 continue  # before the first pass is over too little is known to be worth a detour
             for leg in legs[i]:
                 target = along.copy()
@@ -167,6 +167,8 @@ class SurveyRegressors:
             candidates, phi = self._asked
             self._row = phi[int(np.argmin(np.abs(candidates - positions).sum(axis=(1, 2))))].tolist()
         for i, name in enumerate(self._team.vehicles):
+            if not self._team.moves[i]:
+                continue
             x, y = self._en[i]
             for routes in (self._plan, self._backbone):
                 route = routes[name]
@@ -273,7 +275,9 @@ class SurveyRegressors:
         vias, counts = plan
         legs = [
             next_waypoint(self._en[i, 0], self._en[i, 1], vias[i], 0, int(counts[i]), self._step_m, cut)[:2]
-            for i in range(len(self._en))
+            if moves
+            else self._en[i]
+            for i, moves in enumerate(self._team.moves)
         ]
         return np.array(legs)
 
@@ -312,9 +316,11 @@ class SurveyRegressors:
         on_plan = self._on_plan(candidates)
         for i in range(n):
             route = plan_vias[i, : plan_counts[i]]
-            *_, passed = next_waypoint(
-                self._en[i, 0], self._en[i, 1], route, 0, len(route), self._step_m, CORNER_TOLERANCE
-            )
+            passed = 0
+            if self._team.moves[i]:
+                *_, passed = next_waypoint(
+                    self._en[i, 0], self._en[i, 1], route, 0, len(route), self._step_m, CORNER_TOLERANCE
+                )
             for which, rest in ((on_plan[:, i], route[passed:]), (~on_plan[:, i], route)):
                 vias[which, i, : len(rest)] = rest
                 counts[which, i] = len(rest)
