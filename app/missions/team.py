@@ -12,6 +12,7 @@ from app.missions.fleet.hub import VehicleKey
 from app.missions.fleet.interface import (
     LinkCapabilities,
     LinkState,
+    Position,
     VehicleReport,
     WaypointOrder,
     WaypointStatus,
@@ -20,6 +21,18 @@ from app.missions.spec.mission import Limits, VehicleKind, VehicleSpec
 
 SETTLED = frozenset({WaypointStatus.REACHED, WaypointStatus.REFUSED, WaypointStatus.MISSED})
 OUT_OF_REACH = frozenset({LinkState.UNKNOWN, LinkState.LOST})
+
+
+@dataclass(frozen=True, slots=True)
+class CommittedLeg:
+    """A leg that is decided and written down, and not begun yet; ``number`` counts its vehicle's legs."""
+
+    number: int
+    position: Position
+    target_m: NDArray[np.float64]
+    """Where it ends in the mission's frame, (2,): east, north."""
+    surfacing: bool = False
+    """Whether it brings its vehicle up for a fix."""
 
 
 @dataclass
@@ -50,6 +63,16 @@ class Member:
     """How often it was sent up for one."""
     pursuing: str | None = None
     """The target for which it left the mapping."""
+    ahead: list[CommittedLeg] = field(default_factory=list)
+    """Its legs after the one of its order, first to last."""
+    legs: int = 0
+    """Number of the last leg that was committed for it."""
+    misses: int = 0
+    """How many legs in a row it did not get to the end of."""
+    leg_began_s: float = 0.0
+    """When it was given its order, the event loop's time."""
+    leg_allowed_s: float = 0.0
+    """How long it may take for it, by the vehicles' clock."""
 
     @property
     def name(self) -> str:
@@ -85,6 +108,12 @@ class Member:
         """Give it an order and where that leads, or take its order away."""
         self.order, self.target_m = order, target_m
 
+    def last_end_m(self, frame: LocalFrame) -> NDArray[np.float64]:
+        """Return where its last committed leg ends, (2,), or where it is when it has none to fly."""
+        if self.ahead:
+            return self.ahead[-1].target_m
+        return self.target_m if self.busy and self.target_m is not None else self.place_m(frame)
+
     def cruise_depth_m(self, limits: Limits) -> float:
         """Return the depth it travels at where the bottom leaves room: as asked for, or its place in the stack."""
         if self.spec.depth_m is not None:
@@ -116,6 +145,7 @@ class Team:
         member = Member(spec, slot, self.capabilities_of(spec.kind))
         if before is not None and before.key == member.key:
             member.report, member.heard_s, member.risings = before.report, before.heard_s, before.risings
+            member.legs = before.legs
         self.members[spec.name] = member
         return member
 
@@ -125,6 +155,7 @@ class Team:
         if member is not None:
             member.left_at, member.status, member.pursuing = at, None, None
             member.set_order(None)
+            member.ahead.clear()
             member.engaged = member.surfacing = False
             self.left[name] = member
 

@@ -1,6 +1,6 @@
 """Queries on missions, their vehicles, steps and waypoints."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from datetime import datetime
 from typing import Any
 
@@ -52,6 +52,31 @@ async def forget_memory(session: AsyncSession, mission_id: str, step: int) -> No
     """Drop what planner and targets' filters remembered after a step."""
     of_step = (StepRow.mission_id == mission_id, StepRow.number == step)
     await session.execute(update(StepRow).where(*of_step).values(memory=b"", targets=None))
+
+
+async def remember(session: AsyncSession, mission_id: str, step: int, memory: bytes, targets: bytes | None) -> None:
+    """Replace what planner and targets' filters remember after a step."""
+    of_step = (StepRow.mission_id == mission_id, StepRow.number == step)
+    await session.execute(update(StepRow).where(*of_step).values(memory=memory, targets=targets))
+
+
+async def unsettled_waypoints(
+    session: AsyncSession, mission_id: str, settled: Collection[str]
+) -> Sequence[WaypointRow]:
+    """Return every vehicle's waypoints after the last one whose status is among ``settled``, first to last."""
+    last = (
+        select(WaypointRow.vehicle, func.max(WaypointRow.step).label("step"))
+        .where(WaypointRow.mission_id == mission_id, WaypointRow.status.in_(settled))
+        .group_by(WaypointRow.vehicle)
+        .subquery()
+    )
+    query = (
+        select(WaypointRow)
+        .outerjoin(last, WaypointRow.vehicle == last.c.vehicle)
+        .where(WaypointRow.mission_id == mission_id, WaypointRow.step > func.coalesce(last.c.step, 0))
+        .order_by(WaypointRow.step, WaypointRow.vehicle)
+    )
+    return (await session.scalars(query)).all()
 
 
 async def first_step_at(session: AsyncSession, mission_id: str) -> datetime | None:

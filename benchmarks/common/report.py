@@ -45,6 +45,14 @@ Every section is written by the command that stands in it (`--write`). Vehicles 
 real UDP sockets of the same machine, which take part of its processor themselves.
 """,
 )
+FLIGHT = Page(
+    "flight.md",
+    """# Flying: what was measured
+
+Every section is written by the command that stands in it (`--write`). Vehicles are simulated; service and vehicles
+share the cores of one machine.
+""",
+)
 PLANNING = Page(
     "planning.md",
     """# Planners: what was measured

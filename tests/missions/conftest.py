@@ -34,6 +34,14 @@ async def harbour(make_settings: Callable[..., ServiceSettings]) -> AsyncIterato
 
 
 @pytest.fixture
+async def harbour_closed(make_settings: Callable[..., ServiceSettings]) -> AsyncIterator[Harbour]:
+    """A service that was not started yet."""
+    harbour = Harbour(make_settings)
+    yield harbour
+    await harbour.close()
+
+
+@pytest.fixture
 async def service(harbour: Harbour) -> MissionService:
     return harbour.service
 

@@ -76,7 +76,7 @@ class CaoPlanner(PlannerBase):
         self._history: list[Any] = []
         self._last: list[list[float]] = []
         self._by_vehicle = options.contribution == "vehicle" and not self._surveys
-        self.plans_for_all = isinstance(self._model, SurveyRegressors)
+        self.plans_for_all = self.decides_apart = isinstance(self._model, SurveyRegressors)
         self._size = MoveSize(options.alpha, options.alpha_decay, options.alpha_floor)
 
     def _regressors(self) -> Regressors:

@@ -50,6 +50,7 @@ class LawnmowerPlanner(PlannerBase):
 
     name: ClassVar[str] = "lawnmower"
     plans_for_all = True
+    decides_apart = True
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)

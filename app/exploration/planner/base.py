@@ -32,6 +32,9 @@ class PlannerBase(ABC):
     plans_for_all: bool = False
     """Whether its plan needs to know of vehicles that get no leg now."""
 
+    decides_apart: bool = False
+    """Whether legs may be decided for some of the vehicles while the others fly on."""
+
     def __init__(self, options: PlannerOptions, sensor: Sensor) -> None:
         self.options = options
         self.sensor = sensor

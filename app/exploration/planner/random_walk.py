@@ -20,6 +20,7 @@ class RandomPlanner(PlannerBase):
 
     name: ClassVar[str] = "random"
     runs_errands: ClassVar[bool] = False
+    decides_apart = True
 
     def _decide(self, team: Situation, bottom: Bottom, seed: int) -> Proposal:
         step = team.constraints.max_step_m

@@ -255,6 +255,8 @@ class LinkCapabilities:
     """They tell by themselves what is around them; others have it posted."""
     keeps_depth: bool = False
     """They travel at the depth that their mission began with, whatever they are told."""
+    flies_together: bool = False
+    """They are led in steps of the whole team: nobody is sent on before all have told what they measured."""
     circles_m: float = 0.0
     """From this distance on they circle about a waypoint in place of going straight to it, unless they can hover."""
 

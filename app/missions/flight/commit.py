@@ -1,18 +1,18 @@
-"""Makes a step durable, and turns what is stored of it into the vehicles' orders."""
+"""Makes decisions durable, and turns legs that are stored into the vehicles' orders."""
 
 import numpy as np
 from sqlalchemy.orm import make_transient
 
 from app.arrays import FloatArray
 from app.exploration.core.bottom import Bottom
-from app.exploration.core.constraints import Constraints
+from app.exploration.core.constraints import Constraints, Limit
 from app.missions import metrics, safety
 from app.missions.clock import now
 from app.missions.fleet.interface import Position, WaypointOrder, WaypointStatus
 from app.missions.flight.decision import Decision, Leg
 from app.missions.live.mission import RISES, LiveMission
 from app.missions.spec.mission import Guidance
-from app.missions.team import Member
+from app.missions.team import CommittedLeg, Member
 from app.missions.views.mission import Level
 from app.storage import missions as mission_queries
 from app.storage.models import StepRow, WaypointRow
@@ -25,12 +25,18 @@ LEAD_M = 25.0
 CIRCLE_M = CIRCLE_RADIUS_M + 2.5
 """Radius of the room for a circle: it is not flown on rails."""
 
+WHERE = (Limit.AREA, Limit.AREA_LEG, Limit.KEEP_OUT, Limit.KEEP_OUT_LEG)
+"""What a leg is held to once more when it is begun: its vehicle may be elsewhere than the leg was decided from."""
+
 UNIT_SQUARE = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0]])
 """About a circle of radius 1: what lies apart from the square lies apart from the circle."""
 
 
-class StepCommit:
-    """Writes one running mission's steps down and gives its vehicles their orders; sends nothing.
+class LegCommit:
+    """Writes the legs of one running mission down and makes them its vehicles' orders; sends nothing.
+
+    Every vehicle's legs are numbered. All legs of one number are a step of the mission; the first vehicle that gets one
+    begins it.
 
     Parameters
     ----------
@@ -45,15 +51,16 @@ class StepCommit:
         self._constraints = constraints
         self._leads = leads
         self._bottom = Bottom.unknown()
-        self._targets: dict[str, FloatArray] = {}
-        """Where every vehicle of the step is sent, (2,)."""
 
-    async def commit(self, decision: Decision) -> None:
-        """Make a step durable, decision, waypoints and memory together; then order the vehicles to fly it."""
+    async def commit(self, decision: Decision, numbers: dict[str, int]) -> None:
+        """Make a decision durable, its legs and the planner's memory together; then the vehicles have these legs ahead.
+
+        ``numbers`` are the legs', by vehicle.
+        """
         live = self._live
-        number = live.header.step + 1
         built = live.builder.newest
-        rows = [self._row(number, leg) for leg in decision.legs]
+        rows = [self._row(numbers[leg.vehicle], leg) for leg in decision.legs]
+        number = max(row.step for row in rows)
         step = StepRow(
             mission_id=live.id,
             number=number,
@@ -70,43 +77,64 @@ class StepCommit:
         await live.journal.storage.done(lambda: to_the_end(self._store(step, rows)))
         if live.search is not None and live.search.began_at is None:
             live.search.began_at = step.committed_at
-        metrics.STEPS.inc()
-        live.set_step(number, decision.objective, decision.terms)
+        if number > live.header.step:
+            metrics.STEPS.inc()
+            live.set_step(number, decision.objective, decision.terms)
         self._bottom = decision.bottom
-        self._targets = {leg.vehicle: leg.target_m[:2] for leg in decision.legs}
-        for member in live.team:
-            member.set_order(None)
-            member.status = None
-        for row in rows:
-            member_of_row = live.team.get(row.vehicle)
-            if member_of_row is not None and row.status != WaypointStatus.REFUSED:
-                self.order(row, member_of_row)
-        live.waypoints.show_rows(rows)
+        for row, leg in zip(rows, decision.legs, strict=True):
+            member = live.team.get(row.vehicle)
+            if member is None:
+                continue
+            member.legs = row.step
+            if row.status == WaypointStatus.REFUSED:
+                live.waypoints.show_rows([row])
+            else:
+                member.ahead.append(committed_leg(row, surfacing=leg.surfacing))
         live.publish_summary()
-        await self._tell_of_surfacing(decision, number)
+        for vehicle, fix in decision.fixes.items():
+            rises = any(leg.surfacing for leg in decision.legs if leg.vehicle == vehicle)
+            await live.journal.log(Level.INFO, "surface", fix, step=number, vehicle=vehicle, **{RISES: rises})
         await self._tell_of_pursuits(decision, number)
         for note in decision.notes:
             await live.journal.log(Level.WARNING, "safety", note, step=number)
 
-    def order(self, row: WaypointRow, member: Member) -> None:
-        """Give a vehicle the order that belongs to a stored waypoint."""
+    def begin_next(self, member: Member) -> None:
+        """Make a vehicle's next leg its order."""
+        leg = member.ahead.pop(0)
+        member.risings += leg.surfacing and not member.surfacing
+        member.surfacing = leg.surfacing
+        self._order(leg, member)
+        self._live.waypoints.show(leg.number, member.name, leg.position, leg.target_m)
+
+    def barred(self, member: Member) -> str:
+        """Return why a vehicle may not fly its next leg from where it is now; '' if it may."""
+        if member.report is None or not member.ahead:
+            return ""
+        leg = member.ahead[0]
+        depth_m = leg.position.depth_m
+        here = np.append(member.place_m(self._live.frame), depth_m)[None]
+        there = np.append(leg.target_m, depth_m)[None]
+        broken = self._constraints.violations((member.name,), here, there)
+        return next((violation.reason for violation in broken if violation.limit in WHERE), "")
+
+    def _order(self, leg: CommittedLeg, member: Member) -> None:
         lead: Position | None = None
         circle: Position | None = None
         bottom: tuple[Position, ...] = ()
         spec = self._live.spec
-        target = np.array([row.east_m, row.north_m])
+        target = leg.target_m
         if member.report is not None and self._leads:
             start = member.place_m(self._live.frame)
             beyond = safety.lead_point(self._constraints, start, target, LEAD_M)
-            lead = self._position(beyond[0], beyond[1], row.depth_m)
+            lead = self._position(beyond[0], beyond[1], leg.position.depth_m)
             known = safety.bottom_on_way(np.array([start, target, beyond]), self._bottom)
             bottom = tuple(self._position(east, north, depth) for east, north, depth in known)
             circle = self._circle(member, start, target)
         order = WaypointOrder(
             mission_id=self._live.id,
-            step=row.step,
-            vehicle=row.vehicle,
-            position=Position(row.lat_deg, row.lon_deg, row.depth_m),
+            step=leg.number,
+            vehicle=member.name,
+            position=leg.position,
             speed_mps=spec.speed_mps,
             arrival_radius_m=spec.arrival_radius_m,
             min_altitude_m=spec.limits.min_altitude_m,
@@ -126,8 +154,8 @@ class StepCommit:
             if other is member or other.report is None:
                 continue
             way = [other.place_m(self._live.frame)]
-            if other.name in self._targets:
-                way.append(self._targets[other.name])
+            way += [] if other.target_m is None else [other.target_m]
+            way += [leg.target_m for leg in other.ahead]
             if other.order is not None and other.order.circle is not None:
                 taken.append(CIRCLE_M * UNIT_SQUARE + self._local(other.order.circle))
             taken.append(np.array(way))
@@ -140,16 +168,21 @@ class StepCommit:
 
     async def _store(self, step: StepRow, waypoints: list[WaypointRow]) -> None:
         async with self._live.database.writing() as session:
-            known = await session.get(StepRow, (step.mission_id, step.number))
-            if known is not None and known.committed_at == step.committed_at:
+            first = waypoints[0]
+            if await session.get(WaypointRow, (first.mission_id, first.step, first.vehicle)) is not None:
                 return  # written before the connection broke
             for row in (step, *waypoints):
                 make_transient(row)  # of a transaction that failed
-            session.add(step)
-            await session.flush()
+            if step.number > self._live.header.step:
+                session.add(step)
+                await session.flush()
+                # Only the last one's is ever needed; on a day's mission all of them would fill the disk.
+                await mission_queries.forget_memory(session, self._live.id, step.number - 1)
+            else:
+                await mission_queries.remember(
+                    session, self._live.id, self._live.header.step, step.memory, step.targets
+                )
             session.add_all(waypoints)
-            # Only the last one's is ever needed; on a day's mission all of them would fill the disk.
-            await mission_queries.forget_memory(session, self._live.id, step.number - 1)
 
     def _row(self, step: int, leg: Leg) -> WaypointRow:
         east_m, north_m, depth_m = (float(value) for value in leg.target_m)
@@ -172,18 +205,6 @@ class StepCommit:
         lat, lon = self._live.frame.to_geographic(np.array(east_m), np.array(north_m))
         return Position(float(lat), float(lon), float(depth_m))
 
-    async def _tell_of_surfacing(self, decision: Decision, number: int) -> None:
-        """Note which vehicles go up for a fix, and say why."""
-        live = self._live
-        for leg in decision.legs:
-            going = live.team.get(leg.vehicle)
-            if going is not None:
-                going.risings += leg.surfacing and not going.surfacing
-                going.surfacing = leg.surfacing
-        for vehicle, fix in decision.fixes.items():
-            rises = any(leg.surfacing for leg in decision.legs if leg.vehicle == vehicle)
-            await live.journal.log(Level.INFO, "surface", fix, step=number, vehicle=vehicle, **{RISES: rises})
-
     async def _tell_of_pursuits(self, decision: Decision, number: int) -> None:
         """Say which vehicles left the mapping for a target, and which came back."""
         for member in self._live.team:
@@ -193,3 +214,9 @@ class StepCommit:
                 continue
             words = f"{member.name} goes on with the mapping" if target is None else f"{member.name} goes for {target}"
             await self._live.journal.log(Level.INFO, "target", words, step=number, vehicle=member.name)
+
+
+def committed_leg(row: WaypointRow, *, surfacing: bool = False) -> CommittedLeg:
+    """Return the leg of a stored waypoint."""
+    place = Position(row.lat_deg, row.lon_deg, row.depth_m)
+    return CommittedLeg(row.step, place, np.array([row.east_m, row.north_m]), surfacing)

@@ -36,7 +36,7 @@ INSET_M = 1.0
 
 @dataclass(frozen=True)
 class Place:
-    """Where one vehicle is when a step begins, and the depth it should travel at."""
+    """Where one vehicle's next leg begins, and the depth it should travel at."""
 
     vehicle: str
     en_m: FloatArray
@@ -48,6 +48,10 @@ class Place:
     """Its depth, when its last waypoint brought it up for a fix; NaN when not."""
     keeps_depth: bool = False
     """Whether it travels at the depth that its mission began with, whatever it is told."""
+    moving: bool = True
+    """Whether it gets a leg now; where not, it has enough of them and ``en_m`` is where they end."""
+    left_m: float = math.nan
+    """How far it may still fly; NaN: as many steps as the mission has left."""
 
     @property
     def surfacing(self) -> bool:
@@ -135,6 +139,8 @@ def decide(
     nearby_m = NEARBY_OUTSIDE_M + spec.limits.border_margin_m
     for place in places:
         outside_m = safety.distance_outside_m(polygon, place.en_m)
+        if outside_m > nearby_m and not place.moving:
+            continue
         if outside_m > nearby_m and search is not None:
             refusal = (
                 f"it is {outside_m:.0f} m outside the site, and what lies between is not known: bring it to the entry"
@@ -168,6 +174,8 @@ def decide(
             for p in team
         ]
     )
+    moving = np.array([p.moving for p in team])
+    left_m = np.array([p.left_m for p in team])
     up, fixes = surfacing(team, spec.surface_policy)
     for i, place in enumerate(team):
         if place.surfacing:
@@ -184,11 +192,13 @@ def decide(
         doubtful_en_m=np.zeros((0, 2)) if doubtful_en_m is None else doubtful_en_m,
         targets=targets,
         search=search,
+        moving=None if moving.all() else moving,
+        left_m=None if np.isnan(left_m).any() else left_m,
     )
     proposal = planner.propose(situation, np.random.default_rng([spec.seed, step]))
-    proposed = np.array(proposal.positions, dtype=float)
+    proposed = np.where(moving[:, None], np.array(proposal.positions, dtype=float), origin)
     for i, place in enumerate(team):
-        if not np.isfinite(proposed[i]).all():
+        if not place.moving or not np.isfinite(proposed[i]).all():
             continue  # the check makes the vehicle hold
         proposed[i, 2] = safety.travel_depth_m(
             place.en_m, proposed[i, :2], place.cruise_depth_m, cautious, constraints.min_altitude_m
@@ -202,7 +212,7 @@ def decide(
         notes += held
     for i, place in enumerate(team):
         start = where[place.vehicle]
-        if np.array_equal(start, place.en_m) or not np.isfinite(proposed[i]).all():
+        if not place.moving or np.array_equal(start, place.en_m) or not np.isfinite(proposed[i]).all():
             continue
         # It was planned for from the border, and comes from beyond it: no farther than there where both is too far.
         if np.linalg.norm(proposed[i, :2] - start) > constraints.max_step_m:
@@ -212,8 +222,12 @@ def decide(
         )
         proposed[i, 2] = min(proposed[i, 2], depth_m)
     checked = safety.check_step(names, origin, proposed, constraints, bottom)
-    notes += [f"{name}: {reason}" for name, reason in (checked.corrections | checked.refusals).items()]
+    resting = {place.vehicle for place in team if not place.moving}
+    told = (checked.corrections | checked.refusals).items()
+    notes += [f"{name}: {reason}" for name, reason in told if name not in resting]
     for i, place in enumerate(team):
+        if not place.moving:
+            continue
         refusal = checked.refusals.get(place.vehicle, "")
         if not refusal and place.keeps_depth:
             refusal = safety.too_deep(place.cruise_depth_m, float(checked.positions[i, 2]))
@@ -237,6 +251,9 @@ def surfacing(team: list[Place], policy: SurfacePolicy | None) -> tuple[list[boo
     up: list[bool] = []
     told: dict[str, str] = {}
     for place, late in zip(team, due, strict=True):
+        if not place.moving:
+            up.append(False)
+            continue
         stays = place.surfacing and not place.position_sd_m <= policy.until_sd_m
         up.append(bool(late or stays))
         if up[-1] and not place.surfacing:

@@ -1,4 +1,4 @@
-"""What a step loop has to do beyond the usual when its mission is a search; nothing in a survey."""
+"""What flying has to do beyond the usual when its mission is a search; nothing in a survey."""
 
 import asyncio
 from collections.abc import Awaitable, Callable
@@ -24,7 +24,7 @@ class SearchHooks:
     time_scale
         How much faster than the wall clock the vehicles live.
     wait
-        The step loop's own way to wait for what vehicles tell.
+        The flight's own way to wait for what vehicles tell.
     """
 
     def __init__(self, live: LiveMission, time_scale: float, wait: Wait) -> None:

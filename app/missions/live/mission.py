@@ -27,6 +27,7 @@ from app.missions.fleet.interface import (
     SoundingReport,
     VehicleReport,
     WaypointReport,
+    WaypointStatus,
 )
 from app.missions.live.boundaries import Boundaries
 from app.missions.live.broadcast import Broadcaster
@@ -60,6 +61,9 @@ from app.storage import soundings as sounding_queries
 from app.storage.database import Database
 from app.storage.models import MissionRow
 from app.storage.single_flight import Shared
+
+PACE_MEMORY = 0.9
+"""Weight of the past in the running mean of a leg's duration."""
 
 RISES = "rises"
 """Marks events that tell of a vehicle sent up for a fix."""
@@ -145,7 +149,8 @@ class LiveMission:
         """Set while vehicles are being stopped: the step loop must not send them off again as it ends."""
         self.standstill = ""
         """Why no vehicle may be sent anywhere now; empty while at least one may."""
-        self.seconds_per_step: float | None = None
+        self._leg_s: float | None = None
+        """How long a leg takes, running mean on the wall clock."""
         self.running_since_s: float | None = None
         self.database = database
         """What is written through it is refused once another process has the mission."""
@@ -288,6 +293,13 @@ class LiveMission:
             return
         member.status = event.status
         member.reason = event.reason
+        if event.status is WaypointStatus.REACHED:
+            member.misses = 0
+            took_s = asyncio.get_running_loop().time() - member.leg_began_s
+            before_s = took_s if self._leg_s is None else self._leg_s
+            self._leg_s = PACE_MEMORY * before_s + (1 - PACE_MEMORY) * took_s
+        elif event.status in (WaypointStatus.MISSED, WaypointStatus.REFUSED):
+            member.misses += 1
         self.journal.waypoint(event)
         self.waypoints.take(event)
 
@@ -392,9 +404,11 @@ class LiveMission:
         """Return how long the mission still takes, wall-clock seconds; a search as long as its time window lasts."""
         if self.search is not None:
             return max(self.search.left_s(), 0.0) / self._time_scale
-        if self.seconds_per_step is None:
+        if self._leg_s is None:
             return None
-        return (self.spec.steps - self.header.step) * self.seconds_per_step
+        committed = [len(m.ahead) + m.ordered for m in self.team]
+        left = [self.spec.steps - m.legs for m in self.team.present] or [self.spec.steps - self.header.step]
+        return (max(left) + max(committed, default=0)) * self._leg_s
 
     def summary(self) -> MissionSummary:
         """Return the mission as it stands in a list."""

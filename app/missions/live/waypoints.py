@@ -2,7 +2,10 @@
 
 from collections.abc import Sequence
 
-from app.missions.fleet.interface import WaypointReport, WaypointStatus
+import numpy as np
+from numpy.typing import NDArray
+
+from app.missions.fleet.interface import Position, WaypointReport, WaypointStatus
 from app.missions.live.broadcast import Broadcaster
 from app.missions.spec.mission import MissionSpec
 from app.missions.views.messages import WaypointsMessage
@@ -32,6 +35,11 @@ class WaypointViews:
         views = [self.view(row) for row in rows]
         self._show(views if status is None else [view.model_copy(update={"status": status}) for view in views])
 
+    def show(self, step: int, vehicle: str, place: Position, en_m: NDArray[np.float64]) -> None:
+        """Make a leg that a vehicle begins its newest waypoint."""
+        planned = WaypointStatus.PLANNED
+        self._show([self._view(vehicle, step, place, (float(en_m[0]), float(en_m[1])), planned, "")])
+
     def take(self, report: WaypointReport) -> None:
         """Show what a vehicle told of its waypoint, if that is still its newest."""
         shown = self._newest.get(report.vehicle)
@@ -40,20 +48,26 @@ class WaypointViews:
 
     def view(self, row: WaypointRow) -> WaypointView:
         """Return a stored waypoint as it is shown."""
+        place = Position(row.lat_deg, row.lon_deg, row.depth_m)
+        return self._view(row.vehicle, row.step, place, (row.east_m, row.north_m), row.status, row.reason)
+
+    def _view(
+        self, vehicle: str, step: int, place: Position, en_m: tuple[float, float], status: str, reason: str
+    ) -> WaypointView:
         return WaypointView.model_validate(
             {
-                "vehicle": row.vehicle,
-                "step": row.step,
-                "lat_deg": row.lat_deg,
-                "lon_deg": row.lon_deg,
-                "east_m": row.east_m,
-                "north_m": row.north_m,
-                "depth_m": row.depth_m,
+                "vehicle": vehicle,
+                "step": step,
+                "lat_deg": place.lat_deg,
+                "lon_deg": place.lon_deg,
+                "east_m": en_m[0],
+                "north_m": en_m[1],
+                "depth_m": place.depth_m,
                 "speed_mps": self._spec.speed_mps,
                 "arrival_radius_m": self._spec.arrival_radius_m,
                 "min_altitude_m": self._spec.limits.min_altitude_m,
-                "status": row.status,
-                "reason": row.reason,
+                "status": status,
+                "reason": reason,
             }
         )
 

@@ -12,7 +12,7 @@ from app.missions.compilation import Compilation
 from app.missions.errors import MissionElsewhereError
 from app.missions.fleet.hub import FleetHub
 from app.missions.fleet.interface import LinkState, StopReceipt
-from app.missions.flight.step_loop import Runner
+from app.missions.flight.runner import Runner
 from app.missions.live.mission import LiveMission
 from app.missions.running.claims import Claims
 from app.missions.running.final_maps import FinalMaps

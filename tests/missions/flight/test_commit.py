@@ -8,7 +8,7 @@ from app.exploration.planners import create_planner
 from app.mapping.tides import TideTable
 from app.missions.clock import now
 from app.missions.fleet.interface import Position, VehicleReport
-from app.missions.flight.commit import StepCommit
+from app.missions.flight.commit import LegCommit
 from app.missions.flight.decision import Place, decide, make_constraints
 from app.missions.service import MissionService
 from app.missions.soundings.corrections import Corrections
@@ -53,11 +53,12 @@ async def test_the_guard_gets_the_bottom_below_the_surface(
     places = [Place("a", np.array([10.0, 10.0]), 0.0, 2.0)]
     planner = create_planner("random", spec.planner.options)
     decision = decide(1, spec, constraints, planner, places, belief, np.zeros((0, 2)), level)
-    committing = StepCommit(live, constraints, leads=True)
+    committing = LegCommit(live, constraints, leads=True)
     member = live.team.join(spec.vehicles[0], 0)
     lat, lon = live.frame.to_geographic(np.array(10.0), np.array(10.0))
     member.report = VehicleReport("a", 0.0, Position(float(lat), float(lon), 0.0))
-    await committing.commit(decision)
+    await committing.commit(decision, {"a": 1})
+    committing.begin_next(member)
     assert member.order is not None
     assert member.order.bottom
     assert {round(place.depth_m, 6) for place in member.order.bottom} == {expected_m}

@@ -123,7 +123,7 @@ class NeptusFleetLink(VisitedLink):
     """Sessions of the gateway as a :class:`app.missions.fleet.interface.FleetLink`."""
 
     kind = "neptus"
-    capabilities = LinkCapabilities(keeps_depth=True)
+    capabilities = LinkCapabilities(keeps_depth=True, flies_together=True)
 
     def __init__(self, settings: NeptusSettings, keeper: SessionKeeper) -> None:
         super().__init__(settings.lost_after_s)

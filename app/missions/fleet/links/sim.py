@@ -55,6 +55,8 @@ MOST_AT_ONCE_S = 0.5
 
 log = structlog.get_logger(__name__)
 
+PASSED_WITHIN_M = 8.0
+"""A vehicle that passes its waypoint at most this far to the side has arrived, as for those led over IMC."""
 REPORT_PERIOD_S = 0.5
 """Time between position reports on the vehicle's clock, as often as DUNE sends EstimatedState."""
 
@@ -134,6 +136,7 @@ class _Swimmer:
         self.terrain = terrain
         self.state = LinkState.READY
         self.order: WaypointOrder | None = None
+        self.began_m = (0.0, 0.0)
         self.reached = False
         self.raised = False
         self.reported_s = -math.inf
@@ -158,9 +161,29 @@ class _Swimmer:
         )
         return self.report
 
-    def head_for(self, order: WaypointOrder, depth_m: float) -> None:
-        east, north = self.terrain.frame.to_local(order.position.lat_deg, order.position.lon_deg)
+    def begin(self, order: WaypointOrder) -> None:
+        here = self.body.position
+        self.began_m = (here.east_m, here.north_m)
+        self.order, self.reached, self.raised = order, False, False
+        self.head_for(order, order.position, order.position.depth_m)
+
+    def head_for(self, order: WaypointOrder, place: Position, depth_m: float) -> None:
+        east, north = self._local(place)
         self.body.go_to(east, north, depth_m, order.speed_mps, arrival_radius_m=order.arrival_radius_m)
+
+    @property
+    def arrived(self) -> bool:
+        """Whether it is at its waypoint, or has passed it closely where it is to pass it straight."""
+        order = self.order
+        if order is None or self.body.arrived or order.lead is None:
+            return order is not None and self.body.arrived
+        (east, north), here = self._local(order.position), self.body.position
+        leg_e, leg_n = east - self.began_m[0], north - self.began_m[1]
+        off_e, off_n = here.east_m - east, here.north_m - north
+        return off_e * leg_e + off_n * leg_n >= 0.0 and math.hypot(off_e, off_n) <= PASSED_WITHIN_M
+
+    def _local(self, place: Position) -> tuple[float, float]:
+        return self.terrain.frame.to_local(place.lat_deg, place.lon_deg)
 
 
 class SimFleetLink(FleetLink):
@@ -311,10 +334,7 @@ class SimFleetLink(FleetLink):
         swimmer = self._swimmers.get(order.vehicle)
         if swimmer is None or swimmer.state is not LinkState.ENGAGED:
             raise VehicleRefusedError(order.vehicle, "does not follow this service", "engage it first")
-        swimmer.head_for(order, order.position.depth_m)
-        swimmer.order = order
-        swimmer.reached = False
-        swimmer.raised = False
+        swimmer.begin(order)
         for status in (WaypointStatus.SENT, WaypointStatus.ACKNOWLEDGED):
             self._sink(WaypointReport(order.vehicle, order.mission_id, order.step, status))
 
@@ -368,8 +388,11 @@ class SimFleetLink(FleetLink):
         events += _ranges(swimmer)
         if swimmer.body.time_s - swimmer.reported_s >= REPORT_PERIOD_S:
             events.append(swimmer.make_report())
-        if order is not None and not swimmer.reached and swimmer.body.arrived:
+        if order is not None and not swimmer.reached and swimmer.arrived:
             swimmer.reached = True
+            if order.lead is not None:
+                # Until it is sent on it flies straight ahead, as far as there is room.
+                swimmer.head_for(order, order.lead, order.position.depth_m)
             # The loop plans from the last report: it must be the place of arrival.
             events.append(swimmer.make_report())
             events.append(WaypointReport(order.vehicle, order.mission_id, order.step, WaypointStatus.REACHED))
@@ -378,9 +401,9 @@ class SimFleetLink(FleetLink):
     def _keep_clear_of_bottom(self, swimmer: _Swimmer, order: WaypointOrder) -> None:
         state = swimmer.body.state
         too_low = state.altitude_m < order.min_altitude_m
-        if too_low and not swimmer.raised and not swimmer.body.arrived:
+        if too_low and not swimmer.raised and not swimmer.reached:
             swimmer.raised = True
-            swimmer.head_for(order, max(0.0, swimmer.body.bottom_m - order.min_altitude_m))
+            swimmer.head_for(order, order.position, max(0.0, swimmer.body.bottom_m - order.min_altitude_m))
 
 
 def _lay(settings: SimulationSettings, launch: Launch) -> Terrain:

@@ -7,8 +7,8 @@ import pytest
 
 from app.missions.fleet.hub import FleetHub
 from app.missions.fleet.interface import LinkState, VehicleRefusedError
-from app.missions.flight import step_loop
-from app.missions.flight.commit import StepCommit
+from app.missions.flight import deciding
+from app.missions.flight.commit import LegCommit
 from app.missions.flight.decision import Decision, decide
 from app.missions.operations.history import events_after
 from app.missions.service import MissionService
@@ -31,7 +31,7 @@ async def test_a_step_in_which_every_order_is_refused_does_not_count(
         decision = decide(*arguments, **more)
         return replace(decision, legs=[replace(leg, refusal=REASON) for leg in decision.legs]) if spoilt else decision
 
-    monkeypatch.setattr(step_loop, "decide", refusing)
+    monkeypatch.setattr(deciding, "decide", refusing)
     mission = (await service.create(sim_spec(steps=3))).id
     await act(service, mission, "start", actor="Ana")
     await until(lambda: asked >= 4, "it was decided again and again")
@@ -73,14 +73,14 @@ async def test_a_step_that_every_vehicle_turns_down_is_sent_again(
 async def test_a_waypoint_that_is_committed_while_the_link_is_away_is_sent(
     service: MissionService, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    commit = StepCommit.commit
+    commit = LegCommit.commit
 
-    async def committed_in_a_gap(self: StepCommit, decision: Decision) -> None:
-        await commit(self, decision)
+    async def committed_in_a_gap(self: LegCommit, decision: Decision, numbers: dict[str, int]) -> None:
+        await commit(self, decision, numbers)
         for member in self._live.team:
             member.link = LinkState.LOST
 
-    monkeypatch.setattr(StepCommit, "commit", committed_in_a_gap)
+    monkeypatch.setattr(LegCommit, "commit", committed_in_a_gap)
     mission = (await service.create(sim_spec(steps=2, step_deadline_s=200))).id
     await act(service, mission, "start", actor="Ana")
     await until_state(service, mission, MissionState.FINISHED)

@@ -1,0 +1,153 @@
+"""Sends vehicles the legs that are committed for them, each vehicle on its own time."""
+
+import asyncio
+import math
+
+import numpy as np
+
+from app.missions.fleet.hub import FleetHub
+from app.missions.fleet.interface import VehicleRefusedError, WaypointReport, WaypointStatus
+from app.missions.flight.commit import LegCommit
+from app.missions.live.mission import LiveMission
+from app.missions.spec.mission import Guidance
+from app.missions.team import Member
+from app.missions.views.mission import Level
+from imc_bridge.control.plans import leg_time_s
+
+SOUND_S = 60.0
+"""What commands and reports take by sound, at the most."""
+
+SLOWEST_SHARE = 0.5
+"""Part of the speed asked for that a vehicle may make good on its leg, before it counts as a straggler."""
+
+MOST_REFUSALS = 5
+"""How often a vehicle may refuse the same leg before the next one is tried."""
+
+
+class Dispatch:
+    """Makes legs ahead orders, sends them, and judges those that take too long.
+
+    Parameters
+    ----------
+    live, hub
+    committing
+        Makes a leg an order.
+    time_scale
+        How much faster than the wall clock the vehicles live.
+    persistent
+        Whether a vehicle that refuses its leg is sent it again; else the leg is over for it.
+    """
+
+    def __init__(
+        self, live: LiveMission, hub: FleetHub, committing: LegCommit, time_scale: float, *, persistent: bool
+    ) -> None:
+        self._persistent = persistent
+        self._live = live
+        self._hub = hub
+        self._committing = committing
+        self._time_scale = time_scale
+        self.turned_down: dict[str, int] = {}
+        """How often vehicles refused the order that they have."""
+
+    async def keep(self) -> None:
+        """Keep every vehicle flying its own legs until cancelled."""
+        loop = asyncio.get_running_loop()
+        while True:
+            await self.begin()
+            for member in self._live.team:
+                if member.ordered and not member.busy:
+                    member.leg_began_s = loop.time()  # it is out of reach
+            under_way = {m.name: self._late_at_s(m) for m in self._live.team if m.busy}
+            late = [m for m in self._live.team if under_way.get(m.name, math.inf) <= loop.time()]
+            await self._tell_of_late(late)
+            if late or (self._waiting and not self._live.halted):
+                continue
+            self._live.changed.clear()
+            try:
+                async with asyncio.timeout_at(min(under_way.values(), default=None)):
+                    await self._live.changed.wait()
+            except TimeoutError:
+                continue
+
+    @property
+    def _waiting(self) -> bool:
+        return any(member.ahead and not member.ordered for member in self._live.team)
+
+    async def begin(self) -> None:
+        """Send every vehicle that flies nothing its next leg, unless something bars that from where it is now."""
+        beginning = []
+        for member in self._live.team:
+            if self._live.halted or member.ordered or not member.ahead:
+                continue
+            barred = self._committing.barred(member)
+            if barred:
+                await self.drop_ahead(member, f"from where it is {barred}")
+                continue
+            self._committing.begin_next(member)
+            member.leg_began_s = asyncio.get_running_loop().time()
+            member.leg_allowed_s = self._allowed_s(member)
+            self.turned_down.pop(member.name, None)
+            if member.engaged:
+                beginning.append(self.send(member))
+        await asyncio.gather(*beginning)
+
+    async def send(self, member: Member) -> None:
+        """Send a vehicle its order; one that refuses is asked to follow anew, and then sent it again."""
+        if member.order is None or self._live.halted:
+            return
+        try:
+            await self._hub.order(member.key, member.order)
+        except VehicleRefusedError as error:
+            member.engaged = False
+            before = self.turned_down.get(member.name, 0)
+            self.turned_down[member.name] = before + 1
+            if not before:
+                await self._live.journal.log(Level.WARNING, "vehicle", str(error), vehicle=member.name)
+            if not self._persistent or (before + 1 >= MOST_REFUSALS and member.ahead):
+                self.settle(member, WaypointStatus.REFUSED, str(error))
+
+    def settle(self, member: Member, status: WaypointStatus, reason: str) -> None:
+        """End a vehicle's leg."""
+        if member.order is not None:
+            report = WaypointReport(member.name, member.order.mission_id, member.order.step, status, reason)
+            self._live.receive(report)
+
+    async def drop_ahead(self, member: Member, reason: str) -> None:
+        """Give up the legs that a vehicle has not begun."""
+        legs, member.ahead[:] = list(member.ahead), []
+        for leg in legs:
+            report = WaypointReport(member.name, self._live.id, leg.number, WaypointStatus.MISSED, reason)
+            self._live.journal.waypoint(report)
+        await self._live.journal.log(
+            Level.WARNING,
+            "vehicle",
+            f"{member.name} does not fly its next leg: {reason}; it gets another one",
+            vehicle=member.name,
+        )
+        self._live.changed.set()
+
+    def _allowed_s(self, member: Member) -> float:
+        """Return how long a vehicle may take for its leg, by its clock: longer than asked for where that is long."""
+        spec, order = self._live.spec, member.order
+        if order is None or member.target_m is None or member.report is None:
+            return spec.step_deadline_s
+        away_m = float(np.linalg.norm(member.target_m - member.place_m(self._live.frame)))
+        if member.spec.guidance is Guidance.FOLLOW:
+            return max(spec.step_deadline_s, away_m / (SLOWEST_SHARE * order.speed_mps))
+        by_sound_s = SOUND_S if member.spec.guidance is Guidance.ACOUSTIC else 0.0
+        return max(spec.step_deadline_s, leg_time_s(away_m, order.position.depth_m, order.speed_mps) + by_sound_s)
+
+    def _late_at_s(self, member: Member) -> float:
+        return member.leg_began_s + member.leg_allowed_s / self._time_scale
+
+    async def _tell_of_late(self, late: list[Member]) -> None:
+        for member in late:
+            number = member.order.step if member.order is not None else member.legs
+            self.settle(member, WaypointStatus.MISSED, f"not reached within {member.leg_allowed_s:.0f} s")
+            await self._live.journal.log(
+                Level.WARNING,
+                "straggler",
+                f"{member.name} did not get to the end of its leg {number}: it goes on with the next",
+                step=number,
+                vehicles=[member.name],
+            )

@@ -1,0 +1,257 @@
+"""Flies a mission whose vehicles do not wait for each other: each has its own legs, and more of them ahead.
+
+A decision is made for whoever will need a leg next, from where its last one ends and with everybody else's legs as they
+are, long before the vehicle is there. So nobody waits for a decision, for a slower vehicle, or for one that is lost.
+"""
+
+import asyncio
+import math
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+
+from app.arrays import FloatArray
+from app.missions.flight.commit import LegCommit
+from app.missions.flight.deciding import DECIDE_AGAIN_S, Decider, moved_on, place_ahead
+from app.missions.flight.decision import RESERVE, Decision, Place
+from app.missions.flight.dispatch import Dispatch
+from app.missions.flight.separation import too_close
+from app.missions.flight.step_maps import StepMaps
+from app.missions.flight.waiting import Waiting
+from app.missions.live.mission import LiveMission
+from app.missions.team import Member
+
+AHEAD = 2
+"""Legs that a vehicle has after the one it flies."""
+
+AHEAD_WHEN_WATCHED = 1
+"""The same where targets move, or vehicles come up by what they say of their position: decisions follow closer."""
+
+DECISIONS_AHEAD = 3.0
+"""How many decisions' time a vehicle's legs last at least."""
+
+MOST_AHEAD = 20
+
+HARDLY_BEGUN = 0.6
+"""Part of a leg that may be left when its vehicle gets a leg together with another that needs one."""
+
+
+class OwnLegs:
+    """Flies one running mission, every vehicle on its own time.
+
+    Parameters
+    ----------
+    time_scale
+        How much faster than the wall clock the vehicles live.
+    """
+
+    def __init__(
+        self,
+        live: LiveMission,
+        decider: Decider,
+        committing: LegCommit,
+        dispatch: Dispatch,
+        maps: StepMaps,
+        waiting: Waiting,
+        time_scale: float,
+    ) -> None:
+        self._live = live
+        self._spec = live.spec
+        self._decider = decider
+        self._committing = committing
+        self._dispatch = dispatch
+        self._maps = maps
+        self._waiting = waiting
+        self._time_scale = time_scale
+        watched = bool(live.spec.targets) or live.spec.surface_policy is not None
+        self._ahead = AHEAD_WHEN_WATCHED if watched else AHEAD
+        self._taking_part = {member.name for member in live.team if member.legs}
+        """Vehicles that go on with their own numbers: they had legs, and were not away since."""
+        self._absent_since_s: dict[str, float] = {}
+        self._again_at_s: dict[str, float] = {}
+        """When vehicles that got no leg are looked at again, the event loop's time."""
+
+    async def fly(self, *, resumed: bool) -> str:
+        """Fly until every vehicle has used up its way; returns why nobody goes on.
+
+        ``resumed``: the mission had begun in an earlier run.
+        """
+        patient_s: float | None = self._spec.step_deadline_s / self._time_scale
+        sending = asyncio.create_task(self._dispatch.keep())
+        try:
+            while not self._over():
+                if patient_s is not None or self._nobody_to_lead:
+                    await self._waiting.for_team(patient_s=patient_s)
+                    patient_s = None
+                getting = self._who_gets_legs()
+                if getting:
+                    await self._decide(getting)
+                    continue
+                await self._until_needed(sending)
+        finally:
+            sending.cancel()
+            await asyncio.gather(sending, return_exceptions=True)
+        return "every step is done"
+
+    async def _until_needed(self, sending: asyncio.Task[None]) -> None:
+        if sending.done():
+            sending.result()  # raises what went wrong
+        later_s = min(self._again_at_s.values(), default=None)
+        now_s = asyncio.get_running_loop().time()
+        # Vehicles come nearer to the end of their legs without telling anything new.
+        soon_s = now_s + 0.5 * self._spec.limits.max_step_m / (self._spec.speed_mps * self._time_scale)
+        await self._waiting.until(
+            lambda: bool(self._who_gets_legs()) or self._over() or self._nobody_to_lead or sending.done(),
+            soon_s if later_s is None else min(max(later_s, now_s), soon_s),
+        )
+
+    async def _decide(self, getting: list[Member]) -> None:
+        """Decide the next leg of some vehicles, and commit it."""
+        live = self._live
+        names = {member.name for member in getting}
+        numbers = {member.name: self._next_number(member) for member in getting}
+        places = [self._place(member, moving=member.name in names) for member in live.team.present]
+        decisions = await self._decider.decide_to_fly(max(numbers.values()), places, legs=self._legs_at_once)
+        self._taking_part |= names
+        self._again_at_s = {name: at_s for name, at_s in self._again_at_s.items() if name not in names}
+        if not decisions:
+            self._look_later(names)
+        for later, decision in enumerate(decisions):
+            starts = {place.vehicle: place.en_m for place in places}
+            places = moved_on(places, decision)
+            await self._commit(decision, starts, {name: number + later for name, number in numbers.items()})
+            # Who did not get this leg gets none that goes on from it.
+            numbers = {name: number for name, number in numbers.items() if self._has_leg(name, number + later)}
+        self._maps.begin()
+
+    async def _commit(self, decision: Decision, starts_m: dict[str, FloatArray], numbers: dict[str, int]) -> None:
+        """Commit the legs of a decision that can be flown from where they were to begin."""
+        live = self._live
+        begun = [
+            leg
+            for leg in decision.legs
+            if leg.vehicle in numbers
+            and (member := live.team.get(leg.vehicle)) is not None
+            and member.report is not None
+            and member.legs < numbers[leg.vehicle] <= self._spec.steps
+            and self._begins_at(member, starts_m[leg.vehicle])
+        ]
+        decision = self._apart(replace(decision, legs=begun))
+        self._look_later({leg.vehicle for leg in decision.legs if leg.refusal})
+        legs = [leg for leg in decision.legs if not leg.refusal]
+        if legs:
+            await self._committing.commit(replace(decision, legs=legs), numbers)
+            live.changed.set()
+
+    def _has_leg(self, name: str, number: int) -> bool:
+        member = self._live.team.get(name)
+        return member is not None and member.legs == number
+
+    def _look_later(self, names: set[str]) -> None:
+        again_at_s = asyncio.get_running_loop().time() + DECIDE_AGAIN_S / self._time_scale
+        self._again_at_s |= dict.fromkeys(names, again_at_s)
+
+    @property
+    def _legs_at_once(self) -> int:
+        """How many legs are decided together, so that they last until the next decision is made."""
+        way_m = DECISIONS_AHEAD * self._decider.takes_s * self._time_scale * self._spec.speed_mps
+        return min(max(math.ceil(way_m / self._spec.limits.max_step_m), 1), MOST_AHEAD)
+
+    def _begins_at(self, member: Member, start_m: FloatArray) -> bool:
+        if not member.busy and not member.ahead:
+            return True  # it is there or near it, and its way is looked at once more before it is sent
+        return bool(np.array_equal(member.last_end_m(self._live.frame), start_m))
+
+    def _apart(self, decision: Decision) -> Decision:
+        """Give no leg to a vehicle that would come too close to another one on the way."""
+        close = too_close(decision, self._live, self._spec)
+        if not close:
+            return decision
+        legs = [replace(leg, refusal=close.get(leg.vehicle, leg.refusal)) for leg in decision.legs]
+        notes = [f"{name}: {reason}; it waits" for name, reason in close.items()]
+        return replace(decision, legs=legs, notes=[*decision.notes, *notes])
+
+    def _place(self, member: Member, *, moving: bool) -> Place:
+        left = max(self._legs_left(member), 0)
+        left_m = (1.0 - RESERVE) * left * self._spec.limits.max_step_m
+        if left:
+            left_m = max(left_m, self._spec.limits.max_step_m)
+        return replace(place_ahead(member, self._live), moving=moving, left_m=left_m)
+
+    def _next_number(self, member: Member) -> int:
+        """Return the number of a vehicle's next leg: one that joins, or comes back, goes on where the team is."""
+        others = [m.legs for m in self._live.team.present if m is not member]
+        newcomer = member.name not in self._taking_part and not member.ordered and not member.ahead
+        reached = min(others) if others else self._live.header.step
+        return max(member.legs, min(reached, self._live.header.step) if newcomer else 0) + 1
+
+    def _legs_left(self, member: Member) -> int:
+        return self._spec.steps - member.legs
+
+    def _who_gets_legs(self) -> list[Member]:
+        """Return the vehicles to decide for now: none, or those that need a leg, with others that soon will."""
+        now_s = asyncio.get_running_loop().time()
+        self._taking_part -= {member.name for member in self._live.team if not member.present}
+        able = [
+            member
+            for member in self._live.team.present
+            if self._wants_legs(member)
+            and self._again_at_s.get(member.name, -math.inf) <= now_s
+            and len(member.ahead) < MOST_AHEAD
+        ]
+        if not any(self._needs_leg(member) for member in able):
+            return []
+        return [member for member in able if self._needs_leg(member) or self._will_need_leg(member)]
+
+    def _needs_leg(self, member: Member) -> bool:
+        if not member.ordered and not member.ahead:
+            return True
+        return len(member.ahead) < self._ahead or self._lasts_s(member) < DECISIONS_AHEAD * self._decider.takes_s
+
+    def _will_need_leg(self, member: Member) -> bool:
+        left_m = self._left_of_leg_m(member)
+        return len(member.ahead) <= self._ahead and left_m <= HARDLY_BEGUN * self._spec.limits.max_step_m
+
+    def _left_of_leg_m(self, member: Member) -> float:
+        if member.target_m is None or member.report is None or not member.ordered:
+            return 0.0
+        return float(np.linalg.norm(member.target_m - member.place_m(self._live.frame)))
+
+    def _lasts_s(self, member: Member) -> float:
+        """Return how long a vehicle's legs last, on the wall clock."""
+        ends = [leg.target_m for leg in member.ahead]
+        if member.target_m is not None:
+            ends.insert(0, member.target_m)
+        ahead_m = sum(float(np.linalg.norm(b - a)) for a, b in pairwise(ends))
+        return (self._left_of_leg_m(member) + ahead_m) / (self._spec.speed_mps * self._time_scale)
+
+    def _over(self) -> bool:
+        """Whether everybody has flown its way; who does not get on, or is out of reach for long, keeps nobody."""
+        team = list(self._live.team)
+        left = [m for m in team if self._wants_legs(m) or m.ordered or m.ahead]
+        if not left:
+            return bool(team)
+        somebody_is_done = any(m.present for m in team if m not in left)
+        if any(m.present and not (somebody_is_done and m.misses) for m in left):
+            return False
+        if not somebody_is_done and any(self._wants_legs(m) for m in left):
+            return False
+        patience_s = self._spec.step_deadline_s / self._time_scale
+        return all(m.present or self._absent_s(m) >= patience_s for m in left)
+
+    def _absent_s(self, member: Member) -> float:
+        """Return for how long a vehicle has been out of reach, as far as anybody looked, on the wall clock."""
+        now_s = asyncio.get_running_loop().time()
+        if member.present:
+            self._absent_since_s.pop(member.name, None)
+            return 0.0
+        return now_s - self._absent_since_s.setdefault(member.name, now_s)
+
+    def _wants_legs(self, member: Member) -> bool:
+        return self._next_number(member) <= self._spec.steps
+
+    @property
+    def _nobody_to_lead(self) -> bool:
+        team = self._live.team
+        return not team.present and any(self._wants_legs(member) for member in team)

@@ -1,0 +1,148 @@
+"""One running mission: taken up where it stands, flown to its end.
+
+Every start is a recovery: a mission goes on from what was last committed, whether it was just started, paused, or
+killed in the middle. A decision, its legs and the planner's memory are one transaction; legs are sent after it. So a
+crash between any two moments loses nothing and repeats nothing but the sending, which is harmless.
+"""
+
+import asyncio
+from concurrent.futures import Executor
+
+import numpy as np
+
+from app.arrays import FloatArray
+from app.exploration.planner.base import PlannerBase
+from app.exploration.planners import create_planner
+from app.missions import metrics
+from app.missions.fleet.hub import FleetHub
+from app.missions.fleet.interface import WaypointReport, WaypointStatus
+from app.missions.flight.commit import LegCommit, committed_leg
+from app.missions.flight.deciding import Decider
+from app.missions.flight.decision import make_constraints
+from app.missions.flight.dispatch import Dispatch
+from app.missions.flight.elapsed_time import keep_time, save_elapsed
+from app.missions.flight.engagement import Engagement
+from app.missions.flight.own_legs import OwnLegs
+from app.missions.flight.search_hooks import SearchHooks
+from app.missions.flight.step_maps import StepMaps
+from app.missions.flight.team_steps import TeamSteps
+from app.missions.flight.telemetry_sampler import keep_telemetry
+from app.missions.flight.waiting import Waiting
+from app.missions.live.mission import LiveMission
+from app.missions.team import SETTLED, Member
+from app.missions.views.mission import Level
+from app.storage import missions as mission_queries
+from app.storage.uncancellable import to_the_end
+
+
+class Runner:
+    """Runs one mission from its last committed leg to its last one; cancel ``run`` to stop it.
+
+    Parameters
+    ----------
+    time_scale
+        How much faster than the wall clock the vehicles live.
+    """
+
+    def __init__(self, live: LiveMission, hub: FleetHub, executor: Executor, time_scale: float) -> None:
+        self._live = live
+        self._time_scale = time_scale
+        constraints = make_constraints(live.spec)
+        planner = create_planner(live.spec.planner.name, live.spec.planner.options, live.planning_sensor)
+        linked = np.isfinite(constraints.com_range_m) or any(m.capabilities.flies_together for m in live.team)
+        self._apart = live.search is None and not linked and _decides_apart(planner)
+        self._maps = StepMaps(live, executor, time_scale)
+        self._waiting = Waiting(live)
+        self._lookout = SearchHooks(live, time_scale, self._waiting.until)
+        self._decider = Decider(live, constraints, planner, self._maps, executor)
+        self._committing = LegCommit(live, constraints, leads=not self._lookout.needed)
+        self._dispatch = Dispatch(live, hub, self._committing, time_scale, persistent=self._apart)
+        self._engagement = Engagement(live, hub, time_scale, self._dispatch.send)
+
+    async def run(self) -> str:
+        """Fly to the mission's end. Returns why nobody goes on; raises whatever went wrong."""
+        live = self._live
+        live.running_since_s = asyncio.get_running_loop().time()
+        metrics.RUNNING.inc()
+        keepers = [
+            asyncio.create_task(self._engagement.keep()),
+            asyncio.create_task(keep_time(live)),
+            asyncio.create_task(keep_telemetry(live, self._time_scale)),
+        ]
+        try:
+            resumed = await self._recover()
+            return await self._flight().fly(resumed=resumed)
+        finally:
+            metrics.RUNNING.dec()
+            for keeper in keepers:
+                keeper.cancel()
+            await asyncio.gather(*keepers, return_exceptions=True)
+            await self._maps.end()
+            await to_the_end(save_elapsed(live))
+            live.running_since_s = None
+            live.standstill = ""
+
+    def _flight(self) -> OwnLegs | TeamSteps:
+        shared = (self._live, self._decider, self._committing, self._dispatch, self._maps, self._waiting)
+        if self._apart:
+            return OwnLegs(*shared, self._time_scale)
+        return TeamSteps(*shared, self._lookout, self._time_scale)
+
+    async def _recover(self) -> bool:
+        """Take up what was last committed: the planner's memory, and the legs that were not flown; whether any was."""
+        live = self._live
+        for member in live.team:
+            member.ahead.clear()
+            member.set_order(None)
+            member.status = None
+        async with live.database.reading() as session:
+            step = await mission_queries.last_step(session, live.id)
+            if step is None:
+                return False
+            rows = await mission_queries.unsettled_waypoints(session, live.id, SETTLED)
+            newest = await mission_queries.newest_waypoints(session, live.id)
+        self._decider.planner.restore(step.memory)
+        live.set_step(step.number, step.objective, step.terms)
+        last = {row.vehicle: row.step for row in newest}
+        for member in live.team:
+            member.legs = last.get(member.name, 0)
+            of_it = [row for row in rows if row.vehicle == member.name]
+            member.ahead += [committed_leg(row) for row in of_it if self._apart or row.step == step.number]
+            self._leave_out_passed(member)
+        await live.journal.log(
+            Level.INFO, "resumed", f"going on after step {step.number} of {live.spec.steps}", step=step.number
+        )
+        return True
+
+    def _leave_out_passed(self, member: Member) -> None:
+        """Leave out the legs that a vehicle had flown before anybody could write that down."""
+        if member.report is None or len(member.ahead) < 2:
+            return
+        first = nearest_leg(member.place_m(self._live.frame), np.array([leg.target_m for leg in member.ahead]))
+        for leg in member.ahead[:first]:
+            reason = "flown while nobody was there to note it"
+            self._live.journal.waypoint(
+                WaypointReport(member.name, self._live.id, leg.number, WaypointStatus.MISSED, reason)
+            )
+        del member.ahead[:first]
+
+
+def nearest_leg(place_m: FloatArray, ends_m: FloatArray) -> int:
+    """Return which of a vehicle's legs goes on from where it is: the one that passes it closest, the first of equals.
+
+    Parameters
+    ----------
+    place_m : (2,)
+    ends_m : (n, 2)
+        Where the legs end; each begins at the end before, the first one anywhere.
+    """
+    starts = np.vstack([ends_m[:1], ends_m[:-1]])
+    along = ends_m - starts
+    length2 = np.einsum("ij,ij->i", along, along)
+    part = np.einsum("ij,ij->i", place_m - starts, along) / np.where(length2 > 0.0, length2, 1.0)
+    nearest = starts + np.clip(part, 0.0, 1.0)[:, None] * along
+    return int(np.argmin(np.hypot(*(nearest - place_m).T)))
+
+
+def _decides_apart(planner: object) -> bool:
+    return isinstance(planner, PlannerBase) and planner.decides_apart

@@ -1,0 +1,197 @@
+"""Flies a mission whose vehicles go together: in steps, each decided for all of them when the last is flown.
+
+Searches need what every vehicle saw at its last place, and a team with short links stays together.
+"""
+
+import asyncio
+
+import numpy as np
+
+from app.missions.fleet.interface import WaypointStatus
+from app.missions.flight.commit import LegCommit
+from app.missions.flight.deciding import DECIDE_AGAIN_S, Decider, place_ahead, place_of
+from app.missions.flight.decision import Decision, Place
+from app.missions.flight.dispatch import Dispatch
+from app.missions.flight.search_hooks import SearchHooks
+from app.missions.flight.step_maps import StepMaps
+from app.missions.flight.waiting import Waiting
+from app.missions.live.mission import LiveMission
+from app.missions.team import Member
+from app.missions.views.mission import Level
+
+REPORT_DELAY_S = 0.1
+"""How old a vehicle's last report is at most, on the wall clock."""
+
+
+class TeamSteps:
+    """Flies one running mission step by step.
+
+    Parameters
+    ----------
+    time_scale
+        How much faster than the wall clock the vehicles live.
+    """
+
+    def __init__(
+        self,
+        live: LiveMission,
+        decider: Decider,
+        committing: LegCommit,
+        dispatch: Dispatch,
+        maps: StepMaps,
+        waiting: Waiting,
+        lookout: SearchHooks,
+        time_scale: float,
+    ) -> None:
+        self._live = live
+        self._spec = live.spec
+        self._decider = decider
+        self._committing = committing
+        self._dispatch = dispatch
+        self._maps = maps
+        self._waiting = waiting
+        self._lookout = lookout
+        self._time_scale = time_scale
+
+    async def fly(self, *, resumed: bool) -> str:
+        """Fly all remaining steps; returns why there are no more. ``resumed``: legs of an earlier run come first."""
+        live = self._live
+        if resumed:
+            await self._waiting.for_team(patient_s=self._step_time_s() / self._time_scale)
+            await self._dispatch.begin()
+            await self._arrive(self._deadline_s())
+        decision: Decision | None = None
+        while live.header.step < self._spec.steps:
+            started_s = asyncio.get_running_loop().time()
+            if decision is None:
+                await self._waiting.for_team(
+                    patient_s=None if live.header.step else self._step_time_s() / self._time_scale
+                )
+                await self._lookout.look_round()
+                decision = await self._decide_to_fly()
+            for member in live.team:
+                member.set_order(None)
+                member.status = None
+                member.ahead.clear()
+            number = live.header.step + 1
+            await self._committing.commit(decision, {leg.vehicle: number for leg in decision.legs})
+            await self._dispatch.begin()
+            await self._send_until_flown()
+            taken = decision
+            # The map is made and its model refined while the vehicles travel.
+            self._maps.begin()
+            decision = await self._travel()
+            if await self._lookout.is_over(taken, asyncio.get_running_loop().time() - started_s):
+                return "everybody is back at the entry"
+        return "every step is done"
+
+    async def _decide_to_fly(self) -> Decision:
+        """Decide a step that at least one vehicle flies: one in which nobody may go anywhere is no step."""
+        while True:
+            number = self._live.header.step + 1
+            decision = await self._decider.decide_to_fly(number, self._places(), self._lookout.task(number))
+            if decision:
+                return decision[0]
+            await asyncio.sleep(DECIDE_AGAIN_S / self._time_scale)
+            await self._waiting.for_team()
+
+    async def _travel(self) -> Decision | None:
+        """Wait until the vehicles arrived; returns the next step's decision when it could be made on the way.
+
+        Deciding takes a moment in which vehicles would wait. So it begins when all of them are about to arrive, for the
+        places where they will be. Whether they really came there decides whether the decision counts.
+        """
+        deadline_s, live = self._deadline_s(), self._live
+        close = await self._waiting.until(
+            lambda: all(self._about_to_arrive(m) for m in live.team if m.busy) or bool(self._lookout.barred()),
+            deadline_s,
+        )
+        last = live.header.step >= self._spec.steps
+        if not close or last or not live.team.present or self._lookout.barred():
+            await self._arrive(deadline_s)
+            return None
+        planner = self._decider.planner
+        memory, number = planner.snapshot(), live.header.step + 1
+        expected = [place_ahead(member, live) for member in live.team.present]
+        deciding = asyncio.create_task(self._decider.decide(number, expected, self._lookout.task(number)))
+        try:
+            await self._arrive(deadline_s)
+            [decision] = await deciding
+        finally:
+            deciding.cancel()
+        flown = not all(leg.refusal for leg in decision.legs)
+        if flown and self._came_true(expected) and self._lookout.still_clear(decision):
+            return decision
+        planner.restore(memory)
+        return None
+
+    def _about_to_arrive(self, member: Member) -> bool:
+        """Tell whether a vehicle will be at its waypoint by the time a decision takes."""
+        if member.target_m is None or member.report is None:
+            return False
+        left_m = float(np.linalg.norm(member.target_m - member.place_m(self._live.frame)))
+        ahead_s = (self._decider.takes_s + REPORT_DELAY_S) * self._time_scale
+        return left_m <= self._spec.arrival_radius_m + self._spec.speed_mps * ahead_s
+
+    def _places(self) -> list[Place]:
+        return [place_of(member, self._live) for member in self._live.team.present]
+
+    def _came_true(self, expected: list[Place]) -> bool:
+        """Tell whether the vehicles are the expected ones at the expected places."""
+        there = {place.vehicle: place.en_m for place in self._places()}
+        tolerance_m = 2 * self._spec.arrival_radius_m
+        return there.keys() == {place.vehicle for place in expected} and all(
+            np.linalg.norm(there[place.vehicle] - place.en_m) <= tolerance_m for place in expected
+        )
+
+    async def _send_until_flown(self) -> None:
+        """Send the step again for as long as every vehicle refused it: what nobody took on is not over."""
+        live, turned_down = self._live, self._dispatch.turned_down
+        while not live.halted:
+            ordered = [member for member in live.team if member.order is not None]
+            if not ordered or not all(member.name in turned_down for member in ordered):
+                return
+            await asyncio.sleep(DECIDE_AGAIN_S / self._time_scale)
+            await self._waiting.for_team()
+            for member in live.team.present:
+                if member.order is not None:
+                    member.status = WaypointStatus.PLANNED
+                    turned_down.pop(member.name, None)
+                    await self._dispatch.send(member)
+
+    async def _arrive(self, deadline_s: float) -> None:
+        """Wait until every vehicle under way arrived or refused; at the deadline go on without the others."""
+        if await self._waiting.until(
+            lambda: not any(m.busy for m in self._live.team) or bool(self._lookout.barred()), deadline_s
+        ):
+            await self._end_early(self._lookout.barred())
+            return
+        late = [member for member in self._live.team if member.busy]
+        for member in late:
+            self._dispatch.settle(member, WaypointStatus.MISSED, f"not reached within {self._step_time_s():.0f} s")
+        await self._live.journal.log(
+            Level.WARNING,
+            "straggler",
+            f"step {self._live.header.step} goes on without {', '.join(m.name for m in late)}",
+            step=self._live.header.step,
+            vehicles=[m.name for m in late],
+        )
+
+    async def _end_early(self, barred: list[Member]) -> None:
+        """Where something stands on a vehicle's way, end the step: everybody is sent anew from where it is."""
+        if not barred:
+            return
+        for member in self._live.team:
+            if member.busy:
+                reason = "something stands on its way" if member in barred else "the step ended before it was there"
+                self._dispatch.settle(member, WaypointStatus.MISSED, reason)
+        await self._lookout.tell_of(barred)
+
+    def _deadline_s(self) -> float:
+        """Return the event loop's time at which a step that begins now goes on without stragglers."""
+        return asyncio.get_running_loop().time() + self._step_time_s() / self._time_scale
+
+    def _step_time_s(self) -> float:
+        """Return how long a step may take: longer than asked for where a vehicle's leg takes longer."""
+        under_way = [member.leg_allowed_s for member in self._live.team if member.ordered and member.report is not None]
+        return max([self._spec.step_deadline_s, *under_way])

@@ -1,0 +1,134 @@
+"""Vehicles that fly on their own time: nobody waits, nobody is repeated, and whoever comes too close gets no leg."""
+
+import asyncio
+import time
+from collections import defaultdict
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from sqlalchemy import select
+
+from app.missions.fleet.interface import WaypointOrder, WaypointReport, WaypointStatus
+from app.missions.fleet.links.sim import SimFleetLink
+from app.missions.flight import deciding
+from app.missions.flight.decision import Decision, decide
+from app.missions.flight.runner import nearest_leg
+from app.missions.operations.history import events_after
+from app.missions.service import MissionService
+from app.missions.states import MissionState
+from app.storage.database import Database
+from app.storage.models import StepRow, WaypointRow
+from tests.support.missions.harbour import Harbour, Rover, act, sim_spec, until_state
+
+APART = {"limits": {"max_step_m": 5.0, "min_separation_m": 0.0}}
+
+
+class Flown:
+    """What vehicles were ordered and what they told, as the link saw it: (loop time, step), by vehicle."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.ordered: dict[str, list[tuple[float, int]]] = defaultdict(list)
+        self.reached: dict[str, list[tuple[float, int]]] = defaultdict(list)
+        order = SimFleetLink.order
+
+        async def noted(link: SimFleetLink, waypoint: WaypointOrder) -> None:
+            self.ordered[waypoint.vehicle].append((asyncio.get_running_loop().time(), waypoint.step))
+            await order(link, waypoint)
+
+        monkeypatch.setattr(SimFleetLink, "order", noted)
+        start = SimFleetLink.start
+
+        async def listening(link: SimFleetLink, sink: Any) -> None:
+            def told(event: Any) -> None:
+                if isinstance(event, WaypointReport) and event.status is WaypointStatus.REACHED:
+                    self.reached[event.vehicle].append((asyncio.get_running_loop().time(), event.step))
+                sink(event)
+
+            await start(link, told)
+
+        monkeypatch.setattr(SimFleetLink, "start", listening)
+
+
+async def test_no_vehicle_waits_for_a_decision_that_takes_long(
+    harbour_closed: Harbour, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    flown = Flown(monkeypatch)
+
+    def slow(*arguments: Any, **more: Any) -> Decision:
+        time.sleep(0.5)
+        return decide(*arguments, **more)
+
+    monkeypatch.setattr(deciding, "decide", slow)
+    service = await harbour_closed.open()
+    mission = (await service.create(sim_spec(steps=12, side_m=60.0, planner={"name": "lawnmower"}, **APART))).id
+    await act(service, mission, "start")
+    await until_state(service, mission, MissionState.FINISHED)
+    for name in ("a", "b"):
+        reached = dict(
+            zip([step for _, step in flown.reached[name]], [at for at, _ in flown.reached[name]], strict=True)
+        )
+        waits = [at - reached[step - 1] for at, step in flown.ordered[name] if step - 1 in reached]
+        assert [step for _, step in flown.ordered[name]] == list(range(1, 13))
+        # The first decisions come before any leg ahead; from then on the next leg is there already.
+        assert np.median(waits[4:]) < 0.25, waits
+
+
+async def test_everybody_flies_its_own_legs_and_a_step_is_begun_once(
+    service: MissionService, database: Database
+) -> None:
+    mission = (await service.create(sim_spec("a", "b", "c", steps=6, side_m=60.0, **APART))).id
+    await act(service, mission, "start")
+    await until_state(service, mission, MissionState.FINISHED)
+    async with database.reading() as session:
+        rows = (await session.scalars(select(WaypointRow))).all()
+        steps = (await session.scalars(select(StepRow).order_by(StepRow.number))).all()
+    assert [step.number for step in steps] == [1, 2, 3, 4, 5, 6]
+    assert [bool(step.memory) for step in steps] == [False] * 5 + [True]
+    flown = {name: sorted(row.step for row in rows if row.vehicle == name) for name in "abc"}
+    assert flown == {name: [1, 2, 3, 4, 5, 6] for name in "abc"}
+    assert {row.status for row in rows} == {"reached"}
+
+
+async def test_a_vehicle_that_does_not_move_keeps_nobody(service: MissionService) -> None:
+    vehicles = [{"name": "a", "kind": "sim"}, {"name": "stuck", "kind": "rest"}]
+    mission = await service.create(sim_spec(steps=6, step_deadline_s=300, vehicles=vehicles, **APART))
+    stuck = Rover(service, mission.id, "stuck")
+    await stuck.post()
+    begun = asyncio.get_running_loop().time()
+    await act(service, mission.id, "start")
+    async with asyncio.timeout(60):
+        live = await service.get(mission.id)
+        while (live.team.members["a"].legs, live.team.members["a"].ordered) != (6, False):  # noqa: ASYNC110
+            await asyncio.sleep(0.05)
+    # A step that waited for it would have taken its whole deadline.
+    assert asyncio.get_running_loop().time() - begun < 300 / service.settings.time_scale * 6
+    order = live.team.members["stuck"].order
+    assert order is not None
+    assert order.step == 1
+    await act(service, mission.id, "abort")
+
+
+async def test_vehicles_that_meet_are_kept_apart_on_the_way(service: MissionService, database: Database) -> None:
+    limits = {"max_step_m": 8.0, "min_separation_m": 6.0, "max_depth_m": 2.0, "min_depth_m": 2.0}
+    vehicles = [{"name": name, "kind": "sim", "depth_m": 2.0} for name in "abc"]
+    spec = sim_spec(steps=8, side_m=30.0, vehicles=vehicles, limits=limits, planner={"name": "random"})
+    mission = (await service.create(spec)).id
+    await act(service, mission, "start")
+    view = await until_state(service, mission, MissionState.FINISHED)
+    assert view.progress.step == 8
+    told = [line.message for line in await events_after(await service.get(mission)) if line.kind == "safety"]
+    assert any("its next leg passes" in message for message in told)
+
+
+@given(st.integers(0, 10_000))
+def test_the_leg_that_goes_on_from_a_place_on_it_is_found(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    ends = np.cumsum(rng.uniform(5.0, 20.0, (5, 2)), axis=0)  # never comes back
+    which, part = int(rng.integers(1, 5)), rng.uniform(0.05, 0.95)
+    place = ends[which - 1] + part * (ends[which] - ends[which - 1])
+    assert nearest_leg(place, ends) == which
+    before = ends[0] - rng.uniform(1.0, 20.0, 2)
+    assert nearest_leg(before, ends) == 0
