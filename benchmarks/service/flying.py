@@ -103,12 +103,15 @@ async def fly(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
             process.terminate()
             await process.wait()
     frame = LocalFrame(*ORIGIN)
-    by_vehicle = {}
+    by_vehicle: dict[str, dict[str, Any]] = {}
+    drawn: dict[str, tuple[FloatArray, FloatArray]] = {}
     for name, points in tracks.items():
         lon, lat, _, seconds = np.array(points).T
         track = np.column_stack(frame.to_local(lat, lon))
         ends = np.array([[row.east_m, row.north_m] for row in waypoints if row.vehicle == name]).reshape(-1, 2)
-        by_vehicle[name] = judged(track, seconds, ends)
+        by_vehicle[name], drawn[name] = judged(track, seconds, ends), (track, ends)
+    if options.picture is not None:
+        draw(options.picture, drawn)
     flown = sum(found["flown_m"] for found in by_vehicle.values())
     return {
         "state": str(view.state),
@@ -138,6 +141,7 @@ async def craft(number: int, options: argparse.Namespace) -> asyncio.subprocess.
 
 def slow_down(seconds: float) -> None:
     """Make every decision take so much longer."""
+
     def slow(*arguments: Any, **named: Any) -> Any:
         time.sleep(seconds)
         return decide(*arguments, **named)
@@ -193,6 +197,20 @@ def judged(track: FloatArray, seconds: FloatArray, ends: FloatArray) -> dict[str
     }
 
 
+def draw(file: Path, drawn: dict[str, tuple[FloatArray, FloatArray]]) -> None:
+    """Draw tracks (n, 2) over the ends (k, 2) of legs."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(9, 9), layout="constrained")
+    axes = figure.subplots()
+    for k, (track, ends) in enumerate(drawn.values()):
+        axes.plot(*ends.T, "-", color=f"C{k}", linewidth=0.5)
+        axes.plot(*ends.T, ".", color=f"C{k}", markersize=4)
+        axes.plot(*track.T, color=f"C{k}", linewidth=1.5, alpha=0.6)
+    axes.set_aspect("equal")
+    figure.savefig(file, dpi=110)
+
+
 def main(arguments: Sequence[str] | None = None) -> None:
     """Fly and print."""
     parser = make_parser(__doc__, FLIGHT)
@@ -207,6 +225,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--planner", default="cao")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--slow-decisions", type=float, default=0.0, help="seconds of the vehicles' time")
+    parser.add_argument("--picture", type=Path, metavar="FILE", help="draw the tracks into this file")
     options = parser.parse_args(arguments)
     with tempfile.TemporaryDirectory(prefix="bathyfleet-flying-") as folder:
         found = asyncio.run(fly(options, Path(folder)))

@@ -71,7 +71,7 @@ async def test_no_vehicle_waits_for_a_decision_that_takes_long(
             zip([step for _, step in flown.reached[name]], [at for at, _ in flown.reached[name]], strict=True)
         )
         waits = [at - reached[step - 1] for at, step in flown.ordered[name] if step - 1 in reached]
-        assert [step for _, step in flown.ordered[name]] == list(range(1, 13))
+        assert sorted({step for _, step in flown.ordered[name]}) == list(range(1, 13))
         # The first decisions come before any leg ahead; from then on the next leg is there already.
         assert np.median(waits[4:]) < 0.25, waits
 
