@@ -7,8 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from app.arrays import FloatArray
 from app.exploration.core.constraints import Constraints
-from app.exploration.core.problem import Planner
+from app.exploration.core.problem import Belief, Planner
 from app.exploration.site_search import SearchTask
 from app.missions import metrics
 from app.missions.clock import now
@@ -65,27 +66,34 @@ class Decider:
         await live.journal.storage.done(live.ranges.flush)
         targets = live.ranges.tracking.told(live.ranges.times.now_s(), step_s)
 
+        def decided(number: int, here: list[Place], belief: Belief, sounded: tuple[FloatArray, FloatArray]) -> Decision:
+            sounded_m, doubtful_m = sounded
+            return decide(
+                number,
+                live.spec,
+                self._constraints,
+                self.planner,
+                here,
+                belief,
+                sounded_m,
+                live.gate.corrections.water_level_m(now().timestamp()),
+                doubtful_m,
+                targets,
+                task,
+            )
+
         def work() -> list[Decision]:
-            sounded_m, doubtful_m = live.builder.sounded_at_m()
-            belief, here, decisions = live.builder.belief(), places, list[Decision]()
-            for later in range(legs):
-                decision = decide(
-                    number + later,
-                    live.spec,
-                    self._constraints,
-                    self.planner,
-                    here,
-                    belief,
-                    sounded_m,
-                    live.gate.corrections.water_level_m(now().timestamp()),
-                    doubtful_m,
-                    targets,
-                    task,
-                )
-                decisions.append(decision)
-                here = moved_on(here, decision)
-                if not any(place.moving for place in here):
+            belief, sounded = live.builder.belief(), live.builder.sounded_at_m()
+            decisions = [decided(number, places, belief, sounded)]
+            here = moved_on(places, decisions[0])
+            while len(decisions) < legs and any(place.moving for place in here):
+                try:
+                    decisions.append(decided(number + len(decisions), here, belief, sounded))
+                except Exception:
+                    # It comes out when this leg is the first to be decided.
+                    self.planner.restore(decisions[-1].memory)
                     break
+                here = moved_on(here, decisions[-1])
             return decisions
 
         with metrics.PLANNING_SECONDS.time():

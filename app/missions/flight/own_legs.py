@@ -64,8 +64,8 @@ class OwnLegs:
         self._maps = maps
         self._waiting = waiting
         self._time_scale = time_scale
-        watched = bool(live.spec.targets) or live.spec.surface_policy is not None
-        self._ahead = AHEAD_WHEN_WATCHED if watched else AHEAD
+        self._watched = bool(live.spec.targets) or live.spec.surface_policy is not None
+        self._ahead = AHEAD_WHEN_WATCHED if self._watched else AHEAD
         self._taking_part = {member.name for member in live.team if member.legs}
         """Vehicles that go on with their own numbers: they had legs, and were not away since."""
         self._absent_since_s: dict[str, float] = {}
@@ -155,6 +155,8 @@ class OwnLegs:
     @property
     def _legs_at_once(self) -> int:
         """How many legs are decided together, so that they last until the next decision is made."""
+        if self._watched:
+            return 1
         way_m = DECISIONS_AHEAD * self._decider.takes_s * self._time_scale * self._spec.speed_mps
         return min(max(math.ceil(way_m / self._spec.limits.max_step_m), 1), MOST_AHEAD)
 
@@ -207,7 +209,9 @@ class OwnLegs:
     def _needs_leg(self, member: Member) -> bool:
         if not member.ordered and not member.ahead:
             return True
-        return len(member.ahead) < self._ahead or self._lasts_s(member) < DECISIONS_AHEAD * self._decider.takes_s
+        if len(member.ahead) < self._ahead:
+            return True
+        return not self._watched and self._lasts_s(member) < DECISIONS_AHEAD * self._decider.takes_s
 
     def _will_need_leg(self, member: Member) -> bool:
         left_m = self._left_of_leg_m(member)
