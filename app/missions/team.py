@@ -16,6 +16,7 @@ from app.missions.fleet.interface import (
     WaypointOrder,
     WaypointStatus,
 )
+from app.missions.flown import Flown
 from app.missions.spec.mission import Limits, VehicleKind, VehicleSpec
 
 SETTLED = frozenset({WaypointStatus.REACHED, WaypointStatus.REFUSED, WaypointStatus.MISSED})
@@ -50,6 +51,7 @@ class Member:
     """How often it was sent up for one."""
     pursuing: str | None = None
     """The target for which it left the mapping."""
+    flown: Flown = field(default_factory=Flown)
 
     @property
     def name(self) -> str:
