@@ -59,7 +59,7 @@ class Budget(Model):
         given = [name for name, value in self if value is not None]
         if len(given) != 1:
             raise ValueError(
-                f"{' and '.join(given) or 'nothing'} is given: give exactly one of {', '.join(type(self).model_fields)}"
+                f"{' and '.join(given) or 'nothing'} given: give exactly one of {', '.join(type(self).model_fields)}"
             )
         return self
 
