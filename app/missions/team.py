@@ -33,6 +33,7 @@ class Member:
     report: VehicleReport | None = None
     heard_s: float | None = None
     """When that was, Unix seconds by the service's clock."""
+    flown: Flown = field(default_factory=Flown)
     left_at: datetime | None = None
     """When it left the mission; None while it takes part."""
     link: LinkState = LinkState.UNKNOWN
@@ -51,7 +52,6 @@ class Member:
     """How often it was sent up for one."""
     pursuing: str | None = None
     """The target for which it left the mapping."""
-    flown: Flown = field(default_factory=Flown)
 
     @property
     def name(self) -> str:

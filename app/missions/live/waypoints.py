@@ -49,7 +49,7 @@ class WaypointViews:
                 "east_m": row.east_m,
                 "north_m": row.north_m,
                 "depth_m": row.depth_m,
-                "speed_mps": self._spec.speed_of(row.vehicle),
+                "speed_mps": self._spec.speed_mps,
                 "arrival_radius_m": self._spec.arrival_radius_m,
                 "min_altitude_m": self._spec.limits.min_altitude_m,
                 "status": row.status,
