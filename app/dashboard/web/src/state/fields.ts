@@ -42,7 +42,7 @@ export const FIELDS = {
   km_per_vehicle: {
     path: "budget.km_per_vehicle",
     part: "length",
-    label: "Kilometres per vehicle",
+    label: "Km per vehicle",
     kind: "survey",
   },
   goal_radius_m: {

@@ -212,7 +212,7 @@ function draftMarks(draft: Draft): SearchMark[] {
 const LENGTHS = [
   ["steps", "steps"],
   ["minutes", "minutes"],
-  ["km_per_vehicle", "km per vehicle"],
+  ["km_per_vehicle", "kilometres"],
 ] as const;
 
 /** How long the mission is, in the unit of the operator's choice. */
