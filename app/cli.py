@@ -343,7 +343,15 @@ def demo(
         ),
     ] = None,
     vehicles: Annotated[int, typer.Option(min=1, max=20, help="Number of simulated AUVs.")] = 2,
-    steps: Annotated[int, typer.Option(min=1, max=100_000, help="Steps of the mission.")] = 60,
+    steps: Annotated[
+        int | None, typer.Option(min=1, max=100_000, help="Steps of the mission [default: 60]", show_default=False)
+    ] = None,
+    minutes: Annotated[
+        float | None, typer.Option(min=0.1, max=10_080, help="Instead of steps: minutes under way, of vehicle time.")
+    ] = None,
+    km: Annotated[
+        float | None, typer.Option(min=0.01, max=1000, help="Instead of steps: kilometres that each vehicle flies.")
+    ] = None,
     search: Annotated[
         str | None,
         typer.Option(
@@ -366,11 +374,19 @@ def demo(
     from app.demo import DemoOptions, run_demo
     from app.demo_service import DemoError
 
+    lengths = {"--steps": steps, "--minutes": minutes, "--km": km}
+    given = [option for option, value in lengths.items() if value is not None]
+    if len(given) > 1:
+        raise CommandError(f"{' and '.join(given)} are given", "a mission has one length: leave out all but one")
     if search is not None:
+        if given:
+            raise CommandError(f"{given[0]}: a search is as long as its time window", "give --window in seconds")
         raise typer.Exit(_search_demo(search, vehicles, window, speed, seed, port, output, keep_serving=keep_serving))
     options = DemoOptions(
         vehicles=vehicles,
-        steps=steps,
+        steps=steps if given else 60,
+        minutes=minutes,
+        km=km,
         speed=speed,
         terrain=terrain,
         seed=seed,

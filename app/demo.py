@@ -29,6 +29,7 @@ from app.evaluation.survey.baselines import Baseline, lawnmower_baselines
 from app.exploration.core.constraints import Constraints
 from app.mapping.compare import difference
 from app.mapping.types import Grid
+from app.missions.spec.budget import Budget
 from app.settings import Settings
 from app.storage import private
 from simulator.seafloors import generate
@@ -50,13 +51,20 @@ class DemoOptions:
     """What can be chosen on the command line; see ``bathyfleet demo --help``."""
 
     vehicles: int
-    steps: int
+    steps: int | None
+    minutes: float | None
+    km: float | None
     speed: float
     terrain: Path | None
     seed: int
     port: int
     keep_serving: bool
     output: Path
+
+    @property
+    def budget(self) -> Budget:
+        """How long the mission is."""
+        return Budget(minutes=self.minutes, km_per_vehicle=self.km, steps=self.steps)
 
 
 @dataclass
@@ -213,7 +221,7 @@ class _Demo:
             "name": f"Demo over {terrain.name}",
             "area": {"type": "Polygon", "coordinates": [[*ring, ring[0]]]},
             "vehicles": [{"name": name, "kind": "imc"} for name in self._vehicles],
-            "steps": options.steps,
+            "budget": options.budget.model_dump(),
             "seed": options.seed,
             "sounding_noise": NOISE,
             "limits": {
@@ -239,7 +247,7 @@ class _Demo:
     async def _watch(self, api: httpx.AsyncClient, mission_id: str) -> None:
         """Show the mission's progress until it has ended."""
         bar = Progress(
-            TextColumn("step {task.completed}/{task.total}"),
+            TextColumn("{task.fields[length]}"),
             BarColumn(bar_width=None),
             TextColumn("coverage {task.fields[coverage]:5.1f} %"),
             TextColumn("map RMSE {task.fields[rmse]}"),
@@ -249,7 +257,7 @@ class _Demo:
         )
         rmse, mapped_at = "   –   ", -MAP_PERIOD_S
         with bar:
-            task = bar.add_task("", total=self._options.steps, coverage=0.0, rmse=rmse, eta=None)
+            task = bar.add_task("", total=1.0, length="", coverage=0.0, rmse=rmse, eta=None)
             while True:
                 mission = await get(api, f"/missions/{mission_id}")
                 progress = mission["progress"]
@@ -258,8 +266,9 @@ class _Demo:
                     mapped_at = time.monotonic()
                     error = await self._rmse(api, mission_id)
                     rmse = rmse if error is None else f"{error:5.3f} m"
-                done = progress["step"] if mission["state"] != "running" else max(progress["step"] - 1, 0)
-                bar.update(task, completed=done, coverage=progress["coverage_pct"], rmse=rmse, eta=progress["eta_s"])
+                share, length = _how_far(progress, running=mission["state"] == "running")
+                shown = {"coverage": progress["coverage_pct"], "rmse": rmse, "eta": progress["eta_s"]}
+                bar.update(task, completed=share, length=length, **shown)
                 if mission["state"] in ("finished", "failed", "aborted"):
                     return
                 await asyncio.sleep(POLL_S)
@@ -348,6 +357,18 @@ class _Demo:
             markup=False,
             highlight=False,
         )
+
+
+def _how_far(progress: dict[str, Any], *, running: bool) -> tuple[float, str]:
+    """Return the share of a mission that was flown, and the same in the unit of its length."""
+    budget = progress["budget"] or {}
+    for unit, left, words in (("minutes", "minutes_left", "min"), ("km_per_vehicle", "km_left_per_vehicle", "km")):
+        if unit in budget and progress[left] is not None:
+            whole = budget[unit]
+            done = max(whole - progress[left], 0.0)
+            return done / whole, f"{done:.3g}/{whole:g} {words}"
+    done = max(progress["step"] - running, 0)
+    return done / progress["steps"], f"step {done}/{progress['steps']}"
 
 
 class _Eta(ProgressColumn):

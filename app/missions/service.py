@@ -161,7 +161,8 @@ class MissionService:
             name=spec.name,
             state=MissionState.READY if spec.vehicles else MissionState.DRAFT,
             reason="" if spec.vehicles else "no vehicle yet",
-            spec=spec.model_dump(mode="json"),
+            # Its steps follow from its budget.
+            spec=spec.model_dump(mode="json", exclude={"steps"}),
             created_at=created,
             updated_at=created,
             elapsed_s=0.0,

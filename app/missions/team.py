@@ -17,6 +17,7 @@ from app.missions.fleet.interface import (
     WaypointOrder,
     WaypointStatus,
 )
+from app.missions.flown import Flown
 from app.missions.spec.mission import Limits, VehicleKind, VehicleSpec
 
 SETTLED = frozenset({WaypointStatus.REACHED, WaypointStatus.REFUSED, WaypointStatus.MISSED})
@@ -45,6 +46,7 @@ class Member:
     report: VehicleReport | None = None
     heard_s: float | None = None
     """When that was, Unix seconds by the service's clock."""
+    flown: Flown = field(default_factory=Flown)
     left_at: datetime | None = None
     """When it left the mission; None while it takes part."""
     link: LinkState = LinkState.UNKNOWN

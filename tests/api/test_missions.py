@@ -7,6 +7,7 @@ import httpx
 import pytest
 
 from app.exploration.pcao.model import default_model
+from tests.support.missions.searches import search_json
 from tests.support.rest import mission_spec, soundings
 
 
@@ -94,3 +95,37 @@ async def test_vehicles_and_planners_are_listed(client: httpx.AsyncClient, missi
     planners = {p["name"]: p for p in (await client.get("/planners")).json()}
     assert {"cao", "random", "lawnmower"} <= set(planners)
     assert planners["cao"]["options"]["type"] == "object"
+
+
+async def test_a_mission_is_as_long_as_its_minutes_and_keeps_both_figures(client: httpx.AsyncClient) -> None:
+    vehicles = [
+        {"name": "rover", "kind": "rest", "speed_mps": 2.0, "turn_radius_m": 8},
+        {"name": "slow", "kind": "rest"},
+    ]
+    spec = mission_spec(vehicles=vehicles, budget={"minutes": 10})
+    del spec["steps"]
+    created = (await client.post("/missions", json=spec)).json()
+    assert created["spec"]["budget"] == {"minutes": 10}
+    assert created["spec"]["steps"] == created["progress"]["steps"] == 120
+    assert [(v["speed_mps"], v["turn_radius_m"]) for v in created["spec"]["vehicles"]] == [(2.0, 8.0), (None, None)]
+    again = await client.post("/missions", json=created["spec"])
+    assert (again.status_code, again.json()["spec"]) == (201, created["spec"])
+    checks = (await client.get(f"/missions/{created['id']}/preflight")).json()["checks"]
+    (duration,) = [check["message"] for check in checks if check["id"] == "duration"]
+    assert duration.startswith("at most 10 min at 1.3 to 2 m/s; 2.0 km of tracks by 2 vehicles")
+
+
+async def test_vehicles_tell_what_they_have_flown_in_their_mission(
+    client: httpx.AsyncClient, mission: dict[str, Any]
+) -> None:
+    await client.post(f"/missions/{mission['id']}/measurements", json={"items": soundings(1)})
+    seen = (await client.get(f"/missions/{mission['id']}")).json()
+    assert seen["efficiency_pct"] is None
+    flown = {name: seen["vehicles"][0][name] for name in ("phase", "flown_m", "on_plan_m", "idle_s")}
+    assert flown == {"phase": "transit", "flown_m": 0.0, "on_plan_m": 0.0, "idle_s": 0.0}
+
+
+async def test_in_a_search_all_fly_at_the_missions_speed(client: httpx.AsyncClient) -> None:
+    search = search_json(vehicles=[{"name": "boat", "kind": "rest", "speed_mps": 0.5}])
+    refused = await client.post("/missions", json=search)
+    assert (refused.status_code, refused.json()["errors"][0]["field"]) == (422, "vehicles.0.speed_mps")

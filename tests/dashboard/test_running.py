@@ -3,7 +3,7 @@
 import re
 
 import pytest
-from playwright.sync_api import Page, expect
+from playwright.sync_api import Page, Route, expect
 
 from tests.support.dashboard.browser import Watched
 from tests.support.dashboard.service import Service
@@ -150,3 +150,23 @@ def test_a_fixed_range_and_the_colours_outlive_the_page(page: Page, service: Ser
     by_id(page, "layer").select_option("depth")
     by_id(page, "range-fit").click()
     expect(by_id(page, "range-high")).not_to_have_value("33")
+
+
+def test_progress_is_told_in_the_unit_of_the_missions_length_and_of_each_vehicle(page: Page, service: Service) -> None:
+    mission = service.create(name="By way", vehicles=[{"name": "sim-1", "kind": "sim"}], steps=40)
+
+    def in_kilometres(route: Route) -> None:
+        answer = route.fetch()
+        missions = answer.json()
+        for one in missions:
+            one["progress"] |= {"budget": {"km_per_vehicle": 2.3}, "km_left_per_vehicle": 1.1}
+        route.fulfill(response=answer, json=missions)
+
+    show(page, mission)
+    expect(by_id(page, f"mission-{mission}")).to_contain_text("Step 0 of 40")
+    expect(by_id(page, "flown-sim-1")).to_be_hidden()
+    start(page)
+    expect(by_id(page, "flown-sim-1")).to_have_text(re.compile(r"^[A-Z][a-z ]+ · \d+ m flown · \d+ s idle$"))
+    page.route("**/api/v1/missions", in_kilometres)
+    page.reload()
+    expect(by_id(page, f"mission-{mission}")).to_contain_text("1.2 of 2.3 km")

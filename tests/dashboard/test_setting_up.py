@@ -212,3 +212,25 @@ def test_nothing_hides_the_areas_lower_edge(page: Page, service: Service, width:
     assert strip is not None
     assert scale is not None
     assert scale["y"] + scale["height"] <= strip["y"] + 1
+
+
+def test_a_length_in_minutes_and_a_vehicles_own_speed_are_described_in_the_form(page: Page, service: Service) -> None:
+    page.goto("/")
+    by_id(page, "new-mission").click()
+    expect(by_id(page, "field-steps")).to_have_value("100")
+    by_id(page, "field-name").fill("An hour")
+    by_id(page, "field-length").select_option("minutes")
+    expect(by_id(page, "field-steps")).to_be_hidden()
+    by_id(page, "field-minutes").fill("10081")
+    by_id(page, "create-mission").click()
+    expect(by_id(page, "fault-minutes")).to_contain_text("Minutes must be more than 0 and at most 10080")
+    by_id(page, "field-minutes").fill("60")
+    page.get_by_text("Speeds of single vehicles").click()
+    by_id(page, "speed-sim-2").fill("2")
+    expect(by_id(page, "estimate")).to_contain_text("At most 1 h 00 min and 11.88 km of tracks")
+    by_id(page, "create-mission").click()
+    expect(by_id(page, "mission-name")).to_have_text("An hour")
+    made = next(m for m in service.get("/missions") if m["name"] == "An hour")
+    spec = service.get(f"/missions/{made['id']}")["spec"]
+    assert spec["budget"] == {"minutes": 60}
+    assert [vehicle["speed_mps"] for vehicle in spec["vehicles"]] == [None, 2.0]

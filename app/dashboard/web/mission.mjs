@@ -37,4 +37,8 @@ const flat = (tree, path = []) =>
 
 const fields = Object.fromEntries(leaves(schemas.MissionSpec));
 for (const [path, value] of flat(schemas.MissionSpec.properties.search["x-defaults"])) fields[path].inSearch = value;
+for (const [name, { default: usual }] of Object.entries(schemas.MissionSpec.properties)) {
+  if (typeof usual !== "object" || Array.isArray(usual)) continue;
+  for (const [path, value] of flat(usual, [name])) fields[path].default = value;
+}
 await writeFile(target, `${JSON.stringify(fields, null, 2)}\n`);

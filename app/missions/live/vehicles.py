@@ -70,6 +70,10 @@ class VehicleViews:
             surfacing=member.surfacing,
             risings=member.risings,
             pursuing=member.pursuing,
+            phase=member.flown.phase,
+            flown_m=round(member.flown.flown_m, 1),
+            on_plan_m=round(member.flown.on_plan_m, 1),
+            idle_s=round(member.flown.idle_s, 1),
         )
         if report is None:
             return view

@@ -12,6 +12,7 @@ from app.missions.live.mission import LiveMission
 from app.missions.live.vehicles import local_place
 from app.missions.preflight.search import search_checks
 from app.missions.safety import WAITING_CIRCLE_M
+from app.missions.spec.mission import MissionSpec, VehicleSpec
 from app.missions.team import Member
 from app.missions.views.mission import BatteryState, CheckStatus, CheckView, PreflightView
 
@@ -42,8 +43,17 @@ def preflight(live: LiveMission) -> PreflightView:
 def expected_s(live: LiveMission) -> float:
     """Return how long the mission takes at most when nothing stops it: every step as long as its largest leg."""
     spec = live.spec
-    left = spec.steps - live.header.step
-    return left * min(spec.limits.max_step_m / spec.speed_mps, spec.step_deadline_s)
+    longest_s = max([_way_m(spec, m.spec) / spec.speed_of(m.spec) for m in live.team], default=0.0)
+    return _share_left(live) * min(longest_s, spec.steps * spec.step_deadline_s)
+
+
+def _way_m(spec: MissionSpec, vehicle: VehicleSpec) -> float:
+    """Return how far a vehicle flies at most in the whole mission, metres."""
+    return spec.allowance(vehicle).most_m(spec.limits.max_step_m)
+
+
+def _share_left(live: LiveMission) -> float:
+    return 1 - live.header.step / live.spec.steps
 
 
 def _vehicles(live: LiveMission) -> Iterator[CheckView]:
@@ -276,15 +286,18 @@ def _known_bottom(live: LiveMission) -> Iterator[CheckView]:
 def _duration(live: LiveMission) -> CheckView:
     spec = live.spec
     seconds = expected_s(live)
-    vehicles = len(list(live.team))
-    metres = vehicles * (spec.steps - live.header.step) * spec.limits.max_step_m
+    team = [member.spec for member in live.team]
+    vehicles = len(team)
+    metres = _share_left(live) * sum(_way_m(spec, vehicle) for vehicle in team)
+    speeds = sorted({spec.speed_of(vehicle) for vehicle in team}) or [spec.speed_mps]
+    speed = f"{speeds[0]:g}" if len(speeds) == 1 else f"{speeds[0]:g} to {speeds[-1]:g}"
     area = Polygon(live.area).area
     line_m = area / metres if metres else np.inf
     return CheckView(
         id="duration",
         title="Duration",
         status=OK,
-        message=f"at most {_spoken(seconds)} at {spec.speed_mps:g} m/s; {metres / 1000:.1f} km of tracks by {vehicles} "
+        message=f"at most {_spoken(seconds)} at {speed} m/s; {metres / 1000:.1f} km of tracks by {vehicles} "
         f"vehicle{'' if vehicles == 1 else 's'}"
         + (f", as much as lines {line_m:.1f} m apart over the whole area" if np.isfinite(line_m) else ""),
     )

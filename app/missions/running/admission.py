@@ -40,6 +40,12 @@ def check_vehicle(vehicle: VehicleSpec, spec: MissionSpec, kinds: Sequence[Vehic
             f"{vehicle.depth_m:g} m is deeper than limits.max_depth_m, {spec.limits.max_depth_m:g} m",
             "make it shallower or raise the limit",
         )
+    if vehicle.speed_mps is not None and spec.kind is MissionKind.SEARCH:
+        raise InvalidRequestError(
+            f"{prefix}speed_mps",
+            f"{vehicle.speed_mps:g} m/s is given, and in a search all are back in time at the mission's speed_mps",
+            "leave it out",
+        )
     taken = {name for target in spec.targets for name in (target.name, target.called)}
     if vehicle.name in taken:
         raise InvalidRequestError(

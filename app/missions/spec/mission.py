@@ -18,10 +18,12 @@ from app.exploration.planner.options import PlannerOptions
 from app.mapping.georeference import LocalFrame
 from app.mapping.vertical import LOWEST_ASTRONOMICAL_TIDE, check_depth_datum
 from app.missions.spec.base import Latitude, Longitude, Model, Name, PolygonGeometry
+from app.missions.spec.budget import Allowance, Budget, Steps
 from app.missions.spec.search import DEFAULTS as SEARCH_DEFAULTS
 from app.missions.spec.search import SearchSpec, filled_in
 from app.missions.spec.targets import MOST_TARGETS, TargetSpec, Tracking
 
+Speed = Annotated[float, Field(gt=0, le=5)]
 ProfileDepth = Annotated[float, Field(ge=0, le=12_000)]
 ProfileSpeed = Annotated[float, Field(ge=1300, le=1700)]
 
@@ -83,6 +85,13 @@ class VehicleSpec(Model):
         le=6000,
         description="Depth it travels at where the bottom leaves room; null: the first vehicle of a mission at "
         "limits.min_depth_m, each further one limits.min_vertical_separation_m deeper",
+    )
+    speed_mps: Speed | None = Field(default=None, description="Speed asked of it; null: the mission's speed_mps")
+    turn_radius_m: float | None = Field(
+        default=None,
+        gt=0,
+        le=200,
+        description="Radius of its turning circle; null: not known, it is learned from how the vehicle turns",
     )
     guidance: Guidance = Field(
         default=Guidance.FOLLOW,
@@ -285,7 +294,14 @@ class MissionSpec(Model):
         default_factory=list, max_length=100, description="Zones no vehicle may enter"
     )
     vehicles: list[VehicleSpec] = Field(default_factory=list, max_length=100)
-    steps: int = Field(default=100, ge=1, le=100_000, description="Steps after which the mission is finished")
+    budget: Budget = Field(
+        default=Budget(steps=100), description="How long the mission is: minutes, km_per_vehicle or steps"
+    )
+    steps: Steps = Field(
+        default=100,
+        description="Steps after which the mission is finished, short for a budget in steps; with another budget as "
+        "many legs of limits.max_step_m as the vehicle with the longest way needs",
+    )
     cell_m: float = Field(default=1.0, gt=0, le=1000, description="Cell of the map's grid")
     limits: Limits = Field(default_factory=Limits)
     planner: PlannerSpec = Field(default_factory=PlannerSpec)
@@ -302,7 +318,7 @@ class MissionSpec(Model):
         "steps as many as the time window has room for",
         json_schema_extra={"x-defaults": SEARCH_DEFAULTS},
     )
-    speed_mps: float = Field(default=1.3, gt=0, le=5, description="Speed asked of the vehicles")
+    speed_mps: Speed = Field(default=1.3, description="Speed asked of vehicles that have none of their own")
     arrival_radius_m: float = Field(
         default=3.0, gt=0, le=100, description="Horizontal distance at which a waypoint counts as reached"
     )
@@ -343,6 +359,23 @@ class MissionSpec(Model):
         if twice:
             raise ValueError(f"vehicle {twice[0]!r} is listed twice: every vehicle takes part once")
         return vehicles
+
+    @model_validator(mode="after")
+    def _has_one_length(self) -> Self:
+        given = self.model_fields_set & {"budget", "steps"}
+        if given == {"steps"}:
+            object.__setattr__(self, "budget", Budget(steps=self.steps))
+            return self
+        if self.kind is MissionKind.SEARCH and self.budget.steps is None:
+            raise ValueError("kind is search, whose length is search.window_s: leave budget out, or give it in steps")
+        fastest = max([self.speed_of(vehicle) for vehicle in self.vehicles], default=self.speed_mps)
+        steps = self.budget.allowance(fastest).most_legs(self.limits.max_step_m)
+        if "steps" in given and self.steps != steps:
+            raise ValueError(
+                f"steps is {self.steps} but budget, {self.budget.model_dump_json()}, comes to {steps}: give one of them"
+            )
+        object.__setattr__(self, "steps", steps)
+        return self
 
     @model_validator(mode="after")
     def _targets_can_be_told_apart(self) -> Self:
@@ -417,6 +450,18 @@ class MissionSpec(Model):
                 f"at most {MAX_GRID_CELLS} are taken: make cell_m larger or the area smaller"
             )
         return self
+
+    def speed_of(self, vehicle: VehicleSpec | str) -> float:
+        """Return the speed asked of a vehicle, m/s; of an unknown name the mission's."""
+        if isinstance(vehicle, str):
+            own = next((known.speed_mps for known in self.vehicles if known.name == vehicle), None)
+        else:
+            own = vehicle.speed_mps
+        return self.speed_mps if own is None else own
+
+    def allowance(self, vehicle: VehicleSpec | str) -> Allowance:
+        """Return what a vehicle may fly in the whole mission."""
+        return self.budget.allowance(self.speed_of(vehicle))
 
     def frame(self) -> LocalFrame:
         """The mission's local frame; its origin is the south-western corner of the area's bounding box."""

@@ -77,7 +77,7 @@ def filled_in(data: Any) -> Any:
     for name in ("planner", "limits"):
         if isinstance(filled[name], dict):
             filled[name] = DEFAULTS[name] | filled[name]
-    if isinstance(limits := filled["limits"], dict):
+    if "budget" not in data and isinstance(limits := filled["limits"], dict):
         filled.setdefault("steps", _steps(filled["search"].get("window_s"), filled["speed_mps"], limits["max_step_m"]))
     return filled
 

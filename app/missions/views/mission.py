@@ -7,7 +7,9 @@ from typing import Any
 from pydantic import Field, SkipValidation, computed_field
 
 from app.missions.fleet.interface import LinkState, WaypointStatus
+from app.missions.flown import Flown, Phase, efficiency_pct
 from app.missions.spec.base import Latitude, Longitude
+from app.missions.spec.budget import Budget
 from app.missions.spec.mission import MissionSpec, Sensor, VehicleKind
 from app.missions.states import Action, MissionState, allowed_actions
 from app.missions.views.base import View
@@ -84,6 +86,10 @@ class VehicleView(View):
     surfacing: bool = Field(default=False, description="On its way up, or at the surface, for a GPS fix")
     risings: int = Field(default=0, description="How often it was sent up for a fix in this mission")
     pursuing: str | None = Field(default=None, description="The target that it leaves the mapping for")
+    phase: Phase | None = Field(default=None, description="What it is at; null while it takes part in no mission")
+    flown_m: float = Field(default=0.0, description="What it has flown in this mission, along its track")
+    on_plan_m: float = Field(default=0.0, description="Of those, metres on planned legs that sound new ground")
+    idle_s: float = Field(default=0.0, description="Vehicle time in which it waited for a decision")
 
     @computed_field  # type: ignore[prop-decorator]
     @property
@@ -114,6 +120,13 @@ class Progress(View):
 
     step: int = Field(description="Last committed step; 0 before the first")
     steps: int
+    budget: Budget | None = Field(default=None, description="How long the mission is, as it was given")
+    minutes_left: float | None = Field(
+        default=None, description="Vehicle time under way that is left, of the vehicle with most; null: not known"
+    )
+    km_left_per_vehicle: float | None = Field(
+        default=None, description="What is left to fly for the vehicle with most; null: not known"
+    )
     soundings: int = Field(description="Accepted soundings")
     rejected: int = Field(description="Soundings kept but not used")
     distance_m: float = Field(description="Distance travelled by all vehicles, along their tracks")
@@ -154,6 +167,12 @@ class MissionView(MissionSummary):
     vehicles: list[VehicleView]
     waypoints: list[WaypointView] = Field(description="The newest waypoint of each vehicle")
     targets: list[TargetView] = Field(default_factory=list, description="What is known of the moving targets")
+
+    @computed_field  # type: ignore[prop-decorator]
+    @property
+    def efficiency_pct(self) -> float | None:
+        """Share of all metres flown that sounded new ground on planned legs; null while nothing was flown."""
+        return efficiency_pct(Flown(vehicle.flown_m, vehicle.on_plan_m) for vehicle in self.vehicles)
 
 
 class Level(StrEnum):

@@ -1231,6 +1231,29 @@ export interface components {
             vertical: number[][];
         };
         /**
+         * Budget
+         * @description How long a mission is; exactly one of these.
+         */
+        Budget: {
+            /**
+             * Minutes
+             * @description Minutes of vehicle time under way, each vehicle at its own speed
+             * @example 60
+             */
+            minutes?: number | null;
+            /**
+             * Km Per Vehicle
+             * @description Kilometres that each vehicle flies
+             * @example 2
+             */
+            km_per_vehicle?: number | null;
+            /**
+             * Steps
+             * @description Legs that each vehicle flies
+             */
+            steps?: number | null;
+        };
+        /**
          * Cause
          * @description What a finding is about; the first of a node's problems is the one to look at.
          * @enum {string}
@@ -2028,8 +2051,15 @@ export interface components {
             /** Vehicles */
             vehicles?: components["schemas"]["VehicleSpec"][];
             /**
+             * @description How long the mission is: minutes, km_per_vehicle or steps
+             * @default {
+             *       "steps": 100
+             *     }
+             */
+            budget: components["schemas"]["Budget"];
+            /**
              * Steps
-             * @description Steps after which the mission is finished
+             * @description Steps after which the mission is finished, short for a budget in steps; with another budget as many legs of limits.max_step_m as the vehicle with the longest way needs
              * @default 100
              */
             steps: number;
@@ -2053,7 +2083,7 @@ export interface components {
             search?: components["schemas"]["SearchSpec"] | null;
             /**
              * Speed Mps
-             * @description Speed asked of the vehicles
+             * @description Speed asked of vehicles that have none of their own
              * @default 1.3
              */
             speed_mps: number;
@@ -2183,8 +2213,15 @@ export interface components {
                 /** Vehicles */
                 vehicles?: components["schemas"]["VehicleSpec"][];
                 /**
+                 * @description How long the mission is: minutes, km_per_vehicle or steps
+                 * @default {
+                 *       "steps": 100
+                 *     }
+                 */
+                budget: components["schemas"]["Budget"];
+                /**
                  * Steps
-                 * @description Steps after which the mission is finished
+                 * @description Steps after which the mission is finished, short for a budget in steps; with another budget as many legs of limits.max_step_m as the vehicle with the longest way needs
                  * @default 100
                  */
                 steps: number;
@@ -2208,7 +2245,7 @@ export interface components {
                 search?: components["schemas"]["SearchSpec"] | null;
                 /**
                  * Speed Mps
-                 * @description Speed asked of the vehicles
+                 * @description Speed asked of vehicles that have none of their own
                  * @default 1.3
                  */
                 speed_mps: number;
@@ -2271,6 +2308,11 @@ export interface components {
              * @description What may be asked of it in this state: ``POST /missions/{id}/start`` and so on.
              */
             readonly allowed_actions: components["schemas"]["Action"][];
+            /**
+             * Efficiency Pct
+             * @description Share of all metres flown that sounded new ground on planned legs; null while nothing was flown.
+             */
+            readonly efficiency_pct: number | null;
         };
         /**
          * NodeState
@@ -2379,6 +2421,12 @@ export interface components {
              */
             training: components["schemas"]["Training"];
         };
+        /**
+         * Phase
+         * @description What a vehicle is at.
+         * @enum {string}
+         */
+        Phase: "transit" | "survey" | "surfacing" | "returning" | "home" | "stopped";
         /**
          * PlannerOptions
          * @description Settings of the planners. Every planner reads those that concern it.
@@ -2646,6 +2694,18 @@ export interface components {
             step: number;
             /** Steps */
             steps: number;
+            /** @description How long the mission is, as it was given */
+            budget: components["schemas"]["Budget"] | null;
+            /**
+             * Minutes Left
+             * @description Vehicle time under way that is left, of the vehicle with most; null: not known
+             */
+            minutes_left: number | null;
+            /**
+             * Km Left Per Vehicle
+             * @description What is left to fly for the vehicle with most; null: not known
+             */
+            km_left_per_vehicle: number | null;
             /**
              * Soundings
              * @description Accepted soundings
@@ -3833,6 +3893,16 @@ export interface components {
              */
             depth_m?: number | null;
             /**
+             * Speed Mps
+             * @description Speed asked of it; null: the mission's speed_mps
+             */
+            speed_mps?: number | null;
+            /**
+             * Turn Radius M
+             * @description Radius of its turning circle; null: not known, it is learned from how the vehicle turns
+             */
+            turn_radius_m?: number | null;
+            /**
              * @description How a vehicle of kind imc is led. follow: by references, one a second; legs: by a plan for each whole leg, where radio ends at the surface; acoustic: by legs, and by sound while radio is silent
              * @default follow
              */
@@ -3962,6 +4032,26 @@ export interface components {
              * @description The target that it leaves the mapping for
              */
             pursuing: string | null;
+            /** @description What it is at; null while it takes part in no mission */
+            phase: components["schemas"]["Phase"] | null;
+            /**
+             * Flown M
+             * @description What it has flown in this mission, along its track
+             * @default 0
+             */
+            flown_m: number;
+            /**
+             * On Plan M
+             * @description Of those, metres on planned legs that sound new ground
+             * @default 0
+             */
+            on_plan_m: number;
+            /**
+             * Idle S
+             * @description Vehicle time in which it waited for a decision
+             * @default 0
+             */
+            idle_s: number;
             /** @description What its battery's level is worth; null while it has not said. */
             readonly battery: components["schemas"]["BatteryState"] | null;
         };

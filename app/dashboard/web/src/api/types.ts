@@ -17,6 +17,7 @@ export type WaypointStatus = Schemas["WaypointStatus"];
 export type Severity = Schemas["Severity"];
 export type Level = Schemas["Level"];
 export type MissionAction = Schemas["Action"];
+export type Phase = Schemas["Phase"];
 export type BatteryState = Schemas["BatteryState"];
 
 export type PolygonGeometry = Schemas["PolygonGeometry"];
@@ -54,14 +55,17 @@ export type Problem = Complete<Schemas["Problem"]>;
 export type FieldProblem = Complete<Schemas["FieldProblem"]>;
 
 /** What a request says of a vehicle; whatever is left out takes the service's default. */
-export type VehicleSpec = Pick<Schemas["VehicleSpec"], "name" | "kind" | "sensor"> & { depth_m?: number };
+export type VehicleSpec = Pick<Schemas["VehicleSpec"], "name" | "kind" | "sensor"> & {
+  depth_m?: number;
+  speed_mps?: number;
+};
 export type PlannerOptions = Partial<Schemas["PlannerOptions"]>;
 
 /** What the form sends. */
 export type NewMission = Pick<Schemas["MissionSpec"], "name" | "area" | "keep_out" | "cell_m"> & {
   kind?: Schemas["MissionKind"];
   vehicles: VehicleSpec[];
-  steps?: number;
+  budget?: Schemas["Budget"];
   speed_mps?: number;
   accuracy_m?: number;
   limits: Partial<Schemas["Limits"]>;

@@ -44,7 +44,7 @@ describe("a search", () => {
       entry: [-8.7049, 41.1851],
       window_s: 1200,
     });
-    expect(mission).not.toHaveProperty("steps");
+    expect(mission).not.toHaveProperty("budget");
     expect(mission).not.toHaveProperty("planner");
   });
 
@@ -57,7 +57,7 @@ describe("a search", () => {
 describe("what is sent", () => {
   it("has the numbers as numbers and a closed area", () => {
     const mission = toMission({ ...draft, steps: " 40 ", east_m: "120" });
-    expect(mission.steps).toBe(40);
+    expect(mission.budget).toEqual({ steps: 40 });
     expect(mission.area).toEqual(areaOf({ ...draft, east_m: "120" }));
     expect(mission.limits.max_step_m).toBe(10);
   });
@@ -82,7 +82,8 @@ it.each([
   ["limits.max_step_m", "max_step_m"],
   ["vehicles.0.name", "simulated"],
   ["area.coordinates.0", "ring"],
-  ["steps", "steps"],
+  ["budget.steps", "steps"],
+  ["vehicles.0.speed_mps", "simulated"],
   ["tide.level_m", "tide_m"],
   ["sounding_noise", null],
 ])("the service's field %s is shown at %s", (service, own) => {
@@ -127,6 +128,43 @@ describe("a drawn area", () => {
   });
 });
 
+describe("the length of a mission", () => {
+  const two = { ...draft, simulated: "2", max_step_m: "10", speed_mps: "1" };
+
+  it("is sent, checked and copied in the unit that was chosen, and in no other", () => {
+    const hour = { ...two, length: "minutes", minutes: "60", steps: "x", km_per_vehicle: "" } as const;
+    expect(faultsOf(hour)).toEqual({});
+    expect(Object.keys(faultsOf({ ...hour, minutes: "0" }))).toEqual(["minutes"]);
+    const mission = toMission(hour);
+    expect(mission.budget).toEqual({ minutes: 60 });
+    const spec = { tide: {}, search: null, ...mission, steps: 360 } as unknown as MissionView["spec"];
+    const copy = copyOf({ name: "Quay", spec });
+    expect([copy.length, copy.minutes]).toEqual(["minutes", "60"]);
+    expect(toMission({ ...copy, length: "km_per_vehicle", km_per_vehicle: "2" }).budget).toEqual({
+      km_per_vehicle: 2,
+    });
+  });
+
+  it.each([
+    ["minutes", { minutes: "10" }, { seconds: 600, metres: 1800 }],
+    ["km_per_vehicle", { km_per_vehicle: "0.6" }, { seconds: 600, metres: 1200 }],
+    ["steps", { steps: "60" }, { seconds: 600, metres: 1200 }],
+  ] as const)("in %s is that of the vehicle that takes longest", (length, text, expected) => {
+    expect(estimate({ ...two, ...text, length, speeds: { "sim-1": "2" } }, 10_000)).toMatchObject(expected);
+  });
+
+  it("may be flown by each vehicle at its own speed", () => {
+    const chosen = [{ name: "lauv-1", kind: "imc", sensor: "dvl" }] as const;
+    const fleet = { ...draft, chosen, simulated: "1", speeds: { "lauv-1": "0.8", gone: "9" } };
+    expect(faultsOf({ ...fleet, speeds: { "sim-1": "6" } }).speeds).toContain("Speed of sim-1");
+    expect(faultsOf(fleet)).toEqual({});
+    const mission = toMission(fleet);
+    expect(mission.vehicles.map((vehicle) => vehicle.speed_mps)).toEqual([0.8, undefined]);
+    const spec = { tide: {}, search: null, ...mission } as unknown as MissionView["spec"];
+    expect(copyOf({ name: "Quay", spec }).speeds).toEqual({ "lauv-1": "0.8" });
+  });
+});
+
 it("says before the start how long it takes at most and how dense it gets", () => {
   expect(
     estimate({ ...draft, simulated: "2", steps: "100", max_step_m: "10", speed_mps: "1" }, 10_000),
@@ -162,6 +200,7 @@ it("a copy keeps what the form does not show, and its vehicles as they are descr
     vehicles: [vehicle],
     tide: { level_m: 0, source: "none" },
     search: null,
+    steps: 100,
   };
   const limits = { ...original.limits, keep_out_margin_m: 25 };
   const copy = copyOf({ name: "Quay", spec: { ...original, limits } } as unknown as MissionView);
@@ -169,6 +208,8 @@ it("a copy keeps what the form does not show, and its vehicles as they are descr
   const again = toMission({ ...copy, com_range_m: "" }) as unknown as Record<string, unknown>;
   expect(again.vehicles).toEqual([vehicle]);
   expect(again.seed).toBe(7);
+  expect(again.budget).toEqual({ steps: 100 });
+  expect(again).not.toHaveProperty("steps");
   expect(again.limits).toMatchObject({ keep_out_margin_m: 25, com_range_m: null });
   expect(again.area).toEqual(original.area);
 });

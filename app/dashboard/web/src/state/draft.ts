@@ -10,6 +10,7 @@ import {
   fieldFault,
   fieldsOf,
   isWithin,
+  type LengthUnit,
   type MissionKind,
   numberFault,
   type Schema,
@@ -27,6 +28,7 @@ export type AreaSource = "typed" | "drawn";
 export interface Draft extends Texts {
   name: string;
   kind: MissionKind;
+  length: LengthUnit;
   /** As "latitude, longitude". */
   goal: string;
   entry: string;
@@ -46,6 +48,8 @@ export interface Draft extends Texts {
   /** Of the simulated vehicles, separated by commas; empty: sim-1, sim-2 and so on. */
   names: string;
   chosen: readonly VehicleSpec[];
+  /** By vehicle, where it is another one than the mission's. */
+  speeds: Readonly<Record<string, string>>;
   /** What a mission that is copied has and the form does not show. */
   base: Partial<NewMission>;
 }
@@ -76,6 +80,7 @@ export function emptyDraft(middle: LngLat): Draft {
     ...SUGGESTED,
     name: "",
     kind: "survey",
+    length: "steps",
     goal: "",
     entry: "",
     obstacles: [],
@@ -90,6 +95,7 @@ export function emptyDraft(middle: LngLat): Draft {
     options: {},
     names: "",
     chosen: [],
+    speeds: {},
     base: {},
   };
   return { ...draft, ...centred(draft, middle) };
@@ -98,7 +104,7 @@ export function emptyDraft(middle: LngLat): Draft {
 /** A draft of a mission like one that there is, its vehicles as they are described there. */
 export function copyOf({ spec, name }: Pick<MissionView, "spec" | "name">): Draft {
   const ring = ringOf(spec.area as NewMission["area"]);
-  const { tide, ...base } = spec;
+  const { tide, steps: _, ...base } = spec;
   const { search } = base;
   const places = search && {
     goal: typedPlace(search.goal as LngLat),
@@ -112,6 +118,7 @@ export function copyOf({ spec, name }: Pick<MissionView, "spec" | "name">): Draf
     ...places,
     name: `${name} (copy)`,
     kind: spec.kind,
+    length: Object.keys(spec.budget)[0] as LengthUnit,
     source: "drawn",
     ring,
     keepOut: spec.keep_out.map((zone) => ringOf(zone as NewMission["area"])),
@@ -119,14 +126,19 @@ export function copyOf({ spec, name }: Pick<MissionView, "spec" | "name">): Draf
     planner: spec.planner.name,
     options: spec.planner.options as PlannerOptions,
     simulated: "0",
-    chosen: spec.vehicles as VehicleSpec[],
+    chosen: spec.vehicles.map(({ speed_mps: _, ...vehicle }) => vehicle as VehicleSpec),
+    speeds: Object.fromEntries(
+      spec.vehicles.flatMap(({ name, speed_mps }) => (speed_mps == null ? [] : [[name, String(speed_mps)]])),
+    ),
     base: base as Partial<NewMission>,
   };
 }
 
 /** What changes with the kind of mission: fields that nobody touched take that one's defaults. */
 export function turnedInto(kind: MissionKind, draft: Draft): Partial<Draft> {
-  const untouched = fieldsOf(kind).filter(([name, field]) => draft[name] === startOf(field, draft.kind));
+  const untouched = fieldsOf(kind, draft.length).filter(
+    ([name, field]) => draft[name] === startOf(field, draft.kind),
+  );
   return { kind, ...Object.fromEntries(untouched.map(([name, field]) => [name, startOf(field, kind)])) };
 }
 
@@ -141,6 +153,12 @@ export function simulatedNames(draft: Draft): string[] {
   }
   return names;
 }
+
+/** Names of all vehicles, those that were chosen first. */
+export const vehicleNames = (draft: Draft): string[] => [
+  ...draft.chosen.map((vehicle) => vehicle.name),
+  ...simulatedNames(draft),
+];
 
 /** Where a typed area begins when a place is to be its middle; nothing while its size is no size. */
 export function centred(draft: Draft, [lng, lat]: LngLat): Partial<Draft> {
@@ -175,7 +193,7 @@ export function faultsOf(draft: Draft): Faults {
   if (draft.source === "typed") {
     for (const [field, label, schema] of CORNER) note(field, numberFault(label, draft[field], schema));
   }
-  for (const [name, field] of fieldsOf(draft.kind)) note(name, fieldFault(field, draft[name]));
+  for (const [name, field] of fieldsOf(draft.kind, draft.length)) note(name, fieldFault(field, draft[name]));
   note("simulated", numberFault("Simulated vehicles", draft.simulated, VEHICLES));
   if (draft.source === "drawn") {
     const fault = areaFault(draft.ring, faults.cell_m ? 0 : Number(draft.cell_m));
@@ -203,7 +221,7 @@ export function faultsOf(draft: Draft): Faults {
   }
   if (!faults.simulated) {
     const names = simulatedNames(draft);
-    const all = [...draft.chosen.map((v) => v.name), ...names];
+    const all = vehicleNames(draft);
     const twice = all.find((name, i) => all.indexOf(name) !== i);
     if (names.length !== Number(draft.simulated))
       faults.names = `${names.length} names for ${draft.simulated} vehicles: one for each, separated by commas`;
@@ -211,6 +229,10 @@ export function faultsOf(draft: Draft): Faults {
   }
   if (!faults.simulated && Number(draft.simulated) + draft.chosen.length === 0) {
     faults.simulated = "Choose at least one vehicle, or simulate some";
+  }
+  for (const name of draft.kind === "survey" ? vehicleNames(draft) : []) {
+    const text = draft.speeds[name] ?? "";
+    if (text.trim() !== "") note("speeds", numberFault(`Speed of ${name}`, text, SPEC["vehicles.speed_mps"]));
   }
   return faults;
 }
@@ -249,9 +271,10 @@ export function cornersOf(draft: Draft): LngLat[] {
 export function toMission(draft: Draft): NewMission {
   const area = areaOf(draft);
   if (!area) throw new Error("the draft has faults");
-  const { search, ...base } = draft.base;
+  const { search, budget: _, ...base } = draft.base;
   const simulated = simulatedNames(draft).map((name): VehicleSpec => ({ name, kind: "sim", sensor: "dvl" }));
-  const vehicles = [...draft.chosen, ...simulated];
+  const all = [...draft.chosen, ...simulated];
+  const vehicles = draft.kind === "search" ? all : all.map((vehicle) => withSpeed(vehicle, draft));
   const mission = {
     ...base,
     name: draft.name.trim(),
@@ -266,15 +289,20 @@ export function toMission(draft: Draft): NewMission {
       ? searchOf(draft, vehicles)
       : { planner: { name: draft.planner, options: draft.options } }),
   };
-  return withTexts(mission, draft, draft.kind) as unknown as NewMission;
+  return withTexts(mission, draft, draft.kind, draft.length) as unknown as NewMission;
 }
 
-/** What only a search has: its places, and vehicles at the surface. Planner and steps are left to the service. */
+function withSpeed(vehicle: VehicleSpec, { speeds }: Draft): VehicleSpec {
+  const text = speeds[vehicle.name]?.trim();
+  return text ? { ...vehicle, speed_mps: Number(text) } : vehicle;
+}
+
+/** What only a search has: its places, and vehicles at the surface. Planner and length are left to the service. */
 function searchOf({ base, goal, entry, obstacles }: Draft, vehicles: readonly VehicleSpec[]) {
   const places = { goal: placeOf(goal), entry: placeOf(entry) };
   if (!places.goal || !places.entry) throw new Error("the draft has faults");
   const search = { ...base.search, ...places, obstacles: obstacles.map(polygonOf) };
-  if (base.kind === "search") return { search };
+  if (base.kind === "search") return { search, ...(base.budget ? { budget: base.budget } : {}) };
   const depth_m = SPEC["vehicles.depth_m"].minimum;
   return {
     search,
@@ -288,15 +316,21 @@ export function estimate(
   draft: Draft,
   area_m2: number,
 ): { seconds: number; metres: number; spacing_m: number } | null {
-  const vehicles = Number(draft.simulated) + draft.chosen.length;
-  const [steps, step, speed] = [draft.steps, draft.max_step_m, draft.speed_mps].map(Number) as [
-    number,
-    number,
-    number,
-  ];
-  const metres = vehicles * steps * step;
-  if (!(metres > 0) || !(speed > 0)) return null;
-  return { seconds: (steps * step) / speed, metres, spacing_m: area_m2 / metres };
+  const ways = vehicleNames(draft).map((name) => {
+    const speed = Number(draft.speeds[name]?.trim() || draft.speed_mps);
+    const way = wayOf(draft, speed);
+    return { metres: way, seconds: way / speed };
+  });
+  const metres = ways.reduce((sum, way) => sum + way.metres, 0);
+  const seconds = Math.max(...ways.map((way) => way.seconds));
+  return metres > 0 && seconds > 0 ? { seconds, metres, spacing_m: area_m2 / metres } : null;
+}
+
+/** How far a vehicle of this speed goes at most, metres. */
+function wayOf(draft: Draft, speed_mps: number): number {
+  const length = Number(draft[draft.length]);
+  if (draft.length === "minutes") return length * 60 * speed_mps;
+  return length * (draft.length === "steps" ? Number(draft.max_step_m) : 1000);
 }
 
 /** The form's fields for what is no plain value. */

@@ -3,7 +3,16 @@ import ts from "typescript";
 import { afterEach, describe, expect, it } from "vitest";
 import type { MissionView, NewMission } from "../api/types";
 import { copyOf, type Draft, emptyDraft, faultsOf, fieldOf, toMission, turnedInto } from "./draft";
-import { FIELDS, type Field, type FieldName, fieldFault, fieldsOf, schemaOf, startOf } from "./fields";
+import {
+  FIELDS,
+  type Field,
+  type FieldName,
+  fieldFault,
+  fieldsOf,
+  type LengthUnit,
+  schemaOf,
+  startOf,
+} from "./fields";
 
 const ENTRIES = Object.entries(FIELDS) as [FieldName, Field][];
 const valueAt = (mission: NewMission, path: string): unknown =>
@@ -21,7 +30,7 @@ function draftWith(changes: Partial<Draft>, kind: Draft["kind"] = "survey"): Dra
 const shown = (mission: NewMission): Pick<MissionView, "name" | "spec"> =>
   ({
     name: "Quay",
-    spec: { tide: {}, search: null, planner: {}, ...mission },
+    spec: { tide: {}, search: null, planner: {}, budget: { steps: 100 }, ...mission },
   }) as unknown as MissionView;
 
 describe.each(ENTRIES)("the field %s", (name, field) => {
@@ -30,28 +39,32 @@ describe.each(ENTRIES)("the field %s", (name, field) => {
   const least = schema.minimum ?? schema.exclusiveMinimum ?? 0;
   const inside = Math.ceil(0.3 * least + 0.7 * (schema.maximum ?? least + 20));
   const text = String(inside / (field.factor ?? 1));
+  const length = field.part === "length" ? { length: name as LengthUnit } : {};
 
   it("begins with what the service takes where nothing is said", () => {
     const begun = draftWith({}, kind)[name];
     const usual = schema.default ?? schema.example;
     expect(begun).toBe(field.optional ? "" : String(Number(usual) / (field.factor ?? 1)));
-    expect(faultsOf(draftWith({}, kind))).toEqual({});
+    expect(faultsOf(draftWith(length, kind))).toEqual({});
   });
 
   it("is held to the service's bounds", () => {
     const wrong = [least - 1, ...(schema.maximum === undefined ? [] : [schema.maximum + 1])];
     for (const value of wrong) {
-      const faults = faultsOf(draftWith({ [name]: String(value / (field.factor ?? 1)) }, kind));
+      const faults = faultsOf(draftWith({ ...length, [name]: String(value / (field.factor ?? 1)) }, kind));
       expect(faults[name]).toContain(`${field.label} must be`);
     }
     expect(fieldFault(field, text)).toBe("");
   });
 
   it("is sent at its place, copied, and has the service's refusal shown beside it", () => {
-    const draft = draftWith({ [name]: text, max_depth_m: name === "max_depth_m" ? text : "6000" }, kind);
+    const draft = draftWith(
+      { ...length, [name]: text, max_depth_m: name === "max_depth_m" ? text : "6000" },
+      kind,
+    );
     const mission = toMission(draft);
     expect(valueAt(mission, field.path)).toBe(Number(text) * (field.factor ?? 1));
-    expect(copyOf(shown(mission))[name]).toBe(text);
+    expect(copyOf(shown(mission))).toMatchObject({ ...length, [name]: text });
     expect(fieldOf(field.path)).toBe(name);
   });
 });
@@ -67,7 +80,7 @@ describe("one entry in the table", () => {
   it("adds a field to the form, its checks and what is sent", () => {
     table.noise = added;
     const change = (text: string) => ({ ...draftWith({}), noise: text }) as Draft;
-    expect(fieldsOf("search", "limits").map(([name]) => name)).toContain("noise");
+    expect(fieldsOf("search", "steps", "limits").map(([name]) => name)).toContain("noise");
     expect((draftWith({}) as unknown as Record<string, string>).noise).toBe("0.01");
     expect(Object.keys(faultsOf(change("2")))).toEqual(["noise"]);
     expect(toMission(change("0.03"))).toMatchObject({ sounding_noise: 0.03 });
@@ -109,8 +122,9 @@ function numbersIn(file: string): string[] {
 it.each([
   // Seconds in a minute; without a factor: one.
   ["state/fields.ts", ["60", "1"]],
-  // Corners and digits of places; the size of the first rectangle and how many vehicles are simulated at first.
-  ["state/draft.ts", ["1", "2", "3", "6", "100"]],
+  // Corners and digits of places; the size of the first rectangle and how many vehicles are simulated at first; seconds
+  // in a minute, metres in a kilometre.
+  ["state/draft.ts", ["1", "2", "3", "6", "60", "100", "1000"]],
   // Corners, digits.
   ["ui/NewMissionForm.tsx", ["1", "2"]],
   ["ui/SearchFields.tsx", ["1"]],

@@ -24,7 +24,7 @@ export interface Field {
   /** Where the value stands in a mission. */
   path: keyof typeof SPEC;
   /** Where it stands in the form. */
-  part: "course" | "limits" | "search" | "tide";
+  part: "length" | "limits" | "search" | "tide";
   label: string;
   unit?: string;
   placeholder?: string;
@@ -37,7 +37,14 @@ export interface Field {
 }
 
 export const FIELDS = {
-  steps: { path: "steps", part: "course", label: "Steps", kind: "survey" },
+  steps: { path: "budget.steps", part: "length", label: "Steps", kind: "survey" },
+  minutes: { path: "budget.minutes", part: "length", label: "Minutes", kind: "survey" },
+  km_per_vehicle: {
+    path: "budget.km_per_vehicle",
+    part: "length",
+    label: "Km per vehicle",
+    kind: "survey",
+  },
   goal_radius_m: {
     path: "search.goal_radius_m",
     part: "search",
@@ -88,15 +95,22 @@ export const FIELDS = {
 } as const satisfies Record<string, Field>;
 
 export type FieldName = keyof typeof FIELDS;
+/** Units of a mission's length; one of these fields is sent. */
+export type LengthUnit = "steps" | "minutes" | "km_per_vehicle";
 /** Every field's value as it is typed. */
 export type Texts = Record<FieldName, string>;
 
 export const schemaOf = ({ path }: Pick<Field, "path">): Schema => SPEC[path];
 
-/** The fields of a kind of mission, or those that stand in one part of the form. */
-export function fieldsOf(kind: MissionKind, part?: Field["part"]): [FieldName, Field][] {
+/** The fields of a kind of mission whose length is in this unit, or those of them that stand in one part of the form. */
+export function fieldsOf(kind: MissionKind, length: LengthUnit, part?: Field["part"]): [FieldName, Field][] {
   const all = Object.entries(FIELDS) as [FieldName, Field][];
-  return all.filter(([, field]) => (field.kind ?? kind) === kind && (part ?? field.part) === field.part);
+  return all.filter(
+    ([name, field]) =>
+      (field.kind ?? kind) === kind &&
+      (part ?? field.part) === field.part &&
+      (field.part !== "length" || name === length),
+  );
 }
 
 /** What a field begins with: what the service takes where nothing is said, or its example. */
@@ -141,8 +155,8 @@ export function typedValue(field: Field, text: string): unknown {
 type Tree = { [key: string]: unknown };
 
 /** A mission with the values that were typed. */
-export function withTexts(mission: Tree, texts: Texts, kind: MissionKind): Tree {
-  return fieldsOf(kind).reduce((made, [name, field]) => {
+export function withTexts(mission: Tree, texts: Texts, kind: MissionKind, length: LengthUnit): Tree {
+  return fieldsOf(kind, length).reduce((made, [name, field]) => {
     const value = typedValue(field, texts[name]);
     return value === undefined ? made : put(made, field.path.split("."), value);
   }, mission);

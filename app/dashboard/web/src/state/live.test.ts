@@ -35,6 +35,10 @@ const vehicle = (
   surfacing: false,
   risings: 0,
   pursuing: null,
+  phase: null,
+  flown_m: 0,
+  on_plan_m: 0,
+  idle_s: 0,
 });
 
 const waypoint = (name: string, step: number, status: WaypointView["status"]): WaypointView => ({

@@ -1,7 +1,7 @@
 import { describe, expect, it } from "vitest";
 import type { VehicleView, WaypointView } from "../api/types";
 import { age, clock, count, distance, duration, latitude, longitude, metres } from "./format";
-import { batteryWords, hasEnded, isAllowed, vehicleState } from "./words";
+import { batteryWords, flownWords, hasEnded, isAllowed, lengthWords, vehicleState } from "./words";
 
 describe("numbers", () => {
   it.each([
@@ -32,6 +32,22 @@ describe("numbers", () => {
 
   it("tell UTC", () => {
     expect(clock(new Date("2026-03-01T05:06:07Z"), "utc")).toBe("05:06:07");
+  });
+});
+
+describe("how far a mission has come", () => {
+  const known = { step: 12, steps: 60, minutes_left: null, km_left_per_vehicle: null };
+  it.each([
+    [{ minutes: 60 }, { minutes_left: 48.2 }, "12 of 60 min"],
+    [{ minutes: 7.5 }, { minutes_left: 8 }, "0.0 of 7.5 min"],
+    [{ km_per_vehicle: 2.3 }, { km_left_per_vehicle: 1.1 }, "1.2 of 2.3 km"],
+    [{ minutes: 60 }, {}, "step 12 of 60"],
+    [{ steps: 60 }, { minutes_left: 48 }, "step 12 of 60"],
+    [null, {}, "step 12 of 60"],
+  ] as const)("is told of %j in its unit", (given, left, words) => {
+    const budget = given as Parameters<typeof lengthWords>[0]["budget"];
+    expect(lengthWords({ ...known, ...left, budget })).toBe(words);
+    expect(flownWords({ ...known, ...left, budget })).toBe(words.startsWith("step") ? null : words);
   });
 });
 

@@ -6,6 +6,7 @@ import type {
   MissionAction,
   MissionState,
   MissionView,
+  Phase,
   Severity,
   VehicleView,
   WaypointStatus,
@@ -42,6 +43,36 @@ export const WAYPOINT_WORDS: Record<WaypointStatus, string> = {
   refused: "refused",
   missed: "missed its deadline",
 };
+
+export const PHASE_WORDS: Record<Phase, string> = {
+  transit: "in transit",
+  survey: "surveying",
+  surfacing: "surfacing",
+  returning: "returning",
+  home: "home",
+  stopped: "stopped",
+};
+
+/** How far a mission has come in minutes or kilometres: "12 of 60 min"; null where it is counted in steps. */
+export function flownWords({ budget, ...left }: Progress): string | null {
+  const { minutes, km_per_vehicle } = budget ?? {};
+  if (minutes != null && left.minutes_left !== null) return ofWhole(minutes, left.minutes_left, "min");
+  if (km_per_vehicle != null && left.km_left_per_vehicle !== null)
+    return ofWhole(km_per_vehicle, left.km_left_per_vehicle, "km");
+  return null;
+}
+
+type Progress = Pick<
+  MissionView["progress"],
+  "budget" | "minutes_left" | "km_left_per_vehicle" | "step" | "steps"
+>;
+
+const ofWhole = (whole: number, left: number, unit: string): string =>
+  `${Math.max(whole - left, 0).toFixed(whole < 10 ? 1 : 0)} of ${whole} ${unit}`;
+
+/** How far a mission has come, in the unit of its length. */
+export const lengthWords = (progress: Progress): string =>
+  flownWords(progress) ?? `step ${progress.step} of ${progress.steps}`;
 
 const LINK_WORDS: Record<LinkState, string> = {
   unknown: "Never heard",
@@ -92,7 +123,7 @@ export function vehicleState(
   }
 }
 
-const capital = (words: string): string => words.charAt(0).toUpperCase() + words.slice(1);
+export const capital = (words: string): string => words.charAt(0).toUpperCase() + words.slice(1);
 
 const BATTERY_SIGNS: Record<BatteryState, string> = { ok: "", low: "▲ ", critical: "✕ " };
 

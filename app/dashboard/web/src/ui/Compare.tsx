@@ -7,7 +7,7 @@ import { count, distance, duration, metres, percent } from "../state/format";
 import { figuresOf } from "../state/history";
 import { fetchSteps, noteFault, said } from "../state/session";
 import { mission, missions, seaFloor, steps } from "../state/store";
-import { MISSION_WORDS } from "../state/words";
+import { lengthWords, MISSION_WORDS } from "../state/words";
 import { Choice } from "./Controls";
 import { Plot } from "./Plot";
 
@@ -93,7 +93,7 @@ function Both({ one, other }: { one: MissionView; other: Other }) {
     ["State", (m) => MISSION_WORDS[m.state]],
     ["Planner", (m) => m.spec.planner.name],
     ["Vehicles", (m) => String(m.vehicles.length)],
-    ["Steps", (m) => `${m.progress.step} of ${m.progress.steps}`],
+    ["Length", (m) => lengthWords(m.progress)],
     ["Known to the asked accuracy", (m) => percent(m.progress.coverage_pct, 1)],
     ["Remaining landmarks", (m) => percent(m.progress.remaining_pct, 1)],
     ["Mean deviation", (m) => metres(m.progress.mean_sd_m, 3)],

@@ -55,7 +55,9 @@ export function Text({ field, label, placeholder = "", numeric = false, hint = "
 /** The plain values of one part of the form, as the service and the table of fields declare them. */
 export function Part({ of }: { of: Field["part"] }) {
   const { draft } = useForm();
-  return fieldsOf(draft.kind, of).map(([name, field]) => <Plain key={name} name={name} field={field} />);
+  return fieldsOf(draft.kind, draft.length, of).map(([name, field]) => (
+    <Plain key={name} name={name} field={field} />
+  ));
 }
 
 function Plain({ name, field }: { name: FieldName; field: Field }) {

@@ -1,6 +1,7 @@
 import "./FinishDialog.css";
 import { act } from "../state/session";
 import { finishOpen, mission } from "../state/store";
+import { capital, lengthWords } from "../state/words";
 import { sets } from "./Controls";
 import { StopDialog } from "./StopDialog";
 
@@ -23,7 +24,7 @@ export function FinishDialog() {
       {() => (
         <p>
           {progress
-            ? `Step ${progress.step} of ${progress.steps} is under way. The vehicles are stopped where they are; `
+            ? `${capital(lengthWords(progress))} is under way. The vehicles are stopped where they are; `
             : ""}
           a finished mission cannot be resumed. Its map and files stay.
         </p>

@@ -5,7 +5,7 @@ import { whyNotCommand } from "../state/access";
 import { count } from "../state/format";
 import { deleteMission, selectMission } from "../state/session";
 import { copied, describing, fleetOpen, mission, missions, selectedId, serviceFault } from "../state/store";
-import { MISSION_SIGNS, MISSION_WORDS } from "../state/words";
+import { capital, lengthWords, MISSION_SIGNS, MISSION_WORDS } from "../state/words";
 import { Button, sets } from "./Controls";
 import { NewMissionForm } from "./NewMissionForm";
 
@@ -33,8 +33,8 @@ function MissionList() {
       {list === null && !serviceFault.value ? <p class="empty">Asking the service…</p> : null}
       {list?.length === 0 ? (
         <p class="empty">
-          No mission yet. <b>+ New</b> describes one: an area, vehicles, and how many steps to take. Without a
-          vehicle at hand choose simulated ones.
+          No mission yet. <b>+ New</b> describes one: an area, vehicles, and how long it is. Without a vehicle
+          at hand choose simulated ones.
         </p>
       ) : null}
       <ul class="mission-list">
@@ -51,7 +51,7 @@ function MissionList() {
                 <span aria-hidden="true">{MISSION_SIGNS[m.state]}</span> {MISSION_WORDS[m.state]}
               </span>
               <small>
-                Step {m.progress.step} of {m.progress.steps} · {count(m.progress.soundings)} soundings
+                {capital(lengthWords(m.progress))} · {count(m.progress.soundings)} soundings
               </small>
               <small>
                 {new Date(m.created_at).toLocaleString("en-GB", { dateStyle: "medium", timeStyle: "short" })}

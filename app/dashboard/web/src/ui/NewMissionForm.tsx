@@ -20,6 +20,7 @@ import {
   simulatedNames,
   toMission,
   turnedInto,
+  vehicleNames,
 } from "../state/draft";
 import { distance, duration } from "../state/format";
 import { createMission, said } from "../state/session";
@@ -120,13 +121,14 @@ export function NewMissionForm() {
               hint="Separated by commas; empty: sim-1, sim-2 and so on"
             />
           </div>
+          {draft.value.kind === "survey" ? <Speeds /> : null}
         </fieldset>
         {draft.value.kind === "search" ? (
           <SearchFields />
         ) : (
           <>
             <Planner />
-            <Part of="course" />
+            <Length />
             <Expected />
           </>
         )}
@@ -205,6 +207,60 @@ function draftMarks(draft: Draft): SearchMark[] {
       : []),
     ...(entry ? [{ words: "Entry", sign: "entry" as const, at: entry, radius_m: 0 }] : []),
   ];
+}
+
+const LENGTHS = [
+  ["steps", "steps"],
+  ["minutes", "minutes"],
+  ["km_per_vehicle", "kilometres"],
+] as const;
+
+/** How long the mission is, in the unit of the operator's choice. */
+function Length() {
+  const { draft, set } = useForm();
+  return (
+    <div class="pair">
+      <Part of="length" />
+      <label class="field">
+        Length in
+        <Choice
+          value={draft.length}
+          options={LENGTHS}
+          id="field-length"
+          onChoose={(length) => set({ length })}
+        />
+      </label>
+    </div>
+  );
+}
+
+/** Vehicles that fly at another speed than the mission's. */
+function Speeds() {
+  const { draft, set } = useForm();
+  const names = vehicleNames(draft);
+  if (names.length === 0) return null;
+  return (
+    <details>
+      <summary>Speeds of single vehicles, m/s</summary>
+      <div class="pair">
+        {names.map((name) => (
+          <label key={name} class="field">
+            {name}
+            <input
+              type="text"
+              inputMode="decimal"
+              autocomplete="off"
+              value={draft.speeds[name] ?? ""}
+              placeholder={draft.speed_mps}
+              data-testid={`speed-${name}`}
+              onInput={(event) => set({ speeds: { ...draft.speeds, [name]: event.currentTarget.value } })}
+            />
+          </label>
+        ))}
+      </div>
+      <Fault field="speeds" />
+    </details>
+  );
 }
 
 /** How long it takes at most and how dense it gets, before anything is created. */
@@ -372,7 +428,13 @@ function FleetChoice() {
 function Described({ spec }: { spec: VehicleSpec }) {
   const { draft, set } = useForm();
   const change = (next: VehicleSpec[]) =>
-    set({ chosen: draft.chosen.flatMap((one) => (one === spec ? next : [one])) });
+    set({
+      chosen: draft.chosen.flatMap((one) => (one === spec ? next : [one])),
+      speeds: {
+        ...draft.speeds,
+        ...Object.fromEntries(next.map(({ name }) => [name, draft.speeds[spec.name] ?? ""])),
+      },
+    });
   return (
     <div class="chosen-vehicle field">
       <input

@@ -2,7 +2,7 @@ import "./TimeSlider.css";
 import { clock } from "../state/format";
 import { pace, playing, replay, showPresent } from "../state/replay";
 import { finishOpen, mission, replayStep, steps } from "../state/store";
-import { hasEnded, isAllowed } from "../state/words";
+import { flownWords, hasEnded, isAllowed } from "../state/words";
 import { Button, sets } from "./Controls";
 
 /** How far the mission has come, and back to any step of it. */
@@ -11,12 +11,14 @@ export function TimeSlider() {
   if (!present) return null;
   const { step: last, steps: planned } = present.progress;
   const shown = replayStep.value;
+  const flown = shown === null ? flownWords(present.progress) : null;
   const past = steps.value.find((s) => s.number === shown);
   const over = hasEnded(present);
   return (
     <div class={`timeline${shown === null ? "" : " past"}`}>
       <span class="steps">
-        Step <b data-testid="step">{shown ?? last}</b> of {shown === null ? planned : last}
+        Step <b data-testid="step">{shown ?? last}</b>
+        {flown === null ? ` of ${shown === null ? planned : last}` : ` · ${flown}`}
       </span>
       <Button
         id="play"

@@ -1,5 +1,5 @@
 import "./VehicleCards.css";
-import { age, clock, metres } from "../state/format";
+import { age, clock, distance, metres } from "../state/format";
 import { localizationWords } from "../state/localization";
 import { replayed } from "../state/replay";
 import { rejoin } from "../state/session";
@@ -13,7 +13,7 @@ import {
   type Vehicle,
   vehicles,
 } from "../state/store";
-import { batteryWords, hasEnded, vehicleState, WAYPOINT_WORDS } from "../state/words";
+import { batteryWords, capital, hasEnded, PHASE_WORDS, vehicleState, WAYPOINT_WORDS } from "../state/words";
 import { Button } from "./Controls";
 import { WaypointShape } from "./marks";
 import { SearchCard } from "./SearchCard";
@@ -92,6 +92,15 @@ function Card({ vehicle }: { vehicle: Vehicle }) {
           .map((part) => part?.replaceAll(" ", "\u00a0"))
           .join(" · ")}
       </p>
+      {v.phase !== null && mission.value && mission.value.progress.elapsed_s > 0 ? (
+        <p class="small" data-testid={`flown-${v.name}`}>
+          {[
+            ...(v.active && !ended ? [capital(PHASE_WORDS[v.phase])] : []),
+            `${distance(v.flown_m)} flown`,
+            `${Math.round(v.idle_s)} s idle`,
+          ].join(" · ")}
+        </p>
+      ) : null}
       {vehicle.waypoint && v.active ? (
         <p class="small waypoint-line">
           <WaypointShape status={vehicle.waypoint.status} colour={vehicle.colour} />

@@ -1,0 +1,40 @@
+"""What is left of a mission, in minutes and kilometres."""
+
+from typing import Any
+
+import pytest
+
+from app.missions.live.remaining import Remaining, remaining
+from app.missions.spec.mission import MissionSpec
+from app.missions.team import Team
+from tests.support.missions.specs import spec_json
+
+FAST_AND_SLOW = [{"name": "fast", "kind": "rest", "speed_mps": 2.0}, {"name": "slow", "kind": "rest", "speed_mps": 1.0}]
+
+
+def described(**length: Any) -> tuple[MissionSpec, Team]:
+    values = spec_json(vehicles=FAST_AND_SLOW)
+    del values["steps"]
+    spec, team = MissionSpec.model_validate(values | length), Team()
+    for slot, vehicle in enumerate(spec.vehicles):
+        team.join(vehicle, slot)
+    return spec, team
+
+
+def test_before_the_start_the_whole_budget_is_left() -> None:
+    assert remaining(*described(budget={"minutes": 30})) == Remaining(30.0, 3.6)
+    assert remaining(*described(budget={"km_per_vehicle": 0.9})) == Remaining(15.0, 0.9)
+    assert remaining(*described(steps=40)) == Remaining(None, None)
+
+
+@pytest.mark.parametrize("length", [{"budget": {"minutes": 30}}, {"steps": 40}])
+def test_under_way_it_is_what_the_vehicle_with_most_has(length: dict[str, Any]) -> None:
+    spec, team = described(**length)
+    for member, left_m in zip(team, (600.0, 450.0), strict=True):
+        member.flown.left_m = left_m
+    assert remaining(spec, team) == Remaining(7.5, 0.6)
+
+
+def test_without_vehicles_nothing_is_known() -> None:
+    spec, _ = described(budget={"minutes": 30})
+    assert remaining(spec, Team()) == Remaining(None, None)
