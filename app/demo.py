@@ -361,7 +361,7 @@ class _Demo:
 
 def _how_far(progress: dict[str, Any], *, running: bool) -> tuple[float, str]:
     """Return the share of a mission that was flown, and the same in the unit of its length."""
-    budget = progress["budget"] or {}
+    budget = progress["budget"]
     for unit, left, words in (("minutes", "minutes_left", "min"), ("km_per_vehicle", "km_left_per_vehicle", "km")):
         if unit in budget and progress[left] is not None:
             whole = budget[unit]

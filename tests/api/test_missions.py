@@ -107,6 +107,8 @@ async def test_a_mission_is_as_long_as_its_minutes_and_keeps_both_figures(client
     created = (await client.post("/missions", json=spec)).json()
     assert created["spec"]["budget"] == {"minutes": 10}
     assert created["spec"]["steps"] == created["progress"]["steps"] == 120
+    shown = {name: created["progress"][name] for name in ("budget", "minutes_left", "km_left_per_vehicle")}
+    assert shown == {"budget": {"minutes": 10}, "minutes_left": 10, "km_left_per_vehicle": 1.2}
     assert [(v["speed_mps"], v["turn_radius_m"]) for v in created["spec"]["vehicles"]] == [(2.0, 8.0), (None, None)]
     again = await client.post("/missions", json=created["spec"])
     assert (again.status_code, again.json()["spec"]) == (201, created["spec"])

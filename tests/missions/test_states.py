@@ -71,7 +71,8 @@ def test_something_may_be_asked_of_a_mission_until_it_has_ended(state: S) -> Non
 
 def test_one_entry_in_the_table_of_moves_allows_an_action_everywhere(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(MOVES, "resume", MOVES["resume"] | {S.FAILED: S.RUNNING})
-    at, nothing = datetime.now(UTC), {"step": 0, "steps": 1, "soundings": 0, "rejected": 0, "distance_m": 0}
+    at, length = datetime.now(UTC), {"steps": 1, "budget": {"steps": 1}}
+    nothing = length | {"step": 0, "soundings": 0, "rejected": 0, "distance_m": 0}
     summary = MissionSummary(
         id="m", name="m", state=S.FAILED, created_at=at, updated_at=at, progress=Progress(**nothing, coverage_pct=0)
     )

@@ -34,6 +34,7 @@ from app.missions.live.broadcast import Broadcaster
 from app.missions.live.feed import LiveFeed
 from app.missions.live.journal import Counts, Journal
 from app.missions.live.range_journal import RangeJournal
+from app.missions.live.remaining import remaining
 from app.missions.live.sounding_store import SoundingStore
 from app.missions.live.trails import Trails
 from app.missions.live.vehicles import VehicleViews, local_place
@@ -154,7 +155,7 @@ class LiveMission:
         self.running_since_s: float | None = None
         self.database = database
         """What is written through it is refused once another process has the mission."""
-        self.waypoints = WaypointViews(spec, self.broadcaster)
+        self.waypoints = WaypointViews(spec, self.team, self.broadcaster)
         self.boundaries = Boundaries(self.area, [spec.to_local(zone) for zone in spec.keep_out])
         self.vehicles = VehicleViews(row.id, spec, self.frame, hub, self.team, self.boundaries.breach)
         targets = self.target_views if spec.targets else None
@@ -380,9 +381,13 @@ class LiveMission:
         header = self.header
         loop_time = asyncio.get_running_loop().time()
         running_s = loop_time - self.running_since_s if self.running_since_s is not None else 0.0
+        left = remaining(self.spec, self.team)
         return Progress(
             step=header.step,
             steps=self.spec.steps,
+            budget=self.spec.budget,
+            minutes_left=left.minutes,
+            km_left_per_vehicle=left.km_per_vehicle,
             soundings=self.journal.counts.accepted,
             rejected=self.journal.counts.rejected,
             distance_m=self.journal.travelled_m,

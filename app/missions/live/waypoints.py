@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from app.missions.fleet.interface import Position, WaypointReport, WaypointStatus
 from app.missions.live.broadcast import Broadcaster
 from app.missions.spec.mission import MissionSpec
+from app.missions.team import Team
 from app.missions.views.messages import WaypointsMessage
 from app.missions.views.mission import WaypointView
 from app.storage.models import WaypointRow
@@ -16,8 +17,9 @@ from app.storage.models import WaypointRow
 class WaypointViews:
     """Shows where vehicles were sent last and what became of it."""
 
-    def __init__(self, spec: MissionSpec, broadcaster: Broadcaster) -> None:
+    def __init__(self, spec: MissionSpec, team: Team, broadcaster: Broadcaster) -> None:
         self._spec = spec
+        self._team = team
         self._broadcaster = broadcaster
         self._newest: dict[str, WaypointView] = {}
 
@@ -54,6 +56,7 @@ class WaypointViews:
     def _view(
         self, vehicle: str, step: int, place: Position, en_m: tuple[float, float], status: str, reason: str
     ) -> WaypointView:
+        member = self._team.get(vehicle) or self._team.left.get(vehicle)
         return WaypointView.model_validate(
             {
                 "vehicle": vehicle,
@@ -63,7 +66,7 @@ class WaypointViews:
                 "east_m": en_m[0],
                 "north_m": en_m[1],
                 "depth_m": place.depth_m,
-                "speed_mps": self._spec.speed_mps,
+                "speed_mps": self._spec.speed_of(vehicle if member is None else member.spec),
                 "arrival_radius_m": self._spec.arrival_radius_m,
                 "min_altitude_m": self._spec.limits.min_altitude_m,
                 "status": status,

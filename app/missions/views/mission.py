@@ -120,7 +120,7 @@ class Progress(View):
 
     step: int = Field(description="Last committed step; 0 before the first")
     steps: int
-    budget: Budget | None = Field(default=None, description="How long the mission is, as it was given")
+    budget: Budget = Field(description="How long the mission is, as it was given")
     minutes_left: float | None = Field(
         default=None, description="Vehicle time under way that is left, of the vehicle with most; null: not known"
     )

@@ -2695,7 +2695,7 @@ export interface components {
             /** Steps */
             steps: number;
             /** @description How long the mission is, as it was given */
-            budget: components["schemas"]["Budget"] | null;
+            budget: components["schemas"]["Budget"];
             /**
              * Minutes Left
              * @description Vehicle time under way that is left, of the vehicle with most; null: not known
