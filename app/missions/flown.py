@@ -1,8 +1,15 @@
 """What a vehicle has flown of its part of a mission, and what it is at."""
 
+import math
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass
 from enum import StrEnum
+from typing import Any
+
+ASIDE_M = 4.0
+"""A vehicle that is no farther than this from its leg's line is on it."""
+LEAST_COSINE = math.cos(math.radians(45.0))
+"""And its course leads no farther aside than this."""
 
 
 class Phase(StrEnum):
@@ -18,6 +25,10 @@ class Phase(StrEnum):
     STOPPED = "stopped"
 
 
+Place = tuple[float, float]
+"""East and north in the mission's frame, metres."""
+
+
 @dataclass
 class Flown:
     """What one vehicle has flown."""
@@ -25,26 +36,41 @@ class Flown:
     flown_m: float = 0.0
     """Along its track, metres."""
     on_plan_m: float = 0.0
-    """Of those along planned legs that sound new ground, metres."""
+    """Of those along planned legs, metres."""
     idle_s: float = 0.0
-    """Vehicle time in which it waited for a decision, seconds."""
+    """Vehicle time in which it had no leg to fly and was to get one, seconds."""
     left_m: float | None = None
     """What it may fly yet, metres; None where that is not known."""
-    phase: Phase = Phase.TRANSIT
+    phase: Phase = Phase.STOPPED
 
-    def after_way(self, way_m: float, on_plan_m: float = 0.0) -> "Flown":
-        """Return the same ``way_m`` metres of track later, ``on_plan_m`` of them on plan; so much less is left."""
-        left_m = None if self.left_m is None else max(self.left_m - way_m, 0.0)
-        flown_m, planned_m = self.flown_m + way_m, self.on_plan_m + on_plan_m
-        return replace(self, flown_m=flown_m, on_plan_m=planned_m, left_m=left_m)
+    def add_way(self, start: Place, end: Place, leg: tuple[Place, Place] | None) -> None:
+        """Add a piece of track while a leg was flown; None: it had none."""
+        length_m = math.hypot(end[0] - start[0], end[1] - start[1])
+        self.flown_m += length_m
+        if leg is not None and _along(start, end, leg):
+            self.on_plan_m += length_m
 
-    def after_waiting(self, seconds: float) -> "Flown":
-        """Return the same after it waited so many seconds of vehicle time for a decision."""
-        return replace(self, idle_s=self.idle_s + seconds)
+    def remember(self) -> dict[str, float]:
+        """Return what is stored, so that a restart goes on counting."""
+        kept = asdict(self)
+        return {name: round(kept[name], 2) for name in ("flown_m", "on_plan_m", "idle_s")}
 
-    def minutes_left(self, speed_mps: float) -> float | None:
-        """Return how long what is left takes at a speed in m/s, minutes; None where that is not known."""
-        return None if self.left_m is None else self.left_m / speed_mps / 60
+    @classmethod
+    def recall(cls, stored: dict[str, Any] | None) -> "Flown":
+        """Return what was stored; nothing flown where nothing was."""
+        return cls(**(stored or {}))
+
+
+def _along(start: Place, end: Place, leg: tuple[Place, Place]) -> bool:
+    """Whether a piece of track leads along a leg, close to its line."""
+    (from_e, from_n), (to_e, to_n) = leg
+    leg_e, leg_n = to_e - from_e, to_n - from_n
+    way_e, way_n = end[0] - start[0], end[1] - start[1]
+    leg_m, way_m = math.hypot(leg_e, leg_n), math.hypot(way_e, way_n)
+    if leg_m == 0.0 or way_m == 0.0:
+        return False
+    aside_m = abs((end[0] - from_e) * leg_n - (end[1] - from_n) * leg_e) / leg_m
+    return aside_m <= ASIDE_M and (leg_e * way_e + leg_n * way_n) / (leg_m * way_m) >= LEAST_COSINE
 
 
 def efficiency_pct(team: Iterable[Flown]) -> float | None:

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from datetime import datetime
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +19,7 @@ from app.missions.fleet.interface import (
     WaypointStatus,
 )
 from app.missions.flown import Flown
-from app.missions.spec.mission import Limits, VehicleKind, VehicleSpec
+from app.missions.spec.mission import Limits, MissionSpec, VehicleKind, VehicleSpec
 
 SETTLED = frozenset({WaypointStatus.REACHED, WaypointStatus.REFUSED, WaypointStatus.MISSED})
 OUT_OF_REACH = frozenset({LinkState.UNKNOWN, LinkState.LOST})
@@ -71,6 +72,10 @@ class Member:
     """Number of the last leg that was committed for it."""
     misses: int = 0
     """How many legs in a row it did not get to the end of."""
+    committed_m: float = 0.0
+    """How long all legs are together that were committed for it."""
+    leg_start_m: NDArray[np.float64] | None = None
+    """Where the leg of its order begins, (2,)."""
     leg_began_s: float = 0.0
     """When it was given its order, the event loop's time."""
     leg_allowed_s: float = 0.0
@@ -116,6 +121,22 @@ class Member:
             return self.ahead[-1].target_m
         return self.target_m if self.busy and self.target_m is not None else self.place_m(frame)
 
+    def way_left_m(self, spec: MissionSpec) -> float:
+        """Return how far it may be sent yet, beyond the legs that are committed for it."""
+        allowance = spec.allowance(self.spec)
+        if allowance.metres is not None:
+            return max(allowance.metres - self.committed_m, 0.0)
+        return max(allowance.most_legs(spec.limits.max_step_m) - self.legs, 0) * spec.limits.max_step_m
+
+    def way_ahead_m(self, frame: LocalFrame) -> float:
+        """Return how long what is left of its leg is, and the legs after it."""
+        ends = [leg.target_m for leg in self.ahead]
+        if self.ordered and self.target_m is not None:
+            ends.insert(0, self.target_m)
+        if ends and self.report is not None:
+            ends.insert(0, self.place_m(frame))
+        return sum(float(np.hypot(*(b - a))) for a, b in pairwise(ends))
+
     def cruise_depth_m(self, limits: Limits) -> float:
         """Return the depth it travels at where the bottom leaves room: as asked for, or its place in the stack."""
         if self.spec.depth_m is not None:
@@ -147,7 +168,7 @@ class Team:
         member = Member(spec, slot, self.capabilities_of(spec.kind))
         if before is not None and before.key == member.key:
             member.report, member.heard_s, member.risings = before.report, before.heard_s, before.risings
-            member.legs = before.legs
+            member.legs, member.committed_m, member.flown = before.legs, before.committed_m, before.flown
         self.members[spec.name] = member
         return member
 

@@ -1,5 +1,6 @@
 """Queries on missions, their vehicles, steps and waypoints."""
 
+import math
 from collections.abc import Collection, Sequence
 from datetime import datetime
 from typing import Any
@@ -34,6 +35,29 @@ async def add_elapsed(session: AsyncSession, mission_id: str, seconds: float, no
         .where(MissionRow.id == mission_id)
         .values(elapsed_s=MissionRow.elapsed_s + seconds, updated_at=now)
     )
+
+
+async def keep_flown(session: AsyncSession, mission_id: str, flown: dict[str, dict[str, float]]) -> None:
+    """Record what vehicles have flown, by name."""
+    for name, figures in flown.items():
+        of_it = (MissionVehicleRow.mission_id == mission_id, MissionVehicleRow.name == name)
+        await session.execute(update(MissionVehicleRow).where(*of_it).values(flown=figures))
+
+
+async def committed_way(session: AsyncSession, mission_id: str) -> dict[str, float]:
+    """Return how long all legs of each vehicle are together, metres, but for the way to the end of its first one."""
+    query = (
+        select(WaypointRow.vehicle, WaypointRow.east_m, WaypointRow.north_m)
+        .where(WaypointRow.mission_id == mission_id)
+        .order_by(WaypointRow.vehicle, WaypointRow.step)
+    )
+    way_m: dict[str, float] = {}
+    before: tuple[str, float, float] | None = None
+    for vehicle, east, north in await session.execute(query):
+        if before is not None and before[0] == vehicle:
+            way_m[vehicle] = way_m.get(vehicle, 0.0) + math.hypot(east - before[1], north - before[2])
+        before = (vehicle, east, north)
+    return way_m
 
 
 async def vehicles_of(session: AsyncSession, mission_id: str) -> Sequence[MissionVehicleRow]:

@@ -93,6 +93,8 @@ class MissionVehicleRow(Base):
     spec: Mapped[dict[str, Any]]
     joined_at: Mapped[datetime]
     left_at: Mapped[datetime | None]
+    flown: Mapped[dict[str, Any] | None]
+    """What it has flown; None until it has set out."""
 
 
 class StepRow(Base):

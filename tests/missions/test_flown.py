@@ -4,23 +4,40 @@ import pytest
 
 from app.missions.flown import Flown, Phase, efficiency_pct
 
+LEG = ((0.0, 0.0), (0.0, 100.0))
 
-def test_a_vehicle_begins_on_its_way_with_nothing_flown() -> None:
+
+def test_a_vehicle_begins_stopped_with_nothing_flown() -> None:
     begun = Flown()
     assert (begun.flown_m, begun.on_plan_m, begun.idle_s, begun.left_m) == (0.0, 0.0, 0.0, None)
-    assert begun.phase is Phase.TRANSIT
+    assert begun.phase is Phase.STOPPED
 
 
-def test_what_was_flown_adds_up_and_is_not_left_any_more() -> None:
-    flown = Flown(left_m=100.0).after_way(60.0, on_plan_m=50.0).after_waiting(4.0).after_waiting(1.5)
-    assert flown == Flown(flown_m=60.0, on_plan_m=50.0, idle_s=5.5, left_m=40.0)
-    assert flown.after_way(70.0).left_m == 0.0
-    assert Flown().after_way(5.0) == Flown(flown_m=5.0)
+@pytest.mark.parametrize(
+    ("start", "end", "on_plan"),
+    [
+        ((1.0, 10.0), (2.0, 20.0), True),
+        ((3.0, 10.0), (6.0, 20.0), False),  # too far aside
+        ((1.0, 20.0), (1.0, 10.0), False),  # back
+        ((0.0, 10.0), (3.0, 11.0), False),  # across
+        ((1.0, 10.0), (1.0, 10.0), False),
+    ],
+)
+def test_way_counts_as_planned_along_the_leg(
+    start: tuple[float, float], end: tuple[float, float], on_plan: bool
+) -> None:
+    flown = Flown()
+    flown.add_way(start, end, LEG)
+    assert flown.on_plan_m == (flown.flown_m if on_plan else 0.0)
+    without = Flown()
+    without.add_way(start, end, None)
+    assert (without.flown_m, without.on_plan_m) == (flown.flown_m, 0.0)
 
 
-def test_what_is_left_takes_its_time() -> None:
-    assert Flown().minutes_left(1.5) is None
-    assert Flown(left_m=900.0).minutes_left(1.5) == pytest.approx(10.0)
+def test_what_is_stored_is_counted_on() -> None:
+    flown = Flown(flown_m=60.0, on_plan_m=50.0, idle_s=5.5, left_m=40.0, phase=Phase.SURVEY)
+    assert Flown.recall(flown.remember()) == Flown(flown_m=60.0, on_plan_m=50.0, idle_s=5.5)
+    assert Flown.recall(None) == Flown()
 
 
 def test_efficiency_is_the_teams_and_unknown_before_anything_was_flown() -> None:

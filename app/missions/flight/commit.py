@@ -22,6 +22,9 @@ from imc_bridge.control.plans import CIRCLE_RADIUS_M
 LEAD_M = 25.0
 """How far beyond a waypoint a vehicle may be sent to pass it straight; more than the 15 m from which DUNE circles."""
 
+LEAST_LEG_COUNTS = 0.1
+"""What a leg takes of its vehicle's way at least, in longest legs: who holds its place flies, too."""
+
 CIRCLE_M = CIRCLE_RADIUS_M + 2.5
 """Radius of the room for a circle: it is not flown on rails."""
 
@@ -81,11 +84,14 @@ class LegCommit:
             metrics.STEPS.inc()
             live.set_step(number, decision.objective, decision.terms)
         self._bottom = decision.bottom
+        starts_m = decision.origin_m
+        least_m = LEAST_LEG_COUNTS * live.spec.limits.max_step_m
         for row, leg in zip(rows, decision.legs, strict=True):
             member = live.team.get(row.vehicle)
             if member is None:
                 continue
             member.legs = row.step
+            member.committed_m += max(float(np.hypot(*(leg.target_m[:2] - starts_m[row.vehicle]))), least_m)
             if row.status == WaypointStatus.REFUSED:
                 live.waypoints.show_rows([row])
             else:
@@ -101,6 +107,10 @@ class LegCommit:
     def begin_next(self, member: Member) -> None:
         """Make a vehicle's next leg its order."""
         leg = member.ahead.pop(0)
+        if member.target_m is not None and member.status is WaypointStatus.REACHED:
+            member.leg_start_m = member.target_m
+        elif member.report is not None:
+            member.leg_start_m = member.place_m(self._live.frame)
         member.risings += leg.surfacing and not member.surfacing
         member.surfacing = leg.surfacing
         self._order(leg, member)
@@ -135,7 +145,7 @@ class LegCommit:
             step=leg.number,
             vehicle=member.name,
             position=leg.position,
-            speed_mps=spec.speed_mps,
+            speed_mps=spec.speed_of(member.spec),
             arrival_radius_m=spec.arrival_radius_m,
             min_altitude_m=spec.limits.min_altitude_m,
             lead=lead,

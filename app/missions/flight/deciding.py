@@ -62,7 +62,7 @@ class Decider:
         live = self._live
         started_s = asyncio.get_running_loop().time()
         await live.journal.storage.done(self._maps.renew)
-        step_s = live.spec.limits.max_step_m / live.spec.speed_mps
+        step_s = live.spec.limits.max_step_m / min(live.spec.speed_of(place.vehicle) for place in places)
         await live.journal.storage.done(live.ranges.flush)
         targets = live.ranges.tracking.told(live.ranges.times.now_s(), step_s)
 

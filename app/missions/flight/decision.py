@@ -207,6 +207,9 @@ def decide(
             # It goes on along its leg while it rises; the checks below are the same for it as for everyone.
             proposed[i, 2] = min(proposed[i, 2], max(origin[i, 2] - RISE_OF_STEP * constraints.max_step_m, 0.0))
         proposed[i] = _within_step(origin[i], proposed[i], constraints.max_step_m)
+        length_m = float(np.linalg.norm(proposed[i, :2] - origin[i, :2]))
+        if length_m > place.left_m:
+            proposed[i, :2] = origin[i, :2] + place.left_m / length_m * (proposed[i, :2] - origin[i, :2])
     if search is not None:
         proposed, held = hold_before_hazards(search, names, origin, proposed)
         notes += held

@@ -34,6 +34,7 @@ async def save_elapsed(live: LiveMission) -> None:
     try:
         async with live.database.writing() as session:
             await mission_queries.add_elapsed(session, live.id, seconds, now())
+            await mission_queries.keep_flown(session, live.id, {m.name: m.flown.remember() for m in live.team})
     except Exception as error:
         live.journal.storage.note(error)
         return

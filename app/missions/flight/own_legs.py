@@ -7,7 +7,6 @@ are, long before the vehicle is there. So nobody waits for a decision, for a slo
 import asyncio
 import math
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 
@@ -32,6 +31,9 @@ DECISIONS_AHEAD = 3.0
 """How many decisions' time a vehicle's legs last at least."""
 
 MOST_AHEAD = 20
+
+LEAST_WAY_M = 1.0
+"""A vehicle with less way left is done."""
 
 HARDLY_BEGUN = 0.6
 """Part of a leg that may be left when its vehicle gets a leg together with another that needs one."""
@@ -100,7 +102,8 @@ class OwnLegs:
         later_s = min(self._again_at_s.values(), default=None)
         now_s = asyncio.get_running_loop().time()
         # Vehicles come nearer to the end of their legs without telling anything new.
-        soon_s = now_s + 0.5 * self._spec.limits.max_step_m / (self._spec.speed_mps * self._time_scale)
+        fastest_mps = max((self._spec.speed_of(member.spec) for member in self._live.team), default=1.0)
+        soon_s = now_s + 0.5 * self._spec.limits.max_step_m / (fastest_mps * self._time_scale)
         await self._waiting.until(
             lambda: bool(self._who_gets_legs()) or self._over() or self._nobody_to_lead or sending.done(),
             soon_s if later_s is None else min(max(later_s, now_s), soon_s),
@@ -134,7 +137,8 @@ class OwnLegs:
             if leg.vehicle in numbers
             and (member := live.team.get(leg.vehicle)) is not None
             and member.report is not None
-            and member.legs < numbers[leg.vehicle] <= self._spec.steps
+            and member.legs < numbers[leg.vehicle]
+            and self._wants_legs(member)
             and self._begins_at(member, starts_m[leg.vehicle])
         ]
         decision = self._apart(replace(decision, legs=begun))
@@ -157,7 +161,8 @@ class OwnLegs:
         """How many legs are decided together, so that they last until the next decision is made."""
         if self._watched:
             return 1
-        way_m = DECISIONS_AHEAD * self._decider.takes_s * self._time_scale * self._spec.speed_mps
+        fastest_mps = max(self._spec.speed_of(member.spec) for member in self._live.team)
+        way_m = DECISIONS_AHEAD * self._decider.takes_s * self._time_scale * fastest_mps
         return min(max(math.ceil(way_m / self._spec.limits.max_step_m), 1), MOST_AHEAD)
 
     def _begins_at(self, member: Member, start_m: FloatArray) -> bool:
@@ -175,10 +180,10 @@ class OwnLegs:
         return replace(decision, legs=legs, notes=[*decision.notes, *notes])
 
     def _place(self, member: Member, *, moving: bool) -> Place:
-        left = max(self._legs_left(member), 0)
-        left_m = (1.0 - RESERVE) * left * self._spec.limits.max_step_m
-        if left:
-            left_m = max(left_m, self._spec.limits.max_step_m)
+        left_m = member.way_left_m(self._spec)
+        if self._spec.budget.steps is not None:
+            # Legs that end at a corner are shorter than a step, and count all the same.
+            left_m = max((1.0 - RESERVE) * left_m, min(left_m, self._spec.limits.max_step_m))
         return replace(place_ahead(member, self._live), moving=moving, left_m=left_m)
 
     def _next_number(self, member: Member) -> int:
@@ -187,9 +192,6 @@ class OwnLegs:
         newcomer = member.name not in self._taking_part and not member.ordered and not member.ahead
         reached = min(others) if others else self._live.header.step
         return max(member.legs, min(reached, self._live.header.step) if newcomer else 0) + 1
-
-    def _legs_left(self, member: Member) -> int:
-        return self._spec.steps - member.legs
 
     def _who_gets_legs(self) -> list[Member]:
         """Return the vehicles to decide for now: none, or those that need a leg, with others that soon will."""
@@ -224,11 +226,8 @@ class OwnLegs:
 
     def _lasts_s(self, member: Member) -> float:
         """Return how long a vehicle's legs last, on the wall clock."""
-        ends = [leg.target_m for leg in member.ahead]
-        if member.target_m is not None:
-            ends.insert(0, member.target_m)
-        ahead_m = sum(float(np.linalg.norm(b - a)) for a, b in pairwise(ends))
-        return (self._left_of_leg_m(member) + ahead_m) / (self._spec.speed_mps * self._time_scale)
+        speed_mps = self._spec.speed_of(member.spec) * self._time_scale
+        return member.way_ahead_m(self._live.frame) / speed_mps
 
     def _over(self) -> bool:
         """Whether everybody has flown its way; who does not get on, or is out of reach for long, keeps nobody."""
@@ -253,7 +252,9 @@ class OwnLegs:
         return now_s - self._absent_since_s.setdefault(member.name, now_s)
 
     def _wants_legs(self, member: Member) -> bool:
-        return self._next_number(member) <= self._spec.steps
+        if self._spec.budget.steps is not None:
+            return self._next_number(member) <= self._spec.steps
+        return member.way_left_m(self._spec) > LEAST_WAY_M
 
     @property
     def _nobody_to_lead(self) -> bool:

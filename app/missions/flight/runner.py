@@ -28,6 +28,7 @@ from app.missions.flight.step_maps import StepMaps
 from app.missions.flight.team_steps import TeamSteps
 from app.missions.flight.telemetry_sampler import keep_telemetry
 from app.missions.flight.waiting import Waiting
+from app.missions.flown import Phase
 from app.missions.live.mission import LiveMission
 from app.missions.team import SETTLED, Member
 from app.missions.views.mission import Level
@@ -81,6 +82,8 @@ class Runner:
             await to_the_end(save_elapsed(live))
             live.running_since_s = None
             live.standstill = ""
+            for member in live.team:
+                member.flown.phase = Phase.STOPPED
 
     def _flight(self) -> OwnLegs | TeamSteps:
         shared = (self._live, self._decider, self._committing, self._dispatch, self._maps, self._waiting)
@@ -101,11 +104,12 @@ class Runner:
                 return False
             rows = await mission_queries.unsettled_waypoints(session, live.id, SETTLED)
             newest = await mission_queries.newest_waypoints(session, live.id)
+            way_m = await mission_queries.committed_way(session, live.id)
         self._decider.planner.restore(step.memory)
         live.set_step(step.number, step.objective, step.terms)
         last = {row.vehicle: row.step for row in newest}
         for member in live.team:
-            member.legs = last.get(member.name, 0)
+            member.legs, member.committed_m = last.get(member.name, 0), way_m.get(member.name, 0.0)
             of_it = [row for row in rows if row.vehicle == member.name]
             member.ahead += [committed_leg(row) for row in of_it if self._apart or row.step == step.number]
             self._leave_out_passed(member)

@@ -20,9 +20,10 @@ def too_close(decision: Decision, live: LiveMission, spec: MissionSpec) -> dict[
         return {}
     before = {m.name: _motion(m, live, spec) for m in live.team.present}
     new = {leg.vehicle: leg.target_m for leg in decision.legs if not leg.refusal and leg.vehicle in before}
+    speeds = {m.name: spec.speed_of(m.spec) for m in live.team.present}
     refused: dict[str, str] = {}
     while True:
-        moving = {name: _continued(before[name], end, spec.speed_mps) for name, end in new.items()}
+        moving = {name: _continued(before[name], end, speeds[name]) for name, end in new.items()}
         close = [
             (name, other, approach)
             for name in sorted(moving)
@@ -58,11 +59,12 @@ def _motion(member: Member, live: LiveMission, spec: MissionSpec) -> Timeline:
     """Return a vehicle's motion from now to the end of its last committed leg."""
     depth_m = member.cruise_depth_m(spec.limits) if member.report is None else member.report.position.depth_m
     motion = Timeline(np.zeros(1), np.append(member.place_m(live.frame), depth_m)[None])
+    speed_mps = spec.speed_of(member.spec)
     if member.order is not None and member.target_m is not None and member.busy:
         end = np.append(member.target_m, member.order.position.depth_m)
-        motion = _continued(motion, end, spec.speed_mps)
+        motion = _continued(motion, end, speed_mps)
     for leg in member.ahead:
-        motion = _continued(motion, np.append(leg.target_m, leg.position.depth_m), spec.speed_mps)
+        motion = _continued(motion, np.append(leg.target_m, leg.position.depth_m), speed_mps)
     return motion
 
 

@@ -131,7 +131,7 @@ class TeamSteps:
             return False
         left_m = float(np.linalg.norm(member.target_m - member.place_m(self._live.frame)))
         ahead_s = (self._decider.takes_s + REPORT_DELAY_S) * self._time_scale
-        return left_m <= self._spec.arrival_radius_m + self._spec.speed_mps * ahead_s
+        return left_m <= self._spec.arrival_radius_m + self._spec.speed_of(member.spec) * ahead_s
 
     def _places(self) -> list[Place]:
         return [place_of(member, self._live) for member in self._live.team.present]

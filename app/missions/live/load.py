@@ -7,6 +7,7 @@ from functools import partial
 from app.mapping.tides import parse_tid
 from app.missions.fleet.hub import FleetHub
 from app.missions.fleet.interface import Position, VehicleReport
+from app.missions.flown import Flown
 from app.missions.live.journal import Counts
 from app.missions.live.mission import RISES, LiveMission, builder_of
 from app.missions.search.scan_log import report_of
@@ -70,6 +71,7 @@ async def take_up(
         member.report = _last_report(positions.get(member.name))
         member.heard_s = heard.get(member.name)
         member.risings = risings.get(member.name, 0)
+        member.flown = Flown.recall(vehicle.flown)
         if vehicle.left_at is not None:
             live.team.leave(member.name, vehicle.left_at)
     live.waypoints.show_rows(waypoints)

@@ -1,6 +1,7 @@
 """The side of a mission that lives in memory: its map, its journal, its vehicles' reports and its watchers."""
 
 import asyncio
+import math
 from collections.abc import Callable
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
@@ -29,6 +30,7 @@ from app.missions.fleet.interface import (
     WaypointReport,
     WaypointStatus,
 )
+from app.missions.flown import Phase
 from app.missions.live.boundaries import Boundaries
 from app.missions.live.broadcast import Broadcaster
 from app.missions.live.feed import LiveFeed
@@ -62,6 +64,11 @@ from app.storage import soundings as sounding_queries
 from app.storage.database import Database
 from app.storage.models import MissionRow
 from app.storage.single_flight import Shared
+
+LONGEST_GAP_S = 60.0
+"""What a vehicle flew in a longer silence is not known."""
+FASTEST_MPS = 10.0
+"""A position that is farther from the last one than this speed makes was corrected, not flown to."""
 
 PACE_MEMORY = 0.9
 """Weight of the past in the running mean of a leg's duration."""
@@ -255,6 +262,7 @@ class LiveMission:
                 if place is None:
                     log.warning("position is not near the mission, ignored", vehicle=event.vehicle)
                     return
+                self._count_way(member, event, place)
                 member.report, member.heard_s = event, now().timestamp()
                 self.journal.position(event)
                 self._hold_against_boundaries(event, place)
@@ -280,6 +288,32 @@ class LiveMission:
             case WaypointReport():
                 self._receive_waypoint(member, event)
         self.changed.set()
+
+    def _count_way(self, member: Member, report: VehicleReport, place: tuple[float, float]) -> None:
+        """Add what a vehicle has flown since its last report, if that can have been."""
+        flown = member.flown
+        before = None if member.report is None else local_place(self.frame, member.report.position)
+        if not self.running or member.report is None or before is None:
+            return
+        passed_s = report.time_s - member.report.time_s
+        if not 0.0 < passed_s <= LONGEST_GAP_S or math.dist(before, place) > FASTEST_MPS * passed_s:
+            return
+        leg = None
+        if member.ordered and member.leg_start_m is not None and member.target_m is not None:
+            leg = place_of(member.leg_start_m), place_of(member.target_m)
+        flown.add_way(before, place, leg)
+        way_left_m = member.way_left_m(self.spec)
+        flown.left_m = way_left_m + member.way_ahead_m(self.frame)
+        if not member.ordered and member.legs and way_left_m > 0.0:
+            flown.idle_s += passed_s
+        flown.phase = self._phase(member, way_left_m)
+
+    def _phase(self, member: Member, way_left_m: float) -> Phase:
+        if member.surfacing:
+            return Phase.SURFACING
+        if member.legs == 0 or self.boundaries.breach(member.name):
+            return Phase.TRANSIT
+        return Phase.SURVEY if member.ordered or way_left_m > 0.0 else Phase.STOPPED
 
     def _hold_against_boundaries(self, report: VehicleReport, place: tuple[float, float]) -> None:
         if self.header.state in ENDED:
@@ -412,7 +446,8 @@ class LiveMission:
         if self._leg_s is None:
             return None
         committed = [len(m.ahead) + m.ordered for m in self.team]
-        left = [self.spec.steps - m.legs for m in self.team.present] or [self.spec.steps - self.header.step]
+        leg_m = self.spec.limits.max_step_m
+        left = [m.way_left_m(self.spec) / leg_m for m in self.team.present] or [self.spec.steps - self.header.step]
         return (max(left) + max(committed, default=0)) * self._leg_s
 
     def summary(self) -> MissionSummary:
@@ -458,6 +493,11 @@ class LiveMission:
         await self.ranges.close()
         await self.journal.close()
         await self.whole.close(self.header.step)
+
+
+def place_of(place_m: FloatArray) -> tuple[float, float]:
+    """Return an array (2,) as a pair."""
+    return float(place_m[0]), float(place_m[1])
 
 
 def builder_of(spec: MissionSpec) -> MapBuilder:
