@@ -124,7 +124,7 @@ async def test_vehicles_tell_what_they_have_flown_in_their_mission(
     seen = (await client.get(f"/missions/{mission['id']}")).json()
     assert seen["efficiency_pct"] is None
     flown = {name: seen["vehicles"][0][name] for name in ("phase", "flown_m", "on_plan_m", "idle_s")}
-    assert flown == {"phase": "transit", "flown_m": 0.0, "on_plan_m": 0.0, "idle_s": 0.0}
+    assert flown == {"phase": "stopped", "flown_m": 0.0, "on_plan_m": 0.0, "idle_s": 0.0}
 
 
 async def test_in_a_search_all_fly_at_the_missions_speed(client: httpx.AsyncClient) -> None:

@@ -76,6 +76,7 @@ class LegCommit:
             memory=decision.memory,
             targets=live.ranges.memory(),
         )
+        getting = [live.team.get(row.vehicle) for row in rows]
         # The step is not flown before it is on disk, however long that takes; the vehicles wait where they are.
         await live.journal.storage.done(lambda: to_the_end(self._store(step, rows)))
         if live.search is not None and live.search.began_at is None:
@@ -86,11 +87,12 @@ class LegCommit:
         self._bottom = decision.bottom
         starts_m = decision.origin_m
         least_m = LEAST_LEG_COUNTS * live.spec.limits.max_step_m
-        for row, leg in zip(rows, decision.legs, strict=True):
-            member = live.team.get(row.vehicle)
-            if member is None:
+        for row, leg, member in zip(rows, decision.legs, getting, strict=True):
+            now_of_name = live.team.get(row.vehicle) or live.team.left.get(row.vehicle)
+            if now_of_name is not None:
+                now_of_name.legs = max(now_of_name.legs, row.step)  # it may have left, or come back, meanwhile
+            if member is None or member is not now_of_name or member.left_at is not None:
                 continue
-            member.legs = row.step
             member.committed_m += max(float(np.hypot(*(leg.target_m[:2] - starts_m[row.vehicle]))), least_m)
             if row.status == WaypointStatus.REFUSED:
                 live.waypoints.show_rows([row])

@@ -104,6 +104,8 @@ class OwnLegs:
         # Vehicles come nearer to the end of their legs without telling anything new.
         fastest_mps = max((self._spec.speed_of(member.spec) for member in self._live.team), default=1.0)
         soon_s = now_s + 0.5 * self._spec.limits.max_step_m / (fastest_mps * self._time_scale)
+        # The map is made while vehicles fly, decided for or not.
+        self._maps.begin()
         await self._waiting.until(
             lambda: bool(self._who_gets_legs()) or self._over() or self._nobody_to_lead or sending.done(),
             soon_s if later_s is None else min(max(later_s, now_s), soon_s),

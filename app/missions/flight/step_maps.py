@@ -1,6 +1,7 @@
 """The maps that a running mission decides by: made and refined while the vehicles travel."""
 
 import asyncio
+import math
 import threading
 from concurrent.futures import Executor, Future
 
@@ -11,6 +12,11 @@ from app.missions.maps.builder import MapBuilder
 
 PATIENCE_S = 2.0
 """How much of the vehicles' time a decision may wait for a newer map."""
+
+LEAST_AGE_S = 0.2
+"""How old a map is at least, on the wall clock, before the next one is begun."""
+REST = 1.0
+"""For how long no map is made after one, in times of what it took."""
 
 _LEARNING = threading.Lock()
 
@@ -33,13 +39,22 @@ class StepMaps:
         self._executor = executor
         self._time_scale = time_scale
         self._took_s = 0.0
+        self._made_at_s = -math.inf
         self._making: asyncio.Task[None] | None = None
 
     def begin(self) -> None:
-        """Make a map of what has been sounded so far, unless one is being made, and refine its model."""
-        if self._making is None:
+        """Make a map of what has been sounded so far, unless one is being made or just was, and refine its model."""
+        if not self._due:
+            return
+        if self._making is None or (self._making.done() and self._making.exception() is None):
             self._making = asyncio.create_task(self._make())
         self._executor.submit(_learn, self._live.builder).add_done_callback(_log_failure)
+
+    @property
+    def _due(self) -> bool:
+        """Whether the newest map is so old that the next one may take a core again."""
+        age_s = asyncio.get_running_loop().time() - self._made_at_s
+        return age_s >= max(LEAST_AGE_S, REST * self._took_s)
 
     async def renew(self) -> None:
         """Bring the map up to date, unless vehicles would circle for long meanwhile: then the newest has to do.
@@ -54,7 +69,7 @@ class StepMaps:
         await live.journal.flush()
         await live.notice_imports()
         await live.whole.complete()
-        if patient and live.builder.stale:
+        if patient and live.builder.stale and (self._due or live.builder.newest is None):
             await self._make()
 
     async def end(self) -> None:
@@ -72,7 +87,8 @@ class StepMaps:
         built = await loop.run_in_executor(self._executor, live.builder.build)
         if built is not None and built is not before:
             live.publish_map(built)
-        self._took_s = loop.time() - started_s
+        self._made_at_s = loop.time()
+        self._took_s = self._made_at_s - started_s
         await live.whole.keep_when_grown(live.header.step)
 
 
