@@ -22,8 +22,8 @@ from imc_bridge.control.plans import CIRCLE_RADIUS_M
 LEAD_M = 25.0
 """How far beyond a waypoint a vehicle may be sent to pass it straight; more than the 15 m from which DUNE circles."""
 
-LEAST_LEG_COUNTS = 0.1
-"""What a leg takes of its vehicle's way at least, in longest legs: who holds its place flies, too."""
+STILL_M = 0.5
+"""Who goes no farther holds its place, which takes as much of its way as the longest leg: it flies circles there."""
 
 CIRCLE_M = CIRCLE_RADIUS_M + 2.5
 """Radius of the room for a circle: it is not flown on rails."""
@@ -86,14 +86,14 @@ class LegCommit:
             live.set_step(number, decision.objective, decision.terms)
         self._bottom = decision.bottom
         starts_m = decision.origin_m
-        least_m = LEAST_LEG_COUNTS * live.spec.limits.max_step_m
         for row, leg, member in zip(rows, decision.legs, getting, strict=True):
             now_of_name = live.team.get(row.vehicle) or live.team.left.get(row.vehicle)
             if now_of_name is not None:
                 now_of_name.legs = max(now_of_name.legs, row.step)  # it may have left, or come back, meanwhile
             if member is None or member is not now_of_name or member.left_at is not None:
                 continue
-            member.committed_m += max(float(np.hypot(*(leg.target_m[:2] - starts_m[row.vehicle]))), least_m)
+            length_m = float(np.hypot(*(leg.target_m[:2] - starts_m[row.vehicle])))
+            member.committed_m += length_m if length_m > STILL_M else live.spec.limits.max_step_m
             if row.status == WaypointStatus.REFUSED:
                 live.waypoints.show_rows([row])
             else:

@@ -14,6 +14,7 @@ from sqlalchemy import select
 from app.missions.fleet.interface import WaypointOrder, WaypointReport, WaypointStatus
 from app.missions.fleet.links.sim import SimFleetLink
 from app.missions.flight import deciding
+from app.missions.flight.commit import LegCommit
 from app.missions.flight.decision import Decision, decide
 from app.missions.flight.runner import nearest_leg
 from app.missions.operations.history import events_after
@@ -121,6 +122,48 @@ async def test_vehicles_that_meet_are_kept_apart_on_the_way(service: MissionServ
     assert view.progress.step == 8
     told = [line.message for line in await events_after(await service.get(mission)) if line.kind == "safety"]
     assert any("its next leg passes" in message for message in told)
+
+
+async def test_a_vehicle_that_comes_back_while_its_leg_is_written_gets_numbers_of_its_own(
+    service: MissionService, database: Database, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    store, gone = LegCommit._store, False
+
+    async def stored_while_it_leaves(self: LegCommit, step: StepRow, rows: list[WaypointRow]) -> None:
+        nonlocal gone
+        await store(self, step, rows)
+        if step.number == 2 and not gone:
+            gone = True
+            live = await service.get(self._live.id)
+            await service.team_changes.take_out(live, "a", actor="Ana")
+            await service.team_changes.rejoin(live, "a", actor="Ana")
+
+    monkeypatch.setattr(LegCommit, "_store", stored_while_it_leaves)
+    mission = (await service.create(sim_spec(steps=5, side_m=60.0, **APART))).id
+    await act(service, mission, "start")
+    await until_state(service, mission, MissionState.FINISHED)
+    async with database.reading() as session:
+        rows = (await session.scalars(select(WaypointRow))).all()
+    assert gone
+    assert sorted(row.step for row in rows if row.vehicle == "b") == [1, 2, 3, 4, 5]
+    assert max(row.step for row in rows if row.vehicle == "a") == 5
+
+
+async def test_a_fast_vehicle_flies_more_legs_in_the_same_minutes(harbour_closed: Harbour) -> None:
+    service = await harbour_closed.open(time_scale=15.0)
+    vehicles = [{"name": "fast", "kind": "sim", "speed_mps": 2.0}, {"name": "slow", "kind": "sim", "speed_mps": 0.8}]
+    limits = {"max_step_m": 20.0, "min_separation_m": 0.0}
+    spec = sim_spec(side_m=120.0, vehicles=vehicles, budget={"minutes": 4}, planner={"name": "cao"}, limits=limits)
+    mission = (await service.create(spec)).id
+    await act(service, mission, "start")
+    view = await until_state(service, mission, MissionState.FINISHED)
+    flown = {vehicle.name: vehicle for vehicle in view.vehicles}
+    assert flown["fast"].on_plan_m > 2.0 * flown["slow"].on_plan_m > 0.0
+    # Whoever is still on its last leg flies it to its end; a boundary is no place to stop at.
+    assert flown["fast"].flown_m <= 1.25 * 2.0 * 240.0
+    assert {str(vehicle.phase) for vehicle in view.vehicles} == {"stopped"}
+    assert view.efficiency_pct is not None
+    assert view.efficiency_pct > 50.0
 
 
 @given(st.integers(0, 10_000))

@@ -36,6 +36,8 @@ def spec_json(side_m: float = 30.0, **changes: Any) -> dict[str, Any]:
         "limits": {"max_step_m": 8.0},
         "planner": {"name": "random"},
     }
+    if "budget" in changes:
+        del values["steps"]
     return values | changes
 
 
