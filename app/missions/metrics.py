@@ -9,7 +9,7 @@ PLANNING_SECONDS = Histogram(
     "Time to make the map and decide one step",
     buckets=(0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1, 2.5, 5, 10, 30),
 )
-RUNNING = Gauge("bathyfleet_missions_running", "Missions whose step loop runs in this process")
+RUNNING = Gauge("bathyfleet_missions_running", "Missions whose flight runs in this process")
 EVENTS = Counter("bathyfleet_mission_events_total", "Lines written to mission logs by level", ["level"])
 PACKETS_DROPPED = Counter(
     "bathyfleet_imc_packets_dropped_total", "IMC packets that this machine threw away because its socket was full"

@@ -1,4 +1,4 @@
-"""The vehicles of one mission as its step loop sees them."""
+"""The vehicles of one mission as its flight sees them."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field

@@ -199,7 +199,7 @@ async def test_a_stop_that_is_not_acknowledged_is_an_alarm(service: MissionServi
 
 
 async def test_an_abort_while_the_last_stops_go_out_is_refused_or_stays(service: MissionService) -> None:
-    """The end of the step loop and an operator's abort at the same time lead to one end, not to both."""
+    """The end of the flight and an operator's abort at the same time lead to one end, not to both."""
     mission = await service.create(make_spec(steps=1, vehicles=[{"name": "a", "kind": "rest"}]))
     rover = Rover(service, mission.id, "a")
     await rover.post()
@@ -212,7 +212,7 @@ async def test_an_abort_while_the_last_stops_go_out_is_refused_or_stays(service:
         expected = S.FINISHED
     else:
         expected = S.ABORTED
-    await until(lambda: not service._runs, "the step loop has ended")
+    await until(lambda: not service._runs, "the flight has ended")
     assert await state_of(service, mission.id) is expected
     states = [line.data["state"] for line in await events_after(await service.get(mission.id)) if line.kind == "state"]
     assert states == ["ready", "running", expected]

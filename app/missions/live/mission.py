@@ -97,7 +97,7 @@ class MissionHeader:
 
 
 class LiveMission:
-    """One mission in memory. Made by ``take_up``; the step loop, the service and the watchers share it."""
+    """One mission in memory. Made by ``take_up``; the flight, the service and the watchers share it."""
 
     def __init__(
         self,
@@ -133,7 +133,7 @@ class LiveMission:
         self.tiles = TileCache()
         self.trails = Trails(database, row.id)
         self.changed = asyncio.Event()
-        """Set whenever a vehicle reported something that the step loop may be waiting for."""
+        """Set whenever a vehicle reported something that the flight may be waiting for."""
         self.search = search
         """What a mission of kind search knows of its site."""
         take_scans = None if self.search is None else partial(take, self.search, row.id, self.changed.set)
@@ -154,7 +154,7 @@ class LiveMission:
         self.correcting = asyncio.Lock()
         """Held while corrections change, one after the other."""
         self.halted = False
-        """Set while vehicles are being stopped: the step loop must not send them off again as it ends."""
+        """Set while vehicles are being stopped: the flight must not send them off again as it ends."""
         self.standstill = ""
         """Why no vehicle may be sent anywhere now; empty while at least one may."""
         self._leg_s: float | None = None
@@ -204,11 +204,11 @@ class LiveMission:
 
     @property
     def running(self) -> bool:
-        """Whether its step loop goes on in this process."""
+        """Whether its flight goes on in this process."""
         return self.running_since_s is not None
 
     def set_off(self) -> None:
-        """Let the step loop begin: it engages every vehicle anew."""
+        """Let the flight begin: it engages every vehicle anew."""
         self.header.state = MissionState.RUNNING
         self.halted = False
         for member in self.team:
@@ -237,7 +237,7 @@ class LiveMission:
         self.whole.changed()
 
     def halt(self) -> None:
-        """Keep the step loop from sending anything more, and wake everyone who waits for a waypoint."""
+        """Keep the flight from sending anything more, and wake everyone who waits for a waypoint."""
         self.halted = True
         for member in self.team:
             member.pursuing = None

@@ -1,4 +1,4 @@
-"""Missions as they run: their step loops are begun, watched over and ended, their vehicles stopped."""
+"""Missions as they run: their flights are begun, watched over and ended, their vehicles stopped."""
 
 import asyncio
 from collections.abc import Awaitable, Callable, Sequence
@@ -38,7 +38,7 @@ class MissionSupervisor:
     Attributes
     ----------
     runs
-        The step loops that go on, by their missions' ids.
+        The flights that go on, by their missions' ids.
     """
 
     def __init__(
@@ -71,7 +71,7 @@ class MissionSupervisor:
         return self._acting.setdefault(mission_id, asyncio.Lock())
 
     def run(self, live: LiveMission) -> None:
-        """Begin the step loop."""
+        """Begin the flight."""
         live.set_off()
         runner = Runner(live, self._hub, self._executor, self._time_scale)
         self.runs[live.id] = asyncio.create_task(self._supervise(live, runner.run), name=f"mission {live.id}")
@@ -105,7 +105,7 @@ class MissionSupervisor:
                 self.runs.pop(live.id, None)
 
     async def _conclude(self, live: LiveMission, target: MissionState, reason: str, level: Level) -> None:
-        """Bring a mission whose step loop ended to its end."""
+        """Bring a mission whose flight ended to its end."""
         live.halt()
         stops = await self.stop_team(live)
         await self._write_down(live)
@@ -166,7 +166,7 @@ class MissionSupervisor:
         self._maps.map_last(live)
 
     async def halt(self, live: LiveMission) -> list[StopReceipt]:
-        """End the step loop and stop the vehicles, at once and not only when the loop has ended."""
+        """End the flight and stop the vehicles, at once and not only when the loop has ended."""
         live.halt()
         task = self.runs.pop(live.id, None)
         if task is not None:
@@ -185,7 +185,7 @@ class MissionSupervisor:
         return stops
 
     async def _ended(self, live: LiveMission, task: asyncio.Task[None]) -> list[StopReceipt]:
-        """Wait for a cancelled step loop to end; a vehicle that was just being engaged follows then, and is stopped."""
+        """Wait for a cancelled flight to end; a vehicle that was just being engaged follows then, and is stopped."""
         await asyncio.gather(task, return_exceptions=True)
         return await self.stop_team(live, only_engaged=True)
 

@@ -1,1 +1,1 @@
-"""Missions of kind ``search``: the site, what scans tell of it, and how the step loop serves it."""
+"""Missions of kind ``search``: the site, what scans tell of it, and how the flight serves it."""

@@ -1,4 +1,4 @@
-"""How the step loop serves a search: scans before decisions, the time that is left, obstacles on the way, the end."""
+"""How the flight serves a search: scans before decisions, the time that is left, obstacles on the way, the end."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
