@@ -1,5 +1,7 @@
 """Makes decisions durable, and turns legs that are stored into the vehicles' orders."""
 
+from dataclasses import replace
+
 import numpy as np
 from sqlalchemy.orm import make_transient
 
@@ -21,6 +23,9 @@ from imc_bridge.control.plans import CIRCLE_RADIUS_M
 
 LEAD_M = 25.0
 """How far beyond a waypoint a vehicle may be sent to pass it straight; more than the 15 m from which DUNE circles."""
+
+NO_LEG = 0
+"""In place of a leg's number, in orders that are none."""
 
 STILL_M = 0.5
 """Who goes no farther holds its place, which takes as much of its way as the longest leg: it flies circles there."""
@@ -157,10 +162,26 @@ class LegCommit:
         member.set_order(order, target)
         member.status = WaypointStatus.PLANNED
 
+    def holding(self, member: Member) -> WaypointOrder | None:
+        """Return an order that keeps a vehicle circling near where it is; None where there is no room for that."""
+        if member.report is None or member.order is None:
+            return None
+        here = member.place_m(self._live.frame)
+        centre_m = self._room(member, here, here)
+        if centre_m is None:
+            return None
+        place = self._position(centre_m[0], centre_m[1], member.order.position.depth_m)
+        return replace(member.order, step=NO_LEG, position=place, lead=None, circle=None)
+
     def _circle(self, member: Member, start: FloatArray, target: FloatArray) -> Position | None:
         """Return where a vehicle that is led by legs may circle down, apart from the others' ways and circles."""
         if member.spec.guidance is Guidance.FOLLOW:
             return None
+        centre_m = self._room(member, start, target)
+        return None if centre_m is None else self._position(centre_m[0], centre_m[1], 0.0)
+
+    def _room(self, member: Member, start: FloatArray, target: FloatArray) -> FloatArray | None:
+        """Return the centre of a circle near a leg's target, apart from the others' ways and circles."""
         taken: list[FloatArray] = []
         for other in self._live.team:
             if other is member or other.report is None:
@@ -171,8 +192,7 @@ class LegCommit:
             if other.order is not None and other.order.circle is not None:
                 taken.append(CIRCLE_M * UNIT_SQUARE + self._local(other.order.circle))
             taken.append(np.array(way))
-        centre_m = safety.circling_room(self._constraints, start, target, CIRCLE_M, taken)
-        return None if centre_m is None else self._position(centre_m[0], centre_m[1], 0.0)
+        return safety.circling_room(self._constraints, start, target, CIRCLE_M, taken)
 
     def _local(self, position: Position) -> FloatArray:
         east, north = self._live.frame.to_local(np.array(position.lat_deg), np.array(position.lon_deg))

@@ -4,6 +4,7 @@ import asyncio
 import math
 
 import numpy as np
+import structlog
 
 from app.missions.fleet.hub import FleetHub
 from app.missions.fleet.interface import VehicleRefusedError, WaypointReport, WaypointStatus
@@ -20,8 +21,13 @@ SOUND_S = 60.0
 SLOWEST_SHARE = 0.5
 """Part of the speed asked for that a vehicle may make good on its leg, before it counts as a straggler."""
 
+HOLD_AFTER_S = 3.0
+"""How long a vehicle that has no leg flies straight on, by its clock, before it is sent to circle somewhere."""
+
 MOST_REFUSALS = 5
 """How often a vehicle may refuse the same leg before the next one is tried."""
+
+log = structlog.get_logger(__name__)
 
 
 class Dispatch:
@@ -46,6 +52,8 @@ class Dispatch:
         self._hub = hub
         self._committing = committing
         self._time_scale = time_scale
+        self._idle_since_s: dict[str, float] = {}
+        """Since when vehicles have had nothing to fly, the event loop's time; inf once they hold."""
         self.turned_down: dict[str, int] = {}
         """How often vehicles refused the order that they have."""
 
@@ -60,11 +68,12 @@ class Dispatch:
             under_way = {m.name: self._late_at_s(m) for m in self._live.team if m.busy}
             late = [m for m in self._live.team if under_way.get(m.name, math.inf) <= loop.time()]
             await self._tell_of_late(late)
+            holds_s = await self._hold_idle()
             if late or (self._waiting and not self._live.halted):
                 continue
             self._live.changed.clear()
             try:
-                async with asyncio.timeout_at(min(under_way.values(), default=None)):
+                async with asyncio.timeout_at(min([*under_way.values(), *holds_s], default=None)):
                     await self._live.changed.wait()
             except TimeoutError:
                 continue
@@ -72,6 +81,36 @@ class Dispatch:
     @property
     def _waiting(self) -> bool:
         return any(member.ahead and not member.ordered for member in self._live.team)
+
+    async def _hold_idle(self) -> list[float]:
+        """Send vehicles that have flown all their legs to circles; when the next are due, the event loop's time."""
+        now_s, due_s = asyncio.get_running_loop().time(), []
+        for member in self._live.team:
+            flies = member.capabilities.circles_m > 0.0 or member.capabilities.simulated
+            idle = flies and member.present and member.legs and not member.ordered and not member.ahead
+            if not idle or self._live.halted:
+                self._idle_since_s.pop(member.name, None)
+                continue
+            hold_s = self._idle_since_s.setdefault(member.name, now_s) + HOLD_AFTER_S / self._time_scale
+            if hold_s > now_s:
+                due_s.append(hold_s)
+            elif math.isfinite(hold_s):
+                self._idle_since_s[member.name] = math.inf
+                await self._hold(member)
+        return due_s
+
+    async def _hold(self, member: Member) -> None:
+        """Send a vehicle to where it may circle, inside the area, clear of zones and of the others, if there is room.
+
+        That is no leg: what the vehicle tells of it is of no interest.
+        """
+        order = self._committing.holding(member)
+        if order is None:
+            return
+        try:
+            await self._hub.order(member.key, order)
+        except VehicleRefusedError as error:
+            log.info("a vehicle would not hold", vehicle=member.name, error=str(error))
 
     async def begin(self) -> None:
         """Send every vehicle that flies nothing its next leg, unless something bars that from where it is now."""

@@ -9,12 +9,13 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from shapely import Point, Polygon
 from sqlalchemy import select
 
-from app.missions.fleet.interface import WaypointOrder, WaypointReport, WaypointStatus
+from app.missions.fleet.interface import Position, WaypointOrder, WaypointReport, WaypointStatus
 from app.missions.fleet.links.sim import SimFleetLink
 from app.missions.flight import deciding
-from app.missions.flight.commit import LegCommit
+from app.missions.flight.commit import CIRCLE_M, NO_LEG, LegCommit
 from app.missions.flight.decision import Decision, decide
 from app.missions.flight.runner import nearest_leg
 from app.missions.operations.history import events_after
@@ -33,10 +34,14 @@ class Flown:
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.ordered: dict[str, list[tuple[float, int]]] = defaultdict(list)
         self.reached: dict[str, list[tuple[float, int]]] = defaultdict(list)
+        self.held: dict[str, list[Position]] = defaultdict(list)
         order = SimFleetLink.order
 
         async def noted(link: SimFleetLink, waypoint: WaypointOrder) -> None:
-            self.ordered[waypoint.vehicle].append((asyncio.get_running_loop().time(), waypoint.step))
+            if waypoint.step == NO_LEG:
+                self.held[waypoint.vehicle].append(waypoint.position)
+            else:
+                self.ordered[waypoint.vehicle].append((asyncio.get_running_loop().time(), waypoint.step))
             await order(link, waypoint)
 
         monkeypatch.setattr(SimFleetLink, "order", noted)
@@ -158,12 +163,32 @@ async def test_a_fast_vehicle_flies_more_legs_in_the_same_minutes(harbour_closed
     await act(service, mission, "start")
     view = await until_state(service, mission, MissionState.FINISHED)
     flown = {vehicle.name: vehicle for vehicle in view.vehicles}
-    assert flown["fast"].on_plan_m > 2.0 * flown["slow"].on_plan_m > 0.0
+    assert flown["fast"].on_plan_m > 1.8 * flown["slow"].on_plan_m > 0.0
     # Whoever is still on its last leg flies it to its end; a boundary is no place to stop at.
     assert flown["fast"].flown_m <= 1.25 * 2.0 * 240.0
     assert {str(vehicle.phase) for vehicle in view.vehicles} == {"stopped"}
     assert view.efficiency_pct is not None
     assert view.efficiency_pct > 50.0
+
+
+async def test_who_has_flown_everything_circles_inside_the_area(
+    harbour_closed: Harbour, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    flown = Flown(monkeypatch)
+    service = await harbour_closed.open(time_scale=20.0)
+    vehicles = [
+        {"name": "fast", "kind": "sim", "speed_mps": 2.0},
+        {"name": "slow", "kind": "sim", "speed_mps": 0.7},
+    ]
+    limits = {"max_step_m": 20.0, "min_separation_m": 0.0}
+    spec = sim_spec(side_m=80.0, vehicles=vehicles, budget={"km_per_vehicle": 0.1}, limits=limits)
+    mission = (await service.create(spec)).id
+    await act(service, mission, "start")
+    await until_state(service, mission, MissionState.FINISHED)
+    assert len(flown.held["fast"]) == 1
+    (place,) = flown.held["fast"]
+    east, north = spec.frame().to_local(np.array(place.lat_deg), np.array(place.lon_deg))
+    assert Polygon(spec.local_area()).buffer(-CIRCLE_M + 0.01).contains(Point(float(east), float(north)))
 
 
 @given(st.integers(0, 10_000))
