@@ -132,7 +132,7 @@ class PeerJob:
             "seed": scenario.seed,
         }
         pilot = scenario.log(5)
-        lines = lawnmower_routes(scenario.constraints, starts[:, :2], distance)
+        lines = lawnmower_routes(scenario.constraints, starts[:, :2], np.full(len(starts), distance))
         fly_routes(pilot, starts, lines, distance, scenario.max_step_m)
         plans = [peer.plan(**asked, kernel="matern32", soundings=table(pilot.soundings))]
         for part in REPLAN_AT if self.method == "adaptive" else ():
