@@ -62,8 +62,8 @@ class RecordedTrack:
 class SurveyRun:
     """One run; names as in the command's JSON.
 
-    ``even``: whole even lines, as many as fit. ``ratio``: RMSE over that of the best of the three patterns. ``gap_closed``: how far the RMSE has come from that of
-    the better pattern (0) to that of the oracle (1).
+    ``even``: whole even lines, as many as fit. ``ratio``: RMSE over that of the best of the three patterns.
+    ``gap_closed``: how far the RMSE has come from that of the best pattern (0) to that of the oracle (1).
     """
 
     planner: str
@@ -111,10 +111,14 @@ def run_survey(
     track = fly_planner(scenario, planner, options, progress)
     ours = judge(scenario, track.soundings, track.distance_m)
     limit = float(track.distance_m.mean())
-    usual = _pattern(scenario, lawnmower_routes(scenario.constraints, scenario.starts_m[:, :2], np.full(scenario.vehicles, limit)), limit)
-    coverage = _pattern(scenario, even_coverage(scenario, limit), limit)
+    usual = fly_pattern(
+        scenario,
+        lawnmower_routes(scenario.constraints, scenario.starts_m[:, :2], np.full(scenario.vehicles, limit)),
+        limit,
+    )
+    coverage = fly_pattern(scenario, even_coverage(scenario, limit), limit)
     lines = best_even_survey(scenario, limit)
-    even = coverage if lines is None else _pattern(scenario, lines, limit)
+    even = coverage if lines is None else fly_pattern(scenario, lines, limit)
     walk = fly_planner(scenario, "random", PlannerOptions(), known=unknown_belief(scenario.belief_grid))
     placed = oracle_soundings(
         scenario.log(3), scenario.terrain, len(track.soundings), float(scenario.starts_m[:, 2].mean())
@@ -217,7 +221,8 @@ def _vehicles(scenario: SurveyScenario, distance_m: float) -> Vehicles:
     return Vehicles(np.ascontiguousarray(scenario.starts_m[:, :2]), np.full(n, np.nan), np.full(n, distance_m))
 
 
-def _pattern(scenario: SurveyScenario, routes: list[FloatArray], distance_m: float) -> SurveyResult:
+def fly_pattern(scenario: SurveyScenario, routes: list[FloatArray], distance_m: float) -> SurveyResult:
+    """Fly given routes for at most a distance per vehicle, and judge the better of the two maps of it."""
     log = scenario.log(2)
     spacing = SPEED_MPS / SOUNDING_RATE_HZ if scenario.sampling == "continuous" else distance_m / scenario.steps
     flown = fly_routes(log, scenario.starts_m, routes, distance_m, spacing)

@@ -53,13 +53,16 @@ def even_survey(sweep: Sweep, vehicles: Vehicles, turns: Turns, pattern: Pattern
     orders = orders_across(sweep.to_uv(vehicles.en_m)[:, 0])
     dealt: dict[int, list[FloatArray] | None] = {}
 
+    def length_m(way: list[FloatArray]) -> float:
+        return sum(way_m(vehicles, turns, i, route) for i, route in enumerate(way))
+
     def routes(n: int) -> list[FloatArray] | None:
         if n not in dealt:
             lines_u = even_lines(low, high, n, pattern.to_side, pattern.to_side)
             inset_m = pattern.to_end * (high - low) / (n - 1 + 2 * pattern.to_side)
             paths = [_path(sweep, lines_u, inset_m, pattern.parts, upwards=upwards) for upwards in (True, False)]
             ways = (_dealt(sweep.free, vehicles, turns, path, order) for path in paths for order in orders)
-            dealt[n] = min((way for way in ways if way is not None), key=lambda way: sum(way_m(vehicles, turns, i, route) for i, route in enumerate(way)), default=None)
+            dealt[n] = min((way for way in ways if way is not None), key=length_m, default=None)
         return dealt[n]
 
     n = most_lines(lambda k: routes(k) is not None)

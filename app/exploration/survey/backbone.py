@@ -1,4 +1,4 @@
-"""The coverage backbone of a survey: even lines, either every other line first and the rest coming back, or in order."""
+"""The coverage backbone of a survey: even lines, every other one first and the rest coming back, or all in order."""
 
 import itertools
 from dataclasses import dataclass
@@ -22,8 +22,9 @@ TO_END = 0.25
 PARTS = 8
 """Into how many parts vehicles may share a line."""
 IN_ORDER = (Pattern(), Pattern(TO_BORDER, 0.0), Pattern(TO_BORDER, TO_END, PARTS))
-ADAPTS = 0.97
-"""How much better every other line first counts than all in order: what it has met may be followed up."""
+ADAPTS, MANY_LINES = 0.85, 11
+"""How much better every other line first counts than all in order where every vehicle flies many lines: what it has met
+may be followed up. After fewer the map tells too little of where it is rough."""
 TRANSIT_PENALTY = 0.5
 """How much worse a share counts whose first line would only be reached with the whole budget."""
 LEAST_STRIP = 0.05
@@ -53,7 +54,10 @@ class Strip(NamedTuple):
 
 @dataclass(frozen=True)
 class Share:
-    """One vehicle's part of the backbone: stops (k, 2), the first ``coarse`` of which are the first pass."""
+    """One vehicle's part of the backbone: stops (k, 2), the first ``coarse`` of which are the first pass.
+
+    None are where all lines are flown in order.
+    """
 
     stops: FloatArray
     coarse: int
@@ -69,9 +73,11 @@ def backbone(constraints: Constraints, vehicles: Vehicles, nodes: Nodes, objecti
     sweeps = [Sweep(constraints, free, direction) for direction in (axis, axis + np.pi / 2)]
     whole = [even_survey(sweep, vehicles, objective.turns, Pattern()) for sweep in sweeps]
     # Where no sounding tells which way the ground falls, the direction is that in which lines lie closer.
-    sweep = sweeps[int(np.argmin([np.inf if survey is None else survey.spacing_m for survey in whole]))]
+    spacings_m = [np.inf if survey is None else survey.spacing_m for survey in whole]
+    sweep = sweeps[int(np.argmin(spacings_m))]
     value, shares = there_and_back(sweep, vehicles, nodes, objective)
-    value *= ADAPTS
+    if MANY_LINES * len(vehicles.en_m) * min(spacings_m) <= float(np.ptp(sweep.to_uv(constraints.area)[:, 0])):
+        value *= ADAPTS
     unknown = np.full(len(nodes.x), np.inf)
     for pattern in IN_ORDER:
         survey = even_survey(sweep, vehicles, objective.turns, pattern)
@@ -79,7 +85,7 @@ def backbone(constraints: Constraints, vehicles: Vehicles, nodes: Nodes, objecti
             continue
         left = plan_value(unknown, nodes, objective, vehicles, *packed(survey.routes))
         if left < value * (1 - 1e-9):
-            value, shares = left, [Share(route, len(route)) for route in survey.routes]
+            value, shares = left, [Share(route, 0) for route in survey.routes]
     return shares
 
 
@@ -142,7 +148,7 @@ def _best_share(
 
     def affordable(n: int) -> bool:
         share = _there_and_back(sweep, alone.en_m[0], strip, n, forward=True, upwards=True)
-        return way_m(alone, objective.turns, 0, share.stops) <= alone.left_m[0]
+        return way_m(alone, objective.turns, 0, share.stops) <= float(alone.left_m[0])
 
     most = most_lines(affordable)
     best: tuple[float, Share] | None = None

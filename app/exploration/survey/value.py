@@ -248,4 +248,3 @@ def warm_up() -> None:
     counts = np.zeros((1, 1), dtype=np.int64)
     values_after_first_leg(one, nodes, objective, Vehicles(two[0], one, one), two, two[None], counts)
     plan_value(one, nodes, objective, Vehicles(two[0], one, one), two, counts[0])
-

@@ -46,6 +46,8 @@ LEAVE_BACKBONE = 0.98
 LEAVE_PLAN = 0.02
 """A leg off the plan must promise a squared error smaller by this part: predictions are noisy, and a choice among many
 takes the luckiest."""
+SILENT_WITHIN, SILENT = 0.5, 0.05
+"""Within so many spacings of a place that gave no echo ground counts only this part: there is nothing to be heard."""
 JITTER = 0.7
 CORNER_LOSS = 0.4
 """Part of a step that a corner costs where steps are counted: the leg to it ends early."""
@@ -68,6 +70,8 @@ class SurveyRegressors:
         self._plan: dict[str, FloatArray] = {}
         self._expected: float | None = None
         self._flown_m = self._planned_m = 0.0
+        self._silent = np.zeros((0, 2))
+        self._adapts = True
         self._free = False
         self._row = [0.0, 0.0]
 
@@ -110,12 +114,18 @@ class SurveyRegressors:
         self._spacing = _free_area(constraints) / self._whole_m
         tree = cKDTree(np.vstack([team.soundings_en_m, self._en]), balanced_tree=False)
         distance = np.asarray(tree.query(team.belief.xy_m)[0])
-        roughness = expected_roughness(team.belief, distance, self._spacing)
-        self._nodes = thin_nodes(team, with_second_looks(roughness, team, self._spacing))
+        roughness = np.ones(len(distance))
+        if self._adapts:
+            roughness = expected_roughness(team.belief, distance, self._spacing)
+        roughness = with_second_looks(roughness, team, self._spacing)
+        # What was flown over and gave no echo gives none the next time either.
+        self._silent = self._silent[np.asarray(tree.query(self._silent)[0]) > SILENT_WITHIN * self._spacing]
+        if len(self._silent):
+            heard_of = np.asarray(cKDTree(self._silent).query(team.belief.xy_m)[0]) <= SILENT_WITHIN * self._spacing
+            roughness = np.where(heard_of & (distance > SILENT_WITHIN * self._spacing), SILENT, 1.0) * roughness
+        self._nodes = thin_nodes(team, roughness)
         self._scale = max(team.belief.correlation_length_m, self._spacing)
-        turns = Turns(
-            self._options.turn_radius_m, CORNER_LOSS * constraints.max_step_m if team.left_m is None else 0.0
-        )
+        turns = Turns(self._options.turn_radius_m, CORNER_LOSS * constraints.max_step_m if team.left_m is None else 0.0)
         self._objective = SurveyObjective(self._scale, POWER, turns, REACH * self._spacing)
         self._vehicles = Vehicles(self._en, np.ascontiguousarray(team.headings_rad, dtype=np.float64), self._left_m)
         self._d2 = np.asarray(tree.query(self._nodes.en_m)[0]) ** 2
@@ -173,6 +183,7 @@ class SurveyRegressors:
                 continue
             x, y = self._en[i]
             self._flown_m += float(np.hypot(positions[i, 0] - x, positions[i, 1] - y))
+            self._silent = np.vstack([self._silent, 0.5 * (self._en[i] + positions[i, :2]), positions[i, :2]])
             for routes in (self._plan, self._backbone):
                 route = routes[name]
                 for cut in (CORNER_TOLERANCE, 0.0):
@@ -192,6 +203,8 @@ class SurveyRegressors:
             "expected": self._expected,
             "flown_m": self._flown_m,
             "planned_m": self._planned_m,
+            "silent": self._silent,
+            "adapts": self._adapts,
             "free": self._free,
             "row": self._row,
         }
@@ -205,7 +218,8 @@ class SurveyRegressors:
         self._coarse = {str(k): int(v) for k, v in state["coarse"].items()}
         self._expected = state["expected"]
         self._flown_m, self._planned_m = (float(state.get(key, 0.0)) for key in ("flown_m", "planned_m"))
-        self._free = bool(state["free"])
+        self._silent = np.array(state.get("silent", []), dtype=np.float64).reshape(-1, 2)
+        self._adapts, self._free = bool(state.get("adapts", True)), bool(state["free"])
         self._row = [float(x) for x in state["row"]]
 
     def _adopt_backbone(self) -> None:
@@ -215,6 +229,7 @@ class SurveyRegressors:
         self._backbone = {name: share.stops for name, share in zip(team.vehicles, shares, strict=True)}
         self._coarse = {name: share.coarse for name, share in zip(team.vehicles, shares, strict=True)}
         self._plan = dict(self._backbone)
+        self._adapts = any(share.coarse > 0 for share in shares)
         self._free, self._planned_m = False, self._flown_m
 
     def _hand_over(self) -> None:
@@ -320,9 +335,7 @@ class SurveyRegressors:
                 vias[which, i, : len(rest)] = rest
                 counts[which, i] = len(rest)
         targets = np.ascontiguousarray(candidates[..., :2])
-        return values_after_first_leg(
-            self._d2, self._nodes, self._objective, self._vehicles, targets, vias, counts
-        )
+        return values_after_first_leg(self._d2, self._nodes, self._objective, self._vehicles, targets, vias, counts)
 
 
 def thin_nodes(team: Situation, variability: FloatArray) -> Nodes:
