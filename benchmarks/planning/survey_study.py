@@ -218,7 +218,7 @@ def _beams(runs: Sequence[Run]) -> list[str]:
 
 def best_pattern(run: Run) -> float:
     """Return the RMSE of the best of the patterns that were flown beside a run."""
-    return min(run[way]["rmse_m"] for way in PATTERNS if way in run)
+    return min(float(run[way]["rmse_m"]) for way in PATTERNS if way in run)
 
 
 def _mean(values: Iterable[float | None]) -> float:

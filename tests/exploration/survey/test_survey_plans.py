@@ -206,7 +206,7 @@ def test_every_vehicle_flies_the_metres_that_it_has_left_and_no_more() -> None:
     situation = make_situation()
     planner, rng = create_planner("cao", PlannerOptions(search=200), SingleBeam(0.01)), np.random.default_rng(0)
     positions, names = situation.positions, situation.vehicles
-    left = 150.0 * np.arange(1, len(names) + 1) + 0.3
+    left: FloatArray = 150.0 * np.arange(1.0, len(names) + 1.0) + 0.3
     sounded = positions[:, :2]
     for step in range(1, 200):
         moving = left > 0.1
@@ -217,7 +217,7 @@ def test_every_vehicle_flies_the_metres_that_it_has_left_and_no_more() -> None:
         )
         after = planner.propose(now, rng).positions
         np.testing.assert_array_equal(after[~moving], positions[~moving])
-        left -= np.linalg.norm(after - positions, axis=1)
+        left = left - np.asarray(np.linalg.norm(after - positions, axis=1), dtype=np.float64)
         assert (left > -1e-6).all()
         sounded, positions = np.vstack([sounded, after[:, :2]]), after
     assert (left < 25.0).all()
