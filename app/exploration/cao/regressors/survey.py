@@ -43,6 +43,10 @@ REACH = 4.0
 """Line spacings beyond which a place counts as quite unknown."""
 LEAVE_BACKBONE = 0.98
 """The freer plan must promise at most this part of the squared error that the backbone promises."""
+LEAVE_LINES = 0.85
+"""The same where all lines are flown in order: an even survey is hard to better."""
+KNOWN = 0.5
+"""A map of this part of the area at the beginning tells where it is rough."""
 LEAVE_PLAN = 0.02
 """A leg off the plan must promise a squared error smaller by this part: predictions are noisy, and a choice among many
 takes the luckiest."""
@@ -229,7 +233,8 @@ class SurveyRegressors:
         self._backbone = {name: share.stops for name, share in zip(team.vehicles, shares, strict=True)}
         self._coarse = {name: share.coarse for name, share in zip(team.vehicles, shares, strict=True)}
         self._plan = dict(self._backbone)
-        self._adapts = any(share.coarse > 0 for share in shares)
+        known = np.isfinite(team.belief.depth_m) & np.isfinite(team.belief.sd_m)
+        self._adapts = any(share.coarse > 0 for share in shares) or float(known.mean()) > KNOWN
         self._free, self._planned_m = False, self._flown_m
 
     def _hand_over(self) -> None:
@@ -254,7 +259,8 @@ class SurveyRegressors:
         value, vias, counts = best
         self._plan = {v: vias[i, : counts[i]].copy() for i, v in enumerate(team.vehicles)}
         knows = bool((np.isfinite(team.belief.depth_m) & np.isfinite(team.belief.sd_m)).any())
-        self._free = knows and value < (1.0 if self._free else LEAVE_BACKBONE) * values[1]
+        leave = 1.0 if self._free else LEAVE_BACKBONE if self._adapts else LEAVE_LINES
+        self._free = knows and value < leave * values[1]
         self._planned_m = self._flown_m
         return (vias, counts), (value, values[1])
 
