@@ -44,7 +44,7 @@ from app.evaluation.survey.world import SOUNDING_RATE_HZ, SPEED_MPS, SurveyScena
 from app.exploration.lines.lawnmower import lawnmower_routes
 from app.mapping.types import Soundings
 from benchmarks.common.report import Page, facts, make_parser, write_page
-from benchmarks.planning.survey_study import PATCHY, STEPS, VEHICLES, StudyJob, chosen_floors, study_jobs
+from benchmarks.planning.survey_study import PATCHY, STEPS, VEHICLES, StudyJob, best_pattern, chosen_floors, study_jobs
 
 METHODS = ("ours", "offline", "adaptive")
 REPLAN_AT = (0.25, 0.5, 0.75)
@@ -132,7 +132,7 @@ class PeerJob:
             "seed": scenario.seed,
         }
         pilot = scenario.log(5)
-        lines = lawnmower_routes(scenario.constraints, starts[:, :2], distance)
+        lines = lawnmower_routes(scenario.constraints, starts[:, :2], np.full(len(starts), distance))
         fly_routes(pilot, starts, lines, distance, scenario.max_step_m)
         plans = [peer.plan(**asked, kernel="matern32", soundings=table(pilot.soundings))]
         for part in REPLAN_AT if self.method == "adaptive" else ():
@@ -245,7 +245,7 @@ def _table(runs: Sequence[Run], method: str) -> list[str]:
         mine = [(ours[place], theirs[place]) for place in both if place[0] == name]
         figures = []
         for a, b in mine:
-            pattern = min(a["usual_practice"]["rmse_m"], a["coverage"]["rmse_m"])
+            pattern = best_pattern(a)
             ratios = a["rmse_m"] / b["rmse_m"], b["rmse_m"] / pattern, a["rmse_m"] / pattern
             figures.append((a["rmse_m"], b["rmse_m"], pattern, *ratios, a["plan_s"], b["plan_s"]))
         means[name] = mean = np.mean(figures, axis=0)

@@ -93,7 +93,7 @@ def test_survey_prints_the_planner_beside_its_yardsticks(terrain: Terrain) -> No
         "survey", "--terrain", terrain, "--steps", "12", "--max-step", "8", "--sampling", "continuous", "--json"
     )
     document = json.loads(result.stdout)
-    for part in (document, document["usual_practice"], document["coverage"], document["oracle"]):
+    for part in (document, document["usual_practice"], document["coverage"], document["even"], document["oracle"]):
         assert part.keys() >= SURVEY
     assert "recorded_track" not in document
 

@@ -36,7 +36,7 @@ def fly_lawnmower(
     """
     budget_m = distance_m
     for _ in range(TRIES):
-        routes = lawnmower_routes(constraints, starts_m[:, :2], budget_m)
+        routes = lawnmower_routes(constraints, starts_m[:, :2], np.full(len(starts_m), budget_m))
         rng = np.random.default_rng([seed, 2])
         vehicles = [
             SimulatedVehicle(

@@ -32,7 +32,9 @@ def oracle_soundings(log: Log, terrain: Terrain, count: int, depth_m: float) -> 
         left -= batch
         if batch == 0:
             continue
-        squared = np.where(known, (default_map(log.soundings, grid).depth_m.ravel() - truth) ** 2, 0.0)
+        squared = known.astype(np.float64)
+        if len(log.soundings):
+            squared = np.where(known, (default_map(log.soundings, grid).depth_m.ravel() - truth) ** 2, 0.0)
         apart = np.sqrt(known.sum() * grid.cell_m**2 / count)
         worth = gaussian_filter(squared.reshape(grid.rows, grid.cols), 0.5 * apart / grid.cell_m, mode="nearest")
         _sound(log, centres[_largest(worth.ravel() * known, centres, batch, LEAST_APART * apart)], depth_m)

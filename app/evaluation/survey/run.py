@@ -8,6 +8,7 @@ import numpy as np
 from app.arrays import FloatArray
 from app.evaluation.survey.oracle import oracle_soundings
 from app.evaluation.survey.world import (
+    FAR_M,
     SOUNDING_RATE_HZ,
     SPEED_MPS,
     SurveyScenario,
@@ -18,12 +19,16 @@ from app.evaluation.survey.world import (
     stationary_map,
     unknown_belief,
 )
+from app.exploration.core.routes import FreeSpace, Turns, Vehicles
+from app.exploration.lines.even_survey import Pattern, even_survey
+from app.exploration.lines.lattice import Sweep, longer_axis_rad
 from app.exploration.lines.lawnmower import lawnmower_routes
 from app.exploration.planner.options import PlannerOptions
-from app.exploration.survey.backbone import backbone
-from app.exploration.survey.value import make_nodes
+from app.exploration.survey.backbone import MARGIN_M, there_and_back
+from app.exploration.survey.value import SurveyObjective, make_nodes
 from app.mapping.types import Soundings
 
+NO_TURNS = Turns(0.0, 0.0)
 TVU_A_M, TVU_B = 0.25, 0.0075
 """IHO S-44 special order: total vertical uncertainty at 95 % is sqrt(a^2 + (b depth)^2)."""
 
@@ -57,8 +62,8 @@ class RecordedTrack:
 class SurveyRun:
     """One run; names as in the command's JSON.
 
-    ``ratio``: RMSE over that of the better of the two patterns. ``gap_closed``: how far the RMSE has come from that of
-    the better pattern (0) to that of the oracle (1).
+    ``even``: whole even lines, as many as fit. ``ratio``: RMSE over that of the best of the three patterns.
+    ``gap_closed``: how far the RMSE has come from that of the best pattern (0) to that of the oracle (1).
     """
 
     planner: str
@@ -82,6 +87,7 @@ class SurveyRun:
     plan_s: float
     usual_practice: SurveyResult
     coverage: SurveyResult
+    even: SurveyResult
     random: SurveyResult
     oracle: SurveyResult
     ratio: float
@@ -105,8 +111,14 @@ def run_survey(
     track = fly_planner(scenario, planner, options, progress)
     ours = judge(scenario, track.soundings, track.distance_m)
     limit = float(track.distance_m.mean())
-    usual = _pattern(scenario, lawnmower_routes(scenario.constraints, scenario.starts_m[:, :2], limit), limit)
-    even = _pattern(scenario, even_coverage(scenario, limit), limit)
+    usual = fly_pattern(
+        scenario,
+        lawnmower_routes(scenario.constraints, scenario.starts_m[:, :2], np.full(scenario.vehicles, limit)),
+        limit,
+    )
+    coverage = fly_pattern(scenario, even_coverage(scenario, limit), limit)
+    lines = best_even_survey(scenario, limit)
+    even = coverage if lines is None else fly_pattern(scenario, lines, limit)
     walk = fly_planner(scenario, "random", PlannerOptions(), known=unknown_belief(scenario.belief_grid))
     placed = oracle_soundings(
         scenario.log(3), scenario.terrain, len(track.soundings), float(scenario.starts_m[:, 2].mean())
@@ -115,7 +127,7 @@ def run_survey(
     beside = None
     if recorded is not None:
         beside = RecordedTrack(len(recorded), judge(scenario, recorded, np.zeros(1), yardstick=True).rmse_m)
-    pattern = min(usual.rmse_m, even.rmse_m)
+    pattern = min(usual.rmse_m, coverage.rmse_m, even.rmse_m)
     return SurveyRun(
         planner=planner,
         terrain=scenario.terrain.name,
@@ -137,7 +149,8 @@ def run_survey(
         plan_ms_p99=1e3 * float(np.quantile(track.plan_s, 0.99)),
         plan_s=float(track.plan_s.sum()),
         usual_practice=usual,
-        coverage=even,
+        coverage=coverage,
+        even=even,
         random=judge(scenario, walk.soundings, walk.distance_m, yardstick=True),
         oracle=oracle,
         ratio=ours.rmse_m / pattern,
@@ -154,6 +167,10 @@ def judge(
 
     A yardstick may choose the better of the default and the stationary map.
     """
+    if not len(soundings):
+        return SurveyResult(
+            np.nan, np.nan, 0, float(np.sum(distance_m)), float(np.max(distance_m)) / SPEED_MPS, 0.0, np.nan
+        )
     estimate, stationary = default_map(soundings, scenario.grid), stationary_map(soundings, scenario.grid)
     rmse, l2 = rmse_m(estimate, scenario.terrain)
     rmse_stationary, l2_stationary = rmse_m(stationary, scenario.terrain)
@@ -174,22 +191,38 @@ def judge(
 def even_coverage(scenario: SurveyScenario, distance_m: float) -> list[FloatArray]:
     """Return routes of equal area per vehicle, in the direction and order that come closest to every place."""
     belief = unknown_belief(scenario.belief_grid)
-    steps = max(1, int(distance_m / scenario.max_step_m))
     nodes = make_nodes(belief.xy_m, belief.weight)
     spacing = scenario.terrain.width_m * scenario.terrain.height_m / (scenario.vehicles * distance_m)
-    shares = backbone(
-        scenario.constraints,
-        np.ascontiguousarray(scenario.starts_m[:, :2]),
-        steps,
-        nodes,
-        max(belief.correlation_length_m, spacing),
-        2.0,
-        to_border=0.5,
-    )
-    return [share.stops for share in shares]
+    objective = SurveyObjective(max(belief.correlation_length_m, spacing), 2.0, NO_TURNS, FAR_M)
+    vehicles = _vehicles(scenario, distance_m)
+    found = (there_and_back(sweep, vehicles, nodes, objective, 0.5, 0.0) for sweep in _sweeps(scenario))
+    return [share.stops for share in min(found, key=lambda survey: survey[0])[1]]
 
 
-def _pattern(scenario: SurveyScenario, routes: list[FloatArray], distance_m: float) -> SurveyResult:
+def best_even_survey(scenario: SurveyScenario, distance_m: float) -> list[FloatArray] | None:
+    """Return the even survey of whole lines that fits into ``distance_m`` per vehicle, of both directions the closer.
+
+    None where not even one line fits.
+    """
+    vehicles = _vehicles(scenario, distance_m)
+    found = (even_survey(sweep, vehicles, NO_TURNS, Pattern()) for sweep in _sweeps(scenario))
+    surveys = [survey for survey in found if survey is not None]
+    return min(surveys, key=lambda survey: survey.spacing_m).routes if surveys else None
+
+
+def _sweeps(scenario: SurveyScenario) -> list[Sweep]:
+    """Return both directions of lines, that along the longer axis first."""
+    free, axis = FreeSpace(scenario.constraints, MARGIN_M), longer_axis_rad(scenario.area_m)
+    return [Sweep(scenario.constraints, free, direction) for direction in (axis, axis + np.pi / 2)]
+
+
+def _vehicles(scenario: SurveyScenario, distance_m: float) -> Vehicles:
+    n = scenario.vehicles
+    return Vehicles(np.ascontiguousarray(scenario.starts_m[:, :2]), np.full(n, np.nan), np.full(n, distance_m))
+
+
+def fly_pattern(scenario: SurveyScenario, routes: list[FloatArray], distance_m: float) -> SurveyResult:
+    """Fly given routes for at most a distance per vehicle, and judge the better of the two maps of it."""
     log = scenario.log(2)
     spacing = SPEED_MPS / SOUNDING_RATE_HZ if scenario.sampling == "continuous" else distance_m / scenario.steps
     flown = fly_routes(log, scenario.starts_m, routes, distance_m, spacing)

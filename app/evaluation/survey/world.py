@@ -27,9 +27,15 @@ SPEED_MPS = 1.3
 SOUNDING_RATE_HZ = 5.0
 FIRST_DEPTH_M = 2.0
 MIN_ALTITUDE_M = 0.5
+SHALLOW_M = 2.0
+FAR_M = 1e6
 BELIEF_NODES_PER_SIDE = 50
 MAPS = 20
 """How often the belief is brought up to date in a mission."""
+LEAST_LEFT_M = 0.1
+"""Who has less than this left to fly is done."""
+LONGEST = 2
+"""Missions by metres take at most this many times the legs that they would if all were as long as they may be."""
 LEARN_AT = (0.05, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8)
 """Parts of the mission after which the map's hyperparameters are learned again; between them they are kept."""
 
@@ -45,7 +51,7 @@ class SurveyScenario:
     vehicles : int
         Size of the team, starting in the south-west corner, 5 m apart.
     steps : int
-        Steps of the mission.
+        Steps of the mission; sounding along legs every vehicle flies the metres that these would be at most.
     max_step_m : float
         Largest leg.
     sampling : "step" or "continuous"
@@ -87,9 +93,10 @@ class SurveyScenario:
 
     @property
     def constraints(self) -> Constraints:
-        """The limits of the mission."""
+        """The limits of the mission; where it is shallow vehicles stay at the surface, whatever the map says."""
+        altitude = MIN_ALTITUDE_M if self.terrain.min_depth_m >= SHALLOW_M else -FAR_M
         return Constraints(
-            self.area_m, max_step_m=self.max_step_m, max_depth_m=50.0, min_altitude_m=MIN_ALTITUDE_M, min_depth_m=0.0
+            self.area_m, max_step_m=self.max_step_m, max_depth_m=50.0, min_altitude_m=altitude, min_depth_m=0.0
         )
 
     @property
@@ -230,24 +237,30 @@ def fly_planner(
     positions = scenario.starts_m
     log.sound(positions)
     grid, gp = scenario.belief_grid, GaussianProcessMap()
-    learn_at = {max(2, round(part * scenario.steps)) for part in LEARN_AT}
     names = tuple(f"auv-{k + 1}" for k in range(scenario.vehicles))
     headings, since = np.full(scenario.vehicles, np.nan), np.zeros(scenario.vehicles)
     history, times = [positions], []
     belief = unknown_belief(grid) if known is None else known
     verdict: OutlierReport | None = None
-    every = max(1, scenario.steps // MAPS)
-    for step in range(1, scenario.steps + 1):
-        if known is None and ((step > 2 and step % every == 0) or step in learn_at):
-            estimate = gp.fit(log.soundings, learn=step in learn_at).predict(grid)
+    budget_m = scenario.steps * scenario.max_step_m
+    left_m = np.full(scenario.vehicles, budget_m)
+    by_metres = scenario.sampling == "continuous"
+    maps, learned, step = 0, 0, 0
+    while (left_m > LEAST_LEFT_M).any() and step < LONGEST * scenario.steps:
+        step += 1
+        part = 1.0 - float(left_m.mean()) / budget_m
+        learns = part >= LEARN_AT[min(learned, len(LEARN_AT) - 1)] and learned < len(LEARN_AT)
+        if known is None and len(log.soundings) and step > 1 and (learns or int(part * MAPS) > maps):
+            estimate = gp.fit(log.soundings, learn=learns).predict(grid)
             belief, verdict = belief_of(estimate), gp.outliers_
+            maps, learned = int(part * MAPS), learned + learns
         soundings = log.soundings
         doubted = np.zeros(len(soundings), dtype=np.bool_)
         if verdict is not None:
             doubted[: len(verdict.rejected)] = verdict.rejected
         places = np.column_stack([soundings.east_m, soundings.north_m])
         situation = Situation(
-            step,
+            min(step, scenario.steps),
             scenario.steps,
             names,
             positions,
@@ -256,6 +269,8 @@ def fly_planner(
             places[~doubted],
             scenario.constraints,
             doubtful_en_m=places[doubted],
+            moving=left_m > LEAST_LEFT_M if by_metres else None,
+            left_m=left_m if by_metres else None,
         )
         begun = time.perf_counter()
         proposal = chooser.propose(situation, rng)
@@ -264,11 +279,15 @@ def fly_planner(
         moved = np.hypot(leg[:, 0], leg[:, 1]) > 1e-6
         headings = np.where(moved, np.arctan2(leg[:, 0], leg[:, 1]), headings)
         for i, heading in enumerate(headings):
-            points, since[i] = along(positions[i], proposal.positions[i], scenario.sampling, since[i])
-            log.sound(points, np.full(len(points), heading))
+            if moved[i] or not by_metres:
+                points, since[i] = along(positions[i], proposal.positions[i], scenario.sampling, since[i])
+                log.sound(points, np.full(len(points), heading))
         positions = proposal.positions
+        left_m = left_m - (np.linalg.norm(leg, axis=1) if by_metres else scenario.max_step_m)
         history.append(positions)
-        progress(step)
+        progress(min(step, scenario.steps))
+        if by_metres and not moved.any():
+            break
     return SurveyTrack(np.array(history), log.soundings, np.array(times))
 
 

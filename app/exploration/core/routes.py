@@ -1,5 +1,7 @@
 """Routes: polylines that a vehicle follows in straight legs of at most one step, round keep-out zones."""
 
+from typing import NamedTuple
+
 import numpy as np
 import shapely
 from numba import njit
@@ -11,11 +13,14 @@ from shapely.ops import nearest_points
 
 from app.arrays import BoolArray, FloatArray
 from app.exploration.core.constraints import Constraints
+from app.exploration.core.problem import Situation
 
 CORNER_TOLERANCE = 0.15
 """A corner may be cut when the leg passes it within this fraction of a step."""
 SAME_CORNER = 0.03
 """Vertices that are no farther apart than this fraction of a step are one corner."""
+SHARP_RAD = 0.5
+"""A turn by less than this is no corner: the legs before and after it are as long as they may be."""
 
 
 @njit(cache=True, nogil=True)
@@ -77,45 +82,73 @@ def next_waypoint(
     return to_x, to_y, ahead
 
 
-@njit(cache=True, nogil=True)
-def fly(
-    x: float, y: float, route: FloatArray, count: int, step: float, steps: int, vertices: FloatArray
-) -> tuple[int, int]:
-    """Follow a route for at most ``steps`` legs.
+class Vehicles(NamedTuple):
+    """A team that a plan is made for.
 
-    Writes the corners of the track into ``vertices`` (at least steps + 1 rows; straight legs merged, start included)
-    and returns their number and the steps used.
+    Attributes
+    ----------
+    en_m : (n_vehicles, 2)
+        Positions now.
+    headings_rad : (n_vehicles,)
+        Clockwise from north; NaN unknown.
+    left_m : (n_vehicles,)
+        How far each may fly.
     """
-    vertices[0, 0] = x
-    vertices[0, 1] = y
-    n = 1
-    used = 0
-    i = 0
-    while used < steps and i < count:
-        d = np.hypot(route[i, 0] - x, route[i, 1] - y)
-        if d > 3.0 * step:  # far from the next corner all legs are the same: take them at once
-            legs = min(int(d / step) - 1, steps - used)
-            f = legs * step / d
-            nx, ny = x + f * (route[i, 0] - x), y + f * (route[i, 1] - y)
-            used += legs
-        else:
-            nx, ny, i = next_waypoint(x, y, route, i, count, step, CORNER_TOLERANCE)
-            if np.hypot(nx - x, ny - y) < 1e-9:
-                break
-            used += 1
-        if n >= 2:
-            ux = vertices[n - 1, 0] - vertices[n - 2, 0]
-            uy = vertices[n - 1, 1] - vertices[n - 2, 1]
-            vx = nx - x
-            vy = ny - y
-            if abs(ux * vy - uy * vx) < 1e-6 * (abs(ux) + abs(uy)) and ux * vx + uy * vy > 0.0:
-                n -= 1
-        vertices[n, 0] = nx
-        vertices[n, 1] = ny
-        n += 1
-        x = nx
-        y = ny
-    return n, used
+
+    en_m: FloatArray
+    headings_rad: FloatArray
+    left_m: FloatArray
+
+
+class Turns(NamedTuple):
+    """What turns cost: the radius of the tightest circle, and the metres that are lost at every corner besides."""
+
+    radius_m: float
+    corner_m: float
+
+
+@njit(cache=True, nogil=True)
+def turn_m(turn: float, before: float, leg_m: float, turns: Turns) -> float:
+    """Return by how many metres a turn at the end of a leg of ``leg_m`` lengthens the way.
+
+    ``turn`` and ``before``, the turn at the leg's start, are signed angles. An arc is longer than nothing by r a. What
+    turns farther than a right angle has to swing out, as of a Dubins path: so does a short leg between two turns to the
+    same side.
+    """
+    joined = abs(turn)
+    radius_m = turns.radius_m
+    if turn * before > 0.0 and leg_m < 2.0 * radius_m:
+        joined += abs(before) * (1.0 - leg_m / (2.0 * radius_m))
+    extra = radius_m * (abs(turn) + 8.0 / np.pi * max(0.0, min(joined, np.pi) - 0.5 * np.pi))
+    return extra + turns.corner_m if abs(turn) > SHARP_RAD else extra
+
+
+@njit(cache=True, nogil=True)
+def flown_m(x: float, y: float, heading: float, route: FloatArray, turns: Turns) -> float:
+    """Return how far a vehicle flies from (x, y) along a route (k, 2), turns included; NaN heading: unknown."""
+    total, course, before, leg = 0.0, 0.5 * np.pi - heading, 0.0, np.inf
+    for k in range(len(route)):
+        dx = route[k, 0] - x
+        dy = route[k, 1] - y
+        d = np.hypot(dx, dy)
+        if d < 1e-6:
+            continue
+        towards = np.arctan2(dy, dx)
+        if not np.isnan(course):
+            turn = (towards - course + np.pi) % (2.0 * np.pi) - np.pi
+            total += turn_m(turn, before, leg, turns)
+            before = turn
+        total += d
+        x, y, course, leg = route[k, 0], route[k, 1], towards, d
+    return total
+
+
+def metres_left(team: Situation) -> FloatArray:
+    """Return how far each vehicle may still fly, (n_vehicles,)."""
+    if team.left_m is not None:
+        return np.maximum(0.0, team.left_m)
+    steps = max(1, team.steps_total - team.step + 1)
+    return np.full(len(team.vehicles), steps * team.constraints.max_step_m)
 
 
 class FreeSpace:

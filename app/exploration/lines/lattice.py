@@ -13,6 +13,8 @@ from app.exploration.core.routes import FreeSpace
 
 SHARE_SAMPLES = 200
 MAX_LINES = 2000
+MOST_INSET = 0.4
+"""A line is taken back at either end by at most this part of its length."""
 
 
 def longer_axis_rad(area: FloatArray) -> float:
@@ -51,8 +53,8 @@ class Sweep:
         """Turn (u, v) positions (..., 2) into local ones."""
         return np.asarray(uv_m @ self._axes)
 
-    def shares(self, n: int) -> FloatArray:
-        """Return the ``n + 1`` values of u that cut the free area into strips of equal area."""
+    def shares(self, parts: FloatArray) -> FloatArray:
+        """Return the n + 1 values of u that cut the free area into strips whose areas are as ``parts`` (n,)."""
         area = self.constraints.area
         low, high = area.min(axis=0), area.max(axis=0)
         axes = [np.linspace(low[k], high[k], SHARE_SAMPLES, endpoint=False) for k in (0, 1)]
@@ -60,13 +62,17 @@ class Sweep:
         points = np.column_stack([east.ravel(), north.ravel()])
         u = self.to_uv(points[inside_area(self.constraints, points)])[:, 0]
         u_area = self.to_uv(area)[:, 0]
+        at = np.cumsum(parts)[:-1] / np.sum(parts)
         if len(u) == 0:
-            return np.linspace(u_area.min(), u_area.max(), n + 1)
-        cuts = np.quantile(u, np.arange(1, n) / n)
+            u = u_area
+        cuts = np.quantile(u, at)
         return np.concatenate([[u_area.min()], cuts, [u_area.max()]])
 
-    def lines(self, lines_u: FloatArray) -> list[list[FloatArray]]:
-        """Return the parts (2, 2) of each line at ``lines_u`` that lie in the free space, by increasing v."""
+    def lines(self, lines_u: FloatArray, inset_m: float = 0.0) -> list[list[FloatArray]]:
+        """Return the parts (2, 2) of each line at ``lines_u`` that lie in the free space, by increasing v.
+
+        Both ends of a part are taken back by ``inset_m``, where it is long enough.
+        """
         v = self.to_uv(self.constraints.area)[:, 1]
         n = len(lines_u)
         u = np.repeat(lines_u, 2)
@@ -80,16 +86,22 @@ class Sweep:
         along = self.to_uv(pieces)[..., 1]
         backwards = along[:, 0] > along[:, 1]
         pieces[backwards] = pieces[backwards, ::-1]
+        way = pieces[:, 1] - pieces[:, 0]
+        inset = way * np.minimum(inset_m / np.maximum(np.hypot(*way.T), 1e-9), MOST_INSET)[:, None]
+        pieces = pieces + np.stack([inset, -inset], axis=1)
         found: list[list[FloatArray]] = [[] for _ in range(n)]
         for i in np.lexsort((np.minimum(*along.T), of)):
             found[of[i]].append(pieces[i])
         return found
 
-    def stops(self, lines_u: FloatArray, *, upwards: bool) -> FloatArray:
-        """Return the stops (k, 2) of flying the lines at ``lines_u`` in order, the first one ``upwards`` (along v)."""
+    def stops(self, lines_u: FloatArray, *, upwards: bool, inset_m: float = 0.0) -> FloatArray:
+        """Return the stops (k, 2) of flying the lines at ``lines_u`` in order, the first one ``upwards`` (along v).
+
+        Their ends are taken back by ``inset_m``.
+        """
         stops: list[FloatArray] = []
         # All lines at once: one by one they take most of the time of planning a long mission, and hold others up.
-        for pieces in self.lines(lines_u):
+        for pieces in self.lines(lines_u, inset_m):
             if not pieces:
                 continue
             stops.extend(pieces if upwards else [p[::-1] for p in reversed(pieces)])

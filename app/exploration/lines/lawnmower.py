@@ -3,21 +3,22 @@
 from typing import Any, ClassVar
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from app.arrays import FloatArray
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.constraints import Constraints
 from app.exploration.core.problem import Proposal, Situation
-from app.exploration.core.routes import CORNER_TOLERANCE, FreeSpace, next_waypoint
+from app.exploration.core.routes import CORNER_TOLERANCE, FreeSpace, metres_left, next_waypoint
 from app.exploration.lines.handover import hand_over
 from app.exploration.lines.lattice import Sweep, boustrophedon, longer_axis_rad, route_length
 from app.exploration.planner.base import PlannerBase, settle
 
 BORDER_MARGIN_M = 0.5
+LEAST_BUDGET_M = 1.0
+"""Also who can fly no farther has a strip, a very narrow one."""
 
 
-def lawnmower_routes(constraints: Constraints, starts: FloatArray, budget_m: float) -> list[FloatArray]:
+def lawnmower_routes(constraints: Constraints, starts: FloatArray, budgets_m: FloatArray) -> list[FloatArray]:
     """Return each vehicle's route (k, 2): lines along the longer axis, as many as fit into the distance it can travel.
 
     Parameters
@@ -25,23 +26,16 @@ def lawnmower_routes(constraints: Constraints, starts: FloatArray, budget_m: flo
     constraints : Constraints
         Give the area and its keep-out zones.
     starts : (n_vehicles, 2)
-        Where the vehicles are; each takes the strip that gives the team the least transit.
-    budget_m : float
-        Distance that every vehicle can travel.
+        Where the vehicles are; they take the strips in the order in which they stand across the lines.
+    budgets_m : (n_vehicles,)
+        Distances that the vehicles can travel; their strips are in proportion to them.
     """
-    free = FreeSpace(constraints, BORDER_MARGIN_M)
-    sweep = Sweep(constraints, free, longer_axis_rad(constraints.area))
-    cuts = sweep.shares(len(starts))
-    u = sweep.to_uv(starts)[:, 0]
-    transit = np.maximum(0.0, np.maximum(cuts[:-1] - u[:, None], u[:, None] - cuts[1:]))
-    order = np.argsort(
-        u, kind="stable"
-    )  # of equal totals, the assignment that keeps the vehicles' order across the lines
-    rows, strips = linear_sum_assignment(transit[order])
+    sweep = Sweep(constraints, FreeSpace(constraints, BORDER_MARGIN_M), longer_axis_rad(constraints.area))
+    order = np.argsort(sweep.to_uv(starts)[:, 0], kind="stable")
+    cuts = sweep.shares(np.maximum(budgets_m[order], LEAST_BUDGET_M))
     routes: list[FloatArray] = [np.zeros((0, 2))] * len(starts)
-    for row, strip in zip(rows, strips, strict=True):
-        i = int(order[row])
-        routes[i] = boustrophedon(sweep, starts[i], float(cuts[strip]), float(cuts[strip + 1]), budget_m)
+    for strip, i in enumerate(order):
+        routes[i] = boustrophedon(sweep, starts[i], float(cuts[strip]), float(cuts[strip + 1]), float(budgets_m[i]))
     return routes
 
 
@@ -64,7 +58,7 @@ class LawnmowerPlanner(PlannerBase):
 
     def _decide(self, team: Situation, bottom: Bottom, seed: int) -> Proposal:
         self._adopt(team)
-        step = team.constraints.max_step_m * (1 - 1e-9)
+        steps = np.minimum(team.constraints.max_step_m, metres_left(team)) * (1 - 1e-9)
         # The corner that a leg cuts may be that of a zone: then it is flown out.
         cuts = (CORNER_TOLERANCE, 0.0) if team.constraints.keep_out else (CORNER_TOLERANCE,)
         targets = np.empty((len(cuts), len(team.vehicles), 2))
@@ -74,7 +68,7 @@ class LawnmowerPlanner(PlannerBase):
                 route = self._routes[name] if team.moves[i] else self._routes[name][:0]
                 x, y = team.positions[i, :2]
                 targets[k, i, 0], targets[k, i, 1], following[k, i] = next_waypoint(
-                    x, y, route, 0, len(route), step, cut
+                    x, y, route, 0, len(route), steps[i], cut
                 )
         positions, which = settle(team, bottom, self._at_cruise(team, bottom, targets))
         for i, name in enumerate(team.vehicles):
@@ -89,7 +83,7 @@ class LawnmowerPlanner(PlannerBase):
         """Give every vehicle of the team a route."""
         en = team.positions[:, :2]
         if not self._routes.keys() & set(team.vehicles):
-            budget = (team.steps_total - team.step + 1) * team.constraints.max_step_m
-            self._routes = dict(zip(team.vehicles, lawnmower_routes(team.constraints, en, budget), strict=True))
+            routes = lawnmower_routes(team.constraints, en, metres_left(team))
+            self._routes = dict(zip(team.vehicles, routes, strict=True))
             return
         self._routes = hand_over(self._routes, team.vehicles, en)

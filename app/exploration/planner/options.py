@@ -1,8 +1,8 @@
 """What can be set about a planner; declared once, shown by the command line, REST and the dashboard."""
 
-from typing import Any, Literal
+from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field
 
 from app.exploration.core.objective import Terms
 from app.exploration.pcao.model import PcaoModel
@@ -12,16 +12,6 @@ class PlannerOptions(BaseModel):
     """Settings of the planners. Every planner reads those that concern it."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
-
-    @model_validator(mode="before")
-    @classmethod
-    def _without_what_nothing_reads(cls, given: Any) -> Any:
-        """Let go of a setting that was offered and read nowhere: missions that were stored then have it."""
-        return (
-            {name: value for name, value in given.items() if name != "turn_radius_m"}
-            if isinstance(given, dict)
-            else given
-        )
 
     regressors: Literal["map", "polynomial"] = Field(
         "map",
@@ -54,6 +44,9 @@ class PlannerOptions(BaseModel):
     )
     alpha_floor: float = Field(0.2, ge=0, le=1, description="Least alpha, so that random moves never die out.")
     search: int = Field(4000, ge=0, le=100_000, description="Changes tried when a survey plan is made anew.")
+    turn_radius_m: float = Field(
+        0.0, ge=0, le=1000, description="Radius of the tightest circle that vehicles fly; survey plans pay for turns."
+    )
     cruise_depth_m: float | None = Field(
         None, ge=0, description="Depth at which vehicles survey; by default the depth at which each joined."
     )

@@ -30,6 +30,8 @@ NEAR_PART = 0.3
 WEIGHT_RANGE = (0.02, 50.0)
 HEDGE = 0.25
 """Part of the roughness that is spread evenly: what no sounding has met may be anywhere."""
+TRUSTED_TO = 1.25
+"""Farther from all soundings, in spacings of the survey lines, less and less is known of the roughness."""
 
 SECOND_LOOK = 30.0
 """Weight of a place whose only sounding is doubted: is there a rock, or was it a fish?"""
@@ -100,7 +102,8 @@ def expected_roughness(belief: Belief, distance_m: FloatArray, spacing_m: float)
     roughness = gaussian_filter(error, blur, mode="nearest") / gaussian_filter(squared_distance, blur, mode="nearest")
     roughness = roughness.ravel()[raster.cell]
     roughness = np.clip(roughness / roughness.mean(), *WEIGHT_RANGE)
-    return np.asarray((1.0 - HEDGE) * roughness / roughness.mean() + HEDGE)
+    trust = (1.0 - HEDGE) * np.exp(-np.maximum(0.0, distance_m / spacing_m - TRUSTED_TO))
+    return np.asarray(trust * roughness / roughness.mean() + 1.0 - trust)
 
 
 def with_second_looks(roughness: FloatArray, team: Situation, spacing_m: float) -> FloatArray:

@@ -8,6 +8,7 @@ from numba import njit
 from app.arrays import BoolArray, FloatArray, IntArray
 from app.exploration.core.constraints import Constraints, Region
 from app.exploration.core.geometry import enters, leaves, signed_distance
+from app.exploration.core.routes import Turns, Vehicles
 from app.exploration.survey.value import Nodes, SurveyObjective, expected_error, lower_to_route, make_nodes
 
 DRAWS = 6
@@ -213,8 +214,7 @@ def improve(
     d2: FloatArray,
     nodes: Nodes,
     objective: SurveyObjective,
-    starts: FloatArray,
-    headings: FloatArray,
+    vehicles: Vehicles,
     begin: ViaPoints,
     search: PlanSearch,
     draws: FloatArray,
@@ -222,7 +222,7 @@ def improve(
     """Change the plan at random, keeping changes that lower :func:`~app.exploration.survey.value.plan_value`.
 
     At first changes that worsen it by up to the part ``heat`` are kept too, so that the plan gets out of dead ends;
-    what is tolerated falls to nothing. The best plan met is returned. The first five arguments are as there.
+    what is tolerated falls to nothing. The best plan met is returned. The first four arguments are as there.
 
     Parameters
     ----------
@@ -236,21 +236,18 @@ def improve(
     vias, counts, value
         The improved plan and its value.
     """
+    starts, headings, left_m = vehicles
     n, m = len(starts), len(d2)
     scale, power, weight = objective.scale_m, objective.power, nodes.weight
-    vertices = np.empty((objective.steps + 2, 2))
     current, current_counts = begin.vias.copy(), begin.counts.copy()
     plan = ViaPoints(begin.vias.copy(), begin.counts.copy(), begin.locked)
     after = np.full((n, m), np.inf)
-    turns = np.zeros(n)
     for v in range(n):
-        turns[v] = lower_to_route(
-            after[v], nodes, objective, starts[v], headings[v], plan.vias[v], plan.counts[v], vertices
-        )
+        lower_to_route(after[v], nodes, objective, starts[v], headings[v], left_m[v], plan.vias[v], plan.counts[v])
     running = _left(d2, after, weight, scale, power)
-    value = running[-1] * (1.0 + objective.turn_penalty * turns.sum())
+    value = running[-1]
     best, best_counts, best_value = current.copy(), current_counts.copy(), value
-    trial, trial_turns = after.copy(), turns.copy()
+    trial = after.copy()
     changed = np.zeros(n, np.bool_)
     for it in range(len(draws)):
         changed[:] = False
@@ -263,11 +260,11 @@ def improve(
             for v in range(n):
                 if changed[v]:
                     trial[v, :] = np.inf
-                    trial_turns[v] = lower_to_route(
-                        trial[v], nodes, objective, starts[v], headings[v], plan.vias[v], plan.counts[v], vertices
+                    lower_to_route(
+                        trial[v], nodes, objective, starts[v], headings[v], left_m[v], plan.vias[v], plan.counts[v]
                     )
             left = _left(d2, trial, weight, scale, power)
-            new = left[-1] * (1.0 + objective.turn_penalty * trial_turns.sum())
+            new = left[-1]
             keep = new < value * (1.0 + search.heat * (1.0 - (it + 1.0) / len(draws)) ** 2) - 1e-12
             if keep:
                 value = new
@@ -281,12 +278,10 @@ def improve(
                 current[v] = plan.vias[v]
                 current_counts[v] = plan.counts[v]
                 after[v] = trial[v]
-                turns[v] = trial_turns[v]
             elif changed[v]:
                 plan.vias[v] = current[v]
                 plan.counts[v] = current_counts[v]
                 trial[v] = after[v]
-                trial_turns[v] = turns[v]
     return best, best_counts, best_value
 
 
@@ -296,5 +291,5 @@ def warm_up() -> None:
     places, one, none = np.full((1, 2), 0.5), np.ones(1), np.zeros(1, dtype=np.int64)
     plan = ViaPoints(np.zeros((1, 1, 2)), none, none)
     search = PlanSearch(1.0, Constraints(square).region, 0.0, 0.0)
-    objective = SurveyObjective(1.0, 1, 1.0, 2.0, 0.0, 1.0)
-    improve(one, make_nodes(places, one), objective, places, one, plan, search, np.zeros((1, DRAWS)))
+    objective = SurveyObjective(1.0, 2.0, Turns(0.0, 0.0), 1.0)
+    improve(one, make_nodes(places, one), objective, Vehicles(places, one, one), plan, search, np.zeros((1, DRAWS)))

@@ -3,7 +3,8 @@
 A node at distance D from the nearest sounding has an expected squared error of a x / (1 + x) with x = (D / l)^p, where
 ``a`` is the local roughness, ``l`` the correlation length, and p the exponent of short distances. It grows with the
 distance and ends at ``a``, the most that can be wrong there: far less on sand than among rocks. ``U`` is the sum over
-the nodes. Soundings are taken all along the legs.
+the nodes. Soundings are taken all along the legs. Every vehicle flies its route until the metres are used up that it
+has left, and pays for its turns in metres.
 """
 
 from typing import NamedTuple
@@ -12,7 +13,7 @@ import numpy as np
 from numba import njit
 
 from app.arrays import FloatArray, IntArray
-from app.exploration.core.routes import fly
+from app.exploration.core.routes import Turns, Vehicles, turn_m
 
 BUCKETS_PER_SIDE = 12
 
@@ -51,16 +52,14 @@ class Nodes(NamedTuple):
 
 
 class SurveyObjective(NamedTuple):
-    """How a plan is judged: the largest leg, legs per vehicle, l and p as above, and what a reversal costs.
+    """How a plan is judged: l and p as above, and what turns cost.
 
     Nodes farther than ``reach_m`` from all soundings count as quite unknown.
     """
 
-    step: float
-    steps: int
     scale_m: float
     power: float
-    turn_penalty: float
+    turns: Turns
     reach_m: float
 
 
@@ -140,20 +139,32 @@ def lower_to_route(
     objective: SurveyObjective,
     start: FloatArray,
     heading: float,
+    left_m: float,
     route: FloatArray,
     count: int,
-    vertices: FloatArray,
 ) -> float:
-    """Lower ``d2`` to what it is after flying a route from ``start`` (2,), in place; return how much it turns.
-
-    ``vertices`` is scratch space of at least ``objective.steps + 2`` rows.
-    """
-    n, _ = fly(start[0], start[1], route, count, objective.step, objective.steps, vertices)
-    for k in range(1, n):
-        lower_to_segment(
-            d2, nodes, vertices[k - 1, 0], vertices[k - 1, 1], vertices[k, 0], vertices[k, 1], objective.reach_m
-        )
-    return turning(vertices, n, heading)
+    """Lower ``d2`` to what it is after flying a route from ``start`` (2,), in place; return the metres left."""
+    x, y, course, before, leg = start[0], start[1], 0.5 * np.pi - heading, 0.0, np.inf
+    for k in range(count):
+        dx = route[k, 0] - x
+        dy = route[k, 1] - y
+        d = np.hypot(dx, dy)
+        if d < 1e-6:
+            continue
+        towards = np.arctan2(dy, dx)
+        if not np.isnan(course):
+            turn = (towards - course + np.pi) % (2.0 * np.pi) - np.pi
+            left_m -= turn_m(turn, before, leg, objective.turns)
+            before = turn
+        if left_m <= 0.0:
+            return 0.0
+        f = min(1.0, left_m / d)
+        lower_to_segment(d2, nodes, x, y, x + f * dx, y + f * dy, objective.reach_m)
+        left_m -= d
+        if left_m <= 0.0:
+            return 0.0
+        x, y, course, leg = route[k, 0], route[k, 1], towards, d
+    return left_m
 
 
 @njit(cache=True, nogil=True, inline="always")
@@ -178,51 +189,24 @@ def uncertainty(d2: FloatArray, weight: FloatArray, scale_m: float, power: float
 
 
 @njit(cache=True, nogil=True)
-def turning(vertices: FloatArray, n: int, heading: float) -> float:
-    """Return the sum over corners of how far they turn beyond 100 degrees, in half turns; NaN heading: unknown."""
-    total = 0.0
-    previous = np.nan
-    if not np.isnan(heading):
-        previous = 0.5 * np.pi - heading
-    for k in range(1, n):
-        course = np.arctan2(vertices[k, 1] - vertices[k - 1, 1], vertices[k, 0] - vertices[k - 1, 0])
-        if not np.isnan(previous):
-            turn = abs((course - previous + np.pi) % (2 * np.pi) - np.pi)
-            total += max(0.0, turn - 1.75) / np.pi
-        previous = course
-    return total
-
-
-@njit(cache=True, nogil=True)
 def plan_value(
-    d2: FloatArray,
-    nodes: Nodes,
-    objective: SurveyObjective,
-    starts: FloatArray,
-    headings: FloatArray,
-    vias: FloatArray,
-    counts: IntArray,
+    d2: FloatArray, nodes: Nodes, objective: SurveyObjective, vehicles: Vehicles, vias: FloatArray, counts: IntArray
 ) -> float:
-    """Return U after flying a plan, plus a penalty for reversals.
+    """Return U after flying a plan.
 
     Parameters
     ----------
     d2 : (m,)
         Squared distances of the nodes to the soundings taken so far (not changed).
-    starts : (n_vehicles, 2)
-        Positions now.
-    headings : (n_vehicles,)
-        Clockwise from north; NaN unknown.
     vias : (n_vehicles, k, 2)
         Via points; the first ``counts[j]`` count.
     """
     after = d2.copy()
-    vertices = np.empty((objective.steps + 2, 2))
-    turns = 0.0
-    for j in range(len(starts)):
-        turns += lower_to_route(after, nodes, objective, starts[j], headings[j], vias[j], counts[j], vertices)
-    value = uncertainty(after, nodes.weight, objective.scale_m, objective.power)
-    return value * (1.0 + objective.turn_penalty * turns)
+    for j in range(len(counts)):
+        lower_to_route(
+            after, nodes, objective, vehicles.en_m[j], vehicles.headings_rad[j], vehicles.left_m[j], vias[j], counts[j]
+        )
+    return uncertainty(after, nodes.weight, objective.scale_m, objective.power)
 
 
 @njit(cache=True, nogil=True)
@@ -230,8 +214,7 @@ def values_after_first_leg(
     d2: FloatArray,
     nodes: Nodes,
     objective: SurveyObjective,
-    starts: FloatArray,
-    headings: FloatArray,
+    vehicles: Vehicles,
     targets: FloatArray,
     vias: FloatArray,
     counts: IntArray,
@@ -243,37 +226,25 @@ def values_after_first_leg(
     """
     c, n, _ = targets.shape
     out = np.empty((c, 2))
-    courses = np.empty(n)
-    rest = SurveyObjective(
-        objective.step,
-        objective.steps - 1,
-        objective.scale_m,
-        objective.power,
-        objective.turn_penalty,
-        objective.reach_m,
-    )
+    route = np.empty((vias.shape[2] + 1, 2))
     for i in range(c):
+        first = d2.copy()
         after = d2.copy()
-        turns = 0.0
         for j in range(n):
-            ax, ay = starts[j, 0], starts[j, 1]
-            bx, by = targets[i, j, 0], targets[i, j, 1]
-            lower_to_segment(after, nodes, ax, ay, bx, by, objective.reach_m)
-            courses[j] = headings[j]
-            if np.hypot(bx - ax, by - ay) > 1e-6:
-                courses[j] = 0.5 * np.pi - np.arctan2(by - ay, bx - ax)
-                if not np.isnan(headings[j]):
-                    turn = abs((courses[j] - headings[j] + np.pi) % (2 * np.pi) - np.pi)
-                    turns += max(0.0, turn - 1.75) / np.pi
-        out[i, 0] = uncertainty(after, nodes.weight, objective.scale_m, objective.power)
-        later = plan_value(after, nodes, rest, targets[i], courses, vias[i], counts[i])
-        out[i, 1] = later * (1.0 + objective.turn_penalty * turns)
+            start, heading, left = vehicles.en_m[j], vehicles.headings_rad[j], vehicles.left_m[j]
+            route[0] = targets[i, j]
+            route[1:] = vias[i, j]
+            lower_to_route(first, nodes, objective, start, heading, left, route, 1)
+            lower_to_route(after, nodes, objective, start, heading, left, route, counts[i, j] + 1)
+        out[i, 0] = uncertainty(first, nodes.weight, objective.scale_m, objective.power)
+        out[i, 1] = uncertainty(after, nodes.weight, objective.scale_m, objective.power)
     return out
 
 
 def warm_up() -> None:
     """Compile what values plans, or load it from the cache of an earlier start."""
     one, two = np.zeros(1), np.zeros((1, 1, 2))
-    nodes, objective = make_nodes(two[0], one), SurveyObjective(1.0, 1, 1.0, 2.0, 0.0, 1.0)
+    nodes, objective = make_nodes(two[0], one), SurveyObjective(1.0, 2.0, Turns(0.0, 0.0), 1.0)
     counts = np.zeros((1, 1), dtype=np.int64)
-    values_after_first_leg(one, nodes, objective, two[0], one, two, two[None], counts)
+    values_after_first_leg(one, nodes, objective, Vehicles(two[0], one, one), two, two[None], counts)
+    plan_value(one, nodes, objective, Vehicles(two[0], one, one), two, counts[0])

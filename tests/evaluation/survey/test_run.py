@@ -1,3 +1,4 @@
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -10,7 +11,7 @@ from scipy.spatial import cKDTree
 
 from app.evaluation.survey.baselines import lawnmower_baseline, lawnmower_baselines
 from app.evaluation.survey.flown import fly_lawnmower
-from app.evaluation.survey.run import run_survey
+from app.evaluation.survey.run import best_even_survey, run_survey
 from app.evaluation.survey.world import SurveyScenario, along, default_map, fly_planner, rmse_m
 from app.exploration.planner.options import PlannerOptions
 from simulator.seafloors import generate
@@ -58,13 +59,13 @@ def test_a_run_is_reproducible_and_obeys_its_constraints(harbour: Terrain) -> No
 def test_a_survey_run_reports_the_planner_beside_its_yardsticks(harbour: Terrain) -> None:
     run = run_survey(SurveyScenario(harbour, steps=30, seed=0), "cao", QUICK)
     relief = float(np.std(harbour.z_m))
-    for result in (run, run.usual_practice, run.coverage, run.oracle):
+    for result in (run, run.usual_practice, run.coverage, run.even, run.oracle):
         assert 0.0 < result.rmse_m < relief
         assert result.l2_norm == pytest.approx(result.rmse_m * 60.0, rel=1e-6)
         assert 0.0 <= result.coverage_pct <= 100.0
         assert result.distance_m <= 2 * 300.0 + 1e-6
     assert run.usual_practice.distance_m <= run.distance_m + 1e-6
-    assert run.ratio == pytest.approx(run.rmse_m / min(run.usual_practice.rmse_m, run.coverage.rmse_m))
+    assert run.ratio == pytest.approx(run.rmse_m / min(r.rmse_m for r in (run.usual_practice, run.coverage, run.even)))
     assert run.recorded_track is None
 
 
@@ -88,6 +89,29 @@ def test_a_flown_lawnmower_finishes_its_lines_within_the_distance_that_it_is_giv
     truth = harbour.depth_at(soundings.east_m, soundings.north_m)
     deviation = (soundings.depth_m - truth) / soundings.sd_m
     assert np.abs(deviation).mean() < 1.5
+
+
+def test_floors_with_holes_are_surveyed_also_when_the_first_place_gives_no_echo() -> None:
+    floor = generate("reef", 1, width_m=40.0, height_m=40.0)
+    holes = floor.z_m.copy()
+    holes[:14, :20] = np.nan
+    run = run_survey(SurveyScenario(replace(floor, z_m=holes), 2, 12, 10.0), "cao", PlannerOptions(search=100))
+    assert 0.0 < run.rmse_m < 3.0
+    assert 0.0 < run.even.rmse_m < 3.0
+    nothing = Terrain(np.where(np.isnan(holes), 5.0, np.nan), 1.0)
+    short = run_survey(SurveyScenario(nothing, 1, 2, 0.4, "step"), "lawnmower", PlannerOptions())
+    assert short.samples <= 3
+
+
+def test_even_lines_are_whole_and_fit_into_the_distance() -> None:
+    scenario = SurveyScenario(generate("reef", 1), 2, 60, 10.0)
+    routes = best_even_survey(scenario, 600.0)
+    assert routes is not None
+    for start, route in zip(scenario.starts_m[:, :2], routes, strict=True):
+        legs = np.diff(np.vstack([start, route]), axis=0)
+        assert np.hypot(*legs.T).sum() <= 600.0
+        lines = legs[1::2]
+        np.testing.assert_allclose(np.hypot(*lines.T), 99.0, atol=1e-6)
 
 
 def test_the_default_planner_beats_the_lawnmower_where_detail_is_concentrated() -> None:

@@ -22,11 +22,11 @@ from app.arrays import BoolArray, FloatArray, IntArray
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.constraints import Constraints, inside_area
 from app.exploration.core.problem import Belief, Situation
-from app.exploration.core.routes import CORNER_TOLERANCE, next_waypoint
+from app.exploration.core.routes import CORNER_TOLERANCE, Turns, Vehicles, metres_left, next_waypoint
 from app.exploration.lines.handover import hand_over
 from app.exploration.planner.base import vehicle_rng
 from app.exploration.planner.options import PlannerOptions
-from app.exploration.survey.backbone import MARGIN_M, backbone
+from app.exploration.survey.backbone import MARGIN_M, backbone, packed
 from app.exploration.survey.error import expected_roughness, with_second_looks
 from app.exploration.survey.local_search import DRAWS, PlanSearch, ViaPoints, improve
 from app.exploration.survey.value import Nodes, SurveyObjective, make_nodes, plan_value, values_after_first_leg
@@ -43,12 +43,18 @@ REACH = 4.0
 """Line spacings beyond which a place counts as quite unknown."""
 LEAVE_BACKBONE = 0.98
 """The freer plan must promise at most this part of the squared error that the backbone promises."""
+LEAVE_LINES = 0.85
+"""The same where all lines are flown in order: an even survey is hard to better."""
+KNOWN = 0.5
+"""A map of this part of the area at the beginning tells where it is rough."""
 LEAVE_PLAN = 0.02
 """A leg off the plan must promise a squared error smaller by this part: predictions are noisy, and a choice among many
 takes the luckiest."""
+SILENT_WITHIN, SILENT = 0.5, 0.05
+"""Within so many spacings of a place that gave no echo ground counts only this part: there is nothing to be heard."""
 JITTER = 0.7
-TURN_PENALTY = 0.002
-"""Relative worsening of the final map that a reversal counts for."""
+CORNER_LOSS = 0.4
+"""Part of a step that a corner costs where steps are counted: the leg to it ends early."""
 TURNS_RAD = np.deg2rad([-120.0, -90.0, -60.0, -30.0, 0.0, 30.0, 60.0, 90.0, 120.0])
 
 
@@ -67,7 +73,9 @@ class SurveyRegressors:
         self._coarse: dict[str, int] = {}
         self._plan: dict[str, FloatArray] = {}
         self._expected: float | None = None
-        self._planned = 0
+        self._flown_m = self._planned_m = 0.0
+        self._silent = np.zeros((0, 2))
+        self._adapts = True
         self._free = False
         self._row = [0.0, 0.0]
 
@@ -78,13 +86,13 @@ class SurveyRegressors:
         """
         self._team, self._bottom, self._seed = team, bottom, seed
         self._en = np.ascontiguousarray(team.positions[:, :2])
-        self._steps = max(1, team.steps_total - team.step + 1)
-        self._step_m = team.constraints.max_step_m * (1 - 1e-9)
+        self._left_m = metres_left(team)
+        self._steps_m = np.minimum(team.constraints.max_step_m, self._left_m) * (1 - 1e-9)
+        self._whole_m = max(self._flown_m + float(self._left_m.sum()), 1e-9)
         begins = not self._plan.keys() & set(team.vehicles)
         changed = not begins and self._plan.keys() != set(team.vehicles)
-        every = max(1, round(team.steps_total / REPLANS))
         explores = not begins and any(self._coarse.get(v, 0) == 0 for v in team.vehicles)
-        self._replans = changed or (explores and team.step - self._planned >= every)
+        self._replans = changed or (explores and self._flown_m - self._planned_m >= self._whole_m / REPLANS)
         self._looks = begins or self._replans or self._every_step
         if not self._looks:
             self._followed = self._packed(self._plan if self._free else self._backbone)
@@ -107,15 +115,23 @@ class SurveyRegressors:
     def _look(self) -> None:
         """See what is known and where it is far to the next sounding."""
         team, constraints = self._team, self._team.constraints
-        self._spacing = _free_area(constraints) / (len(self._en) * team.steps_total * constraints.max_step_m)
+        self._spacing = _free_area(constraints) / self._whole_m
         tree = cKDTree(np.vstack([team.soundings_en_m, self._en]), balanced_tree=False)
         distance = np.asarray(tree.query(team.belief.xy_m)[0])
-        roughness = expected_roughness(team.belief, distance, self._spacing)
-        self._nodes = thin_nodes(team, with_second_looks(roughness, team, self._spacing))
+        roughness = np.ones(len(distance))
+        if self._adapts:
+            roughness = expected_roughness(team.belief, distance, self._spacing)
+        roughness = with_second_looks(roughness, team, self._spacing)
+        # What was flown over and gave no echo gives none the next time either.
+        self._silent = self._silent[np.asarray(tree.query(self._silent)[0]) > SILENT_WITHIN * self._spacing]
+        if len(self._silent):
+            heard_of = np.asarray(cKDTree(self._silent).query(team.belief.xy_m)[0]) <= SILENT_WITHIN * self._spacing
+            roughness = np.where(heard_of & (distance > SILENT_WITHIN * self._spacing), SILENT, 1.0) * roughness
+        self._nodes = thin_nodes(team, roughness)
         self._scale = max(team.belief.correlation_length_m, self._spacing)
-        self._objective = SurveyObjective(
-            self._step_m, self._steps, self._scale, POWER, TURN_PENALTY, REACH * self._spacing
-        )
+        turns = Turns(self._options.turn_radius_m, CORNER_LOSS * constraints.max_step_m if team.left_m is None else 0.0)
+        self._objective = SurveyObjective(self._scale, POWER, turns, REACH * self._spacing)
+        self._vehicles = Vehicles(self._en, np.ascontiguousarray(team.headings_rad, dtype=np.float64), self._left_m)
         self._d2 = np.asarray(tree.query(self._nodes.en_m)[0]) ** 2
         self._reference = float(len(self._nodes.x))
 
@@ -170,10 +186,12 @@ class SurveyRegressors:
             if not self._team.moves[i]:
                 continue
             x, y = self._en[i]
+            self._flown_m += float(np.hypot(positions[i, 0] - x, positions[i, 1] - y))
+            self._silent = np.vstack([self._silent, 0.5 * (self._en[i] + positions[i, :2]), positions[i, :2]])
             for routes in (self._plan, self._backbone):
                 route = routes[name]
                 for cut in (CORNER_TOLERANCE, 0.0):
-                    tx, ty, first = next_waypoint(x, y, route, 0, len(route), self._step_m, cut)
+                    tx, ty, first = next_waypoint(x, y, route, 0, len(route), self._steps_m[i], cut)
                     if np.hypot(tx - positions[i, 0], ty - positions[i, 1]) < 1e-3:
                         routes[name] = route[first:]
                         if routes is self._plan:
@@ -187,7 +205,10 @@ class SurveyRegressors:
             "coarse": self._coarse,
             "plan": self._plan,
             "expected": self._expected,
-            "planned": self._planned,
+            "flown_m": self._flown_m,
+            "planned_m": self._planned_m,
+            "silent": self._silent,
+            "adapts": self._adapts,
             "free": self._free,
             "row": self._row,
         }
@@ -200,18 +221,21 @@ class SurveyRegressors:
         )
         self._coarse = {str(k): int(v) for k, v in state["coarse"].items()}
         self._expected = state["expected"]
-        self._planned = int(state["planned"])
-        self._free = bool(state["free"])
+        self._flown_m, self._planned_m = (float(state.get(key, 0.0)) for key in ("flown_m", "planned_m"))
+        self._silent = np.array(state.get("silent", []), dtype=np.float64).reshape(-1, 2)
+        self._adapts, self._free = bool(state.get("adapts", True)), bool(state["free"])
         self._row = [float(x) for x in state["row"]]
 
     def _adopt_backbone(self) -> None:
         """Give every vehicle of the team its share of the backbone."""
         team = self._team
-        shares = backbone(team.constraints, self._en, self._steps, self._nodes, self._scale, POWER)
+        shares = backbone(team.constraints, self._vehicles, self._nodes, self._objective)
         self._backbone = {name: share.stops for name, share in zip(team.vehicles, shares, strict=True)}
         self._coarse = {name: share.coarse for name, share in zip(team.vehicles, shares, strict=True)}
         self._plan = dict(self._backbone)
-        self._free, self._planned = False, team.step
+        known = np.isfinite(team.belief.depth_m) & np.isfinite(team.belief.sd_m)
+        self._adapts = any(share.coarse > 0 for share in shares) or float(known.mean()) > KNOWN
+        self._free, self._planned_m = False, self._flown_m
 
     def _hand_over(self) -> None:
         """Give both plans to a team that has changed."""
@@ -235,8 +259,9 @@ class SurveyRegressors:
         value, vias, counts = best
         self._plan = {v: vias[i, : counts[i]].copy() for i, v in enumerate(team.vehicles)}
         knows = bool((np.isfinite(team.belief.depth_m) & np.isfinite(team.belief.sd_m)).any())
-        self._free = knows and value < (1.0 if self._free else LEAVE_BACKBONE) * values[1]
-        self._planned = team.step
+        leave = 1.0 if self._free else LEAVE_BACKBONE if self._adapts else LEAVE_LINES
+        self._free = knows and value < leave * values[1]
+        self._planned_m = self._flown_m
         return (vias, counts), (value, values[1])
 
     def _improved(
@@ -248,33 +273,24 @@ class SurveyRegressors:
         roomy[:, : vias.shape[1]] = vias
         search = PlanSearch(self._spacing, constraints.region, MARGIN_M, HEAT)
         return improve(
-            self._d2, self._nodes, self._objective, self._en, self._headings, ViaPoints(roomy, counts, locked), search,
+            self._d2, self._nodes, self._objective, self._vehicles, ViaPoints(roomy, counts, locked), search,
             rng.random((self._options.search, DRAWS)),
         )  # fmt: skip
 
-    @property
-    def _headings(self) -> FloatArray:
-        return np.ascontiguousarray(self._team.headings_rad)
-
     def _value(self, vias: FloatArray, counts: IntArray) -> float:
-        return plan_value(self._d2, self._nodes, self._objective, self._en, self._headings, vias, counts)
+        return plan_value(self._d2, self._nodes, self._objective, self._vehicles, vias, counts)
 
     def _uncertainty_now(self) -> float:
         nothing = np.zeros(len(self._en), dtype=np.int64)
         return self._value(np.zeros((len(self._en), 1, 2)), nothing)
 
     def _packed(self, routes: dict[str, FloatArray]) -> tuple[FloatArray, IntArray]:
-        names = self._team.vehicles
-        counts = np.array([len(routes[v]) for v in names], dtype=np.int64)
-        vias = np.zeros((len(names), max(1, int(counts.max())), 2))
-        for i, v in enumerate(names):
-            vias[i, : counts[i]] = routes[v]
-        return vias, counts
+        return packed([routes[v] for v in self._team.vehicles])
 
     def _first_legs(self, plan: tuple[FloatArray, IntArray], cut: float = CORNER_TOLERANCE) -> FloatArray:
         vias, counts = plan
         legs = [
-            next_waypoint(self._en[i, 0], self._en[i, 1], vias[i], 0, int(counts[i]), self._step_m, cut)[:2]
+            next_waypoint(self._en[i, 0], self._en[i, 1], vias[i], 0, int(counts[i]), self._steps_m[i], cut)[:2]
             if moves
             else self._en[i]
             for i, moves in enumerate(self._team.moves)
@@ -292,7 +308,7 @@ class SurveyRegressors:
     def _legs_of(self, i: int, alpha: float) -> FloatArray:
         """Return the free candidates (k, 2) of one vehicle."""
         rng = vehicle_rng(self._seed, self._team.vehicles[i])
-        here, step = self._en[i], self._step_m
+        here, step = self._en[i], self._steps_m[i]
         heading = self._team.headings_rad[i]
         course = np.pi / 2 - (heading if np.isfinite(heading) else rng.uniform(0, 2 * np.pi))
         turns = here + step * np.column_stack([np.cos(course + TURNS_RAD), np.sin(course + TURNS_RAD)])
@@ -319,15 +335,13 @@ class SurveyRegressors:
             passed = 0
             if self._team.moves[i]:
                 *_, passed = next_waypoint(
-                    self._en[i, 0], self._en[i, 1], route, 0, len(route), self._step_m, CORNER_TOLERANCE
+                    self._en[i, 0], self._en[i, 1], route, 0, len(route), self._steps_m[i], CORNER_TOLERANCE
                 )
             for which, rest in ((on_plan[:, i], route[passed:]), (~on_plan[:, i], route)):
                 vias[which, i, : len(rest)] = rest
                 counts[which, i] = len(rest)
         targets = np.ascontiguousarray(candidates[..., :2])
-        return values_after_first_leg(
-            self._d2, self._nodes, self._objective, self._en, self._headings, targets, vias, counts
-        )
+        return values_after_first_leg(self._d2, self._nodes, self._objective, self._vehicles, targets, vias, counts)
 
 
 def thin_nodes(team: Situation, variability: FloatArray) -> Nodes:

@@ -2495,6 +2495,12 @@ export interface components {
              */
             search: number;
             /**
+             * Turn Radius M
+             * @description Radius of the tightest circle that vehicles fly; survey plans pay for turns.
+             * @default 0
+             */
+            turn_radius_m: number;
+            /**
              * Cruise Depth M
              * @description Depth at which vehicles survey; by default the depth at which each joined.
              */
