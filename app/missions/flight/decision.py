@@ -7,15 +7,18 @@ import numpy as np
 from shapely.geometry import Polygon
 
 from app.arrays import FloatArray
+from app.estimation import Sensor, SingleBeam
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.constraints import Constraints
 from app.exploration.core.detours import due_to_rise
 from app.exploration.core.dynamic import Localization, Targets
 from app.exploration.core.problem import Belief, Planner, Situation
+from app.exploration.planner.base import PlannerBase
+from app.exploration.planners import create_planner
 from app.exploration.site_search import SearchTask
 from app.missions import safety
 from app.missions.search.course import hold_before_hazards
-from app.missions.spec.mission import MissionSpec, SurfacePolicy
+from app.missions.spec.mission import MissionSpec, SurfacePolicy, VehicleSpec
 
 NEARBY_OUTSIDE_M = 10.0
 """A vehicle that drifted or overshot this little is planned for as if it were at the border."""
@@ -23,6 +26,9 @@ NEARBY_OUTSIDE_M = 10.0
 RESERVE = 0.06
 """Share of the remaining steps that a planner is not told of: vehicles turn in circles and pass waypoints at the side,
 so a plan that needs every step would end with its last line half flown. What is not used is released bit by bit."""
+
+TURN_S = 4.0
+"""A vehicle whose turning circle nobody knows turns in one whose radius it flies in so many seconds."""
 
 RISE_AT = 0.9
 """Part of the allowed deviation at which a vehicle comes up: the rest is for the way to the surface."""
@@ -109,6 +115,30 @@ def make_constraints(spec: MissionSpec) -> Constraints:
         min_separation_m=limits.min_separation_m,
         min_vertical_separation_m=limits.min_vertical_separation_m,
     )
+
+
+def turn_radius_m(spec: MissionSpec, vehicle: VehicleSpec) -> float:
+    """Return the radius of the circles that a vehicle turns in: as it is declared, or as the planner's options say."""
+    if vehicle.turn_radius_m is not None:
+        return vehicle.turn_radius_m
+    return spec.planner.options.turn_radius_m or TURN_S * spec.speed_of(vehicle)
+
+
+def make_planner(spec: MissionSpec, sensor: Sensor | None = None) -> PlannerBase:
+    """Return a mission's planner, which pays for turns by the widest circles of its vehicles."""
+    widest_m = max((turn_radius_m(spec, vehicle) for vehicle in spec.vehicles), default=TURN_S * spec.speed_mps)
+    options = spec.planner.options.model_copy(update={"turn_radius_m": widest_m})
+    return create_planner(spec.planner.name, options, SingleBeam() if sensor is None else sensor)
+
+
+def planned_way_m(spec: MissionSpec, left_m: float) -> float:
+    """Return how much of the way that a vehicle has left is planned for, metres.
+
+    Where legs are counted, those that end at a corner are shorter than a step, and count all the same.
+    """
+    if spec.budget.steps is None:
+        return left_m
+    return max((1.0 - RESERVE) * left_m, min(left_m, spec.limits.max_step_m))
 
 
 def decide(

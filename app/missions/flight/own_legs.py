@@ -13,7 +13,7 @@ import numpy as np
 from app.arrays import FloatArray
 from app.missions.flight.commit import LegCommit
 from app.missions.flight.deciding import DECIDE_AGAIN_S, Decider, moved_on, place_ahead
-from app.missions.flight.decision import RESERVE, Decision, Place
+from app.missions.flight.decision import Decision, Place, planned_way_m
 from app.missions.flight.dispatch import Dispatch
 from app.missions.flight.separation import too_close
 from app.missions.flight.step_maps import StepMaps
@@ -182,10 +182,7 @@ class OwnLegs:
         return replace(decision, legs=legs, notes=[*decision.notes, *notes])
 
     def _place(self, member: Member, *, moving: bool) -> Place:
-        left_m = member.way_left_m(self._spec)
-        if self._spec.budget.steps is not None:
-            # Legs that end at a corner are shorter than a step, and count all the same.
-            left_m = max((1.0 - RESERVE) * left_m, min(left_m, self._spec.limits.max_step_m))
+        left_m = planned_way_m(self._spec, member.way_left_m(self._spec))
         return replace(place_ahead(member, self._live), moving=moving, left_m=left_m)
 
     def _next_number(self, member: Member) -> int:

@@ -11,14 +11,12 @@ from concurrent.futures import Executor
 import numpy as np
 
 from app.arrays import FloatArray
-from app.exploration.planner.base import PlannerBase
-from app.exploration.planners import create_planner
 from app.missions import metrics
 from app.missions.fleet.hub import FleetHub
 from app.missions.fleet.interface import WaypointReport, WaypointStatus
 from app.missions.flight.commit import LegCommit, committed_leg
 from app.missions.flight.deciding import Decider
-from app.missions.flight.decision import make_constraints
+from app.missions.flight.decision import make_constraints, make_planner
 from app.missions.flight.dispatch import Dispatch
 from app.missions.flight.elapsed_time import keep_time, save_elapsed
 from app.missions.flight.engagement import Engagement
@@ -49,9 +47,9 @@ class Runner:
         self._live = live
         self._time_scale = time_scale
         constraints = make_constraints(live.spec)
-        planner = create_planner(live.spec.planner.name, live.spec.planner.options, live.planning_sensor)
+        planner = make_planner(live.spec, live.planning_sensor)
         linked = np.isfinite(constraints.com_range_m) or any(m.capabilities.flies_together for m in live.team)
-        self._apart = live.search is None and not linked and _decides_apart(planner)
+        self._apart = live.search is None and not linked and planner.decides_apart
         self._maps = StepMaps(live, executor, time_scale)
         self._waiting = Waiting(live)
         self._lookout = SearchHooks(live, time_scale, self._waiting.until)
@@ -146,7 +144,3 @@ def nearest_leg(place_m: FloatArray, ends_m: FloatArray) -> int:
     part = np.einsum("ij,ij->i", place_m - starts, along) / np.where(length2 > 0.0, length2, 1.0)
     nearest = starts + np.clip(part, 0.0, 1.0)[:, None] * along
     return int(np.argmin(np.hypot(*(nearest - place_m).T)))
-
-
-def _decides_apart(planner: object) -> bool:
-    return isinstance(planner, PlannerBase) and planner.decides_apart

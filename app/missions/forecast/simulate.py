@@ -12,9 +12,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from app.arrays import FloatArray
-from app.exploration.planners import create_planner
-from app.missions.flight.decision import Place, decide, make_constraints
+from app.arrays import BoolArray, FloatArray
+from app.missions.flight.commit import STILL_M
+from app.missions.flight.decision import (
+    Place,
+    decide,
+    make_constraints,
+    make_planner,
+    planned_way_m,
+    turn_radius_m,
+)
+from app.missions.flight.own_legs import HARDLY_BEGUN, LEAST_WAY_M
 from app.missions.forecast.floor import Floor, floors_of, forecast_cell_m
 from app.missions.maps.builder import MapBuilder
 from app.missions.spec.mission import MissionSpec, Sensor
@@ -26,9 +34,6 @@ LEARN_AT = (1, 4, 12)
 """Maps before which the model is learned anew; in between it is kept."""
 
 LEAST_SD_M = 0.01
-TURN_S = 2.0
-"""What a vehicle takes for a waypoint beyond its way: it turns, and the next decision is made."""
-
 BEAMS_RAD = {
     Sensor.SINGLE_BEAM: (0.0,),
     Sensor.DVL: (-np.pi / 8, 0.0, np.pi / 8),
@@ -125,9 +130,9 @@ def _fly_over(
     builder.build()
     steps = max(spec.steps - first_step + 1, 0)
     every = max(1, steps // MAPS)
-    distance, seconds, flown = np.zeros(len(members)), 0.0, 0
+    distance, seconds, left_m, flown = np.zeros(len(members)), 0.0, 0.0, 0
     for leg in fly(spec, members, starts_m, builder, floor.terrain, first_step=first_step):
-        distance, seconds, flown = leg.distance_m, leg.seconds, flown + 1
+        distance, seconds, left_m, flown = leg.distance_m, leg.seconds, leg.left_m, flown + 1
         if flown % every == 0:
             builder.build()
             if flown // every in LEARN_AT:
@@ -135,7 +140,7 @@ def _fly_over(
         if stop() or time.thread_time() > until:
             break
     builder.build()
-    whole = steps / flown if flown else 1.0
+    whole = 1.0 + left_m / distance.sum() if distance.sum() > 0.0 else 1.0
     newest = builder.newest
     return Flown(
         duration_s=seconds * whole,
@@ -143,7 +148,7 @@ def _fly_over(
         coverage_pct=builder.coverage_pct(),
         remaining_pct=builder.remaining_pct(),
         mean_sd_m=newest.mean_sd_m if newest is not None else None,
-        steps=flown,
+        steps=steps if left_m <= LEAST_WAY_M * len(members) else flown,
     )
 
 
@@ -154,6 +159,8 @@ class StepFlown:
     step: int
     distance_m: FloatArray
     seconds: float
+    left_m: float
+    """How far all of them together may still fly."""
 
 
 def fly(
@@ -170,32 +177,92 @@ def fly(
 
     ``spacing_m`` is the way between soundings; None: a cell of the terrain.
     """
-    cruise = [member.cruise_depth_m(spec.limits) for member in members]
-    constraints, planner = make_constraints(spec), create_planner(spec.planner.name, spec.planner.options)
+    constraints, planner = make_constraints(spec), make_planner(spec)
     rng = np.random.default_rng([spec.seed, 1])
-    here = np.column_stack([starts_m, np.zeros(len(members))])
-    heading = np.full(len(members), np.nan)
-    distance, seconds = np.zeros(len(members)), 0.0
-    for step in range(first_step, spec.steps + 1):
-        places = [
-            Place(member.name, here[i, :2], float(heading[i]), cruise[i], keeps_depth=member.capabilities.keeps_depth)
-            for i, member in enumerate(members)
-        ]
-        decision = decide(step, spec, constraints, planner, places, builder.belief(), builder.sounded_at_m()[0])
+    swarm = _Swarm(spec, members, starts_m, first_step)
+    apart = planner.decides_apart and np.isinf(constraints.com_range_m)
+    told = first_step - 1
+    while (due := swarm.due(apart=apart)).any():
+        number = int(swarm.legs[due].max()) + 1
+        decision = decide(
+            number, spec, constraints, planner, swarm.places(due), builder.belief(), builder.sounded_at_m()[0]
+        )
         target = {leg.vehicle: leg.target_m for leg in decision.legs}
-        longest = 0.0
-        for i, member in enumerate(members):
-            end = target.get(member.name, here[i])
-            leg_m = float(np.linalg.norm(end - here[i]))
-            way = here[i], end
+        for i in np.flatnonzero(due):
+            member = members[i]
+            way = swarm.here[i].copy(), target.get(member.name, swarm.here[i])
             builder.add(_sounded(member.spec.sensor, *way, terrain, spec.sounding_noise, rng, spacing_m))
-            if leg_m > 0.0:
-                heading[i] = float(np.arctan2(end[0] - here[i, 0], end[1] - here[i, 1]))
-            distance[i] += leg_m
-            longest = max(longest, leg_m)
-            here[i] = end
-        seconds += min(longest / spec.speed_mps + TURN_S, spec.step_deadline_s)
-        yield StepFlown(step, distance.copy(), seconds)
+            swarm.fly(int(i), way[1])
+        if number > told:
+            told = number
+            yield StepFlown(number, swarm.distance_m.copy(), float(swarm.clock_s.max()), float(swarm.left_m.sum()))
+
+
+class _Swarm:
+    """Vehicles without a body: straight legs at their speed, and a while for every turn.
+
+    Attributes
+    ----------
+    here : (n, 3)
+        Where their last legs end.
+    heading_rad, clock_s, distance_m, left_m : (n,)
+        Their course then (NaN: none yet), when that is, and how far they have come and may still go.
+    legs : (n,)
+        How many they had.
+    """
+
+    def __init__(self, spec: MissionSpec, members: list[Member], starts_m: FloatArray, first_step: int) -> None:
+        self._spec, self._members = spec, members
+        self._speed_mps = np.array([spec.speed_of(member.spec) for member in members])
+        self._radius_m = np.array([turn_radius_m(spec, member.spec) for member in members])
+        n = len(members)
+        self.here = np.column_stack([starts_m, np.zeros(n)])
+        self.heading_rad = np.full(n, np.nan)
+        self.clock_s, self.distance_m = np.zeros(n), np.zeros(n)
+        self.legs = np.full(n, first_step - 1)
+        if spec.budget.steps is not None:
+            self.left_m = np.full(n, max(spec.steps - first_step + 1, 0) * spec.limits.max_step_m)
+        else:
+            self.left_m = np.array([member.way_left_m(spec) for member in members])
+
+    def due(self, *, apart: bool) -> BoolArray:
+        """Return who gets the next leg, (n,): all together, or who ends its last one first, with those right after."""
+        able = self.left_m > LEAST_WAY_M
+        if not apart or not able.any():
+            return able
+        soon_s = self.clock_s[able].min() + HARDLY_BEGUN * self._spec.limits.max_step_m / self._speed_mps
+        return np.asarray(able & (self.clock_s <= soon_s))
+
+    def places(self, due: BoolArray) -> list[Place]:
+        """Return where legs begin, for a decision."""
+        return [
+            Place(
+                member.name,
+                self.here[i, :2],
+                float(self.heading_rad[i]),
+                member.cruise_depth_m(self._spec.limits),
+                keeps_depth=member.capabilities.keeps_depth,
+                moving=bool(due[i]),
+                left_m=planned_way_m(self._spec, float(self.left_m[i])),
+            )
+            for i, member in enumerate(self._members)
+        ]
+
+    def fly(self, i: int, end: FloatArray) -> None:
+        """Bring one vehicle to the end of its leg, (3,)."""
+        east, north = end[:2] - self.here[i, :2]
+        leg_m, step_m = float(np.linalg.norm(end - self.here[i])), self._spec.limits.max_step_m
+        if math.hypot(east, north) > 0.0:
+            course = math.atan2(east, north)
+            turn = 0.0 if np.isnan(self.heading_rad[i]) else abs(math.remainder(course - self.heading_rad[i], math.tau))
+            self.heading_rad[i] = course
+            self.clock_s[i] += turn * self._radius_m[i] / self._speed_mps[i]
+        counts_m = step_m if self._spec.budget.steps is not None or leg_m <= STILL_M else leg_m
+        self.left_m[i] = max(self.left_m[i] - counts_m, 0.0)
+        self.legs[i] += 1
+        self.distance_m[i] += leg_m
+        self.clock_s[i] += (counts_m if leg_m <= STILL_M else leg_m) / self._speed_mps[i]
+        self.here[i] = end
 
 
 def _sounded(
