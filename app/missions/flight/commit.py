@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+from shapely import Polygon
 from sqlalchemy.orm import make_transient
 
 from app.arrays import FloatArray
@@ -166,8 +167,8 @@ class LegCommit:
         """Return an order that keeps a vehicle circling near where it is; None where there is no room for that."""
         if member.report is None or member.order is None:
             return None
-        here = member.place_m(self._live.frame)
-        centre_m = self._room(member, here, here)
+        inside = safety.nearest_inside(Polygon(self._constraints.area), member.place_m(self._live.frame))
+        centre_m = self._room(member, inside, inside)
         if centre_m is None:
             return None
         place = self._position(centre_m[0], centre_m[1], member.order.position.depth_m)

@@ -21,7 +21,7 @@ SOUND_S = 60.0
 SLOWEST_SHARE = 0.5
 """Part of the speed asked for that a vehicle may make good on its leg, before it counts as a straggler."""
 
-HOLD_AFTER_S = 3.0
+HOLD_AFTER_S = 1.0
 """How long a vehicle that has no leg flies straight on, by its clock, before it is sent to circle somewhere."""
 
 MOST_REFUSALS = 5
@@ -92,9 +92,9 @@ class Dispatch:
                 self._idle_since_s.pop(member.name, None)
                 continue
             hold_s = self._idle_since_s.setdefault(member.name, now_s) + HOLD_AFTER_S / self._time_scale
-            if hold_s > now_s:
+            if now_s < hold_s < math.inf:
                 due_s.append(hold_s)
-            elif math.isfinite(hold_s):
+            elif hold_s <= now_s:
                 self._idle_since_s[member.name] = math.inf
                 await self._hold(member)
         return due_s

@@ -180,8 +180,13 @@ async def test_who_has_flown_everything_circles_inside_the_area(
         {"name": "fast", "kind": "sim", "speed_mps": 2.0},
         {"name": "slow", "kind": "sim", "speed_mps": 0.7},
     ]
-    limits = {"max_step_m": 20.0, "min_separation_m": 0.0}
-    spec = sim_spec(side_m=80.0, vehicles=vehicles, budget={"km_per_vehicle": 0.1}, limits=limits)
+    spec = sim_spec(
+        side_m=100.0,
+        vehicles=vehicles,
+        budget={"km_per_vehicle": 0.15},
+        limits={"max_step_m": 20.0},
+        planner={"name": "lawnmower"},
+    )
     mission = (await service.create(spec)).id
     await act(service, mission, "start")
     await until_state(service, mission, MissionState.FINISHED)
