@@ -175,6 +175,8 @@ class SimulatedVehicle:
         self.collisions: list[tuple[float, LocalPosition]] = []
         """Time and place of every contact with the bottom (one entry per contact, not per step)."""
         self._arrival_radius_m = 0.0
+        self._pass_within_m = -1.0
+        self._set_out_m = (east, north)
         self._touching = False
         self._start_time_s = self.time_s
         self._steps = 0
@@ -227,8 +229,17 @@ class SimulatedVehicle:
 
     @property
     def arrived(self) -> bool:
-        """Whether the last ``go_to`` has been reached (and the vehicle circles there)."""
-        return self.vehicle.target is not None and self.vehicle.guidance is Guidance.LOITER
+        """Whether the last ``go_to`` has been reached (and the vehicle circles there), or passed as it allowed."""
+        if self.vehicle.target is None:
+            return False
+        return self.vehicle.guidance is Guidance.LOITER or self._passed(self.vehicle.target)
+
+    def _passed(self, target: SteeringTarget) -> bool:
+        """Whether it is beyond its target, as seen from where it set out, and not too far to the side."""
+        here, (from_e, from_n) = self.position, self._set_out_m
+        off_e, off_n = here.east_m - target.east_m, here.north_m - target.north_m
+        beyond = off_e * (target.east_m - from_e) + off_n * (target.north_m - from_n) >= 0.0
+        return beyond and math.hypot(off_e, off_n) <= self._pass_within_m
 
     def go_to(
         self,
@@ -238,6 +249,7 @@ class SimulatedVehicle:
         speed_mps: float = 1.2,
         *,
         arrival_radius_m: float = 5.0,
+        pass_within_m: float | None = None,
         loiter_radius_m: float | None = None,
         by_altitude: bool = False,
     ) -> None:
@@ -251,6 +263,8 @@ class SimulatedVehicle:
             Through the water, brought within the vehicle's limits.
         arrival_radius_m
             Within this distance in the plane the target counts as reached.
+        pass_within_m
+            It counts as reached, too, once the vehicle is beyond it and no farther away than this; None: it does not.
         loiter_radius_m
             Circle flown after arrival; the vehicle's own when None.
         """
@@ -258,6 +272,8 @@ class SimulatedVehicle:
         if not all(math.isfinite(value) for value in values):
             raise ValueError(f"{self.name}: target {values} holds a value that is not finite")
         self._arrival_radius_m = arrival_radius_m
+        self._pass_within_m = -1.0 if pass_within_m is None else pass_within_m
+        self._set_out_m = (self.position.east_m, self.position.north_m)
         self.vehicle.loiter_radius_m = loiter_radius_m or self.vehicle.limits.loiter_radius_m
         self.vehicle.goto(SteeringTarget(east_m, north_m, depth_m, speed_mps, by_altitude))
 

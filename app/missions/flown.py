@@ -6,10 +6,7 @@ from dataclasses import asdict, dataclass
 from enum import StrEnum
 from typing import Any
 
-ASIDE_M = 4.0
-"""A vehicle that is no farther than this from its leg's line is on it."""
-LEAST_COSINE = math.cos(math.radians(45.0))
-"""And its course leads no farther aside than this."""
+from app.exploration.core.track import Place, along_leg
 
 
 class Phase(StrEnum):
@@ -23,10 +20,6 @@ class Phase(StrEnum):
     RETURNING = "returning"
     HOME = "home"
     STOPPED = "stopped"
-
-
-Place = tuple[float, float]
-"""East and north in the mission's frame, metres."""
 
 
 @dataclass
@@ -47,7 +40,7 @@ class Flown:
         """Add a piece of track while a leg was flown; None: it had none."""
         length_m = math.hypot(end[0] - start[0], end[1] - start[1])
         self.flown_m += length_m
-        if leg is not None and _along(start, end, leg):
+        if leg is not None and along_leg(start, end, leg):
             self.on_plan_m += length_m
 
     def remember(self) -> dict[str, float]:
@@ -59,18 +52,6 @@ class Flown:
     def recall(cls, stored: dict[str, Any] | None) -> "Flown":
         """Return what was stored; nothing flown where nothing was."""
         return cls(**(stored or {}))
-
-
-def _along(start: Place, end: Place, leg: tuple[Place, Place]) -> bool:
-    """Whether a piece of track leads along a leg, close to its line."""
-    (from_e, from_n), (to_e, to_n) = leg
-    leg_e, leg_n = to_e - from_e, to_n - from_n
-    way_e, way_n = end[0] - start[0], end[1] - start[1]
-    leg_m, way_m = math.hypot(leg_e, leg_n), math.hypot(way_e, way_n)
-    if leg_m == 0.0 or way_m == 0.0:
-        return False
-    aside_m = abs((end[0] - from_e) * leg_n - (end[1] - from_n) * leg_e) / leg_m
-    return aside_m <= ASIDE_M and (leg_e * way_e + leg_n * way_n) / (leg_m * way_m) >= LEAST_COSINE
 
 
 def efficiency_pct(team: Iterable[Flown]) -> float | None:

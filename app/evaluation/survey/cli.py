@@ -24,7 +24,7 @@ from app.evaluation.runs.command import (
 from app.evaluation.survey.job import SurveyJob
 from app.evaluation.survey.recorded import recorded_soundings
 from app.evaluation.survey.symmetry import SYMMETRIES, turned, turned_soundings
-from app.evaluation.survey.world import Sampling, Sounder, SurveyScenario
+from app.evaluation.survey.world import SPEED_MPS, Sampling, Sounder, SurveyScenario
 from app.exploration.planners import PLANNERS
 
 
@@ -43,6 +43,18 @@ def survey(
         str,
         typer.Option(help="Turned and mirrored terrain as further runs: FIRST:END or a list out of 0 to 7; 0:8 all."),
     ] = "0",
+    dynamics: Annotated[
+        bool,
+        typer.Option(
+            "--dynamics",
+            help="At sea: vehicles with turning circles, decisions that take time, each vehicle on its own time; the "
+            "patterns fly for the same minutes.",
+        ),
+    ] = False,
+    minutes: Annotated[
+        float | None,
+        typer.Option(min=0.1, help="How long a survey at sea lasts; by default what the steps take at 1.3 m/s."),
+    ] = None,
     seed: Seed = 0,
     seeds: Seeds = None,
     candidates: Annotated[int | None, typer.Option(min=4, help="Candidates per vehicle.")] = None,
@@ -56,7 +68,11 @@ def survey(
     names = planners_named(planner, tuple(sorted(PLANNERS)))
     if sampling not in ("step", "continuous"):
         raise typer.BadParameter(f"{sampling!r} is neither step nor continuous", param_hint="--sampling")
-    how: Sampling = "step" if sampling == "step" else "continuous"
+    if minutes is not None and not dynamics:
+        raise typer.BadParameter("minutes are those of a survey at sea: give --dynamics, too", param_hint="--minutes")
+    if dynamics and sounder != "single":
+        raise typer.BadParameter("surveys at sea have a single beam", param_hint="--sounder")
+    how: Sampling = "step" if sampling == "step" and not dynamics else "continuous"
     if sounder not in ("single", "dvl", "swath"):
         raise typer.BadParameter(f"{sounder!r} is none of single, dvl, swath", param_hint="--sounder")
     beams: Sounder = "single" if sounder == "single" else "dvl" if sounder == "dvl" else "swath"
@@ -74,6 +90,7 @@ def survey(
             name,
             options,
             None if recorded is None else turned_soundings(recorded, sea_floor, turn),
+            (minutes or steps * max_step / SPEED_MPS / 60.0) if dynamics else None,
         )
         for name in names
         for which in seed_list(seed, seeds)

@@ -5,7 +5,7 @@ from typing import Any
 
 from app.estimation import Sensor, SingleBeam
 from app.evaluation.runs.jobs import Progress
-from app.evaluation.survey.run import run_survey
+from app.evaluation.survey.run import run_survey, run_survey_at_sea
 from app.evaluation.survey.world import SurveyScenario
 from app.exploration.planner.options import PlannerOptions
 from app.mapping.types import Soundings
@@ -19,6 +19,8 @@ class SurveyJob:
     planner: str
     options: PlannerOptions
     recorded: Soundings | None
+    minutes: float | None = None
+    """How long vehicles with turning circles fly; None: straight legs, counted or by the metre."""
 
     @property
     def title(self) -> str:
@@ -37,7 +39,12 @@ class SurveyJob:
 
     def run(self, progress: Progress) -> dict[str, Any]:
         """Run it."""
-        result = asdict(run_survey(self.scenario, self.planner, self.options, progress, self.recorded))
+        how = (self.scenario, self.planner, self.options)
+        if self.minutes is None:
+            result = asdict(run_survey(*how, progress, self.recorded))
+            del result["minutes"], result["flown_m"], result["on_plan_m"]
+        else:
+            result = asdict(run_survey_at_sea(*how, self.minutes, progress, self.recorded))
         if self.recorded is None:
             del result["recorded_track"], result["ratio_recorded"]
         return result

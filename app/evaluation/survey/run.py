@@ -1,11 +1,12 @@
 """The papers' field experiment on any terrain: a planner beside the usual practice, even coverage and an oracle."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from app.arrays import FloatArray
+from app.evaluation.survey.dynamics import TURN_S, fly_pattern_at_sea, fly_planner_at_sea
 from app.evaluation.survey.oracle import oracle_soundings
 from app.evaluation.survey.world import (
     FAR_M,
@@ -64,6 +65,8 @@ class SurveyRun:
 
     ``even``: whole even lines, as many as fit. ``ratio``: RMSE over that of the best of the three patterns.
     ``gap_closed``: how far the RMSE has come from that of the best pattern (0) to that of the oracle (1).
+    ``minutes``, ``flown_m`` and ``on_plan_m`` are told of surveys at sea only: how long they lasted, how far the
+    vehicles flew together, and how much of that along their legs.
     """
 
     planner: str
@@ -94,6 +97,9 @@ class SurveyRun:
     gap_closed: float
     recorded_track: RecordedTrack | None = None
     ratio_recorded: float | None = None
+    minutes: float | None = None
+    flown_m: float | None = None
+    on_plan_m: float | None = None
 
 
 def run_survey(
@@ -120,14 +126,52 @@ def run_survey(
     lines = best_even_survey(scenario, limit)
     even = coverage if lines is None else fly_pattern(scenario, lines, limit)
     walk = fly_planner(scenario, "random", PlannerOptions(), known=unknown_belief(scenario.belief_grid))
-    placed = oracle_soundings(
-        scenario.log(3), scenario.terrain, len(track.soundings), float(scenario.starts_m[:, 2].mean())
+    random = judge(scenario, walk.soundings, walk.distance_m, yardstick=True)
+    return _compared(scenario, planner, ours, track.plan_s, (usual, coverage, even, random), recorded)
+
+
+def run_survey_at_sea(
+    scenario: SurveyScenario,
+    planner: str,
+    options: PlannerOptions,
+    minutes: float,
+    progress: Callable[[int], None] = lambda step: None,
+    recorded: Soundings | None = None,
+) -> SurveyRun:
+    """Let vehicles with turning circles fly for so many minutes, led by the planner, then by the patterns."""
+    track = fly_planner_at_sea(scenario, planner, options, minutes, progress)
+    ours = judge(scenario, track.soundings, track.flown_m)
+    starts, turns = scenario.starts_m[:, :2], Turns(options.turn_radius_m or TURN_S * SPEED_MPS, 0.0)
+    patterns = (
+        lambda metres: lawnmower_routes(scenario.constraints, starts, np.full(scenario.vehicles, metres)),
+        lambda metres: even_coverage(scenario, metres),
+        lambda metres: best_even_survey(scenario, metres, turns),
     )
+    flown = [fly_pattern_at_sea(scenario, routes_of, minutes) for routes_of in patterns]
+    walk = fly_planner_at_sea(scenario, "random", PlannerOptions(), minutes)
+    usual, coverage, even, random = (
+        judge(scenario, track.soundings, track.flown_m, yardstick=True) for track in (*flown, walk)
+    )
+    run = _compared(scenario, planner, ours, track.plan_s, (usual, coverage, even, random), recorded)
+    return replace(run, minutes=minutes, flown_m=float(track.flown_m.sum()), on_plan_m=float(track.on_plan_m.sum()))
+
+
+def _compared(
+    scenario: SurveyScenario,
+    planner: str,
+    ours: SurveyResult,
+    plan_s: FloatArray,
+    others: tuple[SurveyResult, SurveyResult, SurveyResult, SurveyResult],
+    recorded: Soundings | None,
+) -> SurveyRun:
+    """Put a survey beside the usual practice, even coverage, even lines and the random walk (``others``)."""
+    usual, coverage, even, random = others
+    placed = oracle_soundings(scenario.log(3), scenario.terrain, ours.samples, float(scenario.starts_m[:, 2].mean()))
     oracle = judge(scenario, placed, np.zeros(scenario.vehicles), yardstick=True)
     beside = None
     if recorded is not None:
         beside = RecordedTrack(len(recorded), judge(scenario, recorded, np.zeros(1), yardstick=True).rmse_m)
-    pattern = min(usual.rmse_m, coverage.rmse_m, even.rmse_m)
+    pattern = float(np.nanmin([usual.rmse_m, coverage.rmse_m, even.rmse_m]))
     return SurveyRun(
         planner=planner,
         terrain=scenario.terrain.name,
@@ -145,13 +189,13 @@ def run_survey(
         time_s=ours.time_s,
         coverage_pct=ours.coverage_pct,
         rmse_stationary_m=ours.rmse_stationary_m,
-        plan_ms_median=1e3 * float(np.median(track.plan_s)),
-        plan_ms_p99=1e3 * float(np.quantile(track.plan_s, 0.99)),
-        plan_s=float(track.plan_s.sum()),
+        plan_ms_median=1e3 * float(np.median(plan_s)),
+        plan_ms_p99=1e3 * float(np.quantile(plan_s, 0.99)),
+        plan_s=float(plan_s.sum()),
         usual_practice=usual,
         coverage=coverage,
         even=even,
-        random=judge(scenario, walk.soundings, walk.distance_m, yardstick=True),
+        random=random,
         oracle=oracle,
         ratio=ours.rmse_m / pattern,
         gap_closed=(pattern - ours.rmse_m) / (pattern - oracle.rmse_m) if oracle.rmse_m < pattern else float("nan"),
@@ -199,13 +243,13 @@ def even_coverage(scenario: SurveyScenario, distance_m: float) -> list[FloatArra
     return [share.stops for share in min(found, key=lambda survey: survey[0])[1]]
 
 
-def best_even_survey(scenario: SurveyScenario, distance_m: float) -> list[FloatArray] | None:
+def best_even_survey(scenario: SurveyScenario, distance_m: float, turns: Turns = NO_TURNS) -> list[FloatArray] | None:
     """Return the even survey of whole lines that fits into ``distance_m`` per vehicle, of both directions the closer.
 
     None where not even one line fits.
     """
     vehicles = _vehicles(scenario, distance_m)
-    found = (even_survey(sweep, vehicles, NO_TURNS, Pattern()) for sweep in _sweeps(scenario))
+    found = (even_survey(sweep, vehicles, turns, Pattern()) for sweep in _sweeps(scenario))
     surveys = [survey for survey in found if survey is not None]
     return min(surveys, key=lambda survey: survey.spacing_m).routes if surveys else None
 

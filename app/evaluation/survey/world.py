@@ -159,6 +159,13 @@ class Log:
         self.depth_m.append(depth)
         self.sd_m.append(self.sensor.sd_m(points[:, 2], depth))
 
+    def add(self, east_m: float, north_m: float, depth_m: float, sd_m: float) -> None:
+        """Take in one sounding that a vehicle took by itself."""
+        for column, value in zip(
+            (self.east_m, self.north_m, self.depth_m, self.sd_m), (east_m, north_m, depth_m, sd_m), strict=True
+        ):
+            column.append(np.array([value]))
+
     def _ping(self, beams: Multibeam, point: FloatArray, heading_rad: float) -> None:
         def floor(en_m: FloatArray) -> FloatArray:
             return self.terrain.depth_at(en_m[..., 0], en_m[..., 1])
@@ -172,7 +179,10 @@ class Log:
     @property
     def soundings(self) -> Soundings:
         """All of them."""
-        return Soundings(*(np.concatenate(x) for x in (self.east_m, self.north_m, self.depth_m, self.sd_m)))
+        columns = (self.east_m, self.north_m, self.depth_m, self.sd_m)
+        for column in columns:
+            column[:] = [np.concatenate(column)] if column else [np.zeros(0)]
+        return Soundings(*(column[0] for column in columns))
 
 
 def along(start: FloatArray, end: FloatArray, sampling: Sampling, since_m: float = 0.0) -> tuple[FloatArray, float]:
@@ -220,6 +230,40 @@ class SurveyTrack:
         return np.asarray(np.linalg.norm(np.diff(self.positions_m, axis=0), axis=2).sum(axis=0))
 
 
+class MapSoFar:
+    """A planner's view of the sea floor, brought up to date ``MAPS`` times in a mission.
+
+    Attributes
+    ----------
+    belief
+        What is known; an oracle is given it from the beginning.
+    """
+
+    def __init__(self, grid: Grid, known: Belief | None = None) -> None:
+        self.belief = unknown_belief(grid) if known is None else known
+        self._grid, self._fixed = grid, known is not None
+        self._gp = GaussianProcessMap()
+        self._verdict: OutlierReport | None = None
+        self._maps = self._learned = 0
+
+    def renew(self, log: Log, part: float) -> None:
+        """Make a map when it is time, after this ``part`` of the mission."""
+        learns = part >= LEARN_AT[min(self._learned, len(LEARN_AT) - 1)] and self._learned < len(LEARN_AT)
+        if not self._fixed and len(log.soundings) and (learns or int(part * MAPS) > self._maps):
+            estimate = self._gp.fit(log.soundings, learn=learns).predict(self._grid)
+            self.belief, self._verdict = belief_of(estimate), self._gp.outliers_
+            self._maps, self._learned = int(part * MAPS), self._learned + learns
+
+    def sounded(self, log: Log) -> tuple[FloatArray, FloatArray]:
+        """Return where the map has soundings (n, 2), and where it left them out (k, 2)."""
+        soundings = log.soundings
+        doubted = np.zeros(len(soundings), dtype=np.bool_)
+        if self._verdict is not None:
+            doubted[: len(self._verdict.rejected)] = self._verdict.rejected
+        places = np.column_stack([soundings.east_m, soundings.north_m])
+        return places[~doubted], places[doubted]
+
+
 def fly_planner(
     scenario: SurveyScenario,
     planner: str,
@@ -236,39 +280,28 @@ def fly_planner(
     rng, log = np.random.default_rng([scenario.seed, 0]), scenario.log(1)
     positions = scenario.starts_m
     log.sound(positions)
-    grid, gp = scenario.belief_grid, GaussianProcessMap()
+    so_far = MapSoFar(scenario.belief_grid, known)
     names = tuple(f"auv-{k + 1}" for k in range(scenario.vehicles))
     headings, since = np.full(scenario.vehicles, np.nan), np.zeros(scenario.vehicles)
     history, times = [positions], []
-    belief = unknown_belief(grid) if known is None else known
-    verdict: OutlierReport | None = None
     budget_m = scenario.steps * scenario.max_step_m
     left_m = np.full(scenario.vehicles, budget_m)
     by_metres = scenario.sampling == "continuous"
-    maps, learned, step = 0, 0, 0
+    step = 0
     while (left_m > LEAST_LEFT_M).any() and step < LONGEST * scenario.steps:
         step += 1
-        part = 1.0 - float(left_m.mean()) / budget_m
-        learns = part >= LEARN_AT[min(learned, len(LEARN_AT) - 1)] and learned < len(LEARN_AT)
-        if known is None and len(log.soundings) and step > 1 and (learns or int(part * MAPS) > maps):
-            estimate = gp.fit(log.soundings, learn=learns).predict(grid)
-            belief, verdict = belief_of(estimate), gp.outliers_
-            maps, learned = int(part * MAPS), learned + learns
-        soundings = log.soundings
-        doubted = np.zeros(len(soundings), dtype=np.bool_)
-        if verdict is not None:
-            doubted[: len(verdict.rejected)] = verdict.rejected
-        places = np.column_stack([soundings.east_m, soundings.north_m])
+        so_far.renew(log, 1.0 - float(left_m.mean()) / budget_m)
+        sounded_m, doubtful_m = so_far.sounded(log)
         situation = Situation(
             min(step, scenario.steps),
             scenario.steps,
             names,
             positions,
             headings,
-            belief,
-            places[~doubted],
+            so_far.belief,
+            sounded_m,
             scenario.constraints,
-            doubtful_en_m=places[doubted],
+            doubtful_en_m=doubtful_m,
             moving=left_m > LEAST_LEFT_M if by_metres else None,
             left_m=left_m if by_metres else None,
         )

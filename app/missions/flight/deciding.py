@@ -39,6 +39,8 @@ class Decider:
     ----------
     takes_s
         How long the next decision will take, on the wall clock, as the last ones did.
+    attempt
+        How often in a row legs were decided that a vehicle could not fly.
     """
 
     def __init__(
@@ -51,6 +53,7 @@ class Decider:
         self._told: dict[str, str] = {}
         self.planner = planner
         self.takes_s = EXPECTED_DECISION_S
+        self.attempt = 0
 
     async def decide(
         self, number: int, places: list[Place], task: SearchTask | None = None, legs: int = 1
@@ -80,6 +83,7 @@ class Decider:
                 doubtful_m,
                 targets,
                 task,
+                self.attempt,
             )
 
         def work() -> list[Decision]:

@@ -153,6 +153,7 @@ def decide(
     doubtful_en_m: FloatArray | None = None,
     targets: Targets | None = None,
     search: SearchTask | None = None,
+    attempt: int = 0,
 ) -> Decision:
     """Decide one step for the vehicles at ``places``; vehicles far outside the area are sent to its border.
 
@@ -160,6 +161,7 @@ def decide(
     from the water level: below the datum it leaves them less room; above it the room to spare is not used.
     ``doubtful_en_m`` (k, 2) is where the map left soundings out as outliers.
     ``targets`` are the mission's, in the order of its description. ``search`` is what a search knows of its site.
+    ``attempt``: how often the same legs were decided and not flown; chance then falls out otherwise.
     """
     polygon = Polygon(constraints.area)
     where = {place.vehicle: place.en_m for place in places}
@@ -225,7 +227,7 @@ def decide(
         moving=None if moving.all() else moving,
         left_m=None if np.isnan(left_m).any() else left_m,
     )
-    proposal = planner.propose(situation, np.random.default_rng([spec.seed, step]))
+    proposal = planner.propose(situation, np.random.default_rng([spec.seed, step, *([attempt] if attempt else [])]))
     proposed = np.where(moving[:, None], np.array(proposal.positions, dtype=float), origin)
     for i, place in enumerate(team):
         if not place.moving or not np.isfinite(proposed[i]).all():

@@ -11,15 +11,17 @@ from dataclasses import replace
 import numpy as np
 
 from app.arrays import FloatArray
+from app.exploration.core.constraints import Constraints
 from app.missions.flight.commit import LegCommit
 from app.missions.flight.deciding import DECIDE_AGAIN_S, Decider, moved_on, place_ahead
 from app.missions.flight.decision import Decision, Place, planned_way_m
 from app.missions.flight.dispatch import Dispatch
-from app.missions.flight.separation import too_close
+from app.missions.flight.separation import too_close, ways_aside
 from app.missions.flight.step_maps import StepMaps
 from app.missions.flight.waiting import Waiting
 from app.missions.live.mission import LiveMission
 from app.missions.team import Member
+from app.missions.views.mission import Level
 
 AHEAD = 2
 """Legs that a vehicle has after the one it flies."""
@@ -31,6 +33,9 @@ DECISIONS_AHEAD = 3.0
 """How many decisions' time a vehicle's legs last at least."""
 
 MOST_AHEAD = 20
+
+PATIENCE = 1
+"""How often a vehicle waits for others to pass before it goes aside."""
 
 LEAST_WAY_M = 1.0
 """A vehicle with less way left is done."""
@@ -56,8 +61,10 @@ class OwnLegs:
         dispatch: Dispatch,
         maps: StepMaps,
         waiting: Waiting,
+        constraints: Constraints,
         time_scale: float,
     ) -> None:
+        self._constraints = constraints
         self._live = live
         self._spec = live.spec
         self._decider = decider
@@ -71,6 +78,8 @@ class OwnLegs:
         self._taking_part = {member.name for member in live.team if member.legs}
         """Vehicles that go on with their own numbers: they had legs, and were not away since."""
         self._absent_since_s: dict[str, float] = {}
+        self._refusals: dict[str, int] = {}
+        """How often in a row vehicles got no leg because of others."""
         self._again_at_s: dict[str, float] = {}
         """When vehicles that got no leg are looked at again, the event loop's time."""
 
@@ -117,6 +126,7 @@ class OwnLegs:
         names = {member.name for member in getting}
         numbers = {member.name: self._next_number(member) for member in getting}
         places = [self._place(member, moving=member.name in names) for member in live.team.present]
+        self._decider.attempt = max(self._refusals.get(name, 0) for name in names)
         decisions = await self._decider.decide_to_fly(max(numbers.values()), places, legs=self._legs_at_once)
         self._taking_part |= names
         self._again_at_s = {name: at_s for name, at_s in self._again_at_s.items() if name not in names}
@@ -149,6 +159,9 @@ class OwnLegs:
         if legs:
             await self._committing.commit(replace(decision, legs=legs), numbers)
             live.changed.set()
+        elif any(self._refusals.get(leg.vehicle) == 1 for leg in decision.legs):
+            for note in decision.notes:
+                await live.journal.log(Level.WARNING, "safety", note)
 
     def _has_leg(self, name: str, number: int) -> bool:
         member = self._live.team.get(name)
@@ -175,11 +188,32 @@ class OwnLegs:
     def _apart(self, decision: Decision) -> Decision:
         """Give no leg to a vehicle that would come too close to another one on the way."""
         close = too_close(decision, self._live, self._spec)
+        for name in {leg.vehicle for leg in decision.legs} - close.keys():
+            self._refusals.pop(name, None)
         if not close:
             return decision
+        for name in close:
+            self._refusals[name] = self._refusals.get(name, 0) + 1
+            aside = self._step_aside(decision, name) if self._refusals[name] > PATIENCE else None
+            if aside is not None:
+                return aside
         legs = [replace(leg, refusal=close.get(leg.vehicle, leg.refusal)) for leg in decision.legs]
         notes = [f"{name}: {reason}; it waits" for name, reason in close.items()]
         return replace(decision, legs=legs, notes=[*decision.notes, *notes])
+
+    def _step_aside(self, decision: Decision, name: str) -> Decision | None:
+        """Return a decision in which one vehicle goes somewhere else, so that nobody waits for each other for ever."""
+        [planned] = [leg for leg in decision.legs if leg.vehicle == name]
+        start = np.append(decision.origin_m[name], planned.target_m[2])
+        others = [leg for leg in decision.legs if leg.vehicle != name and not leg.refusal]
+        for target in ways_aside(start, planned.target_m, self._constraints, decision.bottom):
+            legs = [*others, replace(planned, target_m=target)]
+            tried = replace(decision, legs=legs)
+            close = too_close(tried, self._live, self._spec)
+            if name not in close:
+                left = [replace(leg, refusal=close.get(leg.vehicle, "")) for leg in legs]
+                return replace(tried, legs=left, notes=[*decision.notes, f"{name} goes aside to let others pass"])
+        return None
 
     def _place(self, member: Member, *, moving: bool) -> Place:
         left_m = planned_way_m(self._spec, member.way_left_m(self._spec))

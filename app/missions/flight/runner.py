@@ -46,7 +46,7 @@ class Runner:
     def __init__(self, live: LiveMission, hub: FleetHub, executor: Executor, time_scale: float) -> None:
         self._live = live
         self._time_scale = time_scale
-        constraints = make_constraints(live.spec)
+        self._constraints = constraints = make_constraints(live.spec)
         planner = make_planner(live.spec, live.planning_sensor)
         linked = np.isfinite(constraints.com_range_m) or any(m.capabilities.flies_together for m in live.team)
         self._apart = live.search is None and not linked and planner.decides_apart
@@ -86,7 +86,7 @@ class Runner:
     def _flight(self) -> OwnLegs | TeamSteps:
         shared = (self._live, self._decider, self._committing, self._dispatch, self._maps, self._waiting)
         if self._apart:
-            return OwnLegs(*shared, self._time_scale)
+            return OwnLegs(*shared, self._constraints, self._time_scale)
         return TeamSteps(*shared, self._lookout, self._time_scale)
 
     async def _recover(self) -> bool:

@@ -2,11 +2,18 @@
 
 import numpy as np
 
+from app.arrays import FloatArray
+from app.exploration.core.bottom import Bottom
+from app.exploration.core.constraints import Constraints
 from app.exploration.core.timeline import Approach, Timeline, closest_approach
 from app.missions.flight.decision import Decision
 from app.missions.live.mission import LiveMission
 from app.missions.spec.mission import Limits, MissionSpec
 from app.missions.team import Member
+
+DIRECTIONS = 16
+PARTS = (1.0, 0.5)
+"""Of the longest leg."""
 
 
 def too_close(decision: Decision, live: LiveMission, spec: MissionSpec) -> dict[str, str]:
@@ -43,6 +50,24 @@ def too_close(decision: Decision, live: LiveMission, spec: MissionSpec) -> dict[
             f"{approach.time_s:.0f} s from now"
         )
         del new[waits]
+
+
+def ways_aside(start: FloatArray, target: FloatArray, constraints: Constraints, bottom: Bottom) -> FloatArray:
+    """Return where a vehicle may go in place of its target, (k, 3): in all directions, the nearest to the target first.
+
+    Parameters
+    ----------
+    start, target : (3,)
+        East, north and depth of travel.
+    bottom
+        Pessimistic sea floor.
+    """
+    course = np.arange(0.0, 2 * np.pi, 2 * np.pi / DIRECTIONS)
+    unit = np.column_stack([np.sin(course), np.cos(course), np.zeros(DIRECTIONS)])
+    reach_m = constraints.max_step_m * (1 - 1e-9)
+    ends = np.concatenate([start + part * reach_m * unit for part in PARTS])
+    free = ends[constraints.feasible(start[None], ends[:, None], bottom)]
+    return np.asarray(free[np.argsort(np.hypot(*(free - target)[:, :2].T), kind="stable")])
 
 
 def _approach(leg: Timeline, begins_s: float, other: Timeline, limits: Limits) -> Approach | None:

@@ -313,7 +313,7 @@ class LiveMission:
             return Phase.SURFACING
         if member.legs == 0 or self.boundaries.breach(member.name):
             return Phase.TRANSIT
-        return Phase.SURVEY if member.ordered or way_left_m > 0.0 else Phase.STOPPED
+        return Phase.SURVEY if member.ordered or member.ahead or way_left_m > 0.0 else Phase.STOPPED
 
     def _hold_against_boundaries(self, report: VehicleReport, place: tuple[float, float]) -> None:
         if self.header.state in ENDED:

@@ -136,7 +136,6 @@ class _Swimmer:
         self.terrain = terrain
         self.state = LinkState.READY
         self.order: WaypointOrder | None = None
-        self.began_m = (0.0, 0.0)
         self.reached = False
         self.raised = False
         self.reported_s = -math.inf
@@ -162,28 +161,19 @@ class _Swimmer:
         return self.report
 
     def begin(self, order: WaypointOrder) -> None:
-        here = self.body.position
-        self.began_m = (here.east_m, here.north_m)
         self.order, self.reached, self.raised = order, False, False
         self.head_for(order, order.position, order.position.depth_m)
 
     def head_for(self, order: WaypointOrder, place: Position, depth_m: float) -> None:
-        east, north = self._local(place)
-        self.body.go_to(east, north, depth_m, order.speed_mps, arrival_radius_m=order.arrival_radius_m)
-
-    @property
-    def arrived(self) -> bool:
-        """Whether it is at its waypoint, or has passed it closely where it is to pass it straight."""
-        order = self.order
-        if order is None or self.body.arrived or order.lead is None:
-            return order is not None and self.body.arrived
-        (east, north), here = self._local(order.position), self.body.position
-        leg_e, leg_n = east - self.began_m[0], north - self.began_m[1]
-        off_e, off_n = here.east_m - east, here.north_m - north
-        return off_e * leg_e + off_n * leg_n >= 0.0 and math.hypot(off_e, off_n) <= PASSED_WITHIN_M
-
-    def _local(self, place: Position) -> tuple[float, float]:
-        return self.terrain.frame.to_local(place.lat_deg, place.lon_deg)
+        east, north = self.terrain.frame.to_local(place.lat_deg, place.lon_deg)
+        self.body.go_to(
+            east,
+            north,
+            depth_m,
+            order.speed_mps,
+            arrival_radius_m=order.arrival_radius_m,
+            pass_within_m=None if order.lead is None else PASSED_WITHIN_M,
+        )
 
 
 class SimFleetLink(FleetLink):
@@ -388,7 +378,7 @@ class SimFleetLink(FleetLink):
         events += _ranges(swimmer)
         if swimmer.body.time_s - swimmer.reported_s >= REPORT_PERIOD_S:
             events.append(swimmer.make_report())
-        if order is not None and not swimmer.reached and swimmer.arrived:
+        if order is not None and not swimmer.reached and swimmer.body.arrived:
             swimmer.reached = True
             if order.lead is not None:
                 # Until it is sent on it flies straight ahead, as far as there is room.
