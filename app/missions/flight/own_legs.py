@@ -221,10 +221,10 @@ class OwnLegs:
 
     def _next_number(self, member: Member) -> int:
         """Return the number of a vehicle's next leg: one that joins, or comes back, goes on where the team is."""
-        others = [m.legs for m in self._live.team.present if m is not member]
-        newcomer = member.name not in self._taking_part and not member.ordered and not member.ahead
-        reached = min(others) if others else self._live.header.step
-        return max(member.legs, min(reached, self._live.header.step) if newcomer else 0) + 1
+        if member.name in self._taking_part or member.ordered or member.ahead:
+            return member.legs + 1
+        reached = min((m.legs for m in self._live.team.present if m is not member), default=self._live.header.step)
+        return max(member.legs, min(reached, self._live.header.step)) + 1
 
     def _who_gets_legs(self) -> list[Member]:
         """Return the vehicles to decide for now: none, or those that need a leg, with others that soon will."""
