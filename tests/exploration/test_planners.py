@@ -1,5 +1,6 @@
 import itertools
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -260,3 +261,36 @@ def test_an_edge_between_two_lines_counts_although_no_sounding_shows_it() -> Non
     on_edge = (east > 50.0) & (east < 60.0)
     assert roughness[on_edge].min() > 1.5 * roughness[~on_edge & (np.abs(east - 55.0) > 20.0)].max()
     assert np.allclose(expected_roughness(belief, distance, 10.0), 1.0)
+
+
+@pytest.mark.parametrize(("name", "regressors"), [("cao", "map"), ("lawnmower", "map"), ("random", "map")])
+def test_who_gets_no_leg_stays_and_loses_nothing_of_its_plan(name: str, regressors: str) -> None:
+    """A team whose vehicles are decided for one after the other flies as much of its plan as one that goes together."""
+    planner = make(name, regressors)
+    assert planner.decides_apart
+    names = ("a", "b", "c")
+    situation = make_situation(vehicles=names, steps=40)
+    positions, soundings = situation.positions, [situation.positions[:, :2]]
+    left_m = np.full(3, 250.0)
+    flown = [[place[:2]] for place in positions]
+    for step in range(1, 61):
+        moving = np.arange(3) == (step - 1) % 3
+        situation = replace(
+            make_situation(
+                1 + step // 3, steps=40, vehicles=names, positions=positions, soundings=np.vstack(soundings)
+            ),
+            moving=moving,
+            left_m=left_m,
+        )
+        proposed = planner.propose(situation, np.random.default_rng(step)).positions
+        np.testing.assert_array_equal(proposed[~moving], positions[~moving])
+        assert not situation.constraints.violations(names, positions, proposed)
+        left_m = left_m - np.linalg.norm(proposed - positions, axis=1)
+        soundings.append(proposed[moving, :2])
+        flown[(step - 1) % 3].append(proposed[moving][0, :2])
+        positions = proposed
+    if name == "lawnmower":
+        # All its lines run one way: no leg of it goes diagonally, as one that left something out would.
+        for track in flown:
+            leg = np.abs(np.diff(np.array(track), axis=0))[1:]
+            assert (leg.min(axis=1) < 3.0).all()
