@@ -126,6 +126,8 @@ class OwnLegs:
         names = {member.name for member in getting}
         numbers = {member.name: self._next_number(member) for member in getting}
         places = [self._place(member, moving=member.name in names) for member in live.team.present]
+        planner = self._decider.planner
+        memory, committed = planner.snapshot(), False
         self._decider.attempt = max(self._refusals.get(name, 0) for name in names)
         decisions = await self._decider.decide_to_fly(max(numbers.values()), places, legs=self._legs_at_once)
         self._taking_part |= names
@@ -135,20 +137,24 @@ class OwnLegs:
         for later, decision in enumerate(decisions):
             starts = {place.vehicle: place.en_m for place in places}
             places = moved_on(places, decision)
-            await self._commit(decision, starts, {name: number + later for name, number in numbers.items()})
+            committed |= await self._commit(
+                decision, starts, {name: number + later for name, number in numbers.items()}
+            )
             # Who did not get this leg gets none that goes on from it.
             numbers = {name: number for name, number in numbers.items() if self._has_leg(name, number + later)}
+        if not committed:
+            planner.restore(memory)  # what it plans is still to be flown
         self._maps.begin()
 
-    async def _commit(self, decision: Decision, starts_m: dict[str, FloatArray], numbers: dict[str, int]) -> None:
-        """Commit the legs of a decision that can be flown from where they were to begin."""
+    async def _commit(self, decision: Decision, starts_m: dict[str, FloatArray], numbers: dict[str, int]) -> bool:
+        """Commit the legs of a decision that can be flown from where they were to begin; whether there were any."""
         live = self._live
         begun = [
             leg
             for leg in decision.legs
             if leg.vehicle in numbers
             and (member := live.team.get(leg.vehicle)) is not None
-            and member.report is not None
+            and member.present
             and member.legs < numbers[leg.vehicle]
             and self._wants_legs(member)
             and self._begins_at(member, starts_m[leg.vehicle])
@@ -162,6 +168,7 @@ class OwnLegs:
         elif any(self._refusals.get(leg.vehicle) == 1 for leg in decision.legs):
             for note in decision.notes:
                 await live.journal.log(Level.WARNING, "safety", note)
+        return bool(legs)
 
     def _has_leg(self, name: str, number: int) -> bool:
         member = self._live.team.get(name)

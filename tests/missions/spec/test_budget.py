@@ -15,7 +15,7 @@ def spec_with(**changes: Any) -> MissionSpec:
     """A mission with legs of 8 m at 1.3 m/s by default, and no length but the one that is given."""
     values = spec_json(**changes)
     if "steps" not in changes:
-        del values["steps"]
+        values.pop("steps", None)
     return MissionSpec.model_validate(values)
 
 
