@@ -332,7 +332,7 @@ def _show_diagnosis(diagnosis: "Diagnosis") -> None:
 
 @app.command()
 def demo(
-    speed: Annotated[float, typer.Option(min=0.1, max=200, help="How much faster than real time.")] = 6.0,
+    speed: Annotated[float, typer.Option(min=0.1, max=200, help="How much faster than real time.")] = 10.0,
     terrain: Annotated[
         Path | None,
         typer.Option(

@@ -65,7 +65,7 @@ def mission(options: argparse.Namespace) -> MissionSpec:
             "name": "flying",
             "area": {"type": "Polygon", "coordinates": [ring]},
             "vehicles": vehicles,
-            "steps": options.steps,
+            "budget": {"minutes": options.minutes} if options.minutes else {"steps": options.steps},
             "cell_m": max(1.0, side / 100.0),
             "speed_mps": options.speed,
             "limits": {"max_step_m": options.leg, "min_vertical_separation_m": 1.0, "min_altitude_m": 2.0},
@@ -218,6 +218,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--kind", choices=["sim", "imc"], default="sim")
     parser.add_argument("--side", type=float, default=200.0, help="of the square, metres")
     parser.add_argument("--steps", type=int, default=60)
+    parser.add_argument("--minutes", type=float, help="in place of steps")
     parser.add_argument("--leg", type=float, default=10.0, help="longest leg, metres")
     parser.add_argument("--speed", type=float, default=1.3, help="of the vehicles, m/s")
     parser.add_argument("--speeds", type=float, nargs="*", help="of each vehicle, m/s")
@@ -231,9 +232,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
         found = asyncio.run(fly(options, Path(folder)))
     print(json.dumps(found, indent=1))
     figures = {key: value for key, value in found.items() if key != "by_vehicle"}
-    title = (
-        f"{options.vehicles} vehicles ({options.kind}), {options.side:g} m, {options.steps} legs of {options.leg:g} m"
-    )
+    length = f"{options.minutes:g} min in" if options.minutes else f"{options.steps}"
+    title = f"{options.vehicles} vehicles ({options.kind}), {options.side:g} m, {length} legs of {options.leg:g} m"
     write_section(options.write, FLIGHT, title, figures, seeds=[options.seed])
 
 
