@@ -129,7 +129,7 @@ class OwnLegs:
         planner = self._decider.planner
         memory, committed = planner.snapshot(), False
         self._decider.attempt = max(self._refusals.get(name, 0) for name in names)
-        decisions = await self._decider.decide_to_fly(max(numbers.values()), places, legs=self._legs_at_once)
+        decisions = await self._decider.decide_to_fly(max(numbers.values()), places, legs=self._legs_at_once(getting))
         self._taking_part |= names
         self._again_at_s = {name: at_s for name, at_s in self._again_at_s.items() if name not in names}
         if not decisions:
@@ -178,14 +178,14 @@ class OwnLegs:
         again_at_s = asyncio.get_running_loop().time() + DECIDE_AGAIN_S / self._time_scale
         self._again_at_s |= dict.fromkeys(names, again_at_s)
 
-    @property
-    def _legs_at_once(self) -> int:
-        """How many legs are decided together, so that they last until the next decision is made."""
+    def _legs_at_once(self, getting: list[Member]) -> int:
+        """Return how many legs are decided together, so that they last until the next decision is made."""
         if self._watched:
             return 1
         fastest_mps = max(self._spec.speed_of(member.spec) for member in self._live.team)
         way_m = DECISIONS_AHEAD * self._decider.takes_s * self._time_scale * fastest_mps
-        return min(max(math.ceil(way_m / self._spec.limits.max_step_m), 1), MOST_AHEAD)
+        idle = any(not member.ordered and not member.ahead for member in getting)
+        return min(max(math.ceil(way_m / self._spec.limits.max_step_m), 1 + self._ahead * idle), MOST_AHEAD)
 
     def _begins_at(self, member: Member, start_m: FloatArray) -> bool:
         if not member.busy and not member.ahead:
