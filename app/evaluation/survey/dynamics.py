@@ -1,7 +1,8 @@
 """Surveys at sea, in simulated time: vehicles with turning circles fly for as many minutes, every one on its own time.
 
-As in missions, a vehicle has legs ahead of the one that it flies; who will need one next has it decided from where the
-last one ends, with the others' legs as they are, and a decision takes its time. The same vehicles fly the patterns.
+The rules are those of missions, the code is not: a vehicle has legs ahead of the one that it flies; who will need one
+next has it decided from where the last one ends, with the others' legs as they are, and a decision takes its time. The
+same vehicles fly the patterns.
 """
 
 import time

@@ -25,7 +25,7 @@ PACE_MEMORY = 0.9
 EXPECTED_DECISION_S = 0.3
 """How long a decision is taken to last before the first was made."""
 
-STILL_M = 1e-6
+NO_COURSE_M = 1e-6
 """A shorter leg has no course."""
 
 DECIDE_AGAIN_S = 5.0
@@ -166,7 +166,7 @@ def moved_on(places: list[Place], decision: Decision) -> list[Place]:
             replace(
                 place,
                 en_m=leg.target_m[:2],
-                heading_rad=math.atan2(east, north) if length_m > STILL_M else place.heading_rad,
+                heading_rad=math.atan2(east, north) if length_m > NO_COURSE_M else place.heading_rad,
                 surfacing_depth_m=float(leg.target_m[2]) if leg.surfacing else math.nan,
                 left_m=max(place.left_m - length_m, 0.0),
             )
@@ -187,6 +187,6 @@ def place_ahead(member: Member, live: LiveMission) -> Place:
     return replace(
         here,
         en_m=np.asarray(ends[-1], dtype=np.float64),
-        heading_rad=math.atan2(east, north) if math.hypot(east, north) > STILL_M else here.heading_rad,
+        heading_rad=math.atan2(east, north) if math.hypot(east, north) > NO_COURSE_M else here.heading_rad,
         surfacing_depth_m=last_depth_m if up else math.nan,
     )

@@ -91,7 +91,7 @@ class VehicleSpec(Model):
         default=None,
         gt=0,
         le=200,
-        description="Radius of its turning circle; null: not known, it is learned from how the vehicle turns",
+        description="Radius of its turning circle, by which plans pay for turns; null: what it flies in 4 s",
     )
     guidance: Guidance = Field(
         default=Guidance.FOLLOW,

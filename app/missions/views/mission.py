@@ -88,7 +88,7 @@ class VehicleView(View):
     pursuing: str | None = Field(default=None, description="The target that it leaves the mapping for")
     phase: Phase | None = Field(default=None, description="What it is at; null while it takes part in no mission")
     flown_m: float = Field(default=0.0, description="What it has flown in this mission, along its track")
-    on_plan_m: float = Field(default=0.0, description="Of those, metres on planned legs that sound new ground")
+    on_plan_m: float = Field(default=0.0, description="Of those, metres along planned legs")
     idle_s: float = Field(default=0.0, description="Vehicle time in which it waited for a decision")
 
     @computed_field  # type: ignore[prop-decorator]
@@ -171,7 +171,7 @@ class MissionView(MissionSummary):
     @computed_field  # type: ignore[prop-decorator]
     @property
     def efficiency_pct(self) -> float | None:
-        """Share of all metres flown that sounded new ground on planned legs; null while nothing was flown."""
+        """Share of all metres flown that led along planned legs; null while nothing was flown."""
         return efficiency_pct(Flown(vehicle.flown_m, vehicle.on_plan_m) for vehicle in self.vehicles)
 
 

@@ -2310,7 +2310,7 @@ export interface components {
             readonly allowed_actions: components["schemas"]["Action"][];
             /**
              * Efficiency Pct
-             * @description Share of all metres flown that sounded new ground on planned legs; null while nothing was flown.
+             * @description Share of all metres flown that led along planned legs; null while nothing was flown.
              */
             readonly efficiency_pct: number | null;
         };
@@ -3905,7 +3905,7 @@ export interface components {
             speed_mps?: number | null;
             /**
              * Turn Radius M
-             * @description Radius of its turning circle; null: not known, it is learned from how the vehicle turns
+             * @description Radius of its turning circle, by which plans pay for turns; null: what it flies in 4 s
              */
             turn_radius_m?: number | null;
             /**
@@ -4048,7 +4048,7 @@ export interface components {
             flown_m: number;
             /**
              * On Plan M
-             * @description Of those, metres on planned legs that sound new ground
+             * @description Of those, metres along planned legs
              * @default 0
              */
             on_plan_m: number;
