@@ -27,16 +27,17 @@ def screen(request: pytest.FixtureRequest, browser: Browser, service: Service) -
     context.close()
 
 
-def is_on_top(page: Page, name: str) -> bool:
-    """Whether a click in the middle of an element meets it, and all of it is on the screen."""
-    return bool(
-        by_id(page, name).evaluate(
-            """element => {
-                const { left, right, top, bottom } = element.getBoundingClientRect();
-                const hit = document.elementFromPoint((left + right) / 2, (top + bottom) / 2);
-                return element.contains(hit) && left >= 0 && top >= 0 && right <= innerWidth && bottom <= innerHeight;
-            }"""
-        )
+def expect_on_top(page: Page, name: str) -> None:
+    """A click in the middle of an element meets it, and all of it is on the screen, once what opens has opened."""
+    page.wait_for_function(
+        """name => {
+            const element = document.querySelector(`[data-testid="${name}"]`);
+            if (element === null) return false;
+            const { left, right, top, bottom } = element.getBoundingClientRect();
+            const hit = document.elementFromPoint((left + right) / 2, (top + bottom) / 2);
+            return element.contains(hit) && left >= 0 && top >= 0 && right <= innerWidth && bottom <= innerHeight;
+        }""",
+        arg=name,
     )
 
 
@@ -45,25 +46,25 @@ def test_nothing_covers_the_stop_and_a_single_vehicle_can_be_stopped_from_there(
     mission = service.create(name="Always in reach", vehicles=PAIR)
     service.act(mission, "start")
     show(page, mission)
-    assert is_on_top(page, "abort")
+    expect_on_top(page, "abort")
     for pane in ("charts", "files", "soundings", "compare", "log"):
         by_id(page, f"toggle-{pane}").click()
-        assert is_on_top(page, "abort"), pane
+        expect_on_top(page, "abort")
     by_id(page, "toggle-log").click()
     by_id(page, "finish").click()
     expect(by_id(page, "finish-dialog")).to_be_visible()
-    assert is_on_top(page, "abort")
+    expect_on_top(page, "abort")
     page.keyboard.press("Escape")
     expect(by_id(page, "finish-dialog")).to_be_hidden()
     if not by_id(page, "new-mission").is_visible():
         by_id(page, "toggle-missions").click()
-    assert is_on_top(page, "abort")
+    expect_on_top(page, "abort")
     by_id(page, "open-fleet").click()
     expect(by_id(page, "fleet-dialog")).to_be_visible()
-    assert is_on_top(page, "abort")
+    expect_on_top(page, "abort")
 
     by_id(page, "abort").click()
-    assert is_on_top(page, "abort-confirm")
+    expect_on_top(page, "abort-confirm")
     by_id(page, "abort-only-sim-2").click()
     by_id(page, "abort-confirm").click()
     expect(by_id(page, "receipt-sim-2")).to_contain_text("acknowledged the stop")
