@@ -10,10 +10,11 @@ from app.api.json_route import JsonRoute
 from app.api.mission import Mission
 from app.api.peer_lists import from_peers
 from app.api.problems import problems
-from app.api.schemas import API, ActionRequest, NoteRequest, VehicleName
+from app.api.schemas import API, ActionRequest, EndRequest, NoteRequest, VehicleName
 from app.api.state import Service, State
 from app.missions.operations import history
 from app.missions.preflight.survey import preflight
+from app.missions.running.homecoming import call_home
 from app.missions.running.mission_views import action_view, mission_view
 from app.missions.spec.mission import MissionSpec, VehicleSpec
 from app.missions.states import Action
@@ -128,11 +129,14 @@ _ACTION_TEXTS = {
     Action.RESUME: ("Resume a paused mission", "Engage the vehicles again and go on with the next step."),
     Action.ABORT: (
         "Abort a mission",
-        "Stop every vehicle now and end the mission. The answer tells which vehicles acknowledged the stop.",
+        "Stop every vehicle now and end the mission. The answer tells which vehicles acknowledged the stop. With "
+        '{"return": true} they go home first.',
     ),
     Action.FINISH: (
         "Finish a mission early",
-        "Stop the vehicles and end the mission as finished; its products stay available.",
+        "End the mission as finished; its products stay available. Vehicles with a recovery point go home first, "
+        'unless the mission says otherwise or {"return": false} is sent: then they stop where they are. A second '
+        "finish stops them.",
     ),
 }
 
@@ -146,9 +150,13 @@ def _add_action(action: Action) -> None:
         note = body.note if body is not None else ""
         return await service.act(mission, action, actor=operator.name, note=note)
 
+    async def end(service: Service, operator: Operator, mission: Mission, body: EndRequest | None = None) -> ActionView:
+        asked = body or EndRequest()
+        return await service.act(mission, action, actor=operator.name, note=asked.note, return_home=asked.return_home)
+
     router.add_api_route(
         f"/{{mission_id}}/{action}",
-        act,
+        end if action in (Action.ABORT, Action.FINISH) else act,
         methods=["POST"],
         operation_id=f"{action}Mission",
         summary=summary,
@@ -226,6 +234,30 @@ async def write_note(note: NoteRequest, operator: Operator, mission: Mission) ->
 async def abort_vehicle(name: VehicleName, service: Service, operator: Operator, mission: Mission) -> ActionView:
     """Stop a vehicle now and go on without it; the answer tells whether it acknowledged."""
     return action_view(mission, await service.team_changes.stop_one(mission, name, operator.name))
+
+
+@router.post(
+    "/{mission_id}/vehicles/{name}/return",
+    operation_id="returnVehicle",
+    summary="Send one vehicle home",
+    **_OF_A_VEHICLE,
+)
+async def return_vehicle(name: VehicleName, operator: Operator, mission: Mission) -> MissionView:
+    """Send a vehicle to its recovery point, for a new battery or for good; the others go on with its part."""
+    await call_home(mission, name, operator.name)
+    return mission_view(mission)
+
+
+@router.post(
+    "/{mission_id}/vehicles/{name}/resume",
+    operation_id="resumeVehicle",
+    summary="Let a vehicle survey again",
+    **_OF_A_VEHICLE,
+)
+async def resume_vehicle(name: VehicleName, service: Service, operator: Operator, mission: Mission) -> MissionView:
+    """Let a vehicle go on that went home, for example with a new battery: it joins where the team is."""
+    await service.send_on(mission, name, operator.name)
+    return mission_view(mission)
 
 
 @router.post(

@@ -52,6 +52,17 @@ class ActionRequest(BaseModel):
     note: str = Field(default="", max_length=2000, description="Kept in the mission's log beside the action")
 
 
+class EndRequest(ActionRequest):
+    """What an operator adds when a mission is ended."""
+
+    return_home: bool | None = Field(
+        default=None,
+        alias="return",
+        description="true: vehicles go home to their recovery points, and the mission ends when they are there; false: "
+        "they stop where they are. null: as recovery.on_finish says, and never with abort",
+    )
+
+
 class NoteRequest(BaseModel):
     """What the next watch should know."""
 

@@ -32,6 +32,8 @@ class Flown:
     """Of those along planned legs, metres."""
     idle_s: float = 0.0
     """Vehicle time in which it had no leg to fly and was to get one, seconds."""
+    used_s: float = 0.0
+    """Energy used, in seconds at its usual speed."""
     left_m: float | None = None
     """What it may fly yet, metres; None where that is not known."""
     phase: Phase = Phase.STOPPED
@@ -46,7 +48,7 @@ class Flown:
     def remember(self) -> dict[str, float]:
         """Return what is stored, so that a restart goes on counting."""
         kept = asdict(self)
-        return {name: round(kept[name], 2) for name in ("flown_m", "on_plan_m", "idle_s")}
+        return {name: round(kept[name], 2) for name in ("flown_m", "on_plan_m", "idle_s", "used_s")}
 
     @classmethod
     def recall(cls, stored: dict[str, Any] | None) -> "Flown":

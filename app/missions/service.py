@@ -19,7 +19,7 @@ from app.missions.fleet.interface import FleetLink, StopReceipt
 from app.missions.fleet.links.rest import RestFleetLink
 from app.missions.fleet.links.sim import SimFleetLink
 from app.missions.forecast.request import Forecaster
-from app.missions.live.mission import LiveMission
+from app.missions.live.mission import Ending, LiveMission
 from app.missions.operations.imports import Imports
 from app.missions.operations.reading import Reader
 from app.missions.operations.recorrection import check_level_is_known
@@ -28,6 +28,7 @@ from app.missions.running.admission import check_spec
 from app.missions.running.claims import Claims, free_elsewhere
 from app.missions.running.failover import Failover
 from app.missions.running.final_maps import FinalMaps
+from app.missions.running.homecoming import returns, send_on
 from app.missions.running.mission_views import action_view, idle_vehicle_view, mission_view
 from app.missions.running.ownership import Ownership
 from app.missions.running.registry import MissionRegistry
@@ -197,18 +198,26 @@ class MissionService:
         """Raise MissionNotFoundError where there is no such mission; costs little, whoever has it."""
         await self._registry.check_exists(mission_id)
 
-    async def act(self, live: LiveMission, action: Action, *, actor: str, note: str = "") -> ActionView:
+    async def act(
+        self, live: LiveMission, action: Action, *, actor: str, note: str = "", return_home: bool | None = None
+    ) -> ActionView:
         """Start, pause, resume, abort or finish a mission.
+
+        ``return_home`` is whether vehicles go home first when it is finished or aborted; None: where the mission's
+        recovery says so, and never when it is aborted.
 
         Raises
         ------
         MoveRefusedError, ConflictError
-            The latter when a vehicle is not ready or takes part in another mission.
+            The latter when a vehicle is not ready or takes part in another mission, or none has a recovery point to go
+            to.
         """
         async with self._supervisor.acting(live.id):
             target = states.move(live.header.state, action)
             stops: list[StopReceipt] = []
-            if action in (Action.START, Action.RESUME):
+            if returns(live, action, return_home):
+                await self._supervisor.bring_home(live, Ending(target, note, actor))
+            elif action in (Action.START, Action.RESUME):
                 self._claims.check_team(live)
                 check_level_is_known(live)
                 if action == Action.START:
@@ -227,6 +236,10 @@ class MissionService:
                     self._supervisor.dismiss(live)
                 live.publish_summary()
         return action_view(live, stops)
+
+    async def send_on(self, live: LiveMission, name: str, actor: str) -> None:
+        """Let a vehicle survey again that went home or was stopped. Raises VehicleNotFoundError, ConflictError."""
+        await send_on(live, self._supervisor, name, actor)
 
     async def delete(self, live: LiveMission) -> None:
         """Remove a mission in which nothing was measured. Raises ConflictError."""

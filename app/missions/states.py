@@ -26,6 +26,9 @@ class Action(StrEnum):
     FINISH = "finish"
 
 
+AT_SEA = (MissionState.RUNNING, MissionState.PAUSED)
+"""States in which its vehicles are out there."""
+
 ENDED = frozenset({MissionState.FINISHED, MissionState.ABORTED, MissionState.FAILED})
 
 _S = MissionState

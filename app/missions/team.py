@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from datetime import datetime
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,9 @@ from app.missions.fleet.interface import (
     WaypointStatus,
 )
 from app.missions.flown import Flown
+from app.missions.recovery.energy import Energy
+from app.missions.recovery.failsafes import Active
+from app.missions.spec.failsafes import Failsafe, Response
 from app.missions.spec.mission import Limits, MissionSpec, VehicleKind, VehicleSpec
 
 SETTLED = frozenset({WaypointStatus.REACHED, WaypointStatus.REFUSED, WaypointStatus.MISSED})
@@ -35,6 +39,37 @@ class CommittedLeg:
     """Where it ends in the mission's frame, (2,): east, north."""
     surfacing: bool = False
     """Whether it brings its vehicle up for a fix."""
+
+
+@dataclass
+class Withdrawal:
+    """A vehicle surveys no more, for now or for good.
+
+    Attributes
+    ----------
+    response
+        What it does instead: never ``WARN``.
+    why
+        Shown to the operator.
+    over
+        Whether it has come to where that leads: home, up, stopped.
+    led
+        Whether it was sent on its way in this run.
+    """
+
+    response: Response
+    why: str
+    over: bool = False
+    led: bool = False
+
+    def remember(self) -> dict[str, Any]:
+        """Return what is stored, so that a restart goes on with it."""
+        return {"response": self.response, "why": self.why, "over": self.over}
+
+    @classmethod
+    def recall(cls, stored: dict[str, Any] | None) -> "Withdrawal | None":
+        """Return what was stored."""
+        return None if not stored else cls(Response(stored["response"]), stored["why"], stored["over"])
 
 
 @dataclass
@@ -74,6 +109,15 @@ class Member:
     """How many legs in a row it did not get to the end of."""
     committed_m: float = 0.0
     """How long all legs are together that were committed for it."""
+    withdrawal: Withdrawal | None = None
+    """Why it does not survey; None while it does."""
+    energy: Energy = field(default_factory=lambda: Energy(1.0))
+    return_needs_s: float | None = None
+    """How long its way home takes from where it is; None: it has none, or it is not known yet."""
+    faults: dict[Failsafe, str] = field(default_factory=dict)
+    """What it reports of itself that is wrong, in its words."""
+    failsafes: list[Active] = field(default_factory=list)
+    """What is in force for it, the strongest response first."""
     leg_start_m: NDArray[np.float64] | None = None
     """Where the leg of its order begins, (2,)."""
     leg_began_s: float = 0.0
@@ -110,6 +154,16 @@ class Member:
     def unsent(self) -> bool:
         """Whether it has a waypoint that was never sent, as when its link was lost just then."""
         return self.order is not None and self.status is WaypointStatus.PLANNED
+
+    @property
+    def surveys(self) -> bool:
+        """Whether it can be planned for, and is not on its way home or out of action."""
+        return self.present and self.withdrawal is None
+
+    @property
+    def is_home(self) -> bool:
+        """Whether it came home."""
+        return self.withdrawal is not None and self.withdrawal.over and self.withdrawal.response is Response.RETURN
 
     def set_order(self, order: WaypointOrder | None, target_m: NDArray[np.float64] | None = None) -> None:
         """Give it an order and where that leads, or take its order away."""
@@ -158,6 +212,8 @@ class Team:
 
     capabilities_of: Callable[[VehicleKind], LinkCapabilities] = lambda _kind: LinkCapabilities()
     """Returns what vehicles of a kind can do."""
+    energy_of: Callable[[VehicleSpec], Energy] = lambda _spec: Energy(1.0)
+    """Returns the count of what a vehicle uses, which has seen nothing yet."""
     members: dict[str, Member] = field(default_factory=dict)
     left: dict[str, Member] = field(default_factory=dict)
     """Those that took part and do not any more, as they were last."""
@@ -165,10 +221,11 @@ class Team:
     def join(self, spec: VehicleSpec, slot: int) -> Member:
         """Add a vehicle, or take one back."""
         before = self.left.pop(spec.name, None)
-        member = Member(spec, slot, self.capabilities_of(spec.kind))
+        member = Member(spec, slot, self.capabilities_of(spec.kind), energy=self.energy_of(spec))
         if before is not None and before.key == member.key:
             member.report, member.heard_s, member.risings = before.report, before.heard_s, before.risings
             member.legs, member.committed_m, member.flown = before.legs, before.committed_m, before.flown
+            member.energy.used_s = before.energy.used_s
         self.members[spec.name] = member
         return member
 
@@ -192,4 +249,9 @@ class Team:
     @property
     def present(self) -> list[Member]:
         """Those that can be planned for."""
-        return [m for m in self.members.values() if m.present]
+        return [m for m in self.members.values() if m.surveys]
+
+    @property
+    def surveying(self) -> list[Member]:
+        """Those that take part in the survey, whether or not they can be reached now."""
+        return [m for m in self.members.values() if m.withdrawal is None]

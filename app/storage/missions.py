@@ -44,6 +44,17 @@ async def keep_flown(session: AsyncSession, mission_id: str, flown: dict[str, di
         await session.execute(update(MissionVehicleRow).where(*of_it).values(flown=figures))
 
 
+async def keep_withdrawal(session: AsyncSession, mission_id: str, name: str, withdrawal: dict[str, Any] | None) -> None:
+    """Record why a vehicle does not survey any more; None: it does."""
+    of_it = (MissionVehicleRow.mission_id == mission_id, MissionVehicleRow.name == name)
+    await session.execute(update(MissionVehicleRow).where(*of_it).values(withdrawal=withdrawal))
+
+
+async def keep_ending(session: AsyncSession, mission_id: str, ending: dict[str, Any] | None) -> None:
+    """Record what a mission becomes once all its vehicles are home; None: it goes on."""
+    await session.execute(update(MissionRow).where(MissionRow.id == mission_id).values(ending=ending))
+
+
 async def committed_way(session: AsyncSession, mission_id: str) -> dict[str, float]:
     """Return how long all legs of each vehicle are together, metres, but for the way to the end of its first one."""
     query = (

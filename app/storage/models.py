@@ -80,6 +80,8 @@ class MissionRow(Base):
     created_at: Mapped[datetime]
     updated_at: Mapped[datetime]
     elapsed_s: Mapped[float] = mapped_column(default=0.0)
+    ending: Mapped[dict[str, Any] | None]
+    """What it becomes once all vehicles are home; None while it goes on."""
 
 
 class MissionVehicleRow(Base):
@@ -95,6 +97,8 @@ class MissionVehicleRow(Base):
     left_at: Mapped[datetime | None]
     flown: Mapped[dict[str, Any] | None]
     """What it has flown; None until it has set out."""
+    withdrawal: Mapped[dict[str, Any] | None]
+    """Why it does not survey any more; None while it does."""
 
 
 class StepRow(Base):

@@ -14,7 +14,8 @@ from app.missions.clock import now
 from app.missions.fleet.interface import Position, WaypointOrder, WaypointStatus
 from app.missions.flight.decision import Decision, Leg
 from app.missions.live.mission import RISES, LiveMission
-from app.missions.spec.mission import Guidance
+from app.missions.recovery.way_home import berth_m, homeward_ground
+from app.missions.spec.mission import Guidance, MissionSpec
 from app.missions.team import CommittedLeg, Member
 from app.missions.views.mission import Level
 from app.storage import missions as mission_queries
@@ -59,7 +60,8 @@ class LegCommit:
         self._live = live
         self._constraints = constraints
         self._leads = leads
-        self._bottom = Bottom.unknown()
+        self.bottom = Bottom.unknown()
+        """The pessimistic sea floor of the last decision."""
 
     async def commit(self, decision: Decision, numbers: dict[str, int]) -> None:
         """Make a decision durable, its legs and the planner's memory together; then the vehicles have these legs ahead.
@@ -90,7 +92,7 @@ class LegCommit:
         if number > live.header.step:
             metrics.STEPS.inc()
             live.set_step(number, decision.objective, decision.terms)
-        self._bottom = decision.bottom
+        self.bottom = decision.bottom
         starts_m = decision.origin_m
         for row, leg, member in zip(rows, decision.legs, getting, strict=True):
             now_of_name = live.team.get(row.vehicle) or live.team.left.get(row.vehicle)
@@ -102,7 +104,7 @@ class LegCommit:
             member.committed_m += length_m if length_m > STILL_M else live.spec.limits.max_step_m
             if row.status == WaypointStatus.REFUSED:
                 live.waypoints.show_rows([row])
-            else:
+            elif member.withdrawal is None:  # it may have been called home meanwhile
                 member.ahead.append(committed_leg(row, surfacing=leg.surfacing))
         live.publish_summary()
         for vehicle, fix in decision.fixes.items():
@@ -111,6 +113,17 @@ class LegCommit:
         await self._tell_of_pursuits(decision, number)
         for note in decision.notes:
             await live.journal.log(Level.WARNING, "safety", note, step=number)
+
+    def lead_home(self, member: Member, corners: list[tuple[FloatArray, float]]) -> None:
+        """Give a vehicle legs that survey nothing: along corners (2,) at depths, metres.
+
+        They are not written down: after a restart the way is found anew, from where the vehicle is then.
+        """
+        member.ahead.clear()
+        for en_m, depth_m in corners:
+            member.legs += 1
+            place = self._position(float(en_m[0]), float(en_m[1]), depth_m)
+            member.ahead.append(CommittedLeg(member.legs, place, np.asarray(en_m, dtype=np.float64)))
 
     def begin_next(self, member: Member) -> None:
         """Make a vehicle's next leg its order."""
@@ -132,7 +145,10 @@ class LegCommit:
         depth_m = leg.position.depth_m
         here = np.append(member.place_m(self._live.frame), depth_m)[None]
         there = np.append(leg.target_m, depth_m)[None]
-        broken = self._constraints.violations((member.name,), here, there)
+        constraints = self._constraints
+        if member.withdrawal is not None and (home_m := home_of(member, self._live.spec)) is not None:
+            constraints = homeward_ground(constraints, home_m)
+        broken = constraints.violations((member.name,), here, there)
         return next((violation.reason for violation in broken if violation.limit in WHERE), "")
 
     def _order(self, leg: CommittedLeg, member: Member) -> None:
@@ -145,7 +161,7 @@ class LegCommit:
             start = member.place_m(self._live.frame)
             beyond = safety.lead_point(self._constraints, start, target, LEAD_M)
             lead = self._position(beyond[0], beyond[1], leg.position.depth_m)
-            known = safety.bottom_on_way(np.array([start, target, beyond]), self._bottom)
+            known = safety.bottom_on_way(np.array([start, target, beyond]), self.bottom)
             bottom = tuple(self._position(east, north, depth) for east, north, depth in known)
             circle = self._circle(member, start, target)
         order = WaypointOrder(
@@ -247,6 +263,19 @@ class LegCommit:
                 continue
             words = f"{member.name} goes on with the mapping" if target is None else f"{member.name} goes for {target}"
             await self._live.journal.log(Level.INFO, "target", words, step=number, vehicle=member.name)
+
+
+def home_of(member: Member, spec: MissionSpec) -> FloatArray | None:
+    """Return where a vehicle comes home to, (2,): its own berth about the recovery point; None where it has none."""
+    recovery = spec.recovery_of(member.spec)
+    if recovery is None:
+        return None
+    lon, lat = recovery.point
+    east, north = spec.frame().to_local(np.array(lat), np.array(lon))
+    point_m = np.array([float(east), float(north)])
+    # A point of its own is nobody else's.
+    slot = 0 if member.spec.recovery_point is not None else member.slot
+    return berth_m(point_m, slot, recovery.radius_m, spec.limits.min_separation_m)
 
 
 def committed_leg(row: WaypointRow, *, surfacing: bool = False) -> CommittedLeg:

@@ -66,8 +66,7 @@ class Dispatch:
                 if member.ordered and not member.busy:
                     member.leg_began_s = loop.time()  # it is out of reach
             under_way = {m.name: self._late_at_s(m) for m in self._live.team if m.busy}
-            late = [m for m in self._live.team if under_way.get(m.name, math.inf) <= loop.time()]
-            await self._tell_of_late(late)
+            late = await self.settle_late()
             holds_s = await self._hold_idle()
             if late or (self._waiting and not self._live.halted):
                 continue
@@ -78,6 +77,13 @@ class Dispatch:
             except TimeoutError:
                 continue
 
+    async def settle_late(self) -> list[Member]:
+        """End the legs that take too long; returns their vehicles."""
+        now_s = asyncio.get_running_loop().time()
+        late = [m for m in self._live.team if m.busy and self._late_at_s(m) <= now_s]
+        await self._tell_of_late(late)
+        return late
+
     @property
     def _waiting(self) -> bool:
         return any(member.ahead and not member.ordered for member in self._live.team)
@@ -87,7 +93,7 @@ class Dispatch:
         now_s, due_s = asyncio.get_running_loop().time(), []
         for member in self._live.team:
             flies = member.capabilities.circles_m > 0.0 or member.capabilities.simulated
-            idle = flies and member.present and member.legs and not member.ordered and not member.ahead
+            idle = flies and member.surveys and member.legs and not member.ordered and not member.ahead
             if not idle or self._live.halted:
                 self._idle_since_s.pop(member.name, None)
                 continue
@@ -96,10 +102,10 @@ class Dispatch:
                 due_s.append(hold_s)
             elif hold_s <= now_s:
                 self._idle_since_s[member.name] = math.inf
-                await self._hold(member)
+                await self.hold(member)
         return due_s
 
-    async def _hold(self, member: Member) -> None:
+    async def hold(self, member: Member) -> None:
         """Send a vehicle to where it may circle, inside the area, clear of zones and of the others, if there is room.
 
         That is no leg: what the vehicle tells of it is of no interest.

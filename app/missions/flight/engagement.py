@@ -76,14 +76,16 @@ class Engagement:
             member.link = info.state
             if info.state in (LinkState.HEARD, LinkState.READY):
                 member.engaged = False
-            await self._tell_of_loss(member, info)
+            if member.withdrawal is None or not member.withdrawal.over:
+                await self._tell_of_loss(member, info)
             await self._advise(member, info)
             if member.report is None:
                 member.report = info.report
             if member.engaged and member.unsent and member.busy:
                 # It was out of reach when its waypoint was to be sent.
                 await self._send(member)
-            if not member.engaged and member.name not in self._asking and self._due(member):
+            is_out = member.withdrawal is not None and member.withdrawal.over
+            if not member.engaged and not is_out and member.name not in self._asking and self._due(member):
                 task = asyncio.create_task(self._ask(member))
                 self._asking[member.name] = task
                 task.add_done_callback(partial(self._done, member.name))

@@ -14,12 +14,14 @@ from app.arrays import FloatArray
 from app.exploration.core.constraints import Constraints
 from app.missions.flight.commit import LegCommit
 from app.missions.flight.deciding import DECIDE_AGAIN_S, Decider, moved_on, place_ahead
-from app.missions.flight.decision import Decision, Place, planned_way_m
+from app.missions.flight.decision import Decision, Leg, Place, planned_way_m
 from app.missions.flight.dispatch import Dispatch
+from app.missions.flight.range_left import RangeLeft
 from app.missions.flight.separation import too_close, ways_aside
 from app.missions.flight.step_maps import StepMaps
 from app.missions.flight.waiting import Waiting
 from app.missions.live.mission import LiveMission
+from app.missions.spec.failsafes import Response
 from app.missions.team import Member
 from app.missions.views.mission import Level
 
@@ -63,7 +65,9 @@ class OwnLegs:
         waiting: Waiting,
         constraints: Constraints,
         time_scale: float,
+        range_left: RangeLeft,
     ) -> None:
+        self._range = range_left
         self._constraints = constraints
         self._live = live
         self._spec = live.spec
@@ -158,6 +162,7 @@ class OwnLegs:
             and member.legs < numbers[leg.vehicle]
             and self._wants_legs(member)
             and self._begins_at(member, starts_m[leg.vehicle])
+            and self._comes_home_after(member, leg)
         ]
         decision = self._apart(replace(decision, legs=begun))
         self._look_later({leg.vehicle for leg in decision.legs if leg.refusal})
@@ -169,6 +174,14 @@ class OwnLegs:
             for note in decision.notes:
                 await live.journal.log(Level.WARNING, "safety", note)
         return bool(legs)
+
+    def _comes_home_after(self, member: Member, leg: Leg) -> bool:
+        """Whether a vehicle's energy lasts for a leg and its way home after it; where not, it goes home."""
+        if leg.refusal or self._range.allows(member, leg.target_m[:2]):
+            return True
+        if not member.ahead and not member.ordered:
+            self._live.withdraw(member, Response.RETURN, "its energy lasts for its way home and for no further leg")
+        return False
 
     def _has_leg(self, name: str, number: int) -> bool:
         member = self._live.team.get(name)
@@ -224,6 +237,9 @@ class OwnLegs:
 
     def _place(self, member: Member, *, moving: bool) -> Place:
         left_m = planned_way_m(self._spec, member.way_left_m(self._spec))
+        energy_m = self._range.beyond_m(member)
+        if energy_m is not None:
+            left_m = min(left_m, energy_m)
         return replace(place_ahead(member, self._live), moving=moving, left_m=left_m)
 
     def _next_number(self, member: Member) -> int:
@@ -271,10 +287,10 @@ class OwnLegs:
 
     def _over(self) -> bool:
         """Whether everybody has flown its way; who does not get on, or is out of reach for long, keeps nobody."""
-        team = list(self._live.team)
+        team = self._live.team.surveying
         left = [m for m in team if self._wants_legs(m) or m.ordered or m.ahead]
         if not left:
-            return bool(team)
+            return bool(list(self._live.team))
         somebody_is_done = any(m.present for m in team if m not in left)
         if any(m.present and not (somebody_is_done and m.misses) for m in left):
             return False
@@ -292,6 +308,8 @@ class OwnLegs:
         return now_s - self._absent_since_s.setdefault(member.name, now_s)
 
     def _wants_legs(self, member: Member) -> bool:
+        if member.withdrawal is not None:
+            return False
         if self._spec.budget.steps is not None:
             return self._next_number(member) <= self._spec.steps
         return member.way_left_m(self._spec) > LEAST_WAY_M
@@ -299,4 +317,4 @@ class OwnLegs:
     @property
     def _nobody_to_lead(self) -> bool:
         team = self._live.team
-        return not team.present and any(self._wants_legs(member) for member in team)
+        return not team.present and any(self._wants_legs(member) for member in team.surveying)

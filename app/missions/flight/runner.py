@@ -20,14 +20,19 @@ from app.missions.flight.decision import make_constraints, make_planner
 from app.missions.flight.dispatch import Dispatch
 from app.missions.flight.elapsed_time import keep_time, save_elapsed
 from app.missions.flight.engagement import Engagement
+from app.missions.flight.failsafe_watch import FailsafeWatch
 from app.missions.flight.own_legs import OwnLegs
+from app.missions.flight.range_left import RangeLeft
 from app.missions.flight.search_hooks import SearchHooks
 from app.missions.flight.step_maps import StepMaps
 from app.missions.flight.team_steps import TeamSteps
 from app.missions.flight.telemetry_sampler import keep_telemetry
 from app.missions.flight.waiting import Waiting
+from app.missions.flight.withdrawals import Withdrawals
 from app.missions.flown import Phase
 from app.missions.live.mission import LiveMission
+from app.missions.spec.failsafes import Response
+from app.missions.spec.recovery import Homecoming
 from app.missions.team import SETTLED, Member
 from app.missions.views.mission import Level
 from app.storage import missions as mission_queries
@@ -57,20 +62,29 @@ class Runner:
         self._committing = LegCommit(live, constraints, leads=not self._lookout.needed)
         self._dispatch = Dispatch(live, hub, self._committing, time_scale, persistent=self._apart)
         self._engagement = Engagement(live, hub, time_scale, self._dispatch.send)
+        self._range = RangeLeft(live, constraints, self._committing)
+        self._watch = FailsafeWatch(live, hub, self._range, time_scale)
+        self._withdrawals = Withdrawals(live, hub, self._committing, self._dispatch, self._range, time_scale)
 
     async def run(self) -> str:
         """Fly to the mission's end. Returns why nobody goes on; raises whatever went wrong."""
         live = self._live
         live.running_since_s = asyncio.get_running_loop().time()
+        live.call_everybody_home()
         metrics.RUNNING.inc()
         keepers = [
             asyncio.create_task(self._engagement.keep()),
             asyncio.create_task(keep_time(live)),
             asyncio.create_task(keep_telemetry(live, self._time_scale)),
+            asyncio.create_task(self._watch.keep()),
+            asyncio.create_task(self._withdrawals.keep()),
         ]
         try:
             resumed = await self._recover()
-            return await self._flight().fly(resumed=resumed)
+            reason = await self._flight().fly(resumed=resumed)
+            self._call_home(reason)
+            await self._withdrawals.finished()
+            return reason
         finally:
             metrics.RUNNING.dec()
             for keeper in keepers:
@@ -81,13 +95,20 @@ class Runner:
             live.running_since_s = None
             live.standstill = ""
             for member in live.team:
-                member.flown.phase = Phase.STOPPED
+                member.flown.phase = Phase.HOME if member.is_home else Phase.STOPPED
 
     def _flight(self) -> OwnLegs | TeamSteps:
         shared = (self._live, self._decider, self._committing, self._dispatch, self._maps, self._waiting)
         if self._apart:
-            return OwnLegs(*shared, self._constraints, self._time_scale)
+            return OwnLegs(*shared, self._constraints, self._time_scale, self._range)
         return TeamSteps(*shared, self._lookout, self._time_scale)
+
+    def _call_home(self, why: str) -> None:
+        """Send everybody home at the mission's end who has a recovery point, unless the mission wants it otherwise."""
+        for member in self._live.team:
+            recovery = self._live.spec.recovery_of(member.spec)
+            if recovery is not None and recovery.on_finish is Homecoming.RETURN:
+                self._live.withdraw(member, Response.RETURN, why)
 
     async def _recover(self) -> bool:
         """Take up what was last committed: the planner's memory, and the legs that were not flown; whether any was."""
@@ -108,7 +129,7 @@ class Runner:
         last = {row.vehicle: row.step for row in newest}
         for member in live.team:
             member.legs, member.committed_m = last.get(member.name, 0), way_m.get(member.name, 0.0)
-            of_it = [row for row in rows if row.vehicle == member.name]
+            of_it = [row for row in rows if row.vehicle == member.name and member.withdrawal is None]
             member.ahead += [committed_leg(row) for row in of_it if self._apart or row.step == step.number]
             self._leave_out_passed(member)
         await live.journal.log(

@@ -25,9 +25,9 @@ def too_close(decision: Decision, live: LiveMission, spec: MissionSpec) -> dict[
     limits = spec.limits
     if limits.min_separation_m <= 0.0:
         return {}
-    before = {m.name: _motion(m, live, spec) for m in live.team.present}
+    before = {m.name: _motion(m, live, spec) for m in live.team if m.present}
     new = {leg.vehicle: leg.target_m for leg in decision.legs if not leg.refusal and leg.vehicle in before}
-    speeds = {m.name: spec.speed_of(m.spec) for m in live.team.present}
+    speeds = {m.name: spec.speed_of(m.spec) for m in live.team if m.present}
     refused: dict[str, str] = {}
     while True:
         moving = {name: _continued(before[name], end, speeds[name]) for name, end in new.items()}

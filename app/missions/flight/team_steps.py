@@ -61,7 +61,7 @@ class TeamSteps:
             await self._dispatch.begin()
             await self._arrive(self._deadline_s())
         decision: Decision | None = None
-        while live.header.step < self._spec.steps:
+        while live.header.step < self._spec.steps and self._somebody_surveys:
             started_s = asyncio.get_running_loop().time()
             if decision is None:
                 await self._waiting.for_team(
@@ -69,7 +69,7 @@ class TeamSteps:
                 )
                 await self._lookout.look_round()
                 decision = await self._decide_to_fly()
-            for member in live.team:
+            for member in live.team.surveying:
                 member.set_order(None)
                 member.status = None
                 member.ahead.clear()
@@ -103,7 +103,9 @@ class TeamSteps:
         """
         deadline_s, live = self._deadline_s(), self._live
         close = await self._waiting.until(
-            lambda: all(self._about_to_arrive(m) for m in live.team if m.busy) or bool(self._lookout.barred()),
+            lambda: (
+                all(self._about_to_arrive(m) for m in live.team.surveying if m.busy) or bool(self._lookout.barred())
+            ),
             deadline_s,
         )
         last = live.header.step >= self._spec.steps
@@ -162,11 +164,13 @@ class TeamSteps:
     async def _arrive(self, deadline_s: float) -> None:
         """Wait until every vehicle under way arrived or refused; at the deadline go on without the others."""
         if await self._waiting.until(
-            lambda: not any(m.busy for m in self._live.team) or bool(self._lookout.barred()), deadline_s
+            lambda: not any(m.busy for m in self._live.team.surveying) or bool(self._lookout.barred()), deadline_s
         ):
             await self._end_early(self._lookout.barred())
             return
-        late = [member for member in self._live.team if member.busy]
+        late = [member for member in self._live.team.surveying if member.busy]
+        if not late:
+            return
         for member in late:
             self._dispatch.settle(member, WaypointStatus.MISSED, f"not reached within {self._step_time_s():.0f} s")
         await self._live.journal.log(
@@ -181,11 +185,16 @@ class TeamSteps:
         """Where something stands on a vehicle's way, end the step: everybody is sent anew from where it is."""
         if not barred:
             return
-        for member in self._live.team:
+        for member in self._live.team.surveying:
             if member.busy:
                 reason = "something stands on its way" if member in barred else "the step ended before it was there"
                 self._dispatch.settle(member, WaypointStatus.MISSED, reason)
         await self._lookout.tell_of(barred)
+
+    @property
+    def _somebody_surveys(self) -> bool:
+        team = self._live.team
+        return bool(team.surveying) or not list(team)
 
     def _deadline_s(self) -> float:
         """Return the event loop's time at which a step that begins now goes on without stragglers."""

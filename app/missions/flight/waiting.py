@@ -30,13 +30,24 @@ class Waiting:
         live, team = self._live, self._live.team
         if patient_s is not None:
             deadline_s = asyncio.get_running_loop().time() + patient_s
-            if await self.until(lambda: bool(team.present) and all(m.present for m in team), deadline_s):
+            if await self.until(lambda: self._nobody_surveys or self._all_present, deadline_s):
                 return
-        if team.present:
+        if team.present or self._nobody_surveys:
             return
         absent = [member.name for member in team]
         message = (
             "no vehicle can be sent anywhere; waiting for one" if absent else "every vehicle left; add one to go on"
         )
         await live.journal.log(Level.ALARM, "waiting", message, vehicles=absent)
-        await self.until(lambda: bool(team.present), None)
+        await self.until(lambda: bool(team.present) or self._nobody_surveys, None)
+
+    @property
+    def _all_present(self) -> bool:
+        team = self._live.team
+        return bool(team.present) and all(member.present for member in team.surveying)
+
+    @property
+    def _nobody_surveys(self) -> bool:
+        """Whether there are vehicles, and all of them are on their way home or out of action."""
+        team = self._live.team
+        return bool(list(team)) and not team.surveying

@@ -50,8 +50,13 @@ class Boundaries:
         self._been_inside: set[str] = set()
         self._breaches: dict[str, dict[int, _Breach]] = {}
 
-    def judge(self, vehicle: str, en_m: tuple[float, float], depth_m: float, at_s: float) -> list[Crossing]:
-        """Return what there is to tell of a vehicle at a place; ``at_s`` in seconds of any one clock."""
+    def judge(
+        self, vehicle: str, en_m: tuple[float, float], depth_m: float, at_s: float, *, may_leave: bool = False
+    ) -> list[Crossing]:
+        """Return what there is to tell of a vehicle at a place; ``at_s`` in seconds of any one clock.
+
+        ``may_leave``: its way home leads out of the area.
+        """
         place = Point(en_m)
         crossings = []
         for number, zone in enumerate(self._zones, 1):
@@ -70,7 +75,7 @@ class Boundaries:
         if outside_m <= 0:
             self._been_inside.add(vehicle)
         # One that comes from outside for the first time is on its way in.
-        astray = vehicle in self._been_inside and outside_m > OUTSIDE_ALARM_M
+        astray = vehicle in self._been_inside and not may_leave and outside_m > OUTSIDE_ALARM_M
         crossings += self._follow(
             vehicle, 0, "outside the area", outside_m, astray, outside_m <= OUTSIDE_OVER_M, depth_m, at_s
         )

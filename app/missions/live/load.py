@@ -15,6 +15,7 @@ from app.missions.search.state import Search
 from app.missions.spec.mission import MissionSpec, VehicleSpec
 from app.missions.states import ENDED
 from app.missions.targets.filters import warm_up as tracking_warm_up
+from app.missions.team import Withdrawal
 from app.storage import events as event_queries
 from app.storage import missions as mission_queries
 from app.storage import scans as scan_queries
@@ -72,6 +73,8 @@ async def take_up(
         member.heard_s = heard.get(member.name)
         member.risings = risings.get(member.name, 0)
         member.flown = Flown.recall(vehicle.flown)
+        member.energy.used_s = member.flown.used_s
+        member.withdrawal = Withdrawal.recall(vehicle.withdrawal)
         if vehicle.left_at is not None:
             live.team.leave(member.name, vehicle.left_at)
     live.waypoints.show_rows(waypoints)

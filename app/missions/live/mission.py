@@ -45,16 +45,19 @@ from app.missions.maps.builder import BuiltMap, MapBuilder
 from app.missions.maps.live_grid import map_of
 from app.missions.maps.snapshot import NOT_MADE, MapSnapshot, MissionFacts
 from app.missions.maps.tiles import TileCache
+from app.missions.recovery.energy import Energy
+from app.missions.recovery.failsafes import STRENGTH
 from app.missions.search.progress import progress_of
 from app.missions.search.scan_log import take
 from app.missions.search.state import Search
 from app.missions.soundings.corrections import Corrections
 from app.missions.soundings.gate import Gate
-from app.missions.spec.mission import MissionSpec
-from app.missions.states import ENDED, MissionState
+from app.missions.spec.failsafes import Response
+from app.missions.spec.mission import MissionSpec, VehicleSpec
+from app.missions.states import AT_SEA, ENDED, MissionState
 from app.missions.targets.filters import TargetFilters
 from app.missions.targets.views import target_views
-from app.missions.team import Member, Team
+from app.missions.team import Member, Team, Withdrawal
 from app.missions.views.messages import StateMessage
 from app.missions.views.mission import Level, MissionSummary, Progress
 from app.missions.views.search import SearchProgress
@@ -69,6 +72,9 @@ LONGEST_GAP_S = 60.0
 """What a vehicle flew in a longer silence is not known."""
 FASTEST_MPS = 10.0
 """A position that is farther from the last one than this speed makes was corrected, not flown to."""
+
+LONGEST_SILENCE_S = 6 * 3600.0
+"""A vehicle was under way, and used energy, in a silence that was not longer."""
 
 PACE_MEMORY = 0.9
 """Weight of the past in the running mean of a leg's duration."""
@@ -96,6 +102,24 @@ class MissionHeader:
     terms: dict[str, float] | None = None
 
 
+@dataclass(frozen=True, slots=True)
+class Ending:
+    """What a mission becomes once all its vehicles are home, and by whose word."""
+
+    state: MissionState
+    reason: str
+    actor: str
+
+    def remember(self) -> dict[str, str]:
+        """Return what is stored."""
+        return {"state": self.state, "reason": self.reason, "actor": self.actor}
+
+    @classmethod
+    def recall(cls, stored: dict[str, Any] | None) -> "Ending | None":
+        """Return what was stored."""
+        return None if not stored else cls(MissionState(stored["state"]), stored["reason"], stored["actor"])
+
+
 class LiveMission:
     """One mission in memory. Made by ``take_up``; the flight, the service and the watchers share it."""
 
@@ -119,7 +143,7 @@ class LiveMission:
         self.area = spec.local_area()
         self.hub = hub
         """All links, those to its vehicles among them."""
-        self.team = Team(hub.capabilities)
+        self.team = Team(hub.capabilities, self._energy_of)
         self.broadcaster = Broadcaster()
         self.builder = builder or builder_of(spec)
         self.margin_m = 2 * spec.limits.max_step_m
@@ -153,6 +177,8 @@ class LiveMission:
         """Ranges to moving targets, and what they tell."""
         self.correcting = asyncio.Lock()
         """Held while corrections change, one after the other."""
+        self.ending = Ending.recall(row.ending)
+        """What it becomes once all vehicles are home; None while it goes on."""
         self.halted = False
         """Set while vehicles are being stopped: the flight must not send them off again as it ends."""
         self.standstill = ""
@@ -164,7 +190,7 @@ class LiveMission:
         """What is written through it is refused once another process has the mission."""
         self.waypoints = WaypointViews(spec, self.team, self.broadcaster)
         self.boundaries = Boundaries(self.area, [spec.to_local(zone) for zone in spec.keep_out])
-        self.vehicles = VehicleViews(row.id, spec, self.frame, hub, self.team, self.boundaries.breach)
+        self.vehicles = VehicleViews(row.id, spec, self.frame, hub, self.team, self.boundaries.breach, time_scale)
         targets = self.target_views if spec.targets else None
         self.telling = LiveFeed(self.broadcaster, self.vehicles.all, targets, self.search_progress)
         self._time_scale = time_scale
@@ -263,6 +289,7 @@ class LiveMission:
                     log.warning("position is not near the mission, ignored", vehicle=event.vehicle)
                     return
                 self._count_way(member, event, place)
+                self._count_energy(member, event)
                 member.report, member.heard_s = event, now().timestamp()
                 self.journal.position(event)
                 self._hold_against_boundaries(event, place)
@@ -308,7 +335,47 @@ class LiveMission:
             flown.idle_s += passed_s
         flown.phase = self._phase(member, way_left_m)
 
+    def _count_energy(self, member: Member, report: VehicleReport) -> None:
+        """Count what a vehicle has used since its last report."""
+        energy, before = member.energy, member.report
+        energy.take_level(report.battery_pct)
+        if self.header.state not in AT_SEA:
+            energy.begin()
+            return
+        passed_s = 0.0 if before is None else report.time_s - before.time_s
+        if 0.0 < passed_s <= LONGEST_SILENCE_S:
+            energy.pass_time(passed_s, report.speed_mps)
+        member.flown.used_s = energy.used_s
+
+    def _energy_of(self, vehicle: VehicleSpec) -> Energy:
+        endurance_s = None if vehicle.endurance_min is None else 60.0 * vehicle.endurance_min
+        return Energy(self.spec.speed_of(vehicle), endurance_s)
+
+    def withdraw(self, member: Member, response: Response, why: str) -> bool:
+        """Take a vehicle out of the survey, unless it left that for something as strong; whether it does so now.
+
+        The flight sends it where the response leads.
+        """
+        before = member.withdrawal
+        if before is not None and (STRENGTH[before.response] >= STRENGTH[response] or before.over):
+            return False
+        member.withdrawal = Withdrawal(response, why)
+        member.pursuing = None
+        self.changed.set()
+        return True
+
+    def call_everybody_home(self) -> None:
+        """Withdraw all vehicles of a mission that is ending; those without a recovery point stop."""
+        if self.ending is None:
+            return
+        why = f"{self.ending.state} by {self.ending.actor}"
+        for member in self.team:
+            home = self.spec.recovery_of(member.spec)
+            self.withdraw(member, Response.STOP if home is None else Response.RETURN, why)
+
     def _phase(self, member: Member, way_left_m: float) -> Phase:
+        if member.withdrawal is not None:
+            return phase_of(member.withdrawal)
         if member.surfacing:
             return Phase.SURFACING
         if member.legs == 0 or self.boundaries.breach(member.name):
@@ -318,8 +385,14 @@ class LiveMission:
     def _hold_against_boundaries(self, report: VehicleReport, place: tuple[float, float]) -> None:
         if self.header.state in ENDED:
             return
+        member = self.team.get(report.vehicle)
+        on_its_way_home = member is not None and member.withdrawal is not None
         for crossing in self.boundaries.judge(
-            report.vehicle, place, report.position.depth_m, asyncio.get_running_loop().time()
+            report.vehicle,
+            place,
+            report.position.depth_m,
+            asyncio.get_running_loop().time(),
+            may_leave=on_its_way_home,
         ):
             self.journal.note_line(self.journal.line(crossing.level, "boundary", crossing.message, **crossing.data))
 
@@ -460,6 +533,7 @@ class LiveMission:
             reason=self._why_it_waits() or header.reason,
             created_at=header.created_at,
             updated_at=header.updated_at,
+            ending=None if self.ending is None or header.state in ENDED else self.ending.state,
             progress=self.progress(),
         )
 
@@ -493,6 +567,13 @@ class LiveMission:
         await self.ranges.close()
         await self.journal.close()
         await self.whole.close(self.header.step)
+
+
+def phase_of(withdrawal: Withdrawal) -> Phase:
+    """Return what a vehicle is at that does not survey any more."""
+    if withdrawal.response is Response.RETURN:
+        return Phase.HOME if withdrawal.over else Phase.RETURNING
+    return Phase.STOPPED if withdrawal.over or withdrawal.response is Response.HOLD else Phase.SURFACING
 
 
 def place_of(place_m: FloatArray) -> tuple[float, float]:

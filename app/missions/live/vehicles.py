@@ -2,14 +2,17 @@
 
 import math
 from collections.abc import Callable
+from datetime import timedelta
+from typing import Any
 
 from app.mapping.georeference import LocalFrame
 from app.missions.clock import now
 from app.missions.fleet.hub import FleetHub
 from app.missions.fleet.interface import LinkState, Position, VehicleInfo
+from app.missions.recovery.failsafes import with_reserve_s
 from app.missions.spec.mission import MissionSpec, SurfacePolicy
 from app.missions.team import Member, Team
-from app.missions.views.mission import PositionQuality, VehicleView
+from app.missions.views.mission import FailsafeView, PositionQuality, VehicleView
 
 
 class VehicleViews:
@@ -29,7 +32,9 @@ class VehicleViews:
         hub: FleetHub,
         team: Team,
         breach: Callable[[str], str],
+        time_scale: float = 1.0,
     ) -> None:
+        self._time_scale = time_scale
         self._mission_id = mission_id
         self._spec = spec
         self._frame = frame
@@ -74,6 +79,7 @@ class VehicleViews:
             flown_m=round(member.flown.flown_m, 1),
             on_plan_m=round(member.flown.on_plan_m, 1),
             idle_s=round(member.flown.idle_s, 1),
+            **self._recovery(member),
         )
         if report is None:
             return view
@@ -95,6 +101,24 @@ class VehicleViews:
                 "localization": _position_quality(report.position_sd_m, self._spec.surface_policy),
             }
         )
+
+    def _recovery(self, member: Member) -> dict[str, Any]:
+        """Return what is shown of a vehicle's energy, its way home, and what is wrong with it."""
+        recovery, left, needs_s = self._spec.recovery_of(member.spec), member.energy.left, member.return_needs_s
+        turn_back_at = None
+        if left is not None and needs_s is not None and math.isfinite(needs_s) and member.withdrawal is None:
+            slack_s = (left.safe_s - with_reserve_s(needs_s)) / self._time_scale
+            turn_back_at = (now() + timedelta(seconds=max(slack_s, 0.0))).replace(microsecond=0)
+        active = [FailsafeView(failsafe=a.failsafe, response=a.response, message=a.message) for a in member.failsafes]
+        return {
+            "withdrawn": "" if member.withdrawal is None else member.withdrawal.why,
+            "energy_left_pct": rounded(member.energy.level_pct if left is None else left.pct, 1),
+            "energy_left_s": None if left is None else round(left.safe_s),
+            "recovery_point": None if recovery is None else recovery.point,
+            "return_needs_s": None if needs_s is None or not math.isfinite(needs_s) else round(needs_s),
+            "turn_back_at": turn_back_at,
+            "failsafes": active,
+        }
 
     def _place(self, name: str, position: Position) -> tuple[float, float] | None:
         """Return where a vehicle is; it is shown far more often than it moves."""

@@ -9,9 +9,9 @@ from app.missions.errors import ConflictError
 from app.missions.fleet.hub import FleetHub
 from app.missions.fleet.interface import Deployment, LinkState, VehicleRefusedError
 from app.missions.live.mission import LiveMission
-from app.missions.running.ownership import AT_SEA
 from app.missions.search.site import simulated_world
 from app.missions.spec.mission import VehicleSpec
+from app.missions.states import AT_SEA
 from app.storage import processes
 from app.storage.database import Guard
 from simulator.obstacles import ObstacleWorld

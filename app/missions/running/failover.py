@@ -11,10 +11,10 @@ from app.missions.errors import ConflictError, MissionElsewhereError
 from app.missions.fleet.hub import FleetHub
 from app.missions.live.mission import LiveMission
 from app.missions.running.claims import Claims
-from app.missions.running.ownership import AT_SEA, PERIOD_S, Ownership
+from app.missions.running.ownership import PERIOD_S, Ownership
 from app.missions.running.registry import MissionRegistry
 from app.missions.running.supervisor import MissionSupervisor
-from app.missions.states import MissionState
+from app.missions.states import AT_SEA, MissionState
 from app.missions.views.mission import Level
 from app.storage import missions as mission_queries
 from app.storage.database import Database

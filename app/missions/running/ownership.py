@@ -15,7 +15,7 @@ from sqlalchemy.ext.asyncio import AsyncSession
 
 from app.missions.clock import now
 from app.missions.errors import MissionElsewhereError
-from app.missions.states import MissionState
+from app.missions.states import AT_SEA
 from app.storage import processes
 from app.storage.database import Database, Guard
 from app.storage.membership import MembershipLostError, make_membership
@@ -27,7 +27,6 @@ PERIOD_S = 1.0
 TRIES = 5
 """Entering is tried again when another process looks at the wrong moment."""
 
-AT_SEA = (MissionState.RUNNING, MissionState.PAUSED)
 """States in which somebody has to have a mission."""
 
 log = structlog.get_logger(__name__)

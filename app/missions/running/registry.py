@@ -12,8 +12,8 @@ from app.missions.fleet.hub import FleetHub
 from app.missions.live.load import take_up
 from app.missions.live.mission import LiveMission
 from app.missions.running.final_maps import FinalMaps
-from app.missions.running.ownership import AT_SEA, Ownership
-from app.missions.states import ENDED
+from app.missions.running.ownership import Ownership
+from app.missions.states import AT_SEA, ENDED
 from app.missions.views.mission import MissionSummary
 from app.storage.database import Database
 from app.storage.models import MissionRow

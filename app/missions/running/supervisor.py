@@ -13,7 +13,7 @@ from app.missions.errors import MissionElsewhereError
 from app.missions.fleet.hub import FleetHub
 from app.missions.fleet.interface import LinkState, StopReceipt
 from app.missions.flight.runner import Runner
-from app.missions.live.mission import LiveMission
+from app.missions.live.mission import Ending, LiveMission
 from app.missions.running.claims import Claims
 from app.missions.running.final_maps import FinalMaps
 from app.missions.states import MissionState
@@ -98,6 +98,8 @@ class MissionSupervisor:
             target, level, reason = MissionState.FAILED, Level.ALARM, f"the step loop failed: {error}"
         else:
             target, level = MissionState.FINISHED, Level.INFO
+            if live.ending is not None:
+                target, reason = live.ending.state, live.ending.reason or "everybody is back"
         async with self.acting(live.id):
             try:
                 await to_the_end(self._conclude(live, target, reason, level))
@@ -159,6 +161,21 @@ class MissionSupervisor:
         stops = await self.halt(live)
         await asyncio.gather(self._settle(live, written, state, reason), self.log_stops(live, stops))
         return stops
+
+    async def bring_home(self, live: LiveMission, ending: Ending) -> None:
+        """Call all vehicles home; the mission ends when they are there. Those without a recovery point stop."""
+        # What a killed service forgets, nobody would bring home.
+        async with live.database.writing() as session:
+            await mission_queries.keep_ending(session, live.id, ending.remember())
+        live.ending = ending
+        live.call_everybody_home()
+        words = f"everybody returns; {ending.state} then"
+        await live.journal.log(Level.INFO, "recovery", words, actor=ending.actor, state=ending.state)
+        if live.header.state is MissionState.PAUSED:
+            await self.set_state(live, MissionState.RUNNING, "everybody returns", ending.actor)
+            self.run(live)
+        live.changed.set()
+        live.publish_summary()
 
     def dismiss(self, live: LiveMission) -> None:
         """Give up the vehicles of a mission that ended; its last map is made meanwhile."""

@@ -11,10 +11,9 @@ from app.missions.fleet.interface import StopReceipt
 from app.missions.live.mission import LiveMission
 from app.missions.running.admission import check_vehicle
 from app.missions.running.claims import Claims, free_elsewhere
-from app.missions.running.ownership import AT_SEA
 from app.missions.running.supervisor import PATIENCE_S, MissionSupervisor
 from app.missions.spec.mission import VehicleSpec
-from app.missions.states import ENDED, MissionState
+from app.missions.states import AT_SEA, ENDED, MissionState
 from app.missions.team import Member
 from app.missions.views.mission import Level
 from app.storage import missions as mission_queries

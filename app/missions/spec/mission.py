@@ -19,6 +19,8 @@ from app.mapping.georeference import LocalFrame
 from app.mapping.vertical import LOWEST_ASTRONOMICAL_TIDE, check_depth_datum
 from app.missions.spec.base import Latitude, Longitude, Model, Name, PolygonGeometry
 from app.missions.spec.budget import Allowance, Budget, Steps
+from app.missions.spec.failsafes import Failsafe, Response
+from app.missions.spec.recovery import Recovery
 from app.missions.spec.search import DEFAULTS as SEARCH_DEFAULTS
 from app.missions.spec.search import SearchSpec, filled_in
 from app.missions.spec.targets import MOST_TARGETS, TargetSpec, Tracking
@@ -26,6 +28,9 @@ from app.missions.spec.targets import MOST_TARGETS, TargetSpec, Tracking
 Speed = Annotated[float, Field(gt=0, le=5)]
 ProfileDepth = Annotated[float, Field(ge=0, le=12_000)]
 ProfileSpeed = Annotated[float, Field(ge=1300, le=1700)]
+
+FARTHEST_HOME_M = 10_000.0
+"""Farther from the area no recovery point lies."""
 
 MAX_GRID_CELLS = 4_000_000
 MAX_SEARCH_CELLS = 1_000_000
@@ -92,6 +97,17 @@ class VehicleSpec(Model):
         gt=0,
         le=200,
         description="Radius of its turning circle, by which plans pay for turns; null: what it flies in 4 s",
+    )
+    endurance_min: float | None = Field(
+        default=None,
+        gt=0,
+        le=60 * 24 * 365,
+        description="How long its energy lasts at its speed, minutes, from the start of the mission; counts where the "
+        "vehicle tells no battery level. null: not known",
+    )
+    recovery_point: tuple[Longitude, Latitude] | None = Field(
+        default=None,
+        description="Where it is taken out of the water, [longitude, latitude]; null: at the mission's recovery.point",
     )
     guidance: Guidance = Field(
         default=Guidance.FOLLOW,
@@ -305,6 +321,14 @@ class MissionSpec(Model):
     cell_m: float = Field(default=1.0, gt=0, le=1000, description="Cell of the map's grid")
     limits: Limits = Field(default_factory=Limits)
     planner: PlannerSpec = Field(default_factory=PlannerSpec)
+    recovery: Recovery | None = Field(
+        default=None, description="Where vehicles come home to, and when; null: they stop where they are"
+    )
+    failsafes: dict[Failsafe, Response] = Field(
+        default_factory=dict,
+        description="What is done when something fails, where it is not what `bathyfleet failsafes` lists",
+        examples=[{"geofence_left": "return"}],
+    )
     surface_policy: SurfacePolicy | None = Field(
         default=None, description="When vehicles come up for a GPS fix; null: never because of their position"
     )
@@ -376,6 +400,31 @@ class MissionSpec(Model):
             )
         object.__setattr__(self, "steps", steps)
         return self
+
+    @model_validator(mode="after")
+    def _recovery_points_are_near_and_clear(self) -> Self:
+        points = {"recovery.point": None if self.recovery is None else self.recovery.point}
+        points |= {f"vehicles.{index}.recovery_point": v.recovery_point for index, v in enumerate(self.vehicles)}
+        for name, point in points.items():
+            if point is not None:
+                self.check_recovery_point(name, point)
+        return self
+
+    def check_recovery_point(self, name: str, point: tuple[float, float]) -> None:
+        """Refuse a recovery point that is far from the area or in a keep-out zone. Raises ValueError."""
+        try:
+            east, north = self.frame().to_local(np.array(point[1]), np.array(point[0]))
+        except ValueError:
+            raise ValueError(f"{name} is {point}: it is nowhere near the area") from None
+        place = Point(float(east), float(north))
+        away_m = float(Polygon(self.local_area()).distance(place))
+        if away_m > FARTHEST_HOME_M:
+            raise ValueError(
+                f"{name} lies {away_m:.0f} m from the area: vehicles come home over at most {FARTHEST_HOME_M:.0f} m"
+            )
+        for index, zone in enumerate(self.keep_out):
+            if Polygon(self.to_local(zone)).buffer(self.limits.keep_out_margin_m).contains(place):
+                raise ValueError(f"{name} lies in keep_out.{index} or in its margin: give one that vehicles may go to")
 
     @model_validator(mode="after")
     def _targets_can_be_told_apart(self) -> Self:
@@ -458,6 +507,13 @@ class MissionSpec(Model):
         else:
             own = vehicle.speed_mps
         return self.speed_mps if own is None else own
+
+    def recovery_of(self, vehicle: VehicleSpec) -> Recovery | None:
+        """Return where a vehicle comes home to, and when; None where neither it nor the mission says."""
+        if vehicle.recovery_point is None:
+            return self.recovery
+        of_all = {} if self.recovery is None else self.recovery.model_dump(exclude={"point"})
+        return Recovery(point=vehicle.recovery_point, **of_all)
 
     def allowance(self, vehicle: VehicleSpec | str) -> Allowance:
         """Return what a vehicle may fly in the whole mission."""

@@ -10,6 +10,7 @@ from app.missions.fleet.interface import LinkState, WaypointStatus
 from app.missions.flown import Flown, Phase, efficiency_pct
 from app.missions.spec.base import Latitude, Longitude
 from app.missions.spec.budget import Budget
+from app.missions.spec.failsafes import Failsafe, Response
 from app.missions.spec.mission import MissionSpec, Sensor, VehicleKind
 from app.missions.states import Action, MissionState, allowed_actions
 from app.missions.views.base import View
@@ -51,6 +52,14 @@ class BatteryState(StrEnum):
         return cls.LOW if level_pct < LOW_BATTERY_PCT else cls.OK
 
 
+class FailsafeView(View):
+    """A failsafe in force for a vehicle."""
+
+    failsafe: Failsafe
+    response: Response
+    message: str
+
+
 class VehicleView(View):
     """A vehicle as an operator sees it now."""
 
@@ -90,6 +99,25 @@ class VehicleView(View):
     flown_m: float = Field(default=0.0, description="What it has flown in this mission, along its track")
     on_plan_m: float = Field(default=0.0, description="Of those, metres along planned legs")
     idle_s: float = Field(default=0.0, description="Vehicle time in which it waited for a decision")
+    withdrawn: str = Field(default="", description="Why it surveys no more; empty while it does")
+    energy_left_pct: float | None = Field(
+        default=None, description="What is left of its energy, by its battery or else by endurance_min; null: not known"
+    )
+    energy_left_s: float | None = Field(
+        default=None, description="How long that lasts at its speed for sure, vehicle time; null: not known"
+    )
+    recovery_point: tuple[Longitude, Latitude] | None = Field(
+        default=None, description="Where it comes home to, [longitude, latitude]; null: nowhere"
+    )
+    return_needs_s: float | None = Field(
+        default=None, description="How long its way home takes from where it is, vehicle time; null: not known"
+    )
+    turn_back_at: datetime | None = Field(
+        default=None, description="When it has to turn back, if it goes no farther from home; null: not known"
+    )
+    failsafes: list[FailsafeView] = Field(
+        default_factory=list, description="What is wrong with it and what is done about that, the strongest first"
+    )
 
     @computed_field  # type: ignore[prop-decorator]
     @property
@@ -149,6 +177,9 @@ class MissionSummary(View):
     reason: str = Field(default="", description="Why it is in this state")
     created_at: datetime
     updated_at: datetime
+    ending: MissionState | None = Field(
+        default=None, description="What it becomes once all its vehicles are home; null while it goes on"
+    )
     progress: Progress
 
     @computed_field  # type: ignore[prop-decorator]

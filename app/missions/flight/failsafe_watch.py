@@ -1,0 +1,195 @@
+"""Watches a running mission for what the table of failsafes lists, and has done what it says."""
+
+import asyncio
+import math
+from dataclasses import replace
+from itertools import combinations
+
+import numpy as np
+
+from app.missions.fleet.hub import FleetHub
+from app.missions.fleet.interface import LinkState
+from app.missions.flight.range_left import RangeLeft
+from app.missions.live.mission import LiveMission
+from app.missions.recovery.failsafes import (
+    ALTITUDE_SHARE,
+    CRITICAL_PCT,
+    DEPTH_OVERSHOOT_M,
+    LOW_PCT,
+    POSITION_LOST_M,
+    Active,
+    FailsafeJudge,
+    with_reserve_s,
+)
+from app.missions.spec.failsafes import Failsafe, Response
+from app.missions.spec.mission import MissionSpec
+from app.missions.spec.recovery import Homecoming
+from app.missions.team import Member
+from app.missions.views.mission import Level
+
+PERIOD_S = 1.0
+"""How often is looked, seconds of the vehicles' time."""
+
+FRESH_S = 5.0
+"""Places of two vehicles are compared when they are not older, seconds of the vehicles' time."""
+
+TEAM = ""
+"""In place of a vehicle's name: what concerns all of them."""
+
+
+class FailsafeWatch:
+    """Judges the vehicles of one running mission by the table."""
+
+    def __init__(self, live: LiveMission, hub: FleetHub, range_left: RangeLeft, time_scale: float) -> None:
+        self._live = live
+        self._hub = hub
+        self._range = range_left
+        self._time_scale = time_scale
+        self._judges: dict[str, FailsafeJudge] = {}
+        self._told: dict[str, list[Active]] = {}
+
+    async def keep(self) -> None:
+        """Go on until cancelled."""
+        while True:
+            await self.look()
+            await asyncio.sleep(PERIOD_S / self._time_scale)
+
+    async def look(self) -> None:
+        """Look once at everybody."""
+        now_s = asyncio.get_running_loop().time() * self._time_scale
+        too_close = self._too_close()
+        for member in self._live.team:
+            member.return_needs_s = self._range.needs_s(member)
+            over = member.withdrawal is not None and member.withdrawal.over
+            detected = {} if over else self._detected(member) | too_close.get(member.name, {})
+            found = self._judge(member, now_s, detected)
+            member.failsafes = found
+            await self._tell(member.name, found)
+            self._act(member, found)
+        lost = self._all_lost()
+        await self._tell(TEAM, self._judges.setdefault(TEAM, FailsafeJudge()).judge(lost, now_s))
+
+    def _judge(self, member: Member, now_s: float, detected: dict[Failsafe, str]) -> list[Active]:
+        judge = self._judges.get(member.name)
+        if judge is None:
+            judge = self._judges[member.name] = FailsafeJudge(overrides(self._live.spec, member))
+        found = judge.judge(detected, now_s)
+        if self._live.spec.recovery_of(member.spec) is not None:
+            return found
+        # Nobody can be sent home who has none.
+        return [replace(one, response=Response.WARN) if one.response is Response.RETURN else one for one in found]
+
+    def _act(self, member: Member, found: list[Active]) -> None:
+        strongest = next(iter(found), None)
+        held = member.withdrawal is not None and member.withdrawal.response is Response.HOLD
+        if strongest is not None and strongest.response is not Response.WARN:
+            self._live.withdraw(member, strongest.response, strongest.message)
+        elif held:
+            member.withdrawal = None
+            self._live.changed.set()
+
+    def _detected(self, member: Member) -> dict[Failsafe, str]:
+        """Return what is wrong with a vehicle now, in words for the operator."""
+        found: dict[Failsafe, str] = dict(member.faults)
+        report, limits = member.report, self._live.spec.limits
+        link = self._hub.info(member.key)
+        if link.state is LinkState.LOST and member.followed:
+            return found | {Failsafe.LINK_LOST: f"its link is lost: {link.reason or 'silent'}"}
+        if report is None:
+            return found
+        found |= self._energy(member)
+        depth_m, altitude_m = report.position.depth_m, report.altitude_m
+        if depth_m > limits.max_depth_m + DEPTH_OVERSHOOT_M:
+            found[Failsafe.TOO_DEEP] = f"it is at {depth_m:.1f} m, and {limits.max_depth_m:g} m is the limit"
+        elif altitude_m is not None and 0.0 < altitude_m < ALTITUDE_SHARE * limits.min_altitude_m and depth_m > 1.0:
+            found[Failsafe.TOO_DEEP] = (
+                f"it is {altitude_m:.1f} m above the bottom, and {limits.min_altitude_m:g} m is the limit"
+            )
+        if report.position_sd_m is not None and report.position_sd_m > POSITION_LOST_M:
+            found[Failsafe.POSITION_LOST] = f"it knows where it is to {report.position_sd_m:.0f} m"
+        breach = self._live.boundaries.breach(member.name)
+        if breach and member.legs and member.withdrawal is None:
+            found[Failsafe.GEOFENCE_LEFT] = f"it is {breach}"
+        if member.followed and not member.engaged and member.refusal and link.state is not LinkState.LOST:
+            found[Failsafe.OTHER_CONSOLE] = member.refusal
+        return found
+
+    def _energy(self, member: Member) -> dict[Failsafe, str]:
+        left, needs_s = member.energy.left, member.return_needs_s
+        if needs_s is None:
+            level = member.energy.level_pct
+            if level is None or level >= LOW_PCT:
+                return {}
+            words = f"its battery is at {level:.0f} %, and it has no way home"
+            return {Failsafe.CRITICAL_ENERGY if level < CRITICAL_PCT else Failsafe.LOW_ENERGY: words}
+        if left is None:
+            return {}
+        found = {}
+        if left.time_s < needs_s:
+            found[Failsafe.CRITICAL_ENERGY] = (
+                f"its energy lasts {left.time_s:.0f} s, and its way home takes {needs_s:.0f} s"
+                if math.isfinite(needs_s)
+                else "the current is too strong for its way home"
+            )
+        if left.safe_s <= with_reserve_s(needs_s):
+            found[Failsafe.LOW_ENERGY] = (
+                f"its energy lasts {left.safe_s:.0f} s for sure, and its way home takes {needs_s:.0f} s"
+            )
+        return found
+
+    def _too_close(self) -> dict[str, dict[Failsafe, str]]:
+        """Return whom vehicles are too close to."""
+        limits, live = self._live.spec.limits, self._live
+        flying = [m for m in live.team if m.present and m.report is not None and m.legs]
+        found: dict[str, dict[Failsafe, str]] = {}
+        for one, other in combinations(flying, 2):
+            if one.report is None or other.report is None or abs(one.report.time_s - other.report.time_s) > FRESH_S:
+                continue
+            apart_m = abs(one.report.position.depth_m - other.report.position.depth_m)
+            away_m = float(np.hypot(*(one.place_m(live.frame) - other.place_m(live.frame))))
+            if away_m < limits.min_separation_m and apart_m < limits.min_vertical_separation_m / 2:
+                for a, b in ((one, other), (other, one)):
+                    found[a.name] = {Failsafe.SEPARATION_LOST: f"{b.name} is {away_m:.1f} m away at the same depth"}
+        return found
+
+    def _all_lost(self) -> dict[Failsafe, str]:
+        followed = [m for m in self._live.team if m.followed and not (m.withdrawal is not None and m.withdrawal.over)]
+        lost = [m for m in followed if self._hub.info(m.key).state is LinkState.LOST]
+        if len(followed) < 2 or len(lost) < len(followed):
+            return {}
+        return {Failsafe.ALL_LINKS_LOST: f"none of {len(followed)} vehicles is heard any more"}
+
+    async def _tell(self, name: str, found: list[Active]) -> None:
+        """Write down what begins and what is over."""
+        before = {one.failsafe: one for one in self._told.get(name, [])}
+        now = {one.failsafe: one for one in found}
+        self._told[name] = found
+        who = f"{name}: " if name else ""
+        for failsafe, one in now.items():
+            if failsafe not in before:
+                await self._live.journal.log(
+                    Level.WARNING if failsafe is Failsafe.SEPARATION_LOST else Level.ALARM,
+                    "failsafe",
+                    f"{who}{one.message}",
+                    failsafe=failsafe,
+                    response=one.response,
+                    **({"vehicle": name} if name else {}),
+                )
+        for failsafe in before.keys() - now.keys():
+            words = f"{who}{failsafe.replace('_', ' ')} is over"
+            await self._live.journal.log(
+                Level.INFO, "failsafe", words, failsafe=failsafe, **({"vehicle": name} if name else {})
+            )
+        if before.keys() != now.keys():
+            self._live.publish_summary()
+
+
+def overrides(spec: MissionSpec, member: Member) -> dict[Failsafe, Response]:
+    """Return what is done for a vehicle where it differs from the table."""
+    found: dict[Failsafe, Response] = {}
+    recovery = spec.recovery_of(member.spec)
+    if recovery is not None and recovery.on_low_energy is Homecoming.STOP:
+        found[Failsafe.LOW_ENERGY] = Response.SURFACE
+    if recovery is not None and recovery.on_lost_link is Homecoming.STOP:
+        found[Failsafe.LINK_LOST] = Response.SURFACE
+    return found | spec.failsafes

@@ -1,0 +1,103 @@
+"""How far vehicles may go on, so that their energy lasts for the way home from there."""
+
+import math
+
+import numpy as np
+
+from app.arrays import FloatArray
+from app.exploration.core.constraints import Constraints
+from app.missions.flight.commit import LegCommit, home_of
+from app.missions.live.mission import LiveMission
+from app.missions.recovery.failsafes import with_reserve_s
+from app.missions.recovery.way_home import homeward_ground, way_home, way_time_s
+from app.missions.team import Member
+
+MOVED_M = 5.0
+"""The way home is looked for anew when its vehicle is so far from where that was done last."""
+
+ASCENT_MPS = 0.3
+"""How fast vehicles come up."""
+
+LEAST_DEPTH_M = 0.5
+"""Water with less room than the least altitude and this is land to vehicles."""
+
+
+class RangeLeft:
+    """Ways home of the vehicles of one running mission, and what their energy leaves beside them."""
+
+    def __init__(self, live: LiveMission, constraints: Constraints, committing: LegCommit) -> None:
+        self._live = live
+        self._constraints = constraints
+        self._committing = committing
+        self._found: dict[str, tuple[FloatArray, FloatArray | None]] = {}
+        self.current_mps = (0.0, 0.0)
+        """Velocity of the water, east and north."""
+
+    def way(self, member: Member) -> FloatArray | None:
+        """Return the corners of a vehicle's way home, (n, 2), from about where it is; None: it has none."""
+        home_m = home_of(member, self._live.spec)
+        if home_m is None or member.report is None:
+            return None
+        here_m = member.place_m(self._live.frame)
+        from_m, way_m = self._found.get(member.name, (None, None))
+        if from_m is None or float(np.hypot(*(here_m - from_m))) > MOVED_M:
+            way_m = self.way_from(here_m, home_m)
+            self._found[member.name] = here_m, way_m
+        return way_m
+
+    def way_from(self, here_m: FloatArray, home_m: FloatArray) -> FloatArray | None:
+        """Return the corners of the way home from a place, (n, 2); None: there is none."""
+        least_m = self._live.spec.limits.min_altitude_m + LEAST_DEPTH_M
+        ground = homeward_ground(self._constraints, home_m)
+        way_m = way_home(ground, here_m, home_m, self._committing.bottom, least_m)
+        # Better over ground that looks too shallow, at the surface, than not at all.
+        return way_home(ground, here_m, home_m) if way_m is None else way_m
+
+    def needs_s(self, member: Member) -> float | None:
+        """Return how long a vehicle's way home takes from where it is, by its clock; None: not known."""
+        way_m = self.way(member)
+        if way_m is None or member.report is None:
+            return None
+        here_m, speed_mps = member.place_m(self._live.frame), self._live.spec.speed_of(member.spec)
+        up_s = member.report.position.depth_m / ASCENT_MPS
+        return way_time_s(here_m, way_m, speed_mps, self.current_mps) + up_s
+
+    def slack_s(self, member: Member) -> float | None:
+        """Return how long a vehicle may stay as far from home as it is, by its clock; None: not known."""
+        needs_s, left = self.needs_s(member), member.energy.left
+        return None if needs_s is None or left is None else left.safe_s - with_reserve_s(needs_s)
+
+    def beyond_m(self, member: Member) -> float | None:
+        """Return how far a vehicle may be sent beyond its legs, by its energy; None: as far as the mission likes."""
+        home_m, left = home_of(member, self._live.spec), member.energy.left
+        if home_m is None or left is None or member.report is None:
+            return None
+        end_m = member.last_end_m(self._live.frame)
+        speed_mps = self._live.spec.speed_of(member.spec)
+        over_s = left.safe_s - self._until_end_s(member) - with_reserve_s(self._needs_from_s(member, end_m, home_m))
+        return max(over_s * speed_mps, 0.0) if math.isfinite(over_s) else 0.0
+
+    def allows(self, member: Member, target_m: FloatArray) -> bool:
+        """Whether a vehicle's energy lasts for one more leg, to a target (2,), and for the way home from there."""
+        home_m, left = home_of(member, self._live.spec), member.energy.left
+        if home_m is None or left is None or member.report is None:
+            return True
+        end_m = member.last_end_m(self._live.frame)
+        speed_mps = self._live.spec.speed_of(member.spec)
+        leg_s = float(np.hypot(*(target_m - end_m))) / speed_mps
+        needs_s = with_reserve_s(self._needs_from_s(member, target_m, home_m))
+        return self._until_end_s(member) + leg_s + needs_s <= left.safe_s
+
+    def _until_end_s(self, member: Member) -> float:
+        return member.way_ahead_m(self._live.frame) / self._live.spec.speed_of(member.spec)
+
+    def _needs_from_s(self, member: Member, place_m: FloatArray, home_m: FloatArray) -> float:
+        """Return how long the way home takes from a place, straight, and longer by what it is longer from here."""
+        here_m, way_m = member.place_m(self._live.frame), self.way(member)
+        speed_mps = self._live.spec.speed_of(member.spec)
+        around_m = 0.0
+        if way_m is not None:
+            corners = np.vstack([here_m, way_m])
+            around_m = float(np.hypot(*np.diff(corners, axis=0).T).sum() - np.hypot(*(home_m - here_m)))
+        up_s = member.cruise_depth_m(self._live.spec.limits) / ASCENT_MPS
+        return way_time_s(place_m, home_m[None], speed_mps, self.current_mps) + around_m / speed_mps + up_s

@@ -1,0 +1,127 @@
+"""What a vehicle's energy is still good for: told by its battery, or by the clock, and learned on the way.
+
+Consumption is counted in *nominal seconds*: a second at the speed that the mission asks of the vehicle counts as one, a
+second at another speed v as ``HOTEL + (1 - HOTEL) (v / v_nominal)^3``, since what a propeller takes grows with the cube
+of the speed through water and the rest with time alone.
+"""
+
+from dataclasses import dataclass, field
+
+HOTEL = 0.3
+"""Share of a vehicle's consumption at its usual speed that has nothing to do with moving."""
+
+FASTEST_SHARE = 3.0
+"""A speed of more than so many times the usual one is a wrong figure."""
+
+TRUSTED_PCT = 40.0
+"""A level whose stated confidence is lower is not used (DUNE's own limit)."""
+
+PRIOR_PCT = 5.0
+"""The stated endurance counts as much as this much of the battery seen used."""
+
+LEAST_USED_PCT = 2.0
+"""Without a stated endurance nothing is known before this much was seen used."""
+
+UNCERTAIN_PCT = 0.75
+"""Standard deviation with which levels tell what was used: batteries' gauges are neither fine nor straight."""
+
+CLOCK_SD = 0.05
+"""Relative standard deviation of a stated endurance that no battery confirms."""
+
+CHARGED_PCT = 3.0
+"""A level that rises by more was charged."""
+
+SAFE_SD = 2.0
+"""Of what is left, so many standard deviations are not counted on."""
+
+
+@dataclass(frozen=True, slots=True)
+class EnergyLeft:
+    """What is left: percent where that is known, and time at the usual speed with its standard deviation, seconds."""
+
+    pct: float | None
+    time_s: float
+    sd_s: float
+
+    @property
+    def safe_s(self) -> float:
+        """How long it lasts for sure."""
+        return max(self.time_s - SAFE_SD * self.sd_s, 0.0)
+
+
+@dataclass
+class Energy:
+    """Counts what one vehicle uses.
+
+    Parameters
+    ----------
+    speed_mps
+        Its usual speed, the mission's.
+    endurance_s
+        How long it lasts at that speed, as it was stated; None: not stated.
+    used_s
+        What it has used in this mission, nominal seconds.
+    """
+
+    speed_mps: float
+    endurance_s: float | None = None
+    used_s: float = 0.0
+    _level_pct: float | None = None
+    _first_pct: float = field(default=0.0, repr=False)
+    _first_used_s: float = field(default=0.0, repr=False)
+    _rate_pct_s: float | None = field(default=None, repr=False)
+    """What was learned before it was charged, percent a nominal second."""
+
+    def begin(self) -> None:
+        """Learn anew from here: nothing was counted until now."""
+        self._first_pct, self._first_used_s = self._level_pct or 0.0, self.used_s
+
+    def pass_time(self, seconds: float, speed_mps: float | None) -> None:
+        """Count time under way at a speed; None: the usual one."""
+        ratio = 1.0 if speed_mps is None else min(abs(speed_mps) / self.speed_mps, FASTEST_SHARE)
+        self.used_s += seconds * (HOTEL + (1 - HOTEL) * ratio**3)
+
+    def take_level(self, level_pct: float | None, confidence_pct: float | None = None) -> None:
+        """Take what the battery tells: its level, and how sure it is of that, percent."""
+        if level_pct is None or (confidence_pct is not None and confidence_pct < TRUSTED_PCT):
+            return
+        charged = self._level_pct is not None and level_pct > self._level_pct + CHARGED_PCT
+        if charged:
+            self._rate_pct_s = self.rate_pct_s
+        if charged or self._level_pct is None:
+            self._first_pct, self._first_used_s = level_pct, self.used_s
+        self._level_pct = level_pct
+
+    @property
+    def level_pct(self) -> float | None:
+        """The battery's level as it was told and believed last."""
+        return self._level_pct
+
+    @property
+    def rate_pct_s(self) -> float | None:
+        """Percent of the battery that a nominal second takes; None while nobody can know."""
+        prior = self._rate_pct_s or (None if self.endurance_s is None else 100.0 / self.endurance_s)
+        drop_pct, load_s = self._seen()
+        if prior is not None:
+            return (PRIOR_PCT + drop_pct) / (PRIOR_PCT / prior + load_s)
+        return drop_pct / load_s if drop_pct >= LEAST_USED_PCT and load_s > 0 else None
+
+    @property
+    def left(self) -> EnergyLeft | None:
+        """What is left; None where neither battery nor endurance tells."""
+        rate = self.rate_pct_s
+        if self._level_pct is not None and rate is not None:
+            time_s = self._level_pct / rate
+            drop_pct, _ = self._seen()
+            known_pct = drop_pct + (PRIOR_PCT if self.endurance_s is not None or self._rate_pct_s else 0.0)
+            return EnergyLeft(self._level_pct, time_s, time_s * UNCERTAIN_PCT / max(known_pct, LEAST_USED_PCT))
+        if self.endurance_s is None:
+            return None
+        time_s = max(self.endurance_s - self.used_s, 0.0)
+        return EnergyLeft(100.0 * time_s / self.endurance_s, time_s, CLOCK_SD * time_s)
+
+    def _seen(self) -> tuple[float, float]:
+        """Return what was seen used of the battery, percent, and what was done with it, nominal seconds."""
+        if self._level_pct is None:
+            return 0.0, 0.0
+        return max(self._first_pct - self._level_pct, 0.0), max(self.used_s - self._first_used_s, 0.0)

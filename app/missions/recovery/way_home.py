@@ -1,0 +1,164 @@
+"""The way home: from where a vehicle is, inside the area and the corridor to its recovery point, off zones and land."""
+
+import math
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import shapely
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import dijkstra
+from shapely.geometry import LineString, Point, Polygon
+from shapely.geometry.base import BaseGeometry
+from shapely.geometry.polygon import orient
+from shapely.ops import nearest_points, unary_union
+
+from app.arrays import FloatArray
+from app.exploration.core.bottom import Bottom
+from app.exploration.core.constraints import Constraints
+
+CORRIDOR_M = 30.0
+"""Half the width of the corridor that leads from the area to a recovery point outside of it."""
+
+CLEARANCE_M = 0.5
+"""Ways keep this far from borders and zones."""
+
+LAND_MARGIN_M = 5.0
+"""Ways keep this far from where the water is too shallow."""
+
+DETAIL_M = 0.25
+"""Corners of the ground are told apart from this distance on."""
+
+BERTH_M = 8.0
+"""Least distance between the places at which vehicles wait to be taken out of the water."""
+
+LEAST_SHARE = 0.05
+"""A vehicle that makes good less of its speed against the current does not get home."""
+
+GOLDEN_RAD = math.pi * (3.0 - math.sqrt(5.0))
+
+
+def homeward_ground(constraints: Constraints, home_m: FloatArray) -> Constraints:
+    """Return a mission's limits with its area widened by a straight corridor to a recovery point (2,).
+
+    Parameters
+    ----------
+    constraints
+        Of the mission; zones stay as they are.
+    """
+    area, home = Polygon(constraints.area), Point(home_m)
+    if area.contains(home):
+        return constraints
+    free: BaseGeometry = area
+    for zone in constraints.keep_out:
+        free = free.difference(Polygon(zone))
+    ashore, _ = nearest_points(area if free.is_empty else free, home)
+    corridor = LineString([(ashore.x, ashore.y), (home.x, home.y)]).buffer(CORRIDOR_M, quad_segs=2)
+    [whole] = _polygons(unary_union([area, corridor]))
+    ground = orient(Polygon(whole.exterior))
+    return replace(constraints, area=np.asarray(ground.exterior.coords)[:-1])
+
+
+def way_home(
+    ground: Constraints, start_m: FloatArray, home_m: FloatArray, bottom: Bottom | None = None, least_m: float = 0.0
+) -> FloatArray | None:
+    """Return the corners of the shortest way home, (n, 2), the last of them home; None when there is none.
+
+    Parameters
+    ----------
+    ground
+        From :func:`homeward_ground`.
+    start_m, home_m : (2,)
+        A vehicle outside the ground, or in a zone's margin, leaves that by the shortest way first.
+    bottom
+        Pessimistic sea floor; where it is shallower than ``least_m`` counts as land.
+    """
+    free: BaseGeometry = Polygon(ground.area)
+    blocked: list[BaseGeometry] = [Polygon(zone) for zone in ground.keep_out]
+    blocked += [] if bottom is None else _land(bottom, least_m)
+    if blocked:
+        free = free.difference(unary_union(blocked))
+    inner = free.buffer(-CLEARANCE_M, quad_segs=2).simplify(DETAIL_M)
+    home = Point(home_m)
+    if inner.is_empty or inner.distance(home) > CLEARANCE_M + 1e-9:
+        return None
+    first = start_m if inner.covers(Point(start_m)) else _coords(nearest_points(inner, Point(start_m))[0])
+    last = _coords(nearest_points(inner, home)[0])
+    rings = [ring for part in _polygons(inner) for ring in (part.exterior, *part.interiors)]
+    corners = np.concatenate([np.asarray(ring.coords)[:-1] for ring in rings])
+    nodes = np.vstack([first, last, corners])
+    a, b = np.triu_indices(len(nodes), 1)
+    lines = shapely.linestrings(np.stack([nodes[a], nodes[b]], axis=1))
+    roomy = inner.buffer(1e-3)
+    shapely.prepare(roomy)
+    seen = shapely.covers(roomy, lines)
+    length = np.hypot(*(nodes[a[seen]] - nodes[b[seen]]).T)
+    graph = csr_array((np.maximum(length, 1e-9), (a[seen], b[seen])), shape=(len(nodes), len(nodes)))
+    away, before = dijkstra(graph, directed=False, indices=[0], return_predecessors=True)
+    if not np.isfinite(away[0, 1]):
+        return None
+    way, node = [home_m], 1
+    while (node := int(before[0, node])) >= 0:
+        way.append(nodes[node])
+    way.reverse()
+    if np.allclose(way[0], start_m):
+        way = way[1:] or [home_m]
+    return np.array(way)
+
+
+def berth_m(home_m: FloatArray, slot: int, radius_m: float, separation_m: float) -> FloatArray:
+    """Return where a vehicle waits to be taken out of the water, (2,): each has a place of its own about the point.
+
+    Parameters
+    ----------
+    slot
+        The vehicle's number in its team; the first waits at the point itself, the others on a spiral about it, so close
+        together that they stay within the radius, if need be.
+    """
+    spacing_m = max(BERTH_M, 1.5 * separation_m)
+    distance_m = min(spacing_m * math.sqrt(slot), 0.8 * radius_m)
+    return home_m + distance_m * np.array([math.sin(slot * GOLDEN_RAD), math.cos(slot * GOLDEN_RAD)])
+
+
+def way_time_s(start_m: FloatArray, way_m: FloatArray, speed_mps: float, current_mps: tuple[float, float]) -> float:
+    """Return how long a way takes against a current, of which what helps is not counted; inf where it is too strong.
+
+    Parameters
+    ----------
+    start_m : (2,)
+    way_m : (n, 2)
+        Its corners after the start.
+    current_mps
+        East and north.
+    """
+    total_s = 0.0
+    for a, b in pairwise(np.vstack([start_m, way_m])):
+        length_m = float(np.hypot(*(b - a)))
+        if length_m < 1e-9:
+            continue
+        along = (b - a) / length_m
+        helps = float(along @ np.array(current_mps))
+        aside2 = max(current_mps[0] ** 2 + current_mps[1] ** 2 - helps**2, 0.0)
+        made_good = math.sqrt(max(speed_mps**2 - aside2, 0.0)) + min(helps, 0.0)
+        if made_good < LEAST_SHARE * speed_mps:
+            return math.inf
+        total_s += length_m / made_good
+    return total_s
+
+
+def _land(bottom: Bottom, least_m: float) -> list[BaseGeometry]:
+    """Return the ground that is known to be too shallow."""
+    rows, cols = np.nonzero(bottom.depth_m < least_m)
+    if len(rows) == 0:
+        return []
+    west, south = bottom.west_m + cols * bottom.cell_m, bottom.south_m + rows * bottom.cell_m
+    boxes = shapely.box(west, south, west + bottom.cell_m, south + bottom.cell_m)
+    return [shapely.union_all(boxes).buffer(LAND_MARGIN_M, join_style="mitre")]
+
+
+def _polygons(geometry: BaseGeometry) -> list[Polygon]:
+    return [part for part in getattr(geometry, "geoms", [geometry]) if isinstance(part, Polygon)]
+
+
+def _coords(point: Point) -> FloatArray:
+    return np.array([point.x, point.y])

@@ -1,0 +1,76 @@
+"""Whether vehicles go home before a mission ends, and single ones in the middle of it."""
+
+from app.missions.errors import ConflictError, VehicleNotFoundError
+from app.missions.live.mission import LiveMission
+from app.missions.running.supervisor import MissionSupervisor
+from app.missions.spec.failsafes import Response
+from app.missions.spec.recovery import Homecoming
+from app.missions.states import AT_SEA, Action, MissionState
+from app.missions.team import Member
+from app.missions.views.mission import Level
+from app.storage import missions as mission_queries
+
+
+def returns(live: LiveMission, action: Action, asked: bool | None) -> bool:
+    """Whether vehicles go home before an action takes effect.
+
+    Raises ConflictError where that was asked for and nobody has a recovery point.
+    """
+    if action not in (Action.FINISH, Action.ABORT):
+        return False
+    out = [member for member in live.team if member.withdrawal is None or not member.withdrawal.over]
+    homes = {member.name: live.spec.recovery_of(member.spec) for member in out}
+    able = live.header.state in AT_SEA and any(homes.values())
+    if asked:
+        if not any(homes.values()):
+            raise ConflictError("no vehicle has a recovery point to return to", "give recovery.point, or stop them")
+        return able
+    if asked is not None or action is Action.ABORT or live.ending is not None:
+        return False
+    wanted = any(home is not None and home.on_finish is Homecoming.RETURN for home in homes.values())
+    return able and wanted and any(member.legs for member in out)
+
+
+async def call_home(live: LiveMission, name: str, actor: str) -> None:
+    """Send one vehicle home and go on without it. Raises VehicleNotFoundError, ConflictError."""
+    member = _member(live, name)
+    if live.header.state is not MissionState.RUNNING:
+        raise ConflictError(f"the mission is {live.header.state}: nobody is led", "resume it first")
+    if live.spec.recovery_of(member.spec) is None:
+        raise ConflictError(f"vehicle {name!r} has no recovery point", "abort it: it stops where it is")
+    if not live.withdraw(member, Response.RETURN, f"called home by {actor}"):
+        raise ConflictError(f"vehicle {name!r} surveys no more: {_why(member)}", "wait until it is there")
+    live.publish_summary()
+
+
+async def send_on(live: LiveMission, supervisor: MissionSupervisor, name: str, actor: str) -> None:
+    """Let a vehicle survey again that went home or was stopped. Raises VehicleNotFoundError, ConflictError."""
+    member = _member(live, name)
+    if member.withdrawal is None:
+        raise ConflictError(f"vehicle {name!r} is surveying", "nothing has to be done")
+    if live.ending is not None:
+        raise ConflictError("everybody goes home: the mission is ending", "create a new mission")
+    strongest = next((one for one in member.failsafes if one.response is not Response.WARN), None)
+    if strongest is not None and not member.withdrawal.over:
+        raise ConflictError(f"vehicle {name!r} is not fit to go on: {strongest.message}", "see to that first")
+    async with supervisor.acting(live.id):
+        async with live.database.writing() as session:
+            await mission_queries.keep_withdrawal(session, live.id, name, None)
+        member.withdrawal = None
+        member.ahead.clear()
+        member.set_order(None)
+    await live.journal.log(Level.INFO, "recovery", f"{name} goes on with the survey", vehicle=name, actor=actor)
+    live.changed.set()
+    live.publish_summary()
+
+
+def _member(live: LiveMission, name: str) -> Member:
+    member = live.team.get(name)
+    if member is None:
+        present = ", ".join(m.name for m in live.team) or "none"
+        raise VehicleNotFoundError(f"vehicle {name!r} takes no part in this mission", f"those that do: {present}")
+    return member
+
+
+def _why(member: Member) -> str:
+    return "" if member.withdrawal is None else member.withdrawal.why
