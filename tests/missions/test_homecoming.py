@@ -27,6 +27,8 @@ def recovered(*names: str, point: tuple[float, float] = INSIDE, **changes: Any) 
 
 
 def from_home_m(vehicle: VehicleView, point: tuple[float, float]) -> float:
+    assert vehicle.lat_deg is not None
+    assert vehicle.lon_deg is not None
     east, north = FRAME.to_local(vehicle.lat_deg, vehicle.lon_deg)
     home_east, home_north = FRAME.to_local(point[1], point[0])
     return math.hypot(float(east) - float(home_east), float(north) - float(home_north))

@@ -125,7 +125,7 @@ export interface paths {
         put?: never;
         /**
          * Abort a mission
-         * @description Stop every vehicle now and end the mission. The answer tells which vehicles acknowledged the stop.
+         * @description Stop every vehicle now and end the mission. The answer tells which vehicles acknowledged the stop. With {"return": true} they go home first.
          */
         post: operations["abortMission"];
         delete?: never;
@@ -145,7 +145,7 @@ export interface paths {
         put?: never;
         /**
          * Finish a mission early
-         * @description Stop the vehicles and end the mission as finished; its products stay available.
+         * @description End the mission as finished; its products stay available. Vehicles with a recovery point go home first, unless the mission says otherwise or {"return": false} is sent: then they stop where they are. A second finish stops them.
          */
         post: operations["finishMission"];
         delete?: never;
@@ -248,6 +248,46 @@ export interface paths {
          * @description Stop a vehicle now and go on without it; the answer tells whether it acknowledged.
          */
         post: operations["abortVehicle"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/missions/{mission_id}/vehicles/{name}/return": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Send one vehicle home
+         * @description Send a vehicle to its recovery point, for a new battery or for good; the others go on with its part.
+         */
+        post: operations["returnVehicle"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/missions/{mission_id}/vehicles/{name}/resume": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Let a vehicle survey again
+         * @description Let a vehicle go on that went home, for example with a new battery: it joins where the team is.
+         */
+        post: operations["resumeVehicle"];
         delete?: never;
         options?: never;
         head?: never;
@@ -1424,6 +1464,26 @@ export interface components {
             orientation_deg: number;
         };
         /**
+         * EndRequest
+         * @description What an operator adds when a mission is ended.
+         * @example {
+         *       "note": "Ferry passes at 14:10"
+         *     }
+         */
+        EndRequest: {
+            /**
+             * Note
+             * @description Kept in the mission's log beside the action
+             * @default
+             */
+            note: string;
+            /**
+             * Return
+             * @description true: vehicles go home to their recovery points, and the mission ends when they are there; false: they stop where they are. null: as recovery.on_finish says, and never with abort
+             */
+            return?: boolean | null;
+        };
+        /**
          * EventMessage
          * @description A new line of the log.
          */
@@ -1462,6 +1522,22 @@ export interface components {
             data: {
                 [key: string]: unknown;
             };
+        };
+        /**
+         * Failsafe
+         * @description What may go wrong with a vehicle, or with all of them.
+         * @enum {string}
+         */
+        Failsafe: "leak" | "critical_energy" | "too_deep" | "position_lost" | "low_energy" | "link_lost" | "geofence_left" | "separation_lost" | "vehicle_error" | "other_console" | "all_links_lost" | "service_restarted";
+        /**
+         * FailsafeView
+         * @description A failsafe in force for a vehicle.
+         */
+        FailsafeView: {
+            failsafe: components["schemas"]["Failsafe"];
+            response: components["schemas"]["Response"];
+            /** Message */
+            message: string;
         };
         /**
          * FieldProblem
@@ -1595,6 +1671,12 @@ export interface components {
          * @enum {string}
          */
         Guidance: "follow" | "legs" | "acoustic";
+        /**
+         * Homecoming
+         * @description What becomes of a vehicle that goes on no further.
+         * @enum {string}
+         */
+        Homecoming: "return" | "stop";
         /**
          * ImportView
          * @description Soundings from elsewhere that a mission began with. They are not among its own.
@@ -2071,6 +2153,18 @@ export interface components {
             cell_m: number;
             limits?: components["schemas"]["Limits"];
             planner?: components["schemas"]["PlannerSpec"];
+            /** @description Where vehicles come home to, and when; null: they stop where they are */
+            recovery?: components["schemas"]["Recovery"] | null;
+            /**
+             * Failsafes
+             * @description What is done when something fails, where it is not what `bathyfleet failsafes` lists
+             * @example {
+             *       "geofence_left": "return"
+             *     }
+             */
+            failsafes?: {
+                [key: string]: components["schemas"]["Response"];
+            };
             /** @description When vehicles come up for a GPS fix; null: never because of their position */
             surface_policy?: components["schemas"]["SurfacePolicy"] | null;
             /**
@@ -2153,6 +2247,8 @@ export interface components {
              * Format: date-time
              */
             updated_at: string;
+            /** @description What it becomes once all its vehicles are home; null while it goes on */
+            ending: components["schemas"]["MissionState"] | null;
             progress: components["schemas"]["Progress"];
             /**
              * Allowed Actions
@@ -2186,6 +2282,8 @@ export interface components {
              * Format: date-time
              */
             updated_at: string;
+            /** @description What it becomes once all its vehicles are home; null while it goes on */
+            ending: components["schemas"]["MissionState"] | null;
             progress: components["schemas"]["Progress"];
             /**
              * MissionSpec
@@ -2233,6 +2331,18 @@ export interface components {
                 cell_m: number;
                 limits?: components["schemas"]["Limits"];
                 planner?: components["schemas"]["PlannerSpec"];
+                /** @description Where vehicles come home to, and when; null: they stop where they are */
+                recovery?: components["schemas"]["Recovery"] | null;
+                /**
+                 * Failsafes
+                 * @description What is done when something fails, where it is not what `bathyfleet failsafes` lists
+                 * @example {
+                 *       "geofence_left": "return"
+                 *     }
+                 */
+                failsafes?: {
+                    [key: string]: components["schemas"]["Response"];
+                };
                 /** @description When vehicles come up for a GPS fix; null: never because of their position */
                 surface_policy?: components["schemas"]["SurfacePolicy"] | null;
                 /**
@@ -2789,6 +2899,45 @@ export interface components {
             difference: components["schemas"]["DifferenceView"] | null;
         };
         /**
+         * Recovery
+         * @description Where vehicles are taken out of the water, and what brings them there.
+         */
+        Recovery: {
+            /**
+             * Point
+             * @description Where vehicles are taken out of the water, [longitude, latitude]; may lie outside the area
+             * @example [
+             *       -8.7052,
+             *       41.1848
+             *     ]
+             */
+            point: [
+                number,
+                number
+            ];
+            /**
+             * Radius M
+             * @description Who is this close to the point is home
+             * @default 25
+             */
+            radius_m: number;
+            /**
+             * @description What vehicles do at the mission's end, unless finish says otherwise
+             * @default return
+             */
+            on_finish: components["schemas"]["Homecoming"];
+            /**
+             * @description What a vehicle does when its energy is just enough for its way home
+             * @default return
+             */
+            on_low_energy: components["schemas"]["Homecoming"];
+            /**
+             * @description What a vehicle does whose link was lost for long, once it is heard again
+             * @default return
+             */
+            on_lost_link: components["schemas"]["Homecoming"];
+        };
+        /**
          * ReferenceView
          * @description The grid that a mission's map is compared with.
          */
@@ -2810,6 +2959,12 @@ export interface components {
             /** Notes */
             notes: string[];
         };
+        /**
+         * Response
+         * @description What is done, least to most: what is farther down is not undone by what is farther up.
+         * @enum {string}
+         */
+        Response: "warn" | "hold" | "return" | "surface" | "stop";
         /**
          * Role
          * @description What the holder of a token may do.
@@ -3909,6 +4064,19 @@ export interface components {
              */
             turn_radius_m?: number | null;
             /**
+             * Endurance Min
+             * @description How long its energy lasts at its speed, minutes, from the start of the mission; counts where the vehicle tells no battery level. null: not known
+             */
+            endurance_min?: number | null;
+            /**
+             * Recovery Point
+             * @description Where it is taken out of the water, [longitude, latitude]; null: at the mission's recovery.point
+             */
+            recovery_point?: [
+                number,
+                number
+            ] | null;
+            /**
              * @description How a vehicle of kind imc is led. follow: by references, one a second; legs: by a plan for each whole leg, where radio ends at the surface; acoustic: by legs, and by sound while radio is silent
              * @default follow
              */
@@ -4058,6 +4226,45 @@ export interface components {
              * @default 0
              */
             idle_s: number;
+            /**
+             * Withdrawn
+             * @description Why it surveys no more; empty while it does
+             * @default
+             */
+            withdrawn: string;
+            /**
+             * Energy Left Pct
+             * @description What is left of its energy, by its battery or else by endurance_min; null: not known
+             */
+            energy_left_pct: number | null;
+            /**
+             * Energy Left S
+             * @description How long that lasts at its speed for sure, vehicle time; null: not known
+             */
+            energy_left_s: number | null;
+            /**
+             * Recovery Point
+             * @description Where it comes home to, [longitude, latitude]; null: nowhere
+             */
+            recovery_point: [
+                number,
+                number
+            ] | null;
+            /**
+             * Return Needs S
+             * @description How long its way home takes from where it is, vehicle time; null: not known
+             */
+            return_needs_s: number | null;
+            /**
+             * Turn Back At
+             * @description When it has to turn back, if it goes no farther from home; null: not known
+             */
+            turn_back_at: string | null;
+            /**
+             * Failsafes
+             * @description What is wrong with it and what is done about that, the strongest first
+             */
+            failsafes: components["schemas"]["FailsafeView"][];
             /** @description What its battery's level is worth; null while it has not said. */
             readonly battery: components["schemas"]["BatteryState"] | null;
         };
@@ -4843,7 +5050,7 @@ export interface operations {
         };
         requestBody?: {
             content: {
-                "application/json": components["schemas"]["ActionRequest"] | null;
+                "application/json": components["schemas"]["EndRequest"] | null;
             };
         };
         responses: {
@@ -4969,7 +5176,7 @@ export interface operations {
         };
         requestBody?: {
             content: {
-                "application/json": components["schemas"]["ActionRequest"] | null;
+                "application/json": components["schemas"]["EndRequest"] | null;
             };
         };
         responses: {
@@ -5433,6 +5640,164 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["ActionView"];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such mission; there is no such vehicle */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description It contradicts the present state */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too many requests */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    returnVehicle: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description The vehicle's name */
+                name: string;
+                /** @description The mission's id */
+                mission_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["MissionView"];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such mission; there is no such vehicle */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description It contradicts the present state */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too many requests */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    resumeVehicle: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description The vehicle's name */
+                name: string;
+                /** @description The mission's id */
+                mission_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["MissionView"];
                 };
             };
             /** @description An access token is needed */

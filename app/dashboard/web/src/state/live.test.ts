@@ -39,6 +39,13 @@ const vehicle = (
   flown_m: 0,
   on_plan_m: 0,
   idle_s: 0,
+  withdrawn: "",
+  energy_left_pct: null,
+  energy_left_s: null,
+  recovery_point: null,
+  return_needs_s: null,
+  turn_back_at: null,
+  failsafes: [],
 });
 
 const waypoint = (name: string, step: number, status: WaypointView["status"]): WaypointView => ({
