@@ -15,6 +15,7 @@ from app.commands.audit import audit
 from app.commands.backup import backup, prune, restore
 from app.commands.common import CommandError, Database, command_settings, noted
 from app.commands.data import export, import_file, tide
+from app.commands.failsafes import failsafes
 from app.commands.logs import import_logs
 from app.commands.train import train
 
@@ -35,6 +36,7 @@ app.command("import")(import_file)
 app.command("import-log")(import_logs)
 app.command()(tide)
 app.command()(train)
+app.command()(failsafes)
 app.command()(audit)
 app.command()(backup)
 app.command()(restore)

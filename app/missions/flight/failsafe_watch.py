@@ -47,6 +47,8 @@ class FailsafeWatch:
         self._time_scale = time_scale
         self._judges: dict[str, FailsafeJudge] = {}
         self._told: dict[str, list[Active]] = {}
+        self._been_apart: set[frozenset[str]] = set()
+        """Vehicles are launched side by side: who has not been apart yet is not too close."""
 
     async def keep(self) -> None:
         """Go on until cancelled."""
@@ -147,7 +149,10 @@ class FailsafeWatch:
                 continue
             apart_m = abs(one.report.position.depth_m - other.report.position.depth_m)
             away_m = float(np.hypot(*(one.place_m(live.frame) - other.place_m(live.frame))))
-            if away_m < limits.min_separation_m and apart_m < limits.min_vertical_separation_m / 2:
+            pair = frozenset((one.name, other.name))
+            if away_m >= limits.min_separation_m or apart_m >= limits.min_vertical_separation_m:
+                self._been_apart.add(pair)
+            elif pair in self._been_apart and apart_m < limits.min_vertical_separation_m / 2:
                 for a, b in ((one, other), (other, one)):
                     found[a.name] = {Failsafe.SEPARATION_LOST: f"{b.name} is {away_m:.1f} m away at the same depth"}
         return found

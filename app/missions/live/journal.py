@@ -3,6 +3,7 @@
 A sounding counts as accepted only when the transaction that stores it has committed.
 """
 
+import asyncio
 import math
 from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import asdict, dataclass
@@ -90,6 +91,8 @@ class Journal(WriteBehind[Noted]):
         self.counts = counts
         self.travelled_m = 0.0
         self.step = 0
+        self._logging = asyncio.Lock()
+        """Held while lines are written and told: nobody sees them in another order."""
         self._told_of_missing_level = False
         self._untold = ""
         self._track_ends: dict[str, tuple[float, float]] = {}
@@ -206,14 +209,15 @@ class Journal(WriteBehind[Noted]):
             self._note(*rows)
             return
         copies = [_copy(row) for row in rows]
-        try:
-            await to_the_end(self._add(*rows))
-        except Exception as error:
-            self.storage.note(error)
-            self._note(*copies)
-            return
-        for row in rows:
-            self.tell(row)
+        async with self._logging:
+            try:
+                await to_the_end(self._add(*rows))
+            except Exception as error:
+                self.storage.note(error)
+                self._note(*copies)
+                return
+            for row in rows:
+                self.tell(row)
 
     async def write(self, row: EventRow) -> None:
         """Write a line now and show it; raises when that cannot be."""

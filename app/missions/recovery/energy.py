@@ -5,6 +5,7 @@ second at another speed v as ``HOTEL + (1 - HOTEL) (v / v_nominal)^3``, since wh
 of the speed through water and the rest with time alone.
 """
 
+import math
 from dataclasses import dataclass, field
 
 HOTEL = 0.3
@@ -18,6 +19,9 @@ TRUSTED_PCT = 40.0
 
 PRIOR_PCT = 5.0
 """The stated endurance counts as much as this much of the battery seen used."""
+
+PRIOR_SD = 0.3
+"""Relative standard deviation of a stated endurance: one battery in a few is a third worse than told."""
 
 LEAST_USED_PCT = 2.0
 """Without a stated endurance nothing is known before this much was seen used."""
@@ -113,8 +117,11 @@ class Energy:
         if self._level_pct is not None and rate is not None:
             time_s = self._level_pct / rate
             drop_pct, _ = self._seen()
-            known_pct = drop_pct + (PRIOR_PCT if self.endurance_s is not None or self._rate_pct_s else 0.0)
-            return EnergyLeft(self._level_pct, time_s, time_s * UNCERTAIN_PCT / max(known_pct, LEAST_USED_PCT))
+            prior_pct = 0.0 if self.endurance_s is None and self._rate_pct_s is None else PRIOR_PCT
+            known_pct = max(prior_pct + drop_pct, LEAST_USED_PCT)
+            return EnergyLeft(
+                self._level_pct, time_s, time_s * math.hypot(UNCERTAIN_PCT, PRIOR_SD * prior_pct) / known_pct
+            )
         if self.endurance_s is None:
             return None
         time_s = max(self.endurance_s - self.used_s, 0.0)

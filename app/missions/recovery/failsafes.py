@@ -51,7 +51,7 @@ POSITION_LOST_M = 50.0
 TABLE: Mapping[Failsafe, Rule] = {
     Failsafe.LEAK: Rule("the vehicle reports water inside", Response.SURFACE, "alarm: leak"),
     Failsafe.CRITICAL_ENERGY: Rule(
-        f"what it has left for sure does not last for its way home; without one a battery below {CRITICAL_PCT:g} %",
+        f"what it has left does not last for its way home; without one a battery below {CRITICAL_PCT:g} %",
         Response.SURFACE,
         "alarm: it cannot come home",
         after_s=10.0,

@@ -1,0 +1,105 @@
+"""Ways home stay on the ground that is allowed, and are as short as that lets them be."""
+
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from shapely.geometry import LineString, Point, Polygon
+
+from app.arrays import FloatArray
+from app.exploration.core.bottom import Bottom
+from app.exploration.core.constraints import Constraints
+from app.missions.recovery.way_home import CORRIDOR_M, berth_m, homeward_ground, way_home, way_time_s
+
+SQUARE = np.array([[0.0, 0.0], [200.0, 0.0], [200.0, 200.0], [0.0, 200.0]])
+
+
+def box(west: float, south: float, east: float, north: float) -> FloatArray:
+    return np.array([[west, south], [east, south], [east, north], [west, north]])
+
+
+def length_m(start: FloatArray, way: FloatArray) -> float:
+    return sum(float(np.hypot(*(b - a))) for a, b in pairwise([start, *way]))
+
+
+places = st.tuples(st.floats(5.0, 195.0), st.floats(5.0, 195.0)).map(np.array)
+
+
+@settings(deadline=None, max_examples=40)
+@given(start=places, home=places, west=st.floats(20, 120), south=st.floats(20, 120), side=st.floats(10, 60))
+def test_a_way_keeps_clear_of_a_zone_and_is_hardly_longer_than_around_it(
+    start: FloatArray, home: FloatArray, west: float, south: float, side: float
+) -> None:
+    zone = box(west, south, west + side, south + side)
+    constraints = Constraints(SQUARE, (zone,))
+    around = Polygon(zone).buffer(1.0)
+    if around.contains(Point(start)) or around.contains(Point(home)):
+        return
+    way = way_home(homeward_ground(constraints, home), start, home)
+    assert way is not None
+    np.testing.assert_allclose(way[-1], home)
+    assert not LineString([start, *way]).intersects(Polygon(zone))
+    straight_m = float(np.hypot(*(home - start)))
+    assert straight_m - 1e-6 <= length_m(start, way) <= straight_m + 2 * side + 4.0
+    if not LineString(np.array([start, home])).intersects(around):
+        assert length_m(start, way) == pytest.approx(straight_m, abs=0.1)
+
+
+def test_home_outside_is_reached_along_a_corridor() -> None:
+    home = np.array([100.0, -300.0])
+    ground = homeward_ground(Constraints(SQUARE), home)
+    start = np.array([10.0, 190.0])
+    way = way_home(ground, start, home)
+    assert way is not None
+    free = Polygon(SQUARE).union(LineString([(100, 0), home]).buffer(CORRIDOR_M + 1e-6))
+    assert free.covers(LineString([start, *way]))
+    assert homeward_ground(Constraints(SQUARE), np.array([50.0, 50.0])).area is SQUARE
+
+
+def test_a_wall_across_leaves_no_way() -> None:
+    wall = Constraints(SQUARE, (box(-10, 90, 210, 110),))
+    assert way_home(wall, np.array([100.0, 150.0]), np.array([100.0, 20.0])) is None
+
+
+def test_a_vehicle_outside_comes_in_first() -> None:
+    way = way_home(Constraints(SQUARE), np.array([-20.0, 100.0]), np.array([150.0, 100.0]))
+    assert way is not None
+    assert way[0][0] == pytest.approx(0.5, abs=0.1)
+
+
+def test_known_shallows_are_gone_around() -> None:
+    depth = np.full((20, 20), 15.0)
+    depth[8:12, 0:15] = 0.5
+    start, home = np.array([30.0, 180.0]), np.array([30.0, 20.0])
+    way = way_home(Constraints(SQUARE), start, home, Bottom(0.0, 0.0, 10.0, depth), least_m=1.5)
+    assert way is not None
+    assert not LineString([start, *way]).intersects(Polygon(box(0, 80, 150, 120)))
+
+
+def test_berths_lie_apart_and_within_the_radius() -> None:
+    home = np.array([3.0, 4.0])
+    berths = [berth_m(home, slot, 25.0, 5.0) for slot in range(5)]
+    apart = [float(np.hypot(*(a - b))) for i, a in enumerate(berths) for b in berths[:i]]
+    assert min(apart) >= 5.0
+    assert max(float(np.hypot(*(berth - home))) for berth in berths) <= 25.0
+    np.testing.assert_allclose(berths[0], home)
+
+
+@given(course=st.floats(0, 2 * math.pi), current=st.floats(0, 0.9))
+def test_a_current_never_helps(course: float, current: float) -> None:
+    start, way = np.zeros(2), np.array([[0.0, 100.0]])
+    still_s = way_time_s(start, way, 1.0, (0.0, 0.0))
+    time_s = way_time_s(start, way, 1.0, (current * math.sin(course), current * math.cos(course)))
+    assert still_s == pytest.approx(100.0)
+    assert time_s >= still_s - 1e-9
+
+
+def test_against_a_current_it_takes_longer_and_at_last_for_ever() -> None:
+    start, way = np.zeros(2), np.array([[0.0, 100.0]])
+    assert way_time_s(start, way, 1.0, (0.0, -0.5)) == pytest.approx(200.0)
+    assert way_time_s(start, way, 1.0, (0.0, 0.5)) == pytest.approx(100.0), "what helps is not counted"
+    assert math.isinf(way_time_s(start, way, 1.0, (0.0, -1.0)))
+    assert math.isinf(way_time_s(start, way, 1.0, (1.2, 0.0)))
