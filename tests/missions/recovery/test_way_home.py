@@ -41,7 +41,7 @@ def test_a_way_keeps_clear_of_a_zone_and_is_hardly_longer_than_around_it(
     way = way_home(homeward_ground(constraints, home), start, home)
     assert way is not None
     np.testing.assert_allclose(way[-1], home)
-    assert not LineString([start, *way]).intersects(Polygon(zone))
+    assert not LineString(np.vstack([start, way])).intersects(Polygon(zone))
     straight_m = float(np.hypot(*(home - start)))
     assert straight_m - 1e-6 <= length_m(start, way) <= straight_m + 2 * side + 4.0
     if not LineString(np.array([start, home])).intersects(around):
@@ -55,7 +55,7 @@ def test_home_outside_is_reached_along_a_corridor() -> None:
     way = way_home(ground, start, home)
     assert way is not None
     free = Polygon(SQUARE).union(LineString([(100, 0), home]).buffer(CORRIDOR_M + 1e-6))
-    assert free.covers(LineString([start, *way]))
+    assert free.covers(LineString(np.vstack([start, way])))
     assert homeward_ground(Constraints(SQUARE), np.array([50.0, 50.0])).area is SQUARE
 
 
@@ -76,7 +76,7 @@ def test_known_shallows_are_gone_around() -> None:
     start, home = np.array([30.0, 180.0]), np.array([30.0, 20.0])
     way = way_home(Constraints(SQUARE), start, home, Bottom(0.0, 0.0, 10.0, depth), least_m=1.5)
     assert way is not None
-    assert not LineString([start, *way]).intersects(Polygon(box(0, 80, 150, 120)))
+    assert not LineString(np.vstack([start, way])).intersects(Polygon(box(0, 80, 150, 120)))
 
 
 def test_berths_lie_apart_and_within_the_radius() -> None:
