@@ -15,7 +15,7 @@ import numpy as np
 
 from simulator.clock import SimulationClock
 from simulator.dune.contacts import REFRESH_PERIOD_S, Contacts
-from simulator.dune.entities import ANY, HARDWARE_DVL, HARDWARE_MULTIBEAM, SIMULATION, entity_list
+from simulator.dune.entities import ANY, HARDWARE_DVL, HARDWARE_FUEL, HARDWARE_MULTIBEAM, SIMULATION, entity_list
 from simulator.dune.log_book import LogBook
 from simulator.dune.plan import PLAN_ENGINE, SUPERVISOR, PlanEngine
 from simulator.dune.radio import Radio
@@ -176,6 +176,8 @@ class FakeDune:
             self._extra = HARDWARE_DVL
         elif vehicle.sonar.kind is SensorKind.MULTIBEAM:
             self._extra = HARDWARE_MULTIBEAM
+        if vehicle.battery is not None:
+            self._extra = self._extra | HARDWARE_FUEL
         self._entities |= self._extra
         self._radio = Radio(options.radio_range_m)
         self._tcp = TcpServer(self._receive_by_tcp) if options.tcp else None
@@ -390,7 +392,13 @@ class FakeDune:
         def plain(entity: int, build: Callable[[], imcpy.Message]) -> Callable[[], None]:
             return lambda: self.send(build(), entity)
 
+        battery = self.vehicle.battery
+        energy: list[tuple[Periodic, Callable[[], None]]] = []
+        if battery is not None:
+            fuel = limited("FuelLevel", ids["Fuel"], lambda: t.fuel_level(battery))
+            energy.append((Periodic(1.0, now_s), fuel))
         return [
+            *energy,
             (Periodic(STEP_S, now_s), limited("EstimatedState", ids["Navigation"], t.estimated_state)),
             (Periodic(STEP_S, now_s), limited("SimulatedState", ids["Simulation Engine"], t.simulated_state)),
             (Periodic(1.0, now_s), plain(0, imcpy.Heartbeat)),

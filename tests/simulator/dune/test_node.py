@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from simulator import seafloors
+from simulator.battery import BatterySpec
 from simulator.dune.contacts import service_addresses
 from simulator.dune.rates import RateLimiter, RateLimiterError, parse_limits
 from tests.support.imc.dune_bench import CONSOLE, CONSOLE_ID, Bench, announce, rate_limiters, start_request
@@ -200,6 +201,17 @@ class TestTelemetry:
         fix = bench.last(imcpy.GpsFix)
         assert (fix.validity, fix.satellites) == (0, 0)
         assert bench.last(imcpy.VehicleMedium).medium == imcpy.VehicleMedium.MediumEnum.UNDERWATER
+
+    def test_it_tells_its_fuel_every_ten_seconds(self) -> None:
+        bench = Bench(battery=BatterySpec(level_pct=50.0, confidence_pct=80.0)).ready()
+        bench.run(100.0, bench.beat)
+        fuel = bench.all(imcpy.FuelLevel)
+        assert len(fuel) == pytest.approx(10, abs=1)
+        assert fuel[-1].value == pytest.approx(50.0 - 0.3 * 100.0 / 288.0, abs=0.05)
+        assert fuel[-1].confidence == 80.0
+        hours = dict(mode.split("=") for mode in fuel[-1].opmodes.rstrip(";").split(";"))
+        assert float(hours["Motion"]) == pytest.approx(4.0, abs=0.02)
+        assert float(hours["Hotel"]) == pytest.approx(4.0 / 0.3, abs=0.05)
 
     def test_the_entities_are_told_on_request(self, bench: Bench) -> None:
         query = imcpy.EntityList()
