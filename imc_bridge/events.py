@@ -95,7 +95,13 @@ class StateReport:
     speed_mps: float
     altitude_m: float | None = None
     battery_pct: float | None = None
+    battery_confidence_pct: float | None = None
+    """How sure the vehicle is of that level; DUNE itself does not trust one below 40 %."""
+    energy_left_s: float | None = None
+    """For how long that lasts under way, by the vehicle's own reckoning."""
     position_sd_m: float | None = None
+    current_mps: tuple[float, float] | None = None
+    """Velocity of the water over ground, east and north, as the vehicle estimated it last."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -29,6 +29,7 @@ WANTED = (
     "EntityList",
     "EntityParameters",
     "EstimatedState",
+    "EstimatedStreamVelocity",
     "FollowRefState",
     "FuelLevel",
     "Heartbeat",
@@ -315,6 +316,8 @@ class Hearing:
                 for other in self._crew.by_sound_through(node):
                     if other.sound is not None:
                         other.left_by_sound(other.sound.status(message), now)
+            case "EstimatedStreamVelocity":
+                node.take_stream(message)
             case "FuelLevel":
                 node.take_fuel(message)
             case "EntityList" if message.op == imcpy.EntityList.OperationEnum.REPORT:

@@ -188,10 +188,10 @@ def descent_m(depth_m: float) -> float:
     return RUN_UP_M + RUN_PER_DEPTH * depth_m if depth_m > SHALLOW_M else 0.0
 
 
-def leg_time_s(length_m: float, depth_m: float, speed_mps: float) -> float:
-    """How long a leg may take until contact returns."""
+def leg_time_s(length_m: float, depth_m: float, speed_mps: float, current_mps: float = 0.0) -> float:
+    """How long a leg may take until contact returns, were a current of this speed against it all the way."""
     return (
-        length_m / (SLOWEST_SHARE * max(speed_mps, 0.1))
+        length_m / (SLOWEST_SHARE * max(speed_mps - current_mps, 0.1))
         + depth_m / DIVE_MPS
         + depth_m / CLIMB_MPS
         + TURNING_S

@@ -24,10 +24,14 @@ from imc_bridge.nodes.refusals import Refused
 from imc_bridge.nodes.vehicle_clock import Tick, VehicleClock
 from imc_bridge.printable import printable
 from imc_bridge.settings import BridgeSettings
+from imc_bridge.telemetry.energy import Energy, read_fuel
 from imc_bridge.telemetry.ranges import RangeIntake
 from imc_bridge.telemetry.soundings import SoundingIntake, StateHistory, StateSample, beam_table
 
 UNCERTAINTY_VALID_S = 10.0
+CURRENT_VALID_S = 3600.0
+"""DUNE estimates the current at the surface only: when it drifts there, and from where it comes up."""
+FASTEST_CURRENT_MPS = 5.0
 SUBMERGED_DEPTH_M = 0.3
 """Radio is gone that far below; the depth sensor's noise at the surface is about 0.1 m."""
 ANNOUNCES_MISSED = 3
@@ -168,13 +172,14 @@ class Node:
         self.controller: int | None = None
         """Id of the console whose references its FollowReference maneuver reports to take."""
         self.medium: int | None = None
-        self.battery_pct: float | None = None
+        self.energy: Energy | None = None
         self.history = StateHistory()
         self.places = PlausiblePlace()
         self.report: StateReport | None = None
         self.intake = SoundingIntake(name, beam_table(settings.altimeter), settings.max_range_m)
         self.ranges = RangeIntake(name)
         self._uncertainty: tuple[float, float] | None = None
+        self._current: tuple[float, float, float] | None = None
         self._settings = settings
         self._latest: dict[str, float] = {}
 
@@ -269,6 +274,7 @@ class Node:
             self.intake.clear()
             self.ranges.clear()
             self._uncertainty = None
+            self._current = None
         return tick
 
     # Telemetry
@@ -291,6 +297,7 @@ class Node:
             self.history.clear()
         if not self.history.add(sample) or not self.in_order("EstimatedState", time_s):
             return None
+        energy = self.energy
         speed = math.hypot(message.vx, message.vy)
         altitude = float(message.alt)
         self.report = StateReport(
@@ -302,8 +309,11 @@ class Node:
             heading_rad=sample.yaw_rad,
             speed_mps=speed if math.isfinite(speed) else 0.0,
             altitude_m=altitude if math.isfinite(altitude) and altitude >= 0.0 else None,
-            battery_pct=self.battery_pct,
+            battery_pct=energy.level_pct if energy else None,
+            battery_confidence_pct=energy.confidence_pct if energy else None,
+            energy_left_s=energy.left_s if energy else None,
             position_sd_m=self.position_sd_m(),
+            current_mps=self.current_mps(),
         )
         return self.report
 
@@ -320,11 +330,22 @@ class Node:
         at_s, sd = self._uncertainty
         return sd if self.clock.time_s - at_s <= UNCERTAINTY_VALID_S else None
 
+    def take_stream(self, message: Message) -> None:
+        """EstimatedStreamVelocity: x is north, y is east."""
+        east, north = float(message.y), float(message.x)
+        if math.hypot(east, north) <= FASTEST_CURRENT_MPS:
+            self._current = (message.timestamp, east, north)
+
+    def current_mps(self) -> tuple[float, float] | None:
+        """Velocity of the water, east and north, None when the vehicle has not estimated it lately."""
+        if self._current is None or self.clock.time_s is None:
+            return None
+        at_s, east, north = self._current
+        return (east, north) if self.clock.time_s - at_s <= CURRENT_VALID_S else None
+
     def take_fuel(self, message: Message) -> None:
-        """FuelLevel: per cent."""
-        value = float(message.value)
-        if 0.0 <= value <= 100.0:
-            self.battery_pct = value
+        """FuelLevel: level, confidence and the time that is left."""
+        self.energy = read_fuel(message) or self.energy
 
     def take_vehicle_state(self, message: Message, now: float) -> bool:
         """VehicleState: the operation mode and the errors that explain it; True when it has just begun to boot."""

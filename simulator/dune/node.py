@@ -37,6 +37,9 @@ TCP_PORT_TRIES = 50
 DEFAULT_ANNOUNCE_PORTS = (30100, 30101, 30102, 30103, 30104)
 ANNOUNCE_PERIOD_S = 10.0
 BOOT_S = 5.0
+STREAM_PERIOD_S = 10.0
+"""Between two estimates of the current at the surface."""
+STILL_WATER = (0.0, 0.0)
 IMC_VERSION = "5.4.31"
 RESTART_S = 5.0
 """How long DUNE is away when it crashes."""
@@ -393,12 +396,14 @@ class FakeDune:
             return lambda: self.send(build(), entity)
 
         battery = self.vehicle.battery
-        energy: list[tuple[Periodic, Callable[[], None]]] = []
+        further: list[tuple[Periodic, Callable[[], None]]] = []
         if battery is not None:
             fuel = limited("FuelLevel", ids["Fuel"], lambda: t.fuel_level(battery))
-            energy.append((Periodic(1.0, now_s), fuel))
+            further.append((Periodic(1.0, now_s), fuel))
+        if self.vehicle.vehicle.current != STILL_WATER:
+            further.append((Periodic(STREAM_PERIOD_S, now_s), self._send_stream_velocity))
         return [
-            *energy,
+            *further,
             (Periodic(STEP_S, now_s), limited("EstimatedState", ids["Navigation"], t.estimated_state)),
             (Periodic(STEP_S, now_s), limited("SimulatedState", ids["Simulation Engine"], t.simulated_state)),
             (Periodic(1.0, now_s), plain(0, imcpy.Heartbeat)),
@@ -408,6 +413,11 @@ class FakeDune:
             (Periodic(1.0, now_s), plain(ids["Medium"], t.medium)),
             (Periodic(1.0, now_s), plain(ids["Navigation"], t.navigation_uncertainty)),
         ]
+
+    def _send_stream_velocity(self) -> None:
+        """As DUNE's navigation does, which compares where it drifted, or came up, with its position fixes."""
+        if self._telemetry is not None and self.vehicle.navigation.has_fix:
+            self.send(self._telemetry.stream_velocity(), self._entities["Navigation"])
 
     def _send_announce(self) -> None:
         if self._announcer is None or self._telemetry is None:

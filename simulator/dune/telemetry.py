@@ -112,6 +112,12 @@ class Telemetry:
         message.opmodes = "".join(f"{mode}={left:g};" for mode, left in hours.items())
         return message
 
+    def stream_velocity(self) -> imcpy.EstimatedStreamVelocity:
+        """Velocity of the water: x north, y east."""
+        message = imcpy.EstimatedStreamVelocity()
+        message.y, message.x = self._vehicle.vehicle.current
+        return message
+
     def medium(self) -> imcpy.VehicleMedium:
         """At the surface or under water."""
         message = imcpy.VehicleMedium()

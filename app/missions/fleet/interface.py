@@ -55,7 +55,12 @@ class Position:
 
 @dataclass(frozen=True, slots=True)
 class VehicleReport:
-    """One state report of a vehicle. ``time_s`` is the vehicle's own clock (Unix seconds)."""
+    """One state report of a vehicle. ``time_s`` is the vehicle's own clock (Unix seconds); None: not told.
+
+    ``battery_confidence_pct`` is how sure the vehicle is of its level: DUNE itself does not trust one below 40 %.
+    ``energy_left_s`` is for how long it says that the level lasts under way. ``current_mps`` is the velocity of the
+    water over ground, east and north, as the vehicle estimated it last.
+    """
 
     vehicle: str
     time_s: float
@@ -64,7 +69,10 @@ class VehicleReport:
     speed_mps: float | None = None
     altitude_m: float | None = None
     battery_pct: float | None = None
+    battery_confidence_pct: float | None = None
+    energy_left_s: float | None = None
     position_sd_m: float | None = None
+    current_mps: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -281,7 +281,10 @@ def vehicle_report(state: StateReport) -> VehicleReport:
         speed_mps=state.speed_mps,
         altitude_m=state.altitude_m,
         battery_pct=state.battery_pct,
+        battery_confidence_pct=state.battery_confidence_pct,
+        energy_left_s=state.energy_left_s,
         position_sd_m=state.position_sd_m,
+        current_mps=state.current_mps,
     )
 
 
