@@ -17,6 +17,7 @@ import typer
 from simulator import seafloors
 from simulator.battery import BatterySpec
 from simulator.dune import DuneFleet, DuneOptions, default_specs
+from simulator.dune.lost_comms import TIMEOUT_S
 from simulator.dune.node import DEFAULT_ANNOUNCE_PORTS
 from simulator.network import NetworkFaults
 from simulator.sensors import SensorKind, SonarNoise
@@ -90,6 +91,12 @@ def main(
     radio_range: Annotated[
         float, typer.Option(help="Metres at which radio ends, and at the surface; 0: it does not end.", min=0.0)
     ] = 0.0,
+    lost_comms: Annotated[
+        float,
+        typer.Option(
+            help="Seconds without a console until a vehicle starts the plan stored as lostcomms; 0: never.", min=0.0
+        ),
+    ] = TIMEOUT_S,
     log_dir: Annotated[
         Path | None, typer.Option(help="Folder in which every vehicle keeps its log (Data.lsf), as DUNE does on board.")
     ] = None,
@@ -147,6 +154,7 @@ def main(
                 faults=NetworkFaults(loss=loss, delay_s=delay, jitter_s=jitter, duplicate=duplicate, reorder=reorder),
                 chatter=chatter,
                 radio_range_m=radio_range,
+                lost_comms_s=lost_comms,
                 log_dir=log_dir,
             ),
             seed=seed,

@@ -35,6 +35,9 @@ HARDWARE_MULTIBEAM = {"Multibeam": len(_NAMES) + len(HARDWARE_DVL)}
 HARDWARE_FUEL = {"Fuel": len(_NAMES) + len(HARDWARE_DVL) + len(HARDWARE_MULTIBEAM)}
 """What real vehicles estimate their energy with; DUNE's own simulation has no battery."""
 
+SUPERVISORS = {"Lost Comms": len(_NAMES) + len(HARDWARE_DVL) + len(HARDWARE_MULTIBEAM) + len(HARDWARE_FUEL)}
+"""What runs only where a vehicle's configuration enables it."""
+
 ANY = 255
 """No particular entity."""
 

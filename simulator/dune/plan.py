@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from enum import IntEnum
 
 import imcpy
@@ -80,9 +80,20 @@ class PlanEngine:
         Puts messages on the network.
     ready_s
         The vehicle's clock when it will have started up.
+    stored
+        Plans on board, by name.
     """
 
-    def __init__(self, vehicle: SimulatedVehicle, imc_id: int, frame: LocalFrame, send: Send, ready_s: float) -> None:
+    def __init__(
+        self,
+        vehicle: SimulatedVehicle,
+        imc_id: int,
+        frame: LocalFrame,
+        send: Send,
+        ready_s: float,
+        stored: Mapping[str, imcpy.PlanSpecification] | None = None,
+    ) -> None:
+        self._stored = stored if stored is not None else {}
         self.op_mode = OpMode.BOOT
         self.plan_state = PlanState.BLOCKED
         self.outcome = Outcome.NONE
@@ -211,10 +222,11 @@ class PlanEngine:
         return message
 
     def _start(self, message: imcpy.PlanControl, request: tuple[int, int, int], now_s: float) -> None:
-        if self.op_mode in (OpMode.BOOT, OpMode.ERROR):
+        ignores_errors = int(message.flags) & int(imcpy.PlanControl.FlagsBits.IGNORE_ERRORS)
+        if self.op_mode is OpMode.BOOT or (self.op_mode is OpMode.ERROR and not ignores_errors):
             self._reply(message.op, request, message.plan_id, f"vehicle is in {self.op_mode.name} mode", ok=False)
             return
-        specification, problem = _plan_of(message)
+        specification, problem = _plan_of(message, self._stored)
         if specification is None:
             self._reply(message.op, request, message.plan_id, problem, ok=False)
             return
@@ -290,7 +302,8 @@ class PlanEngine:
         self._halt()
         self._send(self._command(imcpy.VehicleCommand.CommandEnum.STOP_MANEUVER), PLAN_ENGINE)
         self._reply(message.op, request, self._plan_id, "plan completed", ok=True)
-        self.outcome = Outcome.SUCCESS
+        # A plan that is stopped has not been completed.
+        self.outcome = Outcome.FAILURE
         self._into_service()
         self._answer_command("OK")
 
@@ -368,9 +381,11 @@ class PlanEngine:
         self._send(message, SUPERVISOR, self._vehicle_id, PLAN_ENGINE)
 
 
-def _plan_of(message: imcpy.PlanControl) -> tuple[imcpy.PlanSpecification | None, str]:
-    """The plan that a request starts, or else what is wrong with it."""
-    argument = message.arg
+def _plan_of(
+    message: imcpy.PlanControl, stored: Mapping[str, imcpy.PlanSpecification]
+) -> tuple[imcpy.PlanSpecification | None, str]:
+    """The plan that a request starts, given with it or stored on board, or else what is wrong with it."""
+    argument = message.arg if message.arg is not None else stored.get(message.plan_id)
     if argument is None:
         return None, "undefined plan"
     if isinstance(argument, SPECIFICATIONS):
