@@ -257,6 +257,8 @@ class NodeView:
     history: tuple[LinkChange, ...] = ()
     """The last changes of its link, oldest first."""
     rate_limiters: str = ""
+    way_home: str = ""
+    """Whether it keeps a way home on board, in words."""
     restarts: int = 0
     """How often DUNE on board restarted while we listened."""
     radio_gaps: int = 0

@@ -36,6 +36,7 @@ WANTED = (
     "NavigationUncertainty",
     "PlanControl",
     "PlanControlState",
+    "PlanDB",
     "TransmissionStatus",
     "VehicleMedium",
     "VehicleState",
@@ -177,7 +178,9 @@ class Hearing:
 
     def _reboot(self, node: Node, now: float) -> None:
         self._tell(Restarted(node.name, node.submerged))
-        control = self._crew.get(node)
+        control, way_home = self._crew.get(node), self._crew.way_home(node)
+        if way_home is not None:
+            way_home.restarted()
         if control is not None:
             control.rebooted(now)
             if control.engaged:
@@ -277,7 +280,7 @@ class Hearing:
     def _take_message(self, node: Node, message: Message, now: float, address: Address) -> None:
         name = type(message).__name__
         control = self._crew.get(node)
-        rates = self._crew.asked_rates(node)
+        rates, way_home = self._crew.asked_rates(node), self._crew.way_home(node)
         tick = node.take_time(message.timestamp, now, self._wall_clock())
         if tick is Tick.DOUBTFUL:
             self.admission.refuse(Refused.OLD, address)
@@ -322,8 +325,13 @@ class Hearing:
                 node.take_fuel(message)
             case "EntityList" if message.op == imcpy.EntityList.OperationEnum.REPORT:
                 node.take_entities(message)
-            case "EntityParameters" if rates is not None:
-                rates.answered(message, now)
+            case "EntityParameters":
+                if rates is not None:
+                    rates.answered(message, now)
+                if way_home is not None:
+                    way_home.answered(message)
+            case "PlanDB" if way_home is not None and int(message.dst) == self._settings.id:
+                way_home.replied(message)
 
     def _take_state(self, node: Node, control: Control | None, message: Message, now: float, address: Address) -> None:
         report = node.take_state(message)

@@ -120,7 +120,7 @@ def leg_plan(settings: BridgeSettings, waypoint: Waypoint, depth_m: float, *, de
         steps.append((DOWN, _elevator(waypoint, depth_m)))
     steps.append((THERE, goto_maneuver(waypoint, depth_m, aim)))
     if depth_m > SHALLOW_M:
-        steps.append((UP, _station(waypoint, depth_m)))
+        steps.append((UP, station_maneuver(waypoint, depth_m)))
     steps.append((SURFACE, _pop_up(waypoint)))
     return goto_plan(settings.plan_id, steps)
 
@@ -141,8 +141,8 @@ def _elevator(waypoint: Waypoint, depth_m: float) -> Message:
     return elevator
 
 
-def _station(waypoint: Waypoint, depth_m: float) -> Message:
-    """Float up at the waypoint."""
+def station_maneuver(waypoint: Waypoint, depth_m: float) -> Message:
+    """Float up at the waypoint from a depth; without one, stay there at the surface for good."""
     station = imcpy.StationKeeping()
     station.lat, station.lon = math.radians(waypoint.lat_deg), math.radians(waypoint.lon_deg)
     station.z, station.z_units = 0.0, imcpy.ZUnits(Z_DEPTH)

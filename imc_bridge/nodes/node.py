@@ -162,6 +162,7 @@ class Node:
         self.plan_state: int | None = None
         self.plan_state_at: float | None = None
         self.plan_id = ""
+        self.maneuver_id = ""
         self.plan_outcome: int | None = None
         self.plan_state_time_s = -math.inf
         """When it was in that state, by the vehicle's clock."""
@@ -228,7 +229,7 @@ class Node:
         self.entities_asked_at = -math.inf
         self.operation_mode = self.plan_state = None
         self.operation_mode_at = self.plan_state_at = None
-        self.plan_id = ""
+        self.plan_id = self.maneuver_id = ""
         self.controller = None
         self._latest.clear()
 
@@ -369,6 +370,7 @@ class Node:
         self.plan_state = int(message.state)
         self.plan_state_at = now
         self.plan_id = printable(text(message, "plan_id"), most=MAX_TEXT)
+        self.maneuver_id = printable(text(message, "man_id"), most=MAX_TEXT)
         self.plan_outcome = int(message.last_outcome)
         self.plan_state_time_s = float(message.timestamp)
         if self.plan_state not in (PlanState.EXECUTING, PlanState.INITIALIZING):
@@ -440,6 +442,16 @@ class Node:
         return running and self.plan_id == plan_id and self.foreign_controller is None
 
     @property
+    def home_prefix(self) -> str:
+        """What the names of the maneuvers of our way home begin with."""
+        return f"{self._settings.plan_id} home"
+
+    @property
+    def home_bound(self) -> bool:
+        """Whether it goes home by a plan that we left on board, perhaps in an earlier run."""
+        return self.plan_state == PlanState.EXECUTING and self.maneuver_id.startswith(self.home_prefix)
+
+    @property
     def ours(self) -> bool:
         """Whether it executes our plan."""
         return self.executing(self._settings.plan_id)
@@ -466,6 +478,8 @@ class Node:
         if self.plan_state in (PlanState.EXECUTING, PlanState.INITIALIZING):
             if self.plan_state == PlanState.INITIALIZING:
                 return Status(NodeState.IN_PLAN, "starts a plan")
+            if self.home_bound:
+                return Status(NodeState.IN_PLAN, "goes home by the plan that it keeps on board for that")
             whose = "our plan"
             if self.plan_id != settings.plan_id or self.foreign_controller is not None:
                 controller = f" (0x{self.foreign_controller:04X})" if self.foreign_controller is not None else ""

@@ -265,6 +265,8 @@ class LinkCapabilities:
     """They travel at the depth that their mission began with, whatever they are told."""
     flies_together: bool = False
     """They are led in steps of the whole team: nobody is sent on before all have told what they measured."""
+    keeps_way_home: bool = False
+    """They can keep a way home on board, which they take by themselves when nobody is heard any more."""
     circles_m: float = 0.0
     """From this distance on they circle about a waypoint in place of going straight to it, unless they can hover."""
 
@@ -351,3 +353,14 @@ class FleetLink(ABC):
     @abstractmethod
     async def stop(self, vehicle: str, *, timeout_s: float = 3.0) -> StopReceipt:
         """Stop the vehicle; see the class's contract."""
+
+    async def keep_way_home(self, vehicle: str, way: Sequence[Position], speed_mps: float) -> None:
+        """Store a way home on board in place of the former one; return when the vehicle confirms it.
+
+        It is armed while the vehicle is ours or lost: a stop disarms it, and the next ``engage`` arms it again. Raises
+        VehicleRefusedError when it is not confirmed, or when the link's vehicles cannot keep one (``capabilities``).
+        """
+        raise VehicleRefusedError(vehicle, "vehicles of its kind keep no way home on board", "Bring it home yourself")
+
+    async def drop_way_home(self, vehicle: str) -> None:  # noqa: B027 - most have none
+        """Leave no way home on board. Raises VehicleRefusedError when that is not confirmed."""

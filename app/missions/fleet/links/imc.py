@@ -80,7 +80,7 @@ class ImcFleetLink(FleetLink):
     """The fleet interface over IMC/UDP; see :class:`app.missions.fleet.interface.FleetLink` for its contract."""
 
     kind = "imc"
-    capabilities = LinkCapabilities(ready_before_start=True, circles_m=DUNE_CIRCLES_M)
+    capabilities = LinkCapabilities(ready_before_start=True, keeps_way_home=True, circles_m=DUNE_CIRCLES_M)
 
     def __init__(self, settings: BridgeSettings) -> None:
         self._bridge = Bridge(settings)
@@ -180,6 +180,23 @@ class ImcFleetLink(FleetLink):
         self._bridge.board.show(f"waypoint of {vehicle}", None)
         result = await self._bridge.stop(vehicle, timeout_s=timeout_s)
         return StopReceipt(result.vehicle, result.acknowledged, result.detail)
+
+    async def keep_way_home(self, vehicle: str, way: Sequence[Position], speed_mps: float) -> None:
+        """Store a way home in DUNE's plan database, for its LostComms supervisor; raises VehicleRefusedError."""
+        places = [
+            Waypoint("home", k, place.lat_deg, place.lon_deg, place.depth_m, speed_mps) for k, place in enumerate(way)
+        ]
+        try:
+            await self._bridge.keep_way_home(vehicle, places)
+        except RefusedError as error:
+            raise VehicleRefusedError(vehicle, error.reason, error.remedy) from error
+
+    async def drop_way_home(self, vehicle: str) -> None:
+        """Disarm the supervisor and delete the way home; raises VehicleRefusedError when that is not confirmed."""
+        try:
+            await self._bridge.drop_way_home(vehicle)
+        except RefusedError as error:
+            raise VehicleRefusedError(vehicle, error.reason, error.remedy) from error
 
     def diagnosis(self) -> Diagnosis:
         """What keeps vehicles from working with us, as heard so far."""
@@ -299,6 +316,7 @@ def _info(node: NodeView) -> VehicleInfo:
         "soundings": str(node.soundings),
         "soundings refused": "; ".join(f"{reason}: {count}" for reason, count in node.refused.items()) or None,
         "rate limiters": node.rate_limiters,
+        "way home": node.way_home or None,
         "conflict": node.conflict,
     }
     return VehicleInfo(
