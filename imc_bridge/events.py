@@ -179,6 +179,8 @@ class LinkChange:
     """Executes a plan of ours, perhaps of an earlier run."""
     at_s: float = 0.0
     """When, by our wall clock (Unix seconds)."""
+    goes_home: bool = False
+    """Executes the way home that we left on board."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -192,6 +194,26 @@ class Restarted:
     submerged: bool
 
 
+class FaultKind(StrEnum):
+    """What is broken on board."""
+
+    LEAK = "leak"
+    """Water where none should be."""
+    ERROR = "error"
+    """The vehicle has been in error for seconds."""
+
+
+@dataclass(frozen=True, slots=True)
+class Fault:
+    """Something broke on board, or with ``over`` is no longer broken; ``time_s`` is the vehicle's clock."""
+
+    vehicle: str
+    time_s: float
+    kind: FaultKind
+    reason: str
+    over: bool = False
+
+
 @dataclass(frozen=True, slots=True)
 class PacketsDropped:
     """Within the last second this machine threw ``count`` packets away because our socket was full."""
@@ -200,7 +222,15 @@ class PacketsDropped:
 
 
 BridgeEvent = (
-    StateReport | Sounding | SoundingRefused | TargetRange | WaypointChange | LinkChange | Restarted | PacketsDropped
+    StateReport
+    | Sounding
+    | SoundingRefused
+    | TargetRange
+    | WaypointChange
+    | LinkChange
+    | Restarted
+    | Fault
+    | PacketsDropped
 )
 EventCallback = Callable[[BridgeEvent], None]
 
@@ -257,6 +287,9 @@ class NodeView:
     history: tuple[LinkChange, ...] = ()
     """The last changes of its link, oldest first."""
     rate_limiters: str = ""
+    faults: tuple[Fault, ...] = ()
+    goes_home: bool = False
+    """Executes the way home that we left on board."""
     way_home: str = ""
     """Whether it keeps a way home on board, in words."""
     restarts: int = 0

@@ -55,6 +55,8 @@ def view_of(
         clock_rate=node.clock.rate(scale),
         history=history,
         rate_limiters=rate_limiters,
+        faults=node.faults.present,
+        goes_home=node.home_bound,
         way_home=way_home,
         restarts=node.boots,
         radio_gaps=node.radio_gaps,

@@ -25,6 +25,7 @@ from imc_bridge.nodes.vehicle_clock import Tick, VehicleClock
 from imc_bridge.printable import printable
 from imc_bridge.settings import BridgeSettings
 from imc_bridge.telemetry.energy import Energy, read_fuel
+from imc_bridge.telemetry.faults import Faults
 from imc_bridge.telemetry.ranges import RangeIntake
 from imc_bridge.telemetry.soundings import SoundingIntake, StateHistory, StateSample, beam_table
 
@@ -179,6 +180,7 @@ class Node:
         self.report: StateReport | None = None
         self.intake = SoundingIntake(name, beam_table(settings.altimeter), settings.max_range_m)
         self.ranges = RangeIntake(name)
+        self.faults = Faults(name)
         self._uncertainty: tuple[float, float] | None = None
         self._current: tuple[float, float, float] | None = None
         self._settings = settings
@@ -276,6 +278,7 @@ class Node:
             self.ranges.clear()
             self._uncertainty = None
             self._current = None
+            self.faults.clock_jumped()
         return tick
 
     # Telemetry

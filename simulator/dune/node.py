@@ -50,6 +50,7 @@ TCP_PORT_TRIES = 50
 DEFAULT_ANNOUNCE_PORTS = (30100, 30101, 30102, 30103, 30104)
 ANNOUNCE_PERIOD_S = 10.0
 BOOT_S = 5.0
+LEAK_SENSOR, FAULTY = "Leak Sensor - Nose", "Motor"
 STREAM_PERIOD_S = 10.0
 """Between two estimates of the current at the surface."""
 STILL_WATER = (0.0, 0.0)
@@ -215,6 +216,7 @@ class FakeDune:
         self._announce = Periodic(ANNOUNCE_PERIOD_S, self._now_s)
         self._refresh = Periodic(REFRESH_PERIOD_S, self._now_s + REFRESH_PERIOD_S)
         self._supervise = Periodic(LOST_COMMS_PERIOD_S, self._now_s)
+        self._leak: imcpy.EntityState.StateEnum | None = None
         self._chatter_owed = 0.0
         self._offered = ""
         self._down_until_s: float | None = None
@@ -290,6 +292,21 @@ class FakeDune:
         if self._options.log_dir is not None:
             self._log = LogBook(self._options.log_dir / self.name, self._now_s)
             self._report_entities()
+
+    def fail(self, what: str) -> None:
+        """Let something break: a leak ("leak"), or what puts the vehicle in error ("error")."""
+        if what == "error":
+            self.plan.break_down(FAULTY, "motor current too high", self._now_s)
+        elif what == "leak":
+            self._leak = imcpy.EntityState.StateEnum.FAILURE
+        else:
+            raise ValueError(f"cannot let {what!r} fail; it must be leak or error")
+
+    def mend(self) -> None:
+        """Repair everything."""
+        self.plan.mend()
+        if self._leak is not None:
+            self._leak = imcpy.EntityState.StateEnum.NORMAL
 
     def crash(self, down_s: float = RESTART_S) -> None:
         """Let DUNE die, and start again ``down_s`` of vehicle time later: whatever it did or knew is forgotten.
@@ -441,11 +458,21 @@ class FakeDune:
             (Periodic(STEP_S, now_s), limited("SimulatedState", ids["Simulation Engine"], t.simulated_state)),
             (Periodic(1.0, now_s), plain(0, imcpy.Heartbeat)),
             (Periodic(1.0 / 3.0, now_s), plain(PLAN_ENGINE, self.plan.plan_control_state)),
+            (Periodic(1.0, now_s), self._send_leak),
             (Periodic(0.5, now_s), plain(SUPERVISOR, self.plan.vehicle_state)),
             (Periodic(1.0, now_s), plain(ids["GPS"], t.gps_fix)),
             (Periodic(1.0, now_s), plain(ids["Medium"], t.medium)),
             (Periodic(1.0, now_s), plain(ids["Navigation"], t.navigation_uncertainty)),
         ]
+
+    def _send_leak(self) -> None:
+        """The state of a leak sensor, once it has told of water: DUNE has all entities report every second."""
+        if self._leak is not None:
+            state = imcpy.EntityState()
+            state.state = self._leak
+            dry = self._leak == imcpy.EntityState.StateEnum.NORMAL
+            state.description = "active" if dry else "leak detected"
+            self._send_limited(state, self._entities[LEAK_SENSOR])
 
     def _send_stream_velocity(self) -> None:
         """As DUNE's navigation does, which compares where it drifted, or came up, with its position fixes."""

@@ -154,6 +154,23 @@ class PlanEngine:
         self._send_vehicle_state()
         self._service_at_s = now_s + ERROR_RECOVERY_S
 
+    def break_down(self, entity: str, text: str, now_s: float) -> None:
+        """Be in error, by the fault of an entity, until it is mended."""
+        self._error_entity = entity
+        running = self.maneuver is not None
+        self._halt()
+        self._error(text, now_s)
+        if running:
+            self.outcome = Outcome.FAILURE
+            self._reply_to_start(text, ok=False)
+        self._into_service()
+
+    def mend(self) -> None:
+        """Be in service again."""
+        self._error_entity = ""
+        if self.maneuver is None:
+            self._into_service()
+
     def miss_vehicle_state(self) -> None:
         """Have had no state of the supervisor for too long: the engine calls itself blocked, the maneuver goes on.
 
@@ -181,12 +198,13 @@ class PlanEngine:
         self._error(text, now_s)
         self.outcome = Outcome.FAILURE
         if is_error:
-            self.op_mode, self._error_entity = OpMode.ERROR, text.partition(":")[0]
+            broken, self._error_entity = self._error_entity, text.partition(":")[0]
+            self.op_mode = OpMode.ERROR
             self._send_vehicle_state()
             self._reply_to_start(text, ok=False)
             self.plan_state = PlanState.BLOCKED
             self._send_plan_state()
-            self._error_entity = ""
+            self._error_entity = broken
         else:
             self._reply_to_start(text, ok=False)
         self._into_service()
@@ -325,7 +343,11 @@ class PlanEngine:
         self._vehicle.stop()
 
     def _into_service(self) -> None:
-        self.op_mode, self.plan_state = OpMode.SERVICE, PlanState.READY
+        """Be ready for plans, unless something is broken."""
+        if self._error_entity:
+            self.op_mode, self.plan_state = OpMode.ERROR, PlanState.BLOCKED
+        else:
+            self.op_mode, self.plan_state = OpMode.SERVICE, PlanState.READY
         self._send_plan_state()
         self._send_vehicle_state()
 

@@ -199,6 +199,28 @@ class LinkReport:
     vehicle: str
     state: LinkState
     reason: str = ""
+    goes_home: bool = False
+    """It takes the way home that it keeps on board; engaging it ends that."""
+
+
+class FaultKind(StrEnum):
+    """What is broken on board."""
+
+    LEAK = "leak"
+    """Water where none should be."""
+    ERROR = "error"
+    """The vehicle has been in error for seconds."""
+
+
+@dataclass(frozen=True, slots=True)
+class FaultReport:
+    """Something broke on board, told once, and once more with ``over`` when it is no longer broken."""
+
+    vehicle: str
+    time_s: float
+    kind: FaultKind
+    reason: str
+    over: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -209,7 +231,16 @@ class RestartReport:
     reason: str
 
 
-FleetEvent = VehicleReport | SoundingReport | RangeReport | ScanReport | WaypointReport | LinkReport | RestartReport
+FleetEvent = (
+    VehicleReport
+    | SoundingReport
+    | RangeReport
+    | ScanReport
+    | WaypointReport
+    | LinkReport
+    | FaultReport
+    | RestartReport
+)
 EventSink = Callable[[FleetEvent], None]
 
 
@@ -225,6 +256,10 @@ class VehicleInfo:
     address: str | None = None
     imc_id: int | None = None
     report: VehicleReport | None = None
+    goes_home: bool = False
+    """It takes the way home that it keeps on board."""
+    faults: tuple[FaultReport, ...] = ()
+    """What is broken on board now."""
     details: dict[str, str] = field(default_factory=dict)
     advice: str = ""
     """What the operator should change about how it is used; told once in the mission's log."""

@@ -8,7 +8,7 @@ from typing import Any
 import imcpy
 import pytest
 
-from imc_bridge import Bridge, BridgeSettings, NodeState, RefusedError, Waypoint, WaypointStatus
+from imc_bridge import Bridge, BridgeSettings, LinkChange, NodeState, RefusedError, Waypoint, WaypointStatus
 from imc_bridge.control.guard import AltitudeGuard
 from imc_bridge.control.way_home import guarded, home_plan
 from imc_bridge.nodes.node import Node
@@ -141,7 +141,10 @@ async def test_when_the_console_dies_the_vehicle_goes_home_and_the_next_one_take
         again: Bridge = await sea.connect()
         await until(lambda: "goes home" in again.nodes()[0].reason if again.nodes() else False, "it is heard")
         assert sea.state(name) is NodeState.IN_PLAN
+        assert again.nodes()[0].goes_home
+        assert any(change.goes_home for change in sea.of(LinkChange))
         await again.engage(name)
+        assert not again.nodes()[0].goes_home
         sea.bridge.goto(name, sea.waypoint(2, 50, 50, 1.0))
         await sea.reached(name, 2)
         assert sea.statuses(name, 2)[-1] is WaypointStatus.REACHED

@@ -303,3 +303,33 @@ class TestRates:
     def test_wrong_limits_are_refused_with_the_form(self, text: str) -> None:
         with pytest.raises(RateLimiterError, match="Message:frequency"):
             parse_limits(text)
+
+
+class TestFaults:
+    def test_a_leak_is_told_every_second_until_it_is_mended_and_after(self, bench: Bench) -> None:
+        bench.run(5.0, bench.beat)
+        assert bench.all(imcpy.EntityState) == []
+        bench.node.fail("leak")
+        bench.run(5.0, bench.beat)
+        bench.node.mend()
+        bench.run(5.0, bench.beat)
+        kinds = imcpy.EntityState.StateEnum
+        states = [state.state for state in bench.all(imcpy.EntityState)]
+        assert (states.count(kinds.FAILURE), states.count(kinds.NORMAL)) == (5, 5)
+
+    def test_in_error_it_takes_no_plan_until_it_is_mended(self, bench: Bench) -> None:
+        bench.node.fail("error")
+        bench.say(imcpy.Abort())
+        bench.run(5.0, bench.beat)
+        assert bench.states() == (2, 0)
+        state = bench.last(imcpy.VehicleState)
+        assert (state.error_ents, state.error_count) == ("Motor", 1)
+        bench.say(start_request())
+        assert bench.states() == (2, 0)
+        bench.node.mend()
+        bench.say(start_request())
+        assert bench.states() == (3, 3)
+
+    def test_only_what_is_known_can_fail(self, bench: Bench) -> None:
+        with pytest.raises(ValueError, match="leak or error"):
+            bench.node.fail("radio")

@@ -10,6 +10,8 @@ from app.missions.fleet.interface import (
     BeamGeometry,
     Deployment,
     EventSink,
+    FaultKind,
+    FaultReport,
     FleetEvent,
     FleetLink,
     LinkCapabilities,
@@ -33,6 +35,7 @@ from imc_bridge import (
     Bridge,
     BridgeEvent,
     BridgeSettings,
+    Fault,
     Guidance,
     LinkChange,
     NodeState,
@@ -233,7 +236,10 @@ def _translate(event: BridgeEvent) -> FleetEvent | None:
             )
             return RestartReport(event.vehicle, words)
         case LinkChange():
-            return LinkReport(event.vehicle, _link_state(event.state, event.engaged, event.ours), event.reason)
+            state = _link_state(event.state, event.engaged, event.ours)
+            return LinkReport(event.vehicle, state, event.reason, event.goes_home)
+        case Fault():
+            return fault_report(event)
         case _:
             # A refused Distance is counted in the vehicle's details.
             return None
@@ -288,6 +294,11 @@ def range_report(event: TargetRange) -> RangeReport:
     )
 
 
+def fault_report(event: Fault) -> FaultReport:
+    """A fault that the bridge heard of, as missions know it."""
+    return FaultReport(event.vehicle, event.time_s, FaultKind(event.kind.value), event.reason, event.over)
+
+
 def vehicle_report(state: StateReport) -> VehicleReport:
     """What the bridge heard of a vehicle, as missions know it."""
     return VehicleReport(
@@ -328,6 +339,8 @@ def _info(node: NodeView) -> VehicleInfo:
         address=node.address,
         imc_id=node.imc_id,
         report=None if node.report is None else vehicle_report(node.report),
+        goes_home=node.goes_home,
+        faults=tuple(fault_report(fault) for fault in node.faults),
         details={key: value for key, value in details.items() if value is not None},
         # Only a vehicle that came back shows that it was radio that ended.
         advice=". ".join(radio_gap_words(node.radio_gaps)) if node.radio_gaps and node.state not in _SILENT else "",

@@ -5,6 +5,8 @@ from typing import Any
 import pytest
 
 from app.missions.fleet.interface import (
+    FaultKind,
+    FaultReport,
     LinkReport,
     LinkState,
     Position,
@@ -102,5 +104,22 @@ async def test_a_way_home_is_kept_on_board() -> None:
                 await link.keep_way_home("nobody", [Position(lat, lon, 0.0)], 1.1)
             with pytest.raises(VehicleRefusedError, match="never heard of"):
                 await link.drop_way_home("nobody")
+        finally:
+            await link.close()
+
+
+async def test_faults_on_board_are_told() -> None:
+    async with open_sea() as sea:
+        await sea.bridge.close()
+        link = ImcFleetLink(sea.settings)
+        events: list[Any] = []
+        await link.start(events.append)
+        try:
+            await until(lambda: [v.state for v in link.vehicles()] == [LinkState.READY], "it is ready")
+            sea.fleet.nodes[0].fail("leak")
+            await until(lambda: any(isinstance(event, FaultReport) for event in events), "the leak is told")
+            (fault,) = (event for event in events if isinstance(event, FaultReport))
+            assert (fault.kind, fault.over) == (FaultKind.LEAK, False)
+            assert link.vehicles()[0].faults == (fault,)
         finally:
             await link.close()
