@@ -245,6 +245,17 @@ class StopResult:
 
 
 @dataclass(frozen=True, slots=True)
+class LostComms:
+    """How DUNE's task that starts a way home is configured: the plan's name, and seconds without a console as it says.
+
+    It is on board; what it starts need not be.
+    """
+
+    plan_name: str
+    timeout: str
+
+
+@dataclass(frozen=True, slots=True)
 class NodeView:
     """All that is known of one node at one moment. Ages are seconds of the wall clock."""
 
@@ -290,6 +301,10 @@ class NodeView:
     faults: tuple[Fault, ...] = ()
     goes_home: bool = False
     """Executes the way home that we left on board."""
+    runs_lost_comms: bool | None = None
+    """Whether the task that starts a way home runs on board; None while that is not known."""
+    lost_comms: LostComms | None = None
+    """How that task is configured, once it has told."""
     way_home: str = ""
     """Whether it keeps a way home on board, in words."""
     restarts: int = 0

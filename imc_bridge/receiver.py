@@ -338,8 +338,7 @@ class Hearing:
             case "EntityParameters":
                 if rates is not None:
                     rates.answered(message, now)
-                if way_home is not None:
-                    way_home.answered(message)
+                node.take_parameters(message)
             case "PlanDB" if way_home is not None and int(message.dst) == self._settings.id:
                 way_home.replied(message)
 

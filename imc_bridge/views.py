@@ -57,6 +57,8 @@ def view_of(
         rate_limiters=rate_limiters,
         faults=node.faults.present,
         goes_home=node.home_bound,
+        runs_lost_comms=None if node.entities is None else node.lost_comms_task is not None,
+        lost_comms=node.lost_comms,
         way_home=way_home,
         restarts=node.boots,
         radio_gaps=node.radio_gaps,

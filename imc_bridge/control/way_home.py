@@ -23,16 +23,13 @@ from imc_bridge.control.control import Refusal
 from imc_bridge.control.guard import FARTHEST_M, AltitudeGuard
 from imc_bridge.control.places import Place, distance_m
 from imc_bridge.control.plans import goto_maneuver, goto_plan, station_maneuver
-from imc_bridge.control.rates import parameter_query
 from imc_bridge.events import NodeState, Waypoint
 from imc_bridge.network.codec import Message
 from imc_bridge.network.text_fields import text
+from imc_bridge.nodes.lost_comms import DEFAULT_PLAN_NAME
 from imc_bridge.nodes.node import Node
 from imc_bridge.settings import BridgeSettings
 
-DEFAULT_PLAN_NAME = "lostcomms"
-PLAN_NAME, TIMEOUT = "Plan Name", "Lost Comms Timeout"
-"""Parameters of the task."""
 RETRY_S = 2.0
 TRIES = 5
 LATER_S = 30.0
@@ -51,7 +48,7 @@ class Step(StrEnum):
     """What is to be done next on board."""
 
     NOTHING = "nothing"
-    ASK = "ask for the task's parameters"
+    WAIT = "wait for the task's parameters"
     STORE = "store"
     DISARM = "disarm"
     DELETE = "delete"
@@ -87,8 +84,6 @@ class WayHome:
         self._way: tuple[Waypoint, ...] = ()
         self._stopped = False
         self._step = Step.NOTHING
-        self._plan_name: str | None = None
-        self._timeout = ""
         self._tries = 0
         self._due = -math.inf
         self._request_id = -1
@@ -103,20 +98,21 @@ class WayHome:
         """How far it has come, in words; empty when there is none."""
         if self.refusal is not None:
             return f"not kept: {self.refusal.reason}"
-        if self._step in (Step.ASK, Step.STORE):
+        if self._step in (Step.WAIT, Step.STORE):
             return "being stored"
         if not self._way:
             return ""
         if self._stopped:
             return "disarmed while it is stopped"
-        return "kept on board" + (f", started after {self._timeout} s without a console" if self._timeout else "")
+        task = self._node.lost_comms
+        return "kept on board" + (f", started after {task.timeout} s without a console" if task is not None else "")
 
     # What the bridge's user asks
 
     def keep(self, way: Sequence[Waypoint]) -> None:
         """Store this way in place of the former one."""
         self._way, self._stopped = tuple(way), False
-        self._next(Step.ASK if self._plan_name is None else Step.STORE)
+        self._next(Step.WAIT)
 
     def drop(self) -> None:
         """Leave nothing on board."""
@@ -137,23 +133,9 @@ class WayHome:
     # What the vehicle says
 
     def restarted(self) -> None:
-        """DUNE has restarted and may be configured otherwise; its task has forgotten the plan."""
-        self._plan_name = None
+        """DUNE has restarted: its task has forgotten the plan."""
         if self._way and not self._stopped:
             self.keep(self._way)
-
-    def answered(self, message: Message) -> None:
-        """EntityParameters: those of the task."""
-        if self._step is not Step.ASK or text(message, "name") != self._task():
-            return
-        values = {
-            text(parameter, "name"): text(parameter, "value")
-            for parameter in message.params
-            if isinstance(parameter, imcpy.EntityParameter)
-        }
-        self._plan_name = values.get(PLAN_NAME) or DEFAULT_PLAN_NAME
-        self._timeout = values.get(TIMEOUT, "")
-        self._next(Step.STORE)
 
     def replied(self, message: Message) -> None:
         """PlanDB to us: whether it was done."""
@@ -181,28 +163,26 @@ class WayHome:
             return
         if self._node.status(now).state in _OUT_OF_REACH:
             self._unconfirmed("it is out of reach", now)
+        elif self._step is Step.WAIT:
+            self._wait(now)
         elif now < self._due:
             return
-        elif self._step is Step.ASK:
-            self._ask(now)
         elif self._tries >= TRIES:
             self._unconfirmed(f"no answer of its plan database to {TRIES} requests", now + LATER_S)
         else:
             self._count(now)
             self._send(self._request())
 
-    def _ask(self, now: float) -> None:
-        task = self._task()
-        if self._node.entities is not None and task is None:
+    def _wait(self, now: float) -> None:
+        """Wait until it is known how the task is configured; whoever does not tell has DUNE's defaults, likely."""
+        node = self._node
+        if node.entities is not None and node.lost_comms_task is None:
             self._next(Step.NOTHING)
             self.refusal = NOT_ON_BOARD
-        elif self._tries >= TRIES:
-            # It has the task and says nothing of it, or does not say what it has: DUNE's own name is the best guess.
+        elif node.lost_comms is not None or self._tries >= TRIES:
             self._next(Step.STORE)
-        else:
+        elif now >= self._due:
             self._count(now)
-            if task is not None:
-                self._send(parameter_query(task))
 
     def _count(self, now: float) -> None:
         self._tries += 1
@@ -216,17 +196,13 @@ class WayHome:
         self._step, self._tries, self._due, self.refusal = step, 0, -math.inf, None
         self._request_id = next(self._request_ids) & 0xFFFF
 
-    def _task(self) -> str | None:
-        """Label of the task among the vehicle's entities."""
-        names = (self._node.entities or {}).values()
-        return next((name for name in names if name.casefold().replace(" ", "").startswith("lostcomms")), None)
-
     def _request(self) -> Message:
         request = imcpy.PlanDB()
         request.type = imcpy.PlanDB.TypeEnum.REQUEST
         request.op = _Operation.DEL if self._step is Step.DELETE else _Operation.SET
         request.request_id = self._request_id
-        request.plan_id = self._plan_name or DEFAULT_PLAN_NAME
+        task = self._node.lost_comms
+        request.plan_id = DEFAULT_PLAN_NAME if task is None else task.plan_name
         if self._step is Step.STORE:
             request.arg = home_plan(request.plan_id, self._node.home_prefix, self._way)
         return request

@@ -14,11 +14,12 @@ from enum import IntEnum
 
 from imcpy.coordinates import toWGS84
 
-from imc_bridge.events import NodeState, StateReport
+from imc_bridge.events import LostComms, NodeState, StateReport
 from imc_bridge.network.codec import Message
 from imc_bridge.network.discovery import MAX_NAME, Announcement
 from imc_bridge.network.text_fields import text
 from imc_bridge.network.transport import Address
+from imc_bridge.nodes.lost_comms import is_lost_comms, read_lost_comms
 from imc_bridge.nodes.plausibility import PlausiblePlace, Step
 from imc_bridge.nodes.refusals import Refused
 from imc_bridge.nodes.vehicle_clock import Tick, VehicleClock
@@ -157,6 +158,9 @@ class Node:
 
         self.entities: dict[int, str] | None = None
         self.entities_asked_at = -math.inf
+        self.lost_comms: LostComms | None = None
+        self.lost_comms_asked = 0
+        """How often it was asked for that."""
         self.operation_mode: int | None = None
         self.operation_mode_at: float | None = None
         self.error_text = ""
@@ -223,12 +227,15 @@ class Node:
         """Note that its telemetry shows a restart, which its announce will show later."""
         self.boots += 1
         self._restart_seen = True
-        self.entities = None
-        self.entities_asked_at = -math.inf
+        self._forget_entities()
+
+    def _forget_entities(self) -> None:
+        """It may be configured otherwise now."""
+        self.entities = self.lost_comms = None
+        self.entities_asked_at, self.lost_comms_asked = -math.inf, 0
 
     def _forget_plan(self) -> None:
-        self.entities = None
-        self.entities_asked_at = -math.inf
+        self._forget_entities()
         self.operation_mode = self.plan_state = None
         self.operation_mode_at = self.plan_state_at = None
         self.plan_id = self.maneuver_id = ""
@@ -388,6 +395,16 @@ class Node:
     def take_entities(self, message: Message) -> None:
         """EntityList report: ``Name=id;…``."""
         self.entities = listed_entities(message) or self.entities
+
+    @property
+    def lost_comms_task(self) -> str | None:
+        """Name of the task that starts a plan when no console is heard, None where it does not run or is not known."""
+        return next(filter(is_lost_comms, (self.entities or {}).values()), None)
+
+    def take_parameters(self, message: Message) -> None:
+        """EntityParameters of that task."""
+        if text(message, "name") == self.lost_comms_task:
+            self.lost_comms = read_lost_comms(message)
 
     def entity_name(self, entity: int) -> str | None:
         """Name of an entity, None while names are unknown; an id the list lacks has the name ``entity N``."""

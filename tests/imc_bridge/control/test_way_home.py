@@ -142,9 +142,9 @@ async def test_when_the_console_dies_the_vehicle_goes_home_and_the_next_one_take
         await until(lambda: "goes home" in again.nodes()[0].reason if again.nodes() else False, "it is heard")
         assert sea.state(name) is NodeState.IN_PLAN
         assert again.nodes()[0].goes_home
-        assert any(change.goes_home for change in sea.of(LinkChange))
+        await until(lambda: any(change.goes_home for change in sea.of(LinkChange)), "that is told")
         await again.engage(name)
-        assert not again.nodes()[0].goes_home
+        await until(lambda: not again.nodes()[0].goes_home, "it is ours again")
         sea.bridge.goto(name, sea.waypoint(2, 50, 50, 1.0))
         await sea.reached(name, 2)
         assert sea.statuses(name, 2)[-1] is WaypointStatus.REACHED
