@@ -71,7 +71,8 @@ class Crew:
         """Whether a node is led, is being stopped, or has rates to be restored."""
         control, rates = self.get(node), self.asked_rates(node)
         busy = control is not None and (control.engaged or control.phase is Phase.STOPPING)
-        busy = busy or node.imc_id in self._ways_home
+        way_home = self.way_home(node)
+        busy = busy or (way_home is not None and way_home.wanted)
         return busy or (rates is not None and rates.restoring)
 
     def forget(self, node: Node) -> None:
@@ -111,8 +112,9 @@ class Crew:
         control, rates = self.get(node), self.asked_rates(node)
         if control is not None:
             control.tick(now)
-        if node.imc_id in self._ways_home:
-            self._ways_home[node.imc_id].tick(now)
+        way_home = self.way_home(node)
+        if way_home is not None:
+            way_home.tick(now)
         if rates is not None and rates.restoring:
             rates.tick(now)
         elif rates is not None and rates.pending and self.engaged(node):

@@ -89,6 +89,11 @@ class WayHome:
         self._request_id = -1
 
     @property
+    def wanted(self) -> bool:
+        """Whether there is one, or one is still to be removed."""
+        return bool(self._way) or self._step is not Step.NOTHING
+
+    @property
     def busy(self) -> bool:
         """Whether an answer is still to be expected."""
         return self._step is not Step.NOTHING and self.refusal is None
@@ -110,9 +115,11 @@ class WayHome:
     # What the bridge's user asks
 
     def keep(self, way: Sequence[Waypoint]) -> None:
-        """Store this way in place of the former one."""
-        self._way, self._stopped = tuple(way), False
-        self._next(Step.WAIT)
+        """Store this way in place of the former one, unless it is there already."""
+        there = self._step is Step.NOTHING and self.refusal is None and not self._stopped
+        if not there or tuple(way) != self._way:
+            self._way = tuple(way)
+            self._store()
 
     def drop(self) -> None:
         """Leave nothing on board."""
@@ -128,14 +135,14 @@ class WayHome:
     def engaged(self) -> None:
         """Store it again, which arms it after a stop, an abort or a restart."""
         if self._way:
-            self.keep(self._way)
+            self._store()
 
     # What the vehicle says
 
     def restarted(self) -> None:
         """DUNE has restarted: its task has forgotten the plan."""
         if self._way and not self._stopped:
-            self.keep(self._way)
+            self._store()
 
     def replied(self, message: Message) -> None:
         """PlanDB to us: whether it was done."""
@@ -184,12 +191,17 @@ class WayHome:
         elif now >= self._due:
             self._count(now)
 
+    def _store(self) -> None:
+        self._stopped = False
+        self._next(Step.WAIT)
+
     def _count(self, now: float) -> None:
         self._tries += 1
         self._due = now + RETRY_S
 
     def _unconfirmed(self, reason: str, again_at: float) -> None:
-        self.refusal = Refusal(f"its way home is not confirmed: {reason}", "It is sent again when the vehicle answers")
+        words = f"what it is to keep as its way home is not confirmed: {reason}"
+        self.refusal = Refusal(words, "It is sent again when the vehicle answers")
         self._tries, self._due = 0, again_at
 
     def _next(self, step: Step) -> None:

@@ -84,6 +84,9 @@ async def test_it_is_stored_replaced_and_removed() -> None:
         assert said(sea) == "kept on board, started after 60 s without a console"
         await sea.bridge.keep_way_home(name, way(sea, HOME_M))
         assert len(on_board(sea).maneuvers) == 2
+        there = on_board(sea)
+        await sea.bridge.keep_way_home(name, way(sea, HOME_M))
+        assert on_board(sea) is there, "it is not stored twice"
         await sea.bridge.drop_way_home(name)
         assert on_board(sea) is None
         assert said(sea) == ""
