@@ -4,6 +4,8 @@ from imc_bridge.bridge import Bridge
 from imc_bridge.events import (
     BottomPoint,
     BridgeEvent,
+    Fault,
+    FaultKind,
     Guidance,
     LinkChange,
     NodeState,
@@ -28,6 +30,8 @@ __all__ = [
     "Bridge",
     "BridgeEvent",
     "BridgeSettings",
+    "Fault",
+    "FaultKind",
     "Guidance",
     "LinkChange",
     "NodeState",

@@ -7,10 +7,11 @@ import contextlib
 import logging
 import time
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from imc_bridge.control.control import Phase
 from imc_bridge.control.controls import Crew
+from imc_bridge.control.way_home import MOST_PLACES, guarded
 from imc_bridge.events import (
     BridgeEvent,
     EventCallback,
@@ -25,6 +26,7 @@ from imc_bridge.events import (
 from imc_bridge.links import Links
 from imc_bridge.network.drops import DropMeter
 from imc_bridge.network.transport import Address, Transport
+from imc_bridge.nodes.node import Node
 from imc_bridge.nodes.roster import Roster
 from imc_bridge.receiver import Hearing
 from imc_bridge.sender import Speaker
@@ -147,8 +149,9 @@ class Bridge:
         """Stop every engaged vehicle, restore rates, release the ports; safe to repeat."""
         if self._task is None:
             return
-        busy = [control.node.name for control in self._crew if control.engaged or control.phase is Phase.STOPPING]
-        await asyncio.gather(*(self.stop(name, timeout_s=CLOSE_TIMEOUT_WALL_S) for name in busy))
+        busy = [control.node for control in self._crew if control.engaged or control.phase is Phase.STOPPING]
+        # Nobody leads them from here on: their ways home stay armed.
+        await asyncio.gather(*(self._stop(node, CLOSE_TIMEOUT_WALL_S) for node in busy))
         self._crew.restore_rates()
         self._task.cancel()
         with contextlib.suppress(asyncio.CancelledError):
@@ -192,6 +195,7 @@ class Bridge:
                 engaged=self._crew.engaged(node),
                 history=self._links.history(node),
                 rate_limiters=self._crew.rates_text(node),
+                way_home=way_home.text if (way_home := self._crew.way_home(node)) is not None else "",
             )
             for node in self._roster
         )
@@ -219,12 +223,7 @@ class Bridge:
         RefusedError
             When the vehicle is unknown, silent, busy with another console's plan, or refuses.
         """
-        if not self._commanding:
-            raise RefusedError(vehicle, "this bridge only listens", "Use one that may command")
-        node = self._roster.named(vehicle)
-        if node is None:
-            known = ", ".join(n.name for n in self._roster if n.is_vehicle) or "none"
-            raise RefusedError(vehicle, f"never heard of (known: {known})", "Switch it on; see `bathyfleet doctor`")
+        node = self._commanded(vehicle)
         self.want(vehicle)
         self._crew.guide(node, guidance)
         control = self._crew.of(node)
@@ -232,12 +231,57 @@ class Bridge:
             self._crew.attach_sound(node, gateway, self._roster, self._now)
         if not control.engaged and control.engage(self._now()):
             self._crew.rates_of(node).begin()
+            way_home = self._crew.way_home(node)
+            if way_home is not None:
+                way_home.engaged()
         while control.engaged and control.phase is not Phase.FOLLOWING:
             await self._turn.wait()
         if not control.engaged:
             refusal = control.refusal
             reason = refusal.reason if refusal else "stopped while it was being engaged"
             raise RefusedError(vehicle, reason, refusal.remedy if refusal else "Engage it again")
+
+    def _commanded(self, vehicle: str) -> Node:
+        """Return a vehicle that may be commanded. Raises RefusedError."""
+        if not self._commanding:
+            raise RefusedError(vehicle, "this bridge only listens", "Use one that may command")
+        node = self._roster.named(vehicle)
+        if node is None:
+            known = ", ".join(n.name for n in self._roster if n.is_vehicle) or "none"
+            raise RefusedError(vehicle, f"never heard of (known: {known})", "Switch it on; see `bathyfleet doctor`")
+        return node
+
+    async def keep_way_home(self, vehicle: str, way: Sequence[Waypoint]) -> None:
+        """Store a way home on board, in place of the former one; return when the vehicle confirms it.
+
+        The vehicle's own supervisor starts it when no console was heard for minutes after a plan that failed. It is
+        armed while the vehicle is ours or lost: a stop disarms it, engaging the vehicle arms it again.
+
+        Raises
+        ------
+        RefusedError
+            When it is not confirmed; it is sent again when the vehicle answers, unless it has nothing to start it with.
+        """
+        node = self._commanded(vehicle)
+        if not 0 < len(way) <= MOST_PLACES:
+            raise RefusedError(vehicle, f"its way home has {len(way)} places", f"Give it 1 to {MOST_PLACES}")
+        self._crew.way_home_of(node).keep(guarded(way, self._crew.of(node).guard, node, self._now()))
+        await self._confirmed(node)
+
+    async def drop_way_home(self, vehicle: str) -> None:
+        """Leave no way home on board; raises RefusedError when that is not confirmed."""
+        node = self._commanded(vehicle)
+        self._crew.way_home_of(node).drop()
+        await self._confirmed(node)
+
+    async def _confirmed(self, node: Node) -> None:
+        way_home = self._crew.way_home_of(node)
+        while way_home.busy:
+            if not self._speaker.talks_to(node):
+                raise RefusedError(node.name, "we do not talk to it", "See `imc.vehicles` in the settings")
+            await self._turn.wait()
+        if way_home.refusal is not None:
+            raise RefusedError(node.name, way_home.refusal.reason, way_home.refusal.remedy)
 
     def intervention(self, vehicle: str) -> str:
         """Return why a vehicle left us of its own or another console's will, until :meth:`stop` is called; else ''."""
@@ -275,7 +319,13 @@ class Bridge:
             return StopResult(vehicle, False, "never heard of")
         if not self._commanding:
             return StopResult(vehicle, False, "this bridge only listens")
-        control = self._crew.of(node)
+        way_home = self._crew.way_home(node)
+        if way_home is not None:
+            way_home.stopped()
+        return await self._stop(node, timeout_s)
+
+    async def _stop(self, node: Node, timeout_s: float) -> StopResult:
+        vehicle, control = node.name, self._crew.of(node)
         if node.status(self._now()).state in (NodeState.LOST, NodeState.EXPECTED_OFFLINE):
             # It is out of reach, and is stopped when its packets arrive again.
             timeout_s = min(timeout_s, SILENT_STOP_WALL_S)

@@ -95,7 +95,13 @@ class StateReport:
     speed_mps: float
     altitude_m: float | None = None
     battery_pct: float | None = None
+    battery_confidence_pct: float | None = None
+    """How sure the vehicle is of that level; DUNE itself does not trust one below 40 %."""
+    energy_left_s: float | None = None
+    """For how long that lasts under way, by the vehicle's own reckoning."""
     position_sd_m: float | None = None
+    current_mps: tuple[float, float] | None = None
+    """Velocity of the water over ground, east and north, as the vehicle estimated it last."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -173,6 +179,8 @@ class LinkChange:
     """Executes a plan of ours, perhaps of an earlier run."""
     at_s: float = 0.0
     """When, by our wall clock (Unix seconds)."""
+    goes_home: bool = False
+    """Executes the way home that we left on board."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -186,6 +194,26 @@ class Restarted:
     submerged: bool
 
 
+class FaultKind(StrEnum):
+    """What is broken on board."""
+
+    LEAK = "leak"
+    """Water where none should be."""
+    ERROR = "error"
+    """The vehicle has been in error for seconds."""
+
+
+@dataclass(frozen=True, slots=True)
+class Fault:
+    """Something broke on board, or with ``over`` is no longer broken; ``time_s`` is the vehicle's clock."""
+
+    vehicle: str
+    time_s: float
+    kind: FaultKind
+    reason: str
+    over: bool = False
+
+
 @dataclass(frozen=True, slots=True)
 class PacketsDropped:
     """Within the last second this machine threw ``count`` packets away because our socket was full."""
@@ -194,7 +222,15 @@ class PacketsDropped:
 
 
 BridgeEvent = (
-    StateReport | Sounding | SoundingRefused | TargetRange | WaypointChange | LinkChange | Restarted | PacketsDropped
+    StateReport
+    | Sounding
+    | SoundingRefused
+    | TargetRange
+    | WaypointChange
+    | LinkChange
+    | Restarted
+    | Fault
+    | PacketsDropped
 )
 EventCallback = Callable[[BridgeEvent], None]
 
@@ -206,6 +242,17 @@ class StopResult:
     vehicle: str
     acknowledged: bool
     detail: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class LostComms:
+    """How DUNE's task that starts a way home is configured: the plan's name, and seconds without a console as it says.
+
+    It is on board; what it starts need not be.
+    """
+
+    plan_name: str
+    timeout: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -251,6 +298,15 @@ class NodeView:
     history: tuple[LinkChange, ...] = ()
     """The last changes of its link, oldest first."""
     rate_limiters: str = ""
+    faults: tuple[Fault, ...] = ()
+    goes_home: bool = False
+    """Executes the way home that we left on board."""
+    runs_lost_comms: bool | None = None
+    """Whether the task that starts a way home runs on board; None while that is not known."""
+    lost_comms: LostComms | None = None
+    """How that task is configured, once it has told."""
+    way_home: str = ""
+    """Whether it keeps a way home on board, in words."""
     restarts: int = 0
     """How often DUNE on board restarted while we listened."""
     radio_gaps: int = 0

@@ -51,6 +51,6 @@ class Links:
         silent = status.state in (NodeState.LOST, NodeState.EXPECTED_OFFLINE)
         if same and (silent or (known is not None and known.reason == reason)):
             return
-        change = LinkChange(node.name, status.state, engaged, reason, node.ours, self._wall_clock())
+        change = LinkChange(node.name, status.state, engaged, reason, node.ours, self._wall_clock(), node.home_bound)
         past.append(change)
         self._tell(change)

@@ -8,7 +8,7 @@ import imcpy
 
 from imc_bridge.control.control import Control
 from imc_bridge.control.controls import Crew
-from imc_bridge.events import BridgeEvent, Restarted, Sounding
+from imc_bridge.events import BridgeEvent, Fault, Restarted, Sounding
 from imc_bridge.links import Links
 from imc_bridge.network.codec import BROADCAST_ID, Decoder, Header, Message, without_argument
 from imc_bridge.network.discovery import Announcement, read_announce
@@ -20,6 +20,7 @@ from imc_bridge.nodes.roster import Roster
 from imc_bridge.nodes.vehicle_clock import Tick
 from imc_bridge.sender import Speaker
 from imc_bridge.settings import BridgeSettings
+from imc_bridge.telemetry.faults import is_leak_sensor
 from imc_bridge.telemetry.ranges import MESSAGES as RANGE_MESSAGES
 from imc_bridge.telemetry.soundings import offer_distance
 
@@ -28,18 +29,22 @@ WANTED = (
     "Distance",
     "EntityList",
     "EntityParameters",
+    "EntityState",
     "EstimatedState",
+    "EstimatedStreamVelocity",
     "FollowRefState",
     "FuelLevel",
     "Heartbeat",
     "NavigationUncertainty",
     "PlanControl",
     "PlanControlState",
+    "PlanDB",
     "TransmissionStatus",
     "VehicleMedium",
     "VehicleState",
     *RANGE_MESSAGES,
 )
+ENTITY_STATE = int(imcpy.EntityState().msg_id)
 SIMULATED_STATE = int(imcpy.SimulatedState().msg_id)
 MAX_PLAUSIBLE_VEHICLE_TIME_S = 4e9
 ANNOUNCE_AGAIN_S = 1.0
@@ -176,7 +181,9 @@ class Hearing:
 
     def _reboot(self, node: Node, now: float) -> None:
         self._tell(Restarted(node.name, node.submerged))
-        control = self._crew.get(node)
+        control, way_home = self._crew.get(node), self._crew.way_home(node)
+        if way_home is not None:
+            way_home.restarted()
         if control is not None:
             control.rebooted(now)
             if control.engaged:
@@ -208,6 +215,10 @@ class Hearing:
             # DUNE's simulation lets that one through where radio would not reach.
             sender.heard(now, address)
         if not self.decoder.wants(header):
+            return
+        if header.msg_id == ENTITY_STATE and not is_leak_sensor(sender.entity_name(header.src_ent)):
+            # Dozens of entities tell how they are every second.
+            self.decoder.unwanted["EntityState"] += 1
             return
         message = self.decoder.message(without_argument(packet))
         if message is not None and 0.0 < message.timestamp < MAX_PLAUSIBLE_VEHICLE_TIME_S:
@@ -276,7 +287,7 @@ class Hearing:
     def _take_message(self, node: Node, message: Message, now: float, address: Address) -> None:
         name = type(message).__name__
         control = self._crew.get(node)
-        rates = self._crew.asked_rates(node)
+        rates, way_home = self._crew.asked_rates(node), self._crew.way_home(node)
         tick = node.take_time(message.timestamp, now, self._wall_clock())
         if tick is Tick.DOUBTFUL:
             self.admission.refuse(Refused.OLD, address)
@@ -303,8 +314,11 @@ class Hearing:
                 if node.take_vehicle_state(message, now):
                     node.restarted()
                     self._reboot(node, now)
+                self._tell_fault(node.faults.take_vehicle_state(message, node.error_text))
                 if control is not None:
                     control.vehicle_state_changed(now)
+            case "EntityState":
+                self._tell_fault(node.faults.take_entity(node.entity_name(int(message.src_ent)) or "", message))
             case "FollowRefState" if control is not None:
                 control.follow_state(message, now)
             case "PlanControl" if control is not None and int(message.dst) == self._settings.id:
@@ -315,12 +329,18 @@ class Hearing:
                 for other in self._crew.by_sound_through(node):
                     if other.sound is not None:
                         other.left_by_sound(other.sound.status(message), now)
+            case "EstimatedStreamVelocity":
+                node.take_stream(message)
             case "FuelLevel":
                 node.take_fuel(message)
             case "EntityList" if message.op == imcpy.EntityList.OperationEnum.REPORT:
                 node.take_entities(message)
-            case "EntityParameters" if rates is not None:
-                rates.answered(message, now)
+            case "EntityParameters":
+                if rates is not None:
+                    rates.answered(message, now)
+                node.take_parameters(message)
+            case "PlanDB" if way_home is not None and int(message.dst) == self._settings.id:
+                way_home.replied(message)
 
     def _take_state(self, node: Node, control: Control | None, message: Message, now: float, address: Address) -> None:
         report = node.take_state(message)
@@ -339,6 +359,10 @@ class Hearing:
             self._tell(result)
         for measured in node.ranges.resolve(node.history, node.position_sd_m()):
             self._tell(measured)
+
+    def _tell_fault(self, fault: Fault | None) -> None:
+        if fault is not None:
+            self._tell(fault)
 
     def _take_distance(self, node: Node, message: Message) -> None:
         refused = offer_distance(node.intake, node.entity_name(int(message.src_ent)), message)

@@ -7,6 +7,7 @@ from collections.abc import Callable
 
 import imcpy
 
+from imc_bridge.control.rates import parameter_query
 from imc_bridge.network.codec import Message, encode
 from imc_bridge.network.consoles import Board
 from imc_bridge.network.discovery import Announcement, own_announce
@@ -16,6 +17,7 @@ from imc_bridge.nodes.roster import Roster
 from imc_bridge.settings import BridgeSettings
 
 ENTITY_QUERY_S = 2.0
+PARAMETER_TRIES = 5
 
 
 def entity_query() -> Message:
@@ -79,6 +81,7 @@ class Speaker:
         for node in self._roster:
             if node.is_vehicle and self.talks_to(node):
                 self._ask_for_names(node, now)
+                self._ask_for_supervisor(node, now)
         for message in self.board.due(now):
             for node in self._roster:
                 if self._is_other_console(node):
@@ -88,6 +91,15 @@ class Speaker:
         if node.entities is None and node.heard_at is not None and now - node.entities_asked_at >= ENTITY_QUERY_S:
             node.entities_asked_at = now
             self.send(node, entity_query())
+
+    def _ask_for_supervisor(self, node: Node, now: float) -> None:
+        """Ask how the task is configured that starts a plan when no console is heard."""
+        task = node.lost_comms_task
+        untold = task is not None and node.lost_comms is None and node.lost_comms_asked < PARAMETER_TRIES
+        if task is not None and untold and now - node.entities_asked_at >= ENTITY_QUERY_S:
+            node.entities_asked_at = now
+            node.lost_comms_asked += 1
+            self.send(node, parameter_query(task))
 
     def _beat(self, node: Node) -> None:
         if node.heard_at is not None or not node.addresses:

@@ -7,7 +7,14 @@ from imc_bridge.nodes.node import Node
 
 
 def view_of(
-    node: Node, now: float, scale: float, *, engaged: bool, history: tuple[LinkChange, ...], rate_limiters: str
+    node: Node,
+    now: float,
+    scale: float,
+    *,
+    engaged: bool,
+    history: tuple[LinkChange, ...],
+    rate_limiters: str,
+    way_home: str,
 ) -> NodeView:
     """All that is known of a node at ``now``; ``scale``: seconds of the bridge's clock per second of the wall's."""
     status = node.status(now)
@@ -48,6 +55,11 @@ def view_of(
         clock_rate=node.clock.rate(scale),
         history=history,
         rate_limiters=rate_limiters,
+        faults=node.faults.present,
+        goes_home=node.home_bound,
+        runs_lost_comms=None if node.entities is None else node.lost_comms_task is not None,
+        lost_comms=node.lost_comms,
+        way_home=way_home,
         restarts=node.boots,
         radio_gaps=node.radio_gaps,
     )

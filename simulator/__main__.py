@@ -15,13 +15,17 @@ from typing import Annotated
 import typer
 
 from simulator import seafloors
+from simulator.battery import BatterySpec
 from simulator.dune import DuneFleet, DuneOptions, default_specs
+from simulator.dune.lost_comms import TIMEOUT_S
 from simulator.dune.node import DEFAULT_ANNOUNCE_PORTS
 from simulator.network import NetworkFaults
 from simulator.sensors import SensorKind, SonarNoise
 from simulator.targets import RangingNoise, TargetSpec
 from simulator.terrain import Terrain
 from simulator.terrain_files import load_terrain
+
+NEW_BATTERY = BatterySpec()
 
 app = typer.Typer(add_completion=False, rich_markup_mode=None)
 
@@ -50,6 +54,19 @@ def main(
         float, typer.Option(help="Growth of the position's variance under water, m2/s (DUNE reports 0.02).")
     ] = 0.0,
     current: Annotated[str, typer.Option(help="EAST,NORTH velocity of the water, m/s.")] = "0,0",
+    endurance: Annotated[
+        float, typer.Option(help="Minutes that a full battery lasts at --nominal-speed.")
+    ] = NEW_BATTERY.endurance_min,
+    nominal_speed: Annotated[
+        float, typer.Option(help="Speed through the water that --endurance is given for, m/s.")
+    ] = NEW_BATTERY.nominal_mps,
+    battery: Annotated[float, typer.Option(help="Level at the start, per cent.")] = NEW_BATTERY.level_pct,
+    battery_confidence: Annotated[
+        float, typer.Option(help="How sure vehicles say that they are of that level, per cent.")
+    ] = NEW_BATTERY.confidence_pct,
+    consumption_factor: Annotated[
+        float, typer.Option(help="How much is really consumed: 1.3 is 30 per cent more than --endurance says.")
+    ] = NEW_BATTERY.consumption_factor,
     start: Annotated[
         list[str] | None,
         typer.Option(help="EAST,NORTH[,DEPTH] of a vehicle in metres from the corner; once per vehicle."),
@@ -74,6 +91,12 @@ def main(
     radio_range: Annotated[
         float, typer.Option(help="Metres at which radio ends, and at the surface; 0: it does not end.", min=0.0)
     ] = 0.0,
+    lost_comms: Annotated[
+        float,
+        typer.Option(
+            help="Seconds without a console until a vehicle starts the plan stored as lostcomms; 0: never.", min=0.0
+        ),
+    ] = TIMEOUT_S,
     log_dir: Annotated[
         Path | None, typer.Option(help="Folder in which every vehicle keeps its log (Data.lsf), as DUNE does on board.")
     ] = None,
@@ -131,11 +154,13 @@ def main(
                 faults=NetworkFaults(loss=loss, delay_s=delay, jitter_s=jitter, duplicate=duplicate, reorder=reorder),
                 chatter=chatter,
                 radio_range_m=radio_range,
+                lost_comms_s=lost_comms,
                 log_dir=log_dir,
             ),
             seed=seed,
             targets=[_target(text) for text in target or []],
             ranging=RangingNoise(relative_sd=range_noise, period_s=range_period, hearing_m=hearing or math.inf),
+            battery=BatterySpec(endurance, nominal_speed, battery, consumption_factor, battery_confidence),
         )
         asyncio.run(_run(fleet, json_ready))
     except (ValueError, OSError) as error:
@@ -160,6 +185,7 @@ def _fleet(
     seed: int,
     targets: list[TargetSpec],
     ranging: RangingNoise,
+    battery: BatterySpec,
 ) -> DuneFleet:
     places = []
     for text in starts:
@@ -179,6 +205,7 @@ def _fleet(
         seed=seed,
         targets=targets,
         ranging=ranging,
+        battery=battery,
     )
 
 

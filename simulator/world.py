@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from simulator.battery import Battery, BatterySpec
 from simulator.navigation import Navigation
 from simulator.sensors import SensorKind, Sonar, SonarNoise, to_local_frame
 from simulator.terrain import Terrain
@@ -122,6 +123,8 @@ class SimulatedVehicle:
         Simulated time between measurements.
     start_time_s
         The vehicle's clock at the start.
+    battery
+        Once it is empty the motor is off: the vehicle drifts and floats up. None: energy without end.
 
     Raises
     ------
@@ -147,6 +150,7 @@ class SimulatedVehicle:
         swath_rad: float = math.radians(120.0),
         swath_beams: int = 32,
         start_time_s: float = 0.0,
+        battery: BatterySpec | None = None,
     ) -> None:
         east, north, depth = (float(value) for value in start)
         if not terrain.contains(east, north):
@@ -162,6 +166,7 @@ class SimulatedVehicle:
         self.time_s = float(start_time_s)
         self.vehicle = Vehicle(Motion(east, north, depth, heading_rad), limits, current)
         sonar_rng, navigation_rng = rng.spawn(2)
+        self.battery = None if battery is None else Battery(battery)
         self.navigation = Navigation(drift_m2ps, navigation_rng)
         self.sonar = Sonar(
             SensorKind(sensor),
@@ -301,6 +306,10 @@ class SimulatedVehicle:
         """One step of 0.1 s; returns whether a ping is due."""
         vehicle = self.vehicle
         m = vehicle.motion
+        if self.battery is not None:
+            if self.battery.empty:
+                self.stop()
+            self.battery.drain(STEP_S, 0.0 if vehicle.guidance is Guidance.IDLE else m.surge_mps)
         hit = vehicle.step(self.navigation.error_m, self.bottom_m)
         self._steps += 1
         self.time_s = self._start_time_s + self._steps * STEP_S

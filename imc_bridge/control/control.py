@@ -153,7 +153,12 @@ class Control(ABC):
 
     def _ours_or_none(self) -> bool:
         """Whether the plan in execution is ours; one that is still nameless may become ours."""
-        return self.node.plan_id in ("", self._settings.plan_id) and self.node.foreign_controller is None
+        own = self.node.plan_id in ("", self._settings.plan_id) and self.node.foreign_controller is None
+        return own or self.node.home_bound
+
+    def _runs_ours(self) -> bool:
+        """Whether what it executes is ours, be it the way home."""
+        return self.node.executing(self._settings.plan_id) or self.node.home_bound
 
     def order(self, waypoint: Waypoint, now: float) -> None:
         """Replace the current waypoint. Repeating one is harmless unless it had been refused."""
@@ -185,7 +190,7 @@ class Control(ABC):
             return
         status = self.node.status(now)
         if not self.engaged or self.phase is Phase.WAITING:
-            ours = self.node.executing(self._settings.plan_id)
+            ours = self._runs_ours()
             if status.state in (NodeState.IN_PLAN, NodeState.READY, NodeState.ACTIVE) and not ours:
                 self.stop_detail = f"was not following us; {status.reason or 'in service'}"
                 self._enter(Phase.IDLE, now)
@@ -227,20 +232,14 @@ class Control(ABC):
         if kind == PLAN_CONTROL_FAILURE and self.node.maneuvering_blocked:
             # It says that no plan runs, and goes on with its maneuver: only an abort ends that.
             self._abort_now(now)
-        elif kind == PLAN_CONTROL_SUCCESS or (
-            kind == PLAN_CONTROL_FAILURE and not self.node.executing(self._settings.plan_id)
-        ):
+        elif kind == PLAN_CONTROL_SUCCESS or (kind == PLAN_CONTROL_FAILURE and not self._runs_ours()):
             self._stopped(text(message, "info") or "plan stopped", now)
 
     def plan_state_changed(self, now: float) -> None:
         """PlanControlState has been taken in by the node."""
         if self.phase is Phase.ENDED:
             self._evidence.blocked |= self.node.plan_state == PlanState.BLOCKED and not self.node.maneuvering_blocked
-        elif (
-            self.phase is Phase.STOPPING
-            and not self.node.executing(self._settings.plan_id)
-            and not self._started_unseen
-        ):
+        elif self.phase is Phase.STOPPING and not self._runs_ours() and not self._started_unseen:
             if self.node.maneuvering_blocked:
                 self._abort_now(now)
             else:
@@ -333,8 +332,9 @@ class Control(ABC):
         elif now - self._since > self._waiting_limit_s():
             reason = status.reason or "does not report being in service and ready"
             self._release(f"not ready within {now - self._since:.0f} s: {reason}", "Clear that, then engage again", now)
-        elif node.executing(settings.plan_id) and now >= self._request_due:
-            # Our plan of an earlier run: its references have ceased, so it is ended before a new one starts.
+        elif self._runs_ours() and now >= self._request_due:
+            # The way home, or our plan of an earlier run, whose references have ceased: it is ended before a new one
+            # starts.
             self._request_due = now + ABANDONED_STOP_RETRY_S
             self._send(plan_control(OPERATION_STOP, self._next_request_id(), settings))
 

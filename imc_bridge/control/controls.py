@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import time
 from collections.abc import Callable, Iterator
+from functools import partial
 
 from imc_bridge.control.acoustics import SoundPath
 from imc_bridge.control.control import Control, Phase
@@ -12,6 +13,7 @@ from imc_bridge.control.follow import Follower
 from imc_bridge.control.legs import LegFollower
 from imc_bridge.control.rates import RateRequest
 from imc_bridge.control.seabed import Seabed
+from imc_bridge.control.way_home import WayHome
 from imc_bridge.events import Guidance, RefusedError, WaypointChange
 from imc_bridge.network.codec import Message
 from imc_bridge.nodes.node import Node
@@ -48,6 +50,7 @@ class Crew:
         self._controls: dict[int, Control] = {}
         self._guidance: dict[int, Guidance] = {}
         self._rates: dict[int, RateRequest] = {}
+        self._ways_home: dict[int, WayHome] = {}
         # Replies to an earlier run's requests must not be taken for replies to ours.
         self._request_ids = itertools.count(int(time.time() * 10.0))
 
@@ -68,11 +71,13 @@ class Crew:
         """Whether a node is led, is being stopped, or has rates to be restored."""
         control, rates = self.get(node), self.asked_rates(node)
         busy = control is not None and (control.engaged or control.phase is Phase.STOPPING)
+        way_home = self.way_home(node)
+        busy = busy or (way_home is not None and way_home.wanted)
         return busy or (rates is not None and rates.restoring)
 
     def forget(self, node: Node) -> None:
         """Keep nothing of a node that has lost its place."""
-        for kept in (self._controls, self._guidance, self._rates):
+        for kept in (self._controls, self._guidance, self._rates, self._ways_home):
             kept.pop(node.imc_id, None)
 
     def asked_rates(self, node: Node) -> RateRequest | None:
@@ -84,6 +89,19 @@ class Crew:
         rates = self.asked_rates(node)
         return rates.text if rates is not None else "as the vehicle has them"
 
+    def way_home(self, node: Node) -> WayHome | None:
+        """The way home that a vehicle was given, None for none."""
+        return self._ways_home.get(node.imc_id)
+
+    def way_home_of(self, node: Node) -> WayHome:
+        """The way home of a vehicle, made when it is first asked for."""
+        way = self.way_home(node)
+        if way is None:
+            way = self._ways_home[node.imc_id] = WayHome(
+                node, self._settings, partial(self._send, node), self._request_ids
+            )
+        return way
+
     def restore_rates(self) -> None:
         """Give every vehicle its own rates back at once."""
         for rates in self._rates.values():
@@ -94,6 +112,9 @@ class Crew:
         control, rates = self.get(node), self.asked_rates(node)
         if control is not None:
             control.tick(now)
+        way_home = self.way_home(node)
+        if way_home is not None:
+            way_home.tick(now)
         if rates is not None and rates.restoring:
             rates.tick(now)
         elif rates is not None and rates.pending and self.engaged(node):

@@ -356,7 +356,7 @@ class LegFollower(Control):
         words = f"{length_m:.0f} m are too short to get to {depth_m:.1f} m, and there is no room to circle down"
         return Leg(
             depth_m,
-            leg_time_s(length_m, depth_m, waypoint.speed_mps),
+            leg_time_s(length_m, depth_m, waypoint.speed_mps, math.hypot(*(self.node.current_mps() or (0.0, 0.0)))),
             descend,
             aim,
             words if steep and not descend else "",

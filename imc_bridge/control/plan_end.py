@@ -55,6 +55,8 @@ def judge_ending(seen: Evidence, node: Node, plan_id: str, *, starved: bool) -> 
     starved
         Whether echoes were missing long enough to prove that no references reached it.
     """
+    if node.home_bound:
+        return Ending("it goes home: to its own mind it heard no console for too long", WHEN_DONE)
     words = seen.failure or seen.error or node.error_text or "no reason given"
     if node.plan_state == PlanState.EXECUTING and node.plan_id not in ("", plan_id):
         return Ending(f"another console took over with plan {node.plan_id!r}", WHEN_DONE)

@@ -120,7 +120,7 @@ def leg_plan(settings: BridgeSettings, waypoint: Waypoint, depth_m: float, *, de
         steps.append((DOWN, _elevator(waypoint, depth_m)))
     steps.append((THERE, goto_maneuver(waypoint, depth_m, aim)))
     if depth_m > SHALLOW_M:
-        steps.append((UP, _station(waypoint, depth_m)))
+        steps.append((UP, station_maneuver(waypoint, depth_m)))
     steps.append((SURFACE, _pop_up(waypoint)))
     return goto_plan(settings.plan_id, steps)
 
@@ -141,8 +141,8 @@ def _elevator(waypoint: Waypoint, depth_m: float) -> Message:
     return elevator
 
 
-def _station(waypoint: Waypoint, depth_m: float) -> Message:
-    """Float up at the waypoint."""
+def station_maneuver(waypoint: Waypoint, depth_m: float) -> Message:
+    """Float up at the waypoint from a depth; without one, stay there at the surface for good."""
     station = imcpy.StationKeeping()
     station.lat, station.lon = math.radians(waypoint.lat_deg), math.radians(waypoint.lon_deg)
     station.z, station.z_units = 0.0, imcpy.ZUnits(Z_DEPTH)
@@ -188,10 +188,10 @@ def descent_m(depth_m: float) -> float:
     return RUN_UP_M + RUN_PER_DEPTH * depth_m if depth_m > SHALLOW_M else 0.0
 
 
-def leg_time_s(length_m: float, depth_m: float, speed_mps: float) -> float:
-    """How long a leg may take until contact returns."""
+def leg_time_s(length_m: float, depth_m: float, speed_mps: float, current_mps: float = 0.0) -> float:
+    """How long a leg may take until contact returns, were a current of this speed against it all the way."""
     return (
-        length_m / (SLOWEST_SHARE * max(speed_mps, 0.1))
+        length_m / (SLOWEST_SHARE * max(speed_mps - current_mps, 0.1))
         + depth_m / DIVE_MPS
         + depth_m / CLIMB_MPS
         + TURNING_S

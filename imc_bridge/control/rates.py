@@ -96,12 +96,7 @@ class RateRequest:
         self._due = now + RETRY_S
         self._tries += 1
         if self._former is None and self._tries <= QUERY_TRIES:
-            query = imcpy.QueryEntityParameters()
-            query.name = ENTITY
-            # DUNE answers with every parameter visible to users in the global scope.
-            query.visibility = "developer"
-            query.scope = "global"
-            self._send(query)
+            self._send(parameter_query(ENTITY))
             return
         self._set = merge_limiters(self._former or DUNE_DEFAULTS, self._wanted)
         self._send(_set_message(self._set))
@@ -145,6 +140,16 @@ class RateRequest:
         while self._restores and self._former is not None:
             self._restores -= 1
             self._send(_set_message(self._former))
+
+
+def parameter_query(entity: str) -> Message:
+    """The question for an entity's parameters."""
+    query = imcpy.QueryEntityParameters()
+    query.name = entity
+    # DUNE answers with every parameter visible to users in the global scope.
+    query.visibility = "developer"
+    query.scope = "global"
+    return query
 
 
 def _same(a: str, b: str) -> bool:

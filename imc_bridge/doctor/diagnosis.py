@@ -57,6 +57,8 @@ class Cause(StrEnum):
     NO_ENTITIES = "no_entities"
     NO_SOUNDINGS = "no_soundings"
     SOUNDINGS_REFUSED = "soundings_refused"
+    NO_WAY_HOME = "no_way_home"
+    """Nothing on board brings it home when it hears nobody, or not when it should."""
     FOREIGN_CONTROL = "foreign_control"
     NOT_READY = "not_ready"
     SEND_ERRORS = "send_errors"

@@ -6,6 +6,7 @@ import asyncio
 from collections.abc import Mapping
 
 from imc_bridge.bridge import Bridge
+from imc_bridge.control.way_home import NOT_ON_BOARD
 from imc_bridge.doctor.diagnosis import (
     Cause,
     Diagnosis,
@@ -25,6 +26,7 @@ from imc_bridge.doctor.replay import replay
 from imc_bridge.events import NodeState, NodeView
 from imc_bridge.network.codec import PacketFault
 from imc_bridge.network.transport import PortInUseError
+from imc_bridge.nodes.lost_comms import DEFAULT_PLAN_NAME, DUNE_CONSOLE_IDS
 from imc_bridge.nodes.refusals import Refused
 from imc_bridge.settings import BridgeSettings
 
@@ -269,6 +271,7 @@ def _node_findings(node: NodeView, bridge: Bridge, answers: Mapping[int, Answer]
         findings.append(problem(Cause.RADIO_GAPS, *radio_gap_words(node.radio_gaps)))
     findings += _sounding_findings(node, live=live)
     findings += _clock_findings(node, settings)
+    findings += _way_home_findings(node, settings)
     findings += _plan_findings(node, settings)
     return findings
 
@@ -393,6 +396,30 @@ def _sounding_findings(node: NodeView, *, live: bool) -> list[Finding]:
     return findings
 
 
+def _way_home_findings(node: NodeView, settings: BridgeSettings) -> list[Finding]:
+    """Whether DUNE would start a way home that is stored on board, and when."""
+    if node.runs_lost_comms is None:
+        return []
+    if not node.runs_lost_comms:
+        return [note(Cause.NO_WAY_HOME, NOT_ON_BOARD.reason, NOT_ON_BOARD.remedy)]
+    if node.lost_comms is None:
+        text = "its task LostComms runs, but does not tell how it is configured"
+        return [note(Cause.NO_WAY_HOME, text, f"Its Plan Name has to be {DEFAULT_PLAN_NAME!r}")]
+    plan, timeout = node.lost_comms.plan_name, node.lost_comms.timeout
+    findings = [ok(f"its task LostComms starts plan {plan!r} after {timeout} s without a console")]
+    if settings.id not in DUNE_CONSOLE_IDS:
+        first, last = DUNE_CONSOLE_IDS[0], DUNE_CONSOLE_IDS[-1]
+        findings.append(
+            note(
+                Cause.NO_WAY_HOME,
+                f"to that task id 0x{settings.id:04X} is no console: a vehicle whose plan failed goes home although it "
+                "hears us",
+                f"Where that is not wanted set imc.id to one from 0x{first:04X} to 0x{last:04X}",
+            )
+        )
+    return findings
+
+
 def _clock_findings(node: NodeView, settings: BridgeSettings) -> list[Finding]:
     scale, rate, offset = settings.time_scale, node.clock_rate, node.clock_offset_s
     if rate is not None and not SLOWEST_RATE < rate / scale < FASTEST_RATE:
@@ -434,7 +461,9 @@ def _plan_findings(node: NodeView, settings: BridgeSettings) -> list[Finding]:
             )
         ]
     remedy = ""
-    if node.state is NodeState.IN_PLAN and not node.ours:
+    if node.goes_home:
+        remedy = "Let it come home, or stop it first"
+    elif node.state is NodeState.IN_PLAN and not node.ours:
         remedy = "Stop that plan on its console before a mission"
     elif node.state is NodeState.ACTIVE:
         remedy = "Clear what the vehicle reports before a mission"

@@ -14,20 +14,26 @@ from enum import IntEnum
 
 from imcpy.coordinates import toWGS84
 
-from imc_bridge.events import NodeState, StateReport
+from imc_bridge.events import LostComms, NodeState, StateReport
 from imc_bridge.network.codec import Message
 from imc_bridge.network.discovery import MAX_NAME, Announcement
 from imc_bridge.network.text_fields import text
 from imc_bridge.network.transport import Address
+from imc_bridge.nodes.lost_comms import is_lost_comms, read_lost_comms
 from imc_bridge.nodes.plausibility import PlausiblePlace, Step
 from imc_bridge.nodes.refusals import Refused
 from imc_bridge.nodes.vehicle_clock import Tick, VehicleClock
 from imc_bridge.printable import printable
 from imc_bridge.settings import BridgeSettings
+from imc_bridge.telemetry.energy import Energy, read_fuel
+from imc_bridge.telemetry.faults import Faults
 from imc_bridge.telemetry.ranges import RangeIntake
 from imc_bridge.telemetry.soundings import SoundingIntake, StateHistory, StateSample, beam_table
 
 UNCERTAINTY_VALID_S = 10.0
+CURRENT_VALID_S = 3600.0
+"""DUNE estimates the current at the surface only: when it drifts there, and from where it comes up."""
+FASTEST_CURRENT_MPS = 5.0
 SUBMERGED_DEPTH_M = 0.3
 """Radio is gone that far below; the depth sensor's noise at the surface is about 0.1 m."""
 ANNOUNCES_MISSED = 3
@@ -152,12 +158,16 @@ class Node:
 
         self.entities: dict[int, str] | None = None
         self.entities_asked_at = -math.inf
+        self.lost_comms: LostComms | None = None
+        self.lost_comms_asked = 0
+        """How often it was asked for that."""
         self.operation_mode: int | None = None
         self.operation_mode_at: float | None = None
         self.error_text = ""
         self.plan_state: int | None = None
         self.plan_state_at: float | None = None
         self.plan_id = ""
+        self.maneuver_id = ""
         self.plan_outcome: int | None = None
         self.plan_state_time_s = -math.inf
         """When it was in that state, by the vehicle's clock."""
@@ -168,13 +178,15 @@ class Node:
         self.controller: int | None = None
         """Id of the console whose references its FollowReference maneuver reports to take."""
         self.medium: int | None = None
-        self.battery_pct: float | None = None
+        self.energy: Energy | None = None
         self.history = StateHistory()
         self.places = PlausiblePlace()
         self.report: StateReport | None = None
         self.intake = SoundingIntake(name, beam_table(settings.altimeter), settings.max_range_m)
         self.ranges = RangeIntake(name)
+        self.faults = Faults(name)
         self._uncertainty: tuple[float, float] | None = None
+        self._current: tuple[float, float, float] | None = None
         self._settings = settings
         self._latest: dict[str, float] = {}
 
@@ -215,15 +227,18 @@ class Node:
         """Note that its telemetry shows a restart, which its announce will show later."""
         self.boots += 1
         self._restart_seen = True
-        self.entities = None
-        self.entities_asked_at = -math.inf
+        self._forget_entities()
+
+    def _forget_entities(self) -> None:
+        """It may be configured otherwise now."""
+        self.entities = self.lost_comms = None
+        self.entities_asked_at, self.lost_comms_asked = -math.inf, 0
 
     def _forget_plan(self) -> None:
-        self.entities = None
-        self.entities_asked_at = -math.inf
+        self._forget_entities()
         self.operation_mode = self.plan_state = None
         self.operation_mode_at = self.plan_state_at = None
-        self.plan_id = ""
+        self.plan_id = self.maneuver_id = ""
         self.controller = None
         self._latest.clear()
 
@@ -269,6 +284,8 @@ class Node:
             self.intake.clear()
             self.ranges.clear()
             self._uncertainty = None
+            self._current = None
+            self.faults.clock_jumped()
         return tick
 
     # Telemetry
@@ -291,6 +308,7 @@ class Node:
             self.history.clear()
         if not self.history.add(sample) or not self.in_order("EstimatedState", time_s):
             return None
+        energy = self.energy
         speed = math.hypot(message.vx, message.vy)
         altitude = float(message.alt)
         self.report = StateReport(
@@ -302,8 +320,11 @@ class Node:
             heading_rad=sample.yaw_rad,
             speed_mps=speed if math.isfinite(speed) else 0.0,
             altitude_m=altitude if math.isfinite(altitude) and altitude >= 0.0 else None,
-            battery_pct=self.battery_pct,
+            battery_pct=energy.level_pct if energy else None,
+            battery_confidence_pct=energy.confidence_pct if energy else None,
+            energy_left_s=energy.left_s if energy else None,
             position_sd_m=self.position_sd_m(),
+            current_mps=self.current_mps(),
         )
         return self.report
 
@@ -320,11 +341,22 @@ class Node:
         at_s, sd = self._uncertainty
         return sd if self.clock.time_s - at_s <= UNCERTAINTY_VALID_S else None
 
+    def take_stream(self, message: Message) -> None:
+        """EstimatedStreamVelocity: x is north, y is east."""
+        east, north = float(message.y), float(message.x)
+        if math.hypot(east, north) <= FASTEST_CURRENT_MPS:
+            self._current = (message.timestamp, east, north)
+
+    def current_mps(self) -> tuple[float, float] | None:
+        """Velocity of the water, east and north, None when the vehicle has not estimated it lately."""
+        if self._current is None or self.clock.time_s is None:
+            return None
+        at_s, east, north = self._current
+        return (east, north) if self.clock.time_s - at_s <= CURRENT_VALID_S else None
+
     def take_fuel(self, message: Message) -> None:
-        """FuelLevel: per cent."""
-        value = float(message.value)
-        if 0.0 <= value <= 100.0:
-            self.battery_pct = value
+        """FuelLevel: level, confidence and the time that is left."""
+        self.energy = read_fuel(message) or self.energy
 
     def take_vehicle_state(self, message: Message, now: float) -> bool:
         """VehicleState: the operation mode and the errors that explain it; True when it has just begun to boot."""
@@ -348,6 +380,7 @@ class Node:
         self.plan_state = int(message.state)
         self.plan_state_at = now
         self.plan_id = printable(text(message, "plan_id"), most=MAX_TEXT)
+        self.maneuver_id = printable(text(message, "man_id"), most=MAX_TEXT)
         self.plan_outcome = int(message.last_outcome)
         self.plan_state_time_s = float(message.timestamp)
         if self.plan_state not in (PlanState.EXECUTING, PlanState.INITIALIZING):
@@ -362,6 +395,16 @@ class Node:
     def take_entities(self, message: Message) -> None:
         """EntityList report: ``Name=id;…``."""
         self.entities = listed_entities(message) or self.entities
+
+    @property
+    def lost_comms_task(self) -> str | None:
+        """Name of the task that starts a plan when no console is heard, None where it does not run or is not known."""
+        return next(filter(is_lost_comms, (self.entities or {}).values()), None)
+
+    def take_parameters(self, message: Message) -> None:
+        """EntityParameters of that task."""
+        if text(message, "name") == self.lost_comms_task:
+            self.lost_comms = read_lost_comms(message)
 
     def entity_name(self, entity: int) -> str | None:
         """Name of an entity, None while names are unknown; an id the list lacks has the name ``entity N``."""
@@ -419,6 +462,16 @@ class Node:
         return running and self.plan_id == plan_id and self.foreign_controller is None
 
     @property
+    def home_prefix(self) -> str:
+        """What the names of the maneuvers of our way home begin with."""
+        return f"{self._settings.plan_id} home"
+
+    @property
+    def home_bound(self) -> bool:
+        """Whether it goes home by a plan that we left on board, perhaps in an earlier run."""
+        return self.plan_state == PlanState.EXECUTING and self.maneuver_id.startswith(self.home_prefix)
+
+    @property
     def ours(self) -> bool:
         """Whether it executes our plan."""
         return self.executing(self._settings.plan_id)
@@ -445,6 +498,8 @@ class Node:
         if self.plan_state in (PlanState.EXECUTING, PlanState.INITIALIZING):
             if self.plan_state == PlanState.INITIALIZING:
                 return Status(NodeState.IN_PLAN, "starts a plan")
+            if self.home_bound:
+                return Status(NodeState.IN_PLAN, "goes home by the plan that it keeps on board for that")
             whose = "our plan"
             if self.plan_id != settings.plan_id or self.foreign_controller is not None:
                 controller = f" (0x{self.foreign_controller:04X})" if self.foreign_controller is not None else ""

@@ -32,6 +32,12 @@ HARDWARE_DVL = {name: len(_NAMES) + k for k, name in enumerate([f"DVL Beam {n}" 
 HARDWARE_MULTIBEAM = {"Multibeam": len(_NAMES) + len(HARDWARE_DVL)}
 """What vehicles with a multibeam sonar have in addition."""
 
+HARDWARE_FUEL = {"Fuel": len(_NAMES) + len(HARDWARE_DVL) + len(HARDWARE_MULTIBEAM)}
+"""What real vehicles estimate their energy with; DUNE's own simulation has no battery."""
+
+SUPERVISORS = {"Lost Comms": len(_NAMES) + len(HARDWARE_DVL) + len(HARDWARE_MULTIBEAM) + len(HARDWARE_FUEL)}
+"""What runs only where a vehicle's configuration enables it."""
+
 ANY = 255
 """No particular entity."""
 

@@ -13,6 +13,7 @@ from typing import Any, Self
 
 import numpy as np
 
+from simulator.battery import BatterySpec
 from simulator.clock import SimulationClock
 from simulator.dune.discovery import listen_for_announces
 from simulator.dune.node import DuneOptions, FakeDune
@@ -105,6 +106,8 @@ class DuneFleet:
         Of all randomness.
     targets, ranging
         What moves about in the water, and how well the vehicles' modems range to it.
+    battery
+        Of every vehicle.
     """
 
     def __init__(
@@ -124,6 +127,7 @@ class DuneFleet:
         seed: int = 0,
         targets: Sequence[TargetSpec] = (),
         ranging: RangingNoise | None = None,
+        battery: BatterySpec | None = None,
     ) -> None:
         self.terrain = terrain
         self.options = options or DuneOptions()
@@ -146,6 +150,7 @@ class DuneFleet:
                     limits=limits,
                     ping_period_s=ping_period_s,
                     start_time_s=self._simulated_s,
+                    battery=battery or BatterySpec(),
                 ),
                 spec.imc_id,
                 spec.port,

@@ -15,13 +15,26 @@ import numpy as np
 
 from simulator.clock import SimulationClock
 from simulator.dune.contacts import REFRESH_PERIOD_S, Contacts
-from simulator.dune.entities import ANY, HARDWARE_DVL, HARDWARE_MULTIBEAM, SIMULATION, entity_list
+from simulator.dune.entities import (
+    ANY,
+    HARDWARE_DVL,
+    HARDWARE_FUEL,
+    HARDWARE_MULTIBEAM,
+    SIMULATION,
+    SUPERVISORS,
+    entity_list,
+)
 from simulator.dune.log_book import LogBook
+from simulator.dune.lost_comms import ENTITY as LOST_COMMS
+from simulator.dune.lost_comms import PERIOD_S as LOST_COMMS_PERIOD_S
+from simulator.dune.lost_comms import PLAN_NAME, LostComms
 from simulator.dune.plan import PLAN_ENGINE, SUPERVISOR, PlanEngine
+from simulator.dune.plan_database import PLAN_DATABASE, PlanDatabase
 from simulator.dune.radio import Radio
 from simulator.dune.rates import DEFAULT_LIMITS_HZ, Periodic, RateLimiter, RateLimiterError, parse_limits
 from simulator.dune.tcp import FIRST_PORT, TcpServer
 from simulator.dune.telemetry import Telemetry
+from simulator.navigation import SURFACE_DEPTH_M
 from simulator.network import Address, Endpoint, NetworkFaults, UdpEndpoint
 from simulator.sensors import SensorKind, cast_rays, to_local_frame
 from simulator.targets import Ranging
@@ -37,6 +50,10 @@ TCP_PORT_TRIES = 50
 DEFAULT_ANNOUNCE_PORTS = (30100, 30101, 30102, 30103, 30104)
 ANNOUNCE_PERIOD_S = 10.0
 BOOT_S = 5.0
+LEAK_SENSOR, FAULTY = "Leak Sensor - Nose", "Motor"
+STREAM_PERIOD_S = 10.0
+"""Between two estimates of the current at the surface."""
+STILL_WATER = (0.0, 0.0)
 IMC_VERSION = "5.4.31"
 RESTART_S = 5.0
 """How long DUNE is away when it crashes."""
@@ -88,6 +105,11 @@ class DuneOptions:
         Also serve consoles by TCP.
     radio_range_m
         Above 0 the radio ends there, and at the surface.
+    lost_comms_s
+        For how long no console may be heard before a stored plan is started; 0: that supervisor is not enabled, as in
+        DUNE's own configurations.
+    lost_comms_plan
+        What that plan is called.
     log_dir
         Where vehicles keep their logs, each in a folder of its name; none by default.
     """
@@ -102,6 +124,8 @@ class DuneOptions:
     imc_version: str = IMC_VERSION
     tcp: bool = False
     radio_range_m: float = 0.0
+    lost_comms_s: float = 0.0
+    lost_comms_plan: str = PLAN_NAME
     log_dir: Path | None = None
 
     def __post_init__(self) -> None:
@@ -164,10 +188,11 @@ class FakeDune:
         self.counts = NodeCounts()
         self.contacts = Contacts()
         self.limiter = RateLimiter(DEFAULT_LIMITS_HZ)
-        self.plan = PlanEngine(vehicle, imc_id, vehicle.terrain.frame, self.send, clock.now() + options.boot_s)
+        self.database = PlanDatabase()
         self.first_port = port
         self._clock = clock
         self._options = options
+        self.plan, self.lost_comms = self._booted(clock.now() + options.boot_s)
         self._rng = rng
         self._ranging = ranging
         self._entities = dict(SIMULATION)
@@ -176,6 +201,10 @@ class FakeDune:
             self._extra = HARDWARE_DVL
         elif vehicle.sonar.kind is SensorKind.MULTIBEAM:
             self._extra = HARDWARE_MULTIBEAM
+        if vehicle.battery is not None:
+            self._extra = self._extra | HARDWARE_FUEL
+        if self.lost_comms is not None:
+            self._extra = self._extra | SUPERVISORS
         self._entities |= self._extra
         self._radio = Radio(options.radio_range_m)
         self._tcp = TcpServer(self._receive_by_tcp) if options.tcp else None
@@ -186,17 +215,20 @@ class FakeDune:
         self._now_s = clock.now()
         self._announce = Periodic(ANNOUNCE_PERIOD_S, self._now_s)
         self._refresh = Periodic(REFRESH_PERIOD_S, self._now_s + REFRESH_PERIOD_S)
+        self._supervise = Periodic(LOST_COMMS_PERIOD_S, self._now_s)
+        self._leak: imcpy.EntityState.StateEnum | None = None
         self._chatter_owed = 0.0
         self._offered = ""
         self._down_until_s: float | None = None
         self._rate_text = RATE_TEXT
         self._schedule: list[tuple[Periodic, Callable[[], None]]] = []
         self._handlers: dict[int, Handler] = {
-            _HEARTBEAT: lambda message, now_s: None,
+            _HEARTBEAT: self._on_heartbeat,
             _PLAN_CONTROL: self._on_plan_control,
             _ENTITY_LIST: self._on_entity_list,
             imcpy.Reference().msg_id: self._on_reference,
             imcpy.Abort().msg_id: self._on_abort,
+            imcpy.PlanDB().msg_id: self._on_plan_database,
             imcpy.SetEntityParameters().msg_id: self._on_set_parameters,
             imcpy.QueryEntityParameters().msg_id: self._on_query_parameters,
         }
@@ -261,6 +293,21 @@ class FakeDune:
             self._log = LogBook(self._options.log_dir / self.name, self._now_s)
             self._report_entities()
 
+    def fail(self, what: str) -> None:
+        """Let something break: a leak ("leak"), or what puts the vehicle in error ("error")."""
+        if what == "error":
+            self.plan.break_down(FAULTY, "motor current too high", self._now_s)
+        elif what == "leak":
+            self._leak = imcpy.EntityState.StateEnum.FAILURE
+        else:
+            raise ValueError(f"cannot let {what!r} fail; it must be leak or error")
+
+    def mend(self) -> None:
+        """Repair everything."""
+        self.plan.mend()
+        if self._leak is not None:
+            self._leak = imcpy.EntityState.StateEnum.NORMAL
+
     def crash(self, down_s: float = RESTART_S) -> None:
         """Let DUNE die, and start again ``down_s`` of vehicle time later: whatever it did or knew is forgotten.
 
@@ -273,7 +320,13 @@ class FakeDune:
         self._rate_text = RATE_TEXT
         self._radio.forget()
         ready_s = self._down_until_s + self._options.boot_s
-        self.plan = PlanEngine(self.vehicle, self.imc_id, self.vehicle.terrain.frame, self.send, ready_s)
+        self.plan, self.lost_comms = self._booted(ready_s)
+
+    def _booted(self, ready_s: float) -> tuple[PlanEngine, LostComms | None]:
+        """Return what remembers nothing of an earlier start."""
+        options, frame = self._options, self.vehicle.terrain.frame
+        plan = PlanEngine(self.vehicle, self.imc_id, frame, self.send, ready_s, self.database.plans)
+        return plan, LostComms(options.lost_comms_s, options.lost_comms_plan) if options.lost_comms_s > 0.0 else None
 
     def _start_again(self) -> None:
         self._down_until_s = None
@@ -353,6 +406,8 @@ class FakeDune:
                 return
             self._start_again()
         self.plan.tick(now_s)
+        if self.lost_comms is not None and self._supervise.due(now_s):
+            self._look_for_consoles(self.lost_comms, now_s)
         here = self.vehicle.position
         lat, lon = self.vehicle.terrain.frame.to_geodetic(here.east_m, here.north_m)
         self._radio.moved(math.radians(lat), math.radians(lon), here.depth_m, now_s)
@@ -390,16 +445,39 @@ class FakeDune:
         def plain(entity: int, build: Callable[[], imcpy.Message]) -> Callable[[], None]:
             return lambda: self.send(build(), entity)
 
+        battery = self.vehicle.battery
+        further: list[tuple[Periodic, Callable[[], None]]] = []
+        if battery is not None:
+            fuel = limited("FuelLevel", ids["Fuel"], lambda: t.fuel_level(battery))
+            further.append((Periodic(1.0, now_s), fuel))
+        if self.vehicle.vehicle.current != STILL_WATER:
+            further.append((Periodic(STREAM_PERIOD_S, now_s), self._send_stream_velocity))
         return [
+            *further,
             (Periodic(STEP_S, now_s), limited("EstimatedState", ids["Navigation"], t.estimated_state)),
             (Periodic(STEP_S, now_s), limited("SimulatedState", ids["Simulation Engine"], t.simulated_state)),
             (Periodic(1.0, now_s), plain(0, imcpy.Heartbeat)),
             (Periodic(1.0 / 3.0, now_s), plain(PLAN_ENGINE, self.plan.plan_control_state)),
+            (Periodic(1.0, now_s), self._send_leak),
             (Periodic(0.5, now_s), plain(SUPERVISOR, self.plan.vehicle_state)),
             (Periodic(1.0, now_s), plain(ids["GPS"], t.gps_fix)),
             (Periodic(1.0, now_s), plain(ids["Medium"], t.medium)),
             (Periodic(1.0, now_s), plain(ids["Navigation"], t.navigation_uncertainty)),
         ]
+
+    def _send_leak(self) -> None:
+        """The state of a leak sensor, once it has told of water: DUNE has all entities report every second."""
+        if self._leak is not None:
+            state = imcpy.EntityState()
+            state.state = self._leak
+            dry = self._leak == imcpy.EntityState.StateEnum.NORMAL
+            state.description = "active" if dry else "leak detected"
+            self._send_limited(state, self._entities[LEAK_SENSOR])
+
+    def _send_stream_velocity(self) -> None:
+        """As DUNE's navigation does, which compares where it drifted, or came up, with its position fixes."""
+        if self._telemetry is not None and self.vehicle.navigation.has_fix:
+            self.send(self._telemetry.stream_velocity(), self._entities["Navigation"])
 
     def _send_announce(self) -> None:
         if self._announcer is None or self._telemetry is None:
@@ -528,12 +606,33 @@ class FakeDune:
         if isinstance(message, imcpy.PlanControl) and message.dst == self.imc_id:
             self.plan.on_plan_control(message, now_s)
 
+    def _look_for_consoles(self, supervisor: LostComms, now_s: float) -> None:
+        submerged = self.vehicle.vehicle.motion.depth_m > SURFACE_DEPTH_M
+        request = supervisor.tick(self.plan, submerged=submerged, now_s=now_s)
+        if request is not None:
+            self.send(request, self._entities[LOST_COMMS], self.imc_id)
+            self.plan.on_plan_control(request, now_s)
+
+    def _on_heartbeat(self, message: imcpy.Message, now_s: float) -> None:
+        if self.lost_comms is not None:
+            self.lost_comms.heard(int(message.src), now_s)
+
+    def _on_plan_database(self, message: imcpy.Message, now_s: float) -> None:
+        if not isinstance(message, imcpy.PlanDB) or message.dst != self.imc_id:
+            return
+        if self.lost_comms is not None:
+            self.lost_comms.stored(message)
+        for reply in self.database.answer(message, now_s):
+            self.send(reply, PLAN_DATABASE, message.src, message.src_ent)
+
     def _on_reference(self, message: imcpy.Message, now_s: float) -> None:
         if isinstance(message, imcpy.Reference) and message.dst == self.imc_id:
             self.plan.on_reference(message, now_s)
 
     def _on_abort(self, message: imcpy.Message, now_s: float) -> None:
         if message.dst == self.imc_id:
+            if self.lost_comms is not None:
+                self.lost_comms.aborted()
             who = f"{self.contacts.name_of(message.src)} - 0x{message.src:04X}"
             self.plan.on_abort(f"{who} @ 0x{message.src_ent:02X}", now_s)
 
@@ -569,15 +668,20 @@ class FakeDune:
     def _on_query_parameters(self, message: imcpy.Message, now_s: float) -> None:
         if not isinstance(message, imcpy.QueryEntityParameters) or message.dst != self.imc_id:
             return
-        if message.name != UDP_ENTITY:
+        values = {}
+        if message.name == UDP_ENTITY:
+            values = {RATE_LIMITERS: self._rate_text}
+        elif message.name == LOST_COMMS and self.lost_comms is not None:
+            values = self.lost_comms.parameters()
+        if not values:
             return
         reply = imcpy.EntityParameters()
-        reply.name = UDP_ENTITY
-        parameter = imcpy.EntityParameter()
-        parameter.name = RATE_LIMITERS
-        parameter.value = self._rate_text
-        reply.params.append(parameter)
-        self.send(reply, self._entities[UDP_ENTITY], message.src)
+        reply.name = message.name
+        for name, value in values.items():
+            parameter = imcpy.EntityParameter()
+            parameter.name, parameter.value = name, value
+            reply.params.append(parameter)
+        self.send(reply, self._entities[message.name], message.src)
 
     def _log_book(self, text: str) -> None:
         log.info("%s: %s", self.name, text)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from enum import IntEnum
 
 import imcpy
@@ -80,9 +80,20 @@ class PlanEngine:
         Puts messages on the network.
     ready_s
         The vehicle's clock when it will have started up.
+    stored
+        Plans on board, by name.
     """
 
-    def __init__(self, vehicle: SimulatedVehicle, imc_id: int, frame: LocalFrame, send: Send, ready_s: float) -> None:
+    def __init__(
+        self,
+        vehicle: SimulatedVehicle,
+        imc_id: int,
+        frame: LocalFrame,
+        send: Send,
+        ready_s: float,
+        stored: Mapping[str, imcpy.PlanSpecification] | None = None,
+    ) -> None:
+        self._stored = stored if stored is not None else {}
         self.op_mode = OpMode.BOOT
         self.plan_state = PlanState.BLOCKED
         self.outcome = Outcome.NONE
@@ -143,6 +154,23 @@ class PlanEngine:
         self._send_vehicle_state()
         self._service_at_s = now_s + ERROR_RECOVERY_S
 
+    def break_down(self, entity: str, text: str, now_s: float) -> None:
+        """Be in error, by the fault of an entity, until it is mended."""
+        self._error_entity = entity
+        running = self.maneuver is not None
+        self._halt()
+        self._error(text, now_s)
+        if running:
+            self.outcome = Outcome.FAILURE
+            self._reply_to_start(text, ok=False)
+        self._into_service()
+
+    def mend(self) -> None:
+        """Be in service again."""
+        self._error_entity = ""
+        if self.maneuver is None:
+            self._into_service()
+
     def miss_vehicle_state(self) -> None:
         """Have had no state of the supervisor for too long: the engine calls itself blocked, the maneuver goes on.
 
@@ -170,12 +198,13 @@ class PlanEngine:
         self._error(text, now_s)
         self.outcome = Outcome.FAILURE
         if is_error:
-            self.op_mode, self._error_entity = OpMode.ERROR, text.partition(":")[0]
+            broken, self._error_entity = self._error_entity, text.partition(":")[0]
+            self.op_mode = OpMode.ERROR
             self._send_vehicle_state()
             self._reply_to_start(text, ok=False)
             self.plan_state = PlanState.BLOCKED
             self._send_plan_state()
-            self._error_entity = ""
+            self._error_entity = broken
         else:
             self._reply_to_start(text, ok=False)
         self._into_service()
@@ -211,10 +240,11 @@ class PlanEngine:
         return message
 
     def _start(self, message: imcpy.PlanControl, request: tuple[int, int, int], now_s: float) -> None:
-        if self.op_mode in (OpMode.BOOT, OpMode.ERROR):
+        ignores_errors = int(message.flags) & int(imcpy.PlanControl.FlagsBits.IGNORE_ERRORS)
+        if self.op_mode is OpMode.BOOT or (self.op_mode is OpMode.ERROR and not ignores_errors):
             self._reply(message.op, request, message.plan_id, f"vehicle is in {self.op_mode.name} mode", ok=False)
             return
-        specification, problem = _plan_of(message)
+        specification, problem = _plan_of(message, self._stored)
         if specification is None:
             self._reply(message.op, request, message.plan_id, problem, ok=False)
             return
@@ -290,7 +320,8 @@ class PlanEngine:
         self._halt()
         self._send(self._command(imcpy.VehicleCommand.CommandEnum.STOP_MANEUVER), PLAN_ENGINE)
         self._reply(message.op, request, self._plan_id, "plan completed", ok=True)
-        self.outcome = Outcome.SUCCESS
+        # A plan that is stopped has not been completed.
+        self.outcome = Outcome.FAILURE
         self._into_service()
         self._answer_command("OK")
 
@@ -312,7 +343,11 @@ class PlanEngine:
         self._vehicle.stop()
 
     def _into_service(self) -> None:
-        self.op_mode, self.plan_state = OpMode.SERVICE, PlanState.READY
+        """Be ready for plans, unless something is broken."""
+        if self._error_entity:
+            self.op_mode, self.plan_state = OpMode.ERROR, PlanState.BLOCKED
+        else:
+            self.op_mode, self.plan_state = OpMode.SERVICE, PlanState.READY
         self._send_plan_state()
         self._send_vehicle_state()
 
@@ -368,9 +403,11 @@ class PlanEngine:
         self._send(message, SUPERVISOR, self._vehicle_id, PLAN_ENGINE)
 
 
-def _plan_of(message: imcpy.PlanControl) -> tuple[imcpy.PlanSpecification | None, str]:
-    """The plan that a request starts, or else what is wrong with it."""
-    argument = message.arg
+def _plan_of(
+    message: imcpy.PlanControl, stored: Mapping[str, imcpy.PlanSpecification]
+) -> tuple[imcpy.PlanSpecification | None, str]:
+    """The plan that a request starts, given with it or stored on board, or else what is wrong with it."""
+    argument = message.arg if message.arg is not None else stored.get(message.plan_id)
     if argument is None:
         return None, "undefined plan"
     if isinstance(argument, SPECIFICATIONS):

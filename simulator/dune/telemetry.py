@@ -9,6 +9,7 @@ from datetime import UTC, datetime
 
 import imcpy
 
+from simulator.battery import Battery
 from simulator.geodesy import LocalFrame
 from simulator.navigation import SURFACE_DEPTH_M
 from simulator.sensors import DVL_TILT_RAD
@@ -101,6 +102,20 @@ class Telemetry:
         moment = datetime.fromtimestamp(vehicle.time_s, UTC)
         message.utc_year, message.utc_month, message.utc_day = moment.year, moment.month, moment.day
         message.utc_time = moment.hour * 3600.0 + moment.minute * 60.0 + moment.second
+        return message
+
+    def fuel_level(self, battery: Battery) -> imcpy.FuelLevel:
+        """What is left of the energy, and for how many hours that lasts in each mode of operation."""
+        message = imcpy.FuelLevel()
+        message.value, message.confidence = battery.level_pct, battery.spec.confidence_pct
+        hours = {"Hotel": battery.time_left_s(0.0) / 3600.0, "Motion": battery.time_left_s() / 3600.0}
+        message.opmodes = "".join(f"{mode}={left:g};" for mode, left in hours.items())
+        return message
+
+    def stream_velocity(self) -> imcpy.EstimatedStreamVelocity:
+        """Velocity of the water: x north, y east."""
+        message = imcpy.EstimatedStreamVelocity()
+        message.y, message.x = self._vehicle.vehicle.current
         return message
 
     def medium(self) -> imcpy.VehicleMedium:

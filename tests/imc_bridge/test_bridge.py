@@ -7,7 +7,7 @@ from functools import partial
 import imcpy
 import pytest
 
-from imc_bridge import Bridge, LinkChange, NodeState, RefusedError, Sounding, WaypointChange, WaypointStatus
+from imc_bridge import Bridge, Guidance, LinkChange, NodeState, RefusedError, Sounding, WaypointChange, WaypointStatus
 from imc_bridge.control.plans import OPERATION_START, plan_control
 from imc_bridge.network.codec import encode
 from tests.support.imc.sea import Peer, Sea, open_sea
@@ -323,3 +323,13 @@ async def test_plan_that_the_vehicle_refuses_is_told_in_its_words() -> None:
         with pytest.raises(RefusedError, match=r"plan refused: vehicle is not ready: DVL error\. Clear what"):
             await sea.bridge.engage(name)
         assert not sea.bridge.nodes()[0].engaged
+
+
+@pytest.mark.parametrize("guidance", [Guidance.FOLLOW, Guidance.LEGS])
+async def test_waypoints_are_reached_in_a_current_of_half_the_speed(guidance: Guidance) -> None:
+    async with open_sea(family="flat", water={"current": (0.35, -0.35)}, bridge={"unknown_bottom_depth_m": 0.0}) as sea:
+        (name,) = await sea.ready()
+        await sea.bridge.engage(name, guidance)
+        for step, (east, north) in enumerate([(30, 60), (70, 60), (30, 30)]):
+            sea.bridge.goto(name, sea.waypoint(step, east, north, 1.0, speed_mps=1.0))
+            await sea.reached(name, step)

@@ -83,6 +83,9 @@ def test_vehicles_can_be_named_numbered_and_placed() -> None:
         (["--announce-ports", "x"], "--announce-ports is 'x'"),
         (["--bind", "0.0.0.0"], "bind address"),
         (["--size", "0"], "width_m is 0"),
+        (["--endurance", "0"], "endurance_min is 0"),
+        (["--battery", "120"], "level_pct is 120"),
+        (["--consumption-factor", "-1"], "consumption_factor is -1"),
     ],
 )
 def test_wrong_options_say_what_would_be_right(arguments: list[str], message: str) -> None:
@@ -94,5 +97,18 @@ def test_wrong_options_say_what_would_be_right(arguments: list[str], message: st
 def test_help_lists_every_option() -> None:
     result = CliRunner().invoke(app, ["--help"], env={"COLUMNS": "200"})
     assert result.exit_code == 0
-    for option in ("--terrain", "--family", "--loss", "--duplicate", "--drift", "--names", "--json-ready", "--chatter"):
+    for option in (
+        "--terrain",
+        "--family",
+        "--loss",
+        "--duplicate",
+        "--drift",
+        "--names",
+        "--json-ready",
+        "--chatter",
+        "--endurance",
+        "--battery",
+        "--consumption-factor",
+        "--lost-comms",
+    ):
         assert option in result.output

@@ -74,6 +74,33 @@ def test_every_target_is_passed_closely(east: float, north: float, heading: floa
     assert nearest < 1.5
 
 
+@pytest.mark.parametrize("current", [(0.5, 0.0), (-0.5, 0.0), (0.0, 0.5), (0.0, -0.5), (0.35, -0.35)])
+@pytest.mark.parametrize("heading", [0.0, 2.0, 4.0])
+@pytest.mark.parametrize("place", [(0.0, 60.0), (5.0, 5.0), (-30.0, 3.0), (2.0, -8.0)])
+def test_half_its_speed_of_current_keeps_it_from_no_target(
+    place: tuple[float, float], heading: float, current: tuple[float, float]
+) -> None:
+    vehicle = Vehicle(Motion(heading_rad=wrap(heading)), current=current)
+    target = SteeringTarget(*place, 3.0, 1.0)
+    vehicle.goto(target)
+    nearest = math.inf
+    for _ in range(3000):
+        vehicle.step(NO_ERROR, DEEP)
+        nearest = min(nearest, distance(vehicle, target))
+    assert nearest < 3.0
+
+
+@pytest.mark.parametrize("clockwise", [True, False])
+def test_it_stays_near_where_it_circles_in_a_current(clockwise: bool) -> None:
+    vehicle = Vehicle(current=(0.5, 0.0))
+    target = SteeringTarget(30.0, 20.0, 3.0, 1.0)
+    vehicle.goto(target)
+    vehicle.loiter(clockwise=clockwise)
+    fly(vehicle, 120)
+    for p in fly(vehicle, 240):
+        assert math.hypot(p[0] - 30.0, p[1] - 20.0) < 20.0
+
+
 def test_it_flies_straight_in_a_cross_current() -> None:
     vehicle = Vehicle(current=(0.3, 0.0))
     vehicle.goto(SteeringTarget(0.0, 200.0, 2.0))

@@ -12,6 +12,7 @@ from app.missions.fleet.interface import (
     FleetLink,
     LinkCapabilities,
     LinkState,
+    Position,
     StopReceipt,
     VehicleInfo,
     VehicleRefusedError,
@@ -126,6 +127,14 @@ class FleetHub:
     async def order(self, key: VehicleKey, order: WaypointOrder) -> None:
         """Send a waypoint. Raises VehicleRefusedError."""
         await self._link(key).order(order)
+
+    async def keep_way_home(self, key: VehicleKey, way: Sequence[Position], speed_mps: float) -> None:
+        """Store a way home on board a vehicle. Raises VehicleRefusedError."""
+        await self._link(key).keep_way_home(key[1], way, speed_mps)
+
+    async def drop_way_home(self, key: VehicleKey) -> None:
+        """Leave no way home on board a vehicle. Raises VehicleRefusedError."""
+        await self._link(key).drop_way_home(key[1])
 
     async def stop(self, key: VehicleKey) -> StopReceipt:
         """Stop a vehicle; whatever goes wrong is told in the receipt."""

@@ -55,7 +55,12 @@ class Position:
 
 @dataclass(frozen=True, slots=True)
 class VehicleReport:
-    """One state report of a vehicle. ``time_s`` is the vehicle's own clock (Unix seconds)."""
+    """One state report of a vehicle. ``time_s`` is the vehicle's own clock (Unix seconds); None: not told.
+
+    ``battery_confidence_pct`` is how sure the vehicle is of its level: DUNE itself does not trust one below 40 %.
+    ``energy_left_s`` is for how long it says that the level lasts under way. ``current_mps`` is the velocity of the
+    water over ground, east and north, as the vehicle estimated it last.
+    """
 
     vehicle: str
     time_s: float
@@ -64,7 +69,10 @@ class VehicleReport:
     speed_mps: float | None = None
     altitude_m: float | None = None
     battery_pct: float | None = None
+    battery_confidence_pct: float | None = None
+    energy_left_s: float | None = None
     position_sd_m: float | None = None
+    current_mps: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -191,6 +199,28 @@ class LinkReport:
     vehicle: str
     state: LinkState
     reason: str = ""
+    goes_home: bool = False
+    """It takes the way home that it keeps on board; engaging it ends that."""
+
+
+class FaultKind(StrEnum):
+    """What is broken on board."""
+
+    LEAK = "leak"
+    """Water where none should be."""
+    ERROR = "error"
+    """The vehicle has been in error for seconds."""
+
+
+@dataclass(frozen=True, slots=True)
+class FaultReport:
+    """Something broke on board, told once, and once more with ``over`` when it is no longer broken."""
+
+    vehicle: str
+    time_s: float
+    kind: FaultKind
+    reason: str
+    over: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -201,7 +231,16 @@ class RestartReport:
     reason: str
 
 
-FleetEvent = VehicleReport | SoundingReport | RangeReport | ScanReport | WaypointReport | LinkReport | RestartReport
+FleetEvent = (
+    VehicleReport
+    | SoundingReport
+    | RangeReport
+    | ScanReport
+    | WaypointReport
+    | LinkReport
+    | FaultReport
+    | RestartReport
+)
 EventSink = Callable[[FleetEvent], None]
 
 
@@ -217,6 +256,10 @@ class VehicleInfo:
     address: str | None = None
     imc_id: int | None = None
     report: VehicleReport | None = None
+    goes_home: bool = False
+    """It takes the way home that it keeps on board."""
+    faults: tuple[FaultReport, ...] = ()
+    """What is broken on board now."""
     details: dict[str, str] = field(default_factory=dict)
     advice: str = ""
     """What the operator should change about how it is used; told once in the mission's log."""
@@ -257,6 +300,8 @@ class LinkCapabilities:
     """They travel at the depth that their mission began with, whatever they are told."""
     flies_together: bool = False
     """They are led in steps of the whole team: nobody is sent on before all have told what they measured."""
+    keeps_way_home: bool = False
+    """They can keep a way home on board, which they take by themselves when nobody is heard any more."""
     circles_m: float = 0.0
     """From this distance on they circle about a waypoint in place of going straight to it, unless they can hover."""
 
@@ -343,3 +388,14 @@ class FleetLink(ABC):
     @abstractmethod
     async def stop(self, vehicle: str, *, timeout_s: float = 3.0) -> StopReceipt:
         """Stop the vehicle; see the class's contract."""
+
+    async def keep_way_home(self, vehicle: str, way: Sequence[Position], speed_mps: float) -> None:
+        """Store a way home on board in place of the former one; return when the vehicle confirms it.
+
+        It is armed while the vehicle is ours or lost: a stop disarms it, and the next ``engage`` arms it again. Raises
+        VehicleRefusedError when it is not confirmed, or when the link's vehicles cannot keep one (``capabilities``).
+        """
+        raise VehicleRefusedError(vehicle, "vehicles of its kind keep no way home on board", "Bring it home yourself")
+
+    async def drop_way_home(self, vehicle: str) -> None:  # noqa: B027 - most have none
+        """Leave no way home on board. Raises VehicleRefusedError when that is not confirmed."""

@@ -168,3 +168,4 @@ async def test_a_refused_plan_is_told_with_the_vehicles_words(monkeypatch: pytes
 def test_a_leg_is_given_time_to_turn_to_be_slow_and_to_come_up() -> None:
     assert leg_time_s(100.0, 3.0, 1.3) > 100.0 / 1.3 + 20.0
     assert leg_time_s(0.0, 0.0, 1.3) > 10.0
+    assert leg_time_s(100.0, 3.0, 1.0, current_mps=0.5) > leg_time_s(100.0, 3.0, 1.0) + 100.0

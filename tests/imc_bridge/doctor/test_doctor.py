@@ -295,3 +295,21 @@ async def test_an_honest_vehicle_that_sends_much_is_not_called_a_stranger() -> N
         [finding] = [f for f in judge(sea.bridge, 1.0).own if "max_packets_per_s" in f.text]
         assert "a vehicle of yours" in finding.remedy
         assert "multiplied by time_scale" in finding.remedy
+
+
+async def test_what_would_bring_a_vehicle_home_is_told() -> None:
+    async with open_sea(lost_comms_s=120.0, lost_comms_plan="lost_comms") as sea:
+        await sea.ready()
+        text = (await examine(sea)).text()
+        assert "starts plan 'lost_comms' after 120 s without a console" in text
+        assert "0x3F01 is no console" in text
+        sea.settings = sea.settings.changed(id=0x4F01)
+        assert "is no console" not in (await diagnose(sea.settings, LISTEN_S)).text()
+
+
+async def test_a_vehicle_that_nothing_would_bring_home_is_well_and_told_what_to_enable() -> None:
+    async with open_sea() as sea:
+        await sea.ready()
+        diagnosis = await examine(sea)
+        assert diagnosis.causes == ()
+        assert "[Supervisors.AUV.LostComms]" in diagnosis.text()

@@ -123,3 +123,12 @@ async def test_one_links_trouble_does_not_keep_the_others_from_closing() -> None
     await hub.close()
     assert sim._task is not None
     assert sim._task.done()
+
+
+async def test_ways_home_go_to_links_that_keep_them(hub: FleetHub) -> None:
+    assert not hub.capabilities(VehicleKind.REST).keeps_way_home
+    with pytest.raises(VehicleRefusedError, match="keep no way home"):
+        await hub.keep_way_home(A, [HERE], 1.0)
+    await hub.drop_way_home(A)
+    with pytest.raises(VehicleRefusedError, match="switched off"):
+        await hub.keep_way_home((VehicleKind.IMC, "a"), [HERE], 1.0)

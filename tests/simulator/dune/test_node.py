@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from simulator import seafloors
+from simulator.battery import BatterySpec
 from simulator.dune.contacts import service_addresses
 from simulator.dune.rates import RateLimiter, RateLimiterError, parse_limits
 from tests.support.imc.dune_bench import CONSOLE, CONSOLE_ID, Bench, announce, rate_limiters, start_request
@@ -201,6 +202,17 @@ class TestTelemetry:
         assert (fix.validity, fix.satellites) == (0, 0)
         assert bench.last(imcpy.VehicleMedium).medium == imcpy.VehicleMedium.MediumEnum.UNDERWATER
 
+    def test_it_tells_its_fuel_every_ten_seconds(self) -> None:
+        bench = Bench(battery=BatterySpec(level_pct=50.0, confidence_pct=80.0)).ready()
+        bench.run(100.0, bench.beat)
+        fuel = bench.all(imcpy.FuelLevel)
+        assert len(fuel) == pytest.approx(10, abs=1)
+        assert fuel[-1].value == pytest.approx(50.0 - 0.3 * 100.0 / 288.0, abs=0.05)
+        assert fuel[-1].confidence == 80.0
+        hours = dict(mode.split("=") for mode in fuel[-1].opmodes.rstrip(";").split(";"))
+        assert float(hours["Motion"]) == pytest.approx(4.0, abs=0.02)
+        assert float(hours["Hotel"]) == pytest.approx(4.0 / 0.3, abs=0.05)
+
     def test_the_entities_are_told_on_request(self, bench: Bench) -> None:
         query = imcpy.EntityList()
         query.op = imcpy.EntityList.OperationEnum.QUERY
@@ -291,3 +303,33 @@ class TestRates:
     def test_wrong_limits_are_refused_with_the_form(self, text: str) -> None:
         with pytest.raises(RateLimiterError, match="Message:frequency"):
             parse_limits(text)
+
+
+class TestFaults:
+    def test_a_leak_is_told_every_second_until_it_is_mended_and_after(self, bench: Bench) -> None:
+        bench.run(5.0, bench.beat)
+        assert bench.all(imcpy.EntityState) == []
+        bench.node.fail("leak")
+        bench.run(5.0, bench.beat)
+        bench.node.mend()
+        bench.run(5.0, bench.beat)
+        kinds = imcpy.EntityState.StateEnum
+        states = [state.state for state in bench.all(imcpy.EntityState)]
+        assert (states.count(kinds.FAILURE), states.count(kinds.NORMAL)) == (5, 5)
+
+    def test_in_error_it_takes_no_plan_until_it_is_mended(self, bench: Bench) -> None:
+        bench.node.fail("error")
+        bench.say(imcpy.Abort())
+        bench.run(5.0, bench.beat)
+        assert bench.states() == (2, 0)
+        state = bench.last(imcpy.VehicleState)
+        assert (state.error_ents, state.error_count) == ("Motor", 1)
+        bench.say(start_request())
+        assert bench.states() == (2, 0)
+        bench.node.mend()
+        bench.say(start_request())
+        assert bench.states() == (3, 3)
+
+    def test_only_what_is_known_can_fail(self, bench: Bench) -> None:
+        with pytest.raises(ValueError, match="leak or error"):
+            bench.node.fail("radio")

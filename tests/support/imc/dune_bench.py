@@ -9,6 +9,7 @@ import imcpy
 import numpy as np
 
 from simulator import seafloors
+from simulator.battery import BatterySpec
 from simulator.clock import SimulationClock
 from simulator.dune.node import DuneOptions, FakeDune
 from simulator.terrain import Terrain
@@ -119,6 +120,8 @@ class Bench:
         sensor: str = "single",
         start: tuple[float, float, float] = (50.0, 20.0, 0.0),
         imc_id: int = VEHICLE_ID,
+        battery: BatterySpec | None = None,
+        current: tuple[float, float] = (0.0, 0.0),
         **options: Any,
     ) -> None:
         self.wall_s = 0.0
@@ -132,6 +135,8 @@ class Bench:
             np.random.default_rng(0),
             ping_period_s=0.1,
             start_time_s=self.clock.now(),
+            battery=battery,
+            current=current,
         )
         self.node = FakeDune(
             self.vehicle, imc_id, HOME[1], self.clock, DuneOptions(**options), np.random.default_rng(0)

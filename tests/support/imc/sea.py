@@ -35,6 +35,7 @@ class Sea:
     sensor: str = "single"
     options: dict[str, Any] = field(default_factory=dict)
     clock_offset_s: float = 0.0
+    water: dict[str, Any] = field(default_factory=dict)
     bridge: Bridge = field(init=False)
     running: DuneFleet | None = None
     events: list[BridgeEvent] = field(default_factory=list)
@@ -50,6 +51,7 @@ class Sea:
             options=options,
             sensor=self.sensor,
             clock_offset_s=self.clock_offset_s,
+            **self.water,
         )
         await self.running.start()
 
@@ -112,9 +114,10 @@ async def open_sea(
     clock_offset_s: float = 0.0,
     connected: bool = True,
     bridge: dict[str, Any] | None = None,
+    water: dict[str, Any] | None = None,
     **options: Any,
 ) -> AsyncIterator[Sea]:
-    """A sea with its vehicles ready to be engaged; ``options`` are those of the fake DUNEs.
+    """A sea with its vehicles ready to be engaged; ``options`` are those of the fake DUNEs, ``water`` of their fleet.
 
     With ``connected`` false nobody listens on the bridge's ports yet.
     """
@@ -122,7 +125,9 @@ async def open_sea(
     changes = {"loopback_only": True} | (bridge or {})
     settings = BridgeSettings(port=port, announce_ports=tuple(announce_ports), time_scale=speed, **changes)
     floor = seafloors.generate(family, 0, width_m=100.0, height_m=100.0)
-    sea = Sea(floor, settings, base_port, vehicles, NetworkFaults(loss=loss), sensor, options, clock_offset_s)
+    sea = Sea(
+        floor, settings, base_port, vehicles, NetworkFaults(loss=loss), sensor, options, clock_offset_s, water or {}
+    )
     sea.bridge = Bridge(settings)
     if connected:
         await sea.launch()

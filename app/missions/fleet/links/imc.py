@@ -10,6 +10,8 @@ from app.missions.fleet.interface import (
     BeamGeometry,
     Deployment,
     EventSink,
+    FaultKind,
+    FaultReport,
     FleetEvent,
     FleetLink,
     LinkCapabilities,
@@ -33,6 +35,7 @@ from imc_bridge import (
     Bridge,
     BridgeEvent,
     BridgeSettings,
+    Fault,
     Guidance,
     LinkChange,
     NodeState,
@@ -80,7 +83,7 @@ class ImcFleetLink(FleetLink):
     """The fleet interface over IMC/UDP; see :class:`app.missions.fleet.interface.FleetLink` for its contract."""
 
     kind = "imc"
-    capabilities = LinkCapabilities(ready_before_start=True, circles_m=DUNE_CIRCLES_M)
+    capabilities = LinkCapabilities(ready_before_start=True, keeps_way_home=True, circles_m=DUNE_CIRCLES_M)
 
     def __init__(self, settings: BridgeSettings) -> None:
         self._bridge = Bridge(settings)
@@ -181,6 +184,23 @@ class ImcFleetLink(FleetLink):
         result = await self._bridge.stop(vehicle, timeout_s=timeout_s)
         return StopReceipt(result.vehicle, result.acknowledged, result.detail)
 
+    async def keep_way_home(self, vehicle: str, way: Sequence[Position], speed_mps: float) -> None:
+        """Store a way home in DUNE's plan database, for its LostComms supervisor; raises VehicleRefusedError."""
+        places = [
+            Waypoint("home", k, place.lat_deg, place.lon_deg, place.depth_m, speed_mps) for k, place in enumerate(way)
+        ]
+        try:
+            await self._bridge.keep_way_home(vehicle, places)
+        except RefusedError as error:
+            raise VehicleRefusedError(vehicle, error.reason, error.remedy) from error
+
+    async def drop_way_home(self, vehicle: str) -> None:
+        """Disarm the supervisor and delete the way home; raises VehicleRefusedError when that is not confirmed."""
+        try:
+            await self._bridge.drop_way_home(vehicle)
+        except RefusedError as error:
+            raise VehicleRefusedError(vehicle, error.reason, error.remedy) from error
+
     def diagnosis(self) -> Diagnosis:
         """What keeps vehicles from working with us, as heard so far."""
         return judge(self._bridge, self._bridge.listening_s)
@@ -216,7 +236,10 @@ def _translate(event: BridgeEvent) -> FleetEvent | None:
             )
             return RestartReport(event.vehicle, words)
         case LinkChange():
-            return LinkReport(event.vehicle, _link_state(event.state, event.engaged, event.ours), event.reason)
+            state = _link_state(event.state, event.engaged, event.ours)
+            return LinkReport(event.vehicle, state, event.reason, event.goes_home)
+        case Fault():
+            return fault_report(event)
         case _:
             # A refused Distance is counted in the vehicle's details.
             return None
@@ -271,6 +294,11 @@ def range_report(event: TargetRange) -> RangeReport:
     )
 
 
+def fault_report(event: Fault) -> FaultReport:
+    """A fault that the bridge heard of, as missions know it."""
+    return FaultReport(event.vehicle, event.time_s, FaultKind(event.kind.value), event.reason, event.over)
+
+
 def vehicle_report(state: StateReport) -> VehicleReport:
     """What the bridge heard of a vehicle, as missions know it."""
     return VehicleReport(
@@ -281,7 +309,10 @@ def vehicle_report(state: StateReport) -> VehicleReport:
         speed_mps=state.speed_mps,
         altitude_m=state.altitude_m,
         battery_pct=state.battery_pct,
+        battery_confidence_pct=state.battery_confidence_pct,
+        energy_left_s=state.energy_left_s,
         position_sd_m=state.position_sd_m,
+        current_mps=state.current_mps,
     )
 
 
@@ -296,6 +327,7 @@ def _info(node: NodeView) -> VehicleInfo:
         "soundings": str(node.soundings),
         "soundings refused": "; ".join(f"{reason}: {count}" for reason, count in node.refused.items()) or None,
         "rate limiters": node.rate_limiters,
+        "way home": node.way_home or None,
         "conflict": node.conflict,
     }
     return VehicleInfo(
@@ -307,6 +339,8 @@ def _info(node: NodeView) -> VehicleInfo:
         address=node.address,
         imc_id=node.imc_id,
         report=None if node.report is None else vehicle_report(node.report),
+        goes_home=node.goes_home,
+        faults=tuple(fault_report(fault) for fault in node.faults),
         details={key: value for key, value in details.items() if value is not None},
         # Only a vehicle that came back shows that it was radio that ended.
         advice=". ".join(radio_gap_words(node.radio_gaps)) if node.radio_gaps and node.state not in _SILENT else "",

@@ -3,7 +3,7 @@
 import asyncio
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import structlog
@@ -33,6 +33,7 @@ from app.missions.fleet.interface import (
 from app.missions.settings import SimulationSettings
 from app.missions.spec.mission import Sensor
 from app.missions.spec.targets import TargetSpec
+from simulator.battery import Battery, BatterySpec
 from simulator.obstacles import ObstacleWorld
 from simulator.raycasting import warm_up
 from simulator.scanning import Scan, Scanning
@@ -104,6 +105,7 @@ class Launch:
         What moves about there, and how well it ranges to that.
     lookout
         For a search: then it is a boat that can stop and turn on the spot.
+    battery
     """
 
     vehicle: str
@@ -117,6 +119,7 @@ class Launch:
     targets: tuple[TargetSpec, ...] = ()
     ranging: RangingNoise = RangingNoise()  # noqa: RUF009 - frozen
     lookout: Lookout | None = None
+    battery: BatterySpec = BatterySpec()  # noqa: RUF009 - frozen
 
 
 class _Swimmer:
@@ -141,6 +144,12 @@ class _Swimmer:
         self.reported_s = -math.inf
         self.report: VehicleReport | None = None
 
+    @property
+    def battery(self) -> Battery:
+        if self.body.battery is None:
+            raise ValueError(f"{self.body.name} has no battery")
+        return self.body.battery
+
     def position(self, place: LocalPosition) -> Position:
         lat, lon = self.terrain.frame.to_geodetic(place.east_m, place.north_m)
         return Position(lat, lon, place.depth_m)
@@ -155,8 +164,11 @@ class _Swimmer:
             heading_rad=state.heading_rad,
             speed_mps=state.speed_mps,
             altitude_m=state.altitude_m if math.isfinite(state.altitude_m) else None,
-            battery_pct=None,
+            battery_pct=self.battery.level_pct,
+            battery_confidence_pct=self.battery.spec.confidence_pct,
+            energy_left_s=self.battery.time_left_s(),
             position_sd_m=math.sqrt(state.position_variance_m2),
+            current_mps=self.body.vehicle.current,
         )
         return self.report
 
@@ -183,13 +195,26 @@ class SimFleetLink(FleetLink):
     ----------
     time_scale
         How much faster than the wall clock they live.
+    current
+        Velocity of the water, (east, north) in m/s.
+    battery
+        Of every vehicle that a mission deploys; its nominal speed is the one that the mission asks for.
     """
 
     kind = "sim"
     capabilities = LinkCapabilities(simulated=True, scans=True)
 
-    def __init__(self, settings: SimulationSettings, time_scale: float) -> None:
+    def __init__(
+        self,
+        settings: SimulationSettings,
+        time_scale: float,
+        *,
+        current: tuple[float, float] = (0.0, 0.0),
+        battery: BatterySpec | None = None,
+    ) -> None:
         self._settings = settings
+        self._current = current
+        self._battery = battery or BatterySpec()
         self._time_scale = time_scale
         self._told_of_pace = False
         self._terrains: dict[tuple[float, float, float, float], Terrain] = {}
@@ -233,6 +258,7 @@ class SimFleetLink(FleetLink):
             lookout=None
             if world is None or mission.search is None
             else Lookout(world, mission.search.scanner.reach_m, mission.search.scanner.resolution_deg),
+            battery=replace(self._battery, nominal_mps=mission.speed_of(vehicle)),
         )
         try:
             self.launch(launch)
@@ -269,7 +295,9 @@ class SimFleetLink(FleetLink):
             noise=SonarNoise(relative_sd=launch.noise),
             start_time_s=started_s,
             drift_m2ps=self._settings.drift_m2ps,
+            current=self._current,
             limits=None if launch.lookout is None else BOAT,
+            battery=launch.battery,
         )
         ranging = Ranging(targets, launch.ranging, np.random.default_rng([*seed, 1]), started_s)
         scanning = None
@@ -280,6 +308,10 @@ class SimFleetLink(FleetLink):
         swimmer = _Swimmer(launch.mission_id, body, terrain, ranging, scanning)
         swimmer.make_report()
         self._swimmers[launch.vehicle] = swimmer
+
+    def recharge(self, vehicle: str, level_pct: float = 100.0) -> None:
+        """Fill a vehicle's battery up to a level."""
+        self._swimmers[vehicle].battery.recharge(level_pct)
 
     def put_away(self, vehicle: str) -> None:
         """Take a vehicle out of the world; nothing happens when it is not there."""

@@ -5,6 +5,8 @@ from typing import Any
 import pytest
 
 from app.missions.fleet.interface import (
+    FaultKind,
+    FaultReport,
     LinkReport,
     LinkState,
     Position,
@@ -78,5 +80,46 @@ async def test_unknown_vehicle_is_refused() -> None:
                 await link.engage("nobody")
             assert caught.value.remedy
             assert not (await link.stop("nobody")).acknowledged
+        finally:
+            await link.close()
+
+
+async def test_a_way_home_is_kept_on_board() -> None:
+    async with open_sea(lost_comms_s=60.0) as sea:
+        (name,) = await sea.ready()
+        await sea.bridge.close()
+        link = ImcFleetLink(sea.settings)
+        assert link.capabilities.keeps_way_home
+        await link.start(lambda event: None)
+        try:
+            await until(lambda: [v.state for v in link.vehicles()] == [LinkState.READY], "it is ready")
+            lat, lon = sea.floor.frame.to_geodetic(20.0, 20.0)
+            await link.keep_way_home(name, [Position(lat, lon, 0.0)], 1.1)
+            (plan,) = sea.fleet.nodes[0].database.plans.values()
+            assert plan.maneuvers[0].data.speed == pytest.approx(1.1)
+            assert link.vehicles()[0].details["way home"].startswith("kept on board")
+            await link.drop_way_home(name)
+            assert not sea.fleet.nodes[0].database.plans
+            with pytest.raises(VehicleRefusedError, match="never heard of"):
+                await link.keep_way_home("nobody", [Position(lat, lon, 0.0)], 1.1)
+            with pytest.raises(VehicleRefusedError, match="never heard of"):
+                await link.drop_way_home("nobody")
+        finally:
+            await link.close()
+
+
+async def test_faults_on_board_are_told() -> None:
+    async with open_sea() as sea:
+        await sea.bridge.close()
+        link = ImcFleetLink(sea.settings)
+        events: list[Any] = []
+        await link.start(events.append)
+        try:
+            await until(lambda: [v.state for v in link.vehicles()] == [LinkState.READY], "it is ready")
+            sea.fleet.nodes[0].fail("leak")
+            await until(lambda: any(isinstance(event, FaultReport) for event in events), "the leak is told")
+            (fault,) = (event for event in events if isinstance(event, FaultReport))
+            assert (fault.kind, fault.over) == (FaultKind.LEAK, False)
+            assert link.vehicles()[0].faults == (fault,)
         finally:
             await link.close()

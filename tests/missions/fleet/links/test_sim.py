@@ -1,0 +1,86 @@
+"""Vehicles in this process: what they tell of their energy and of the current."""
+
+from functools import partial
+
+import pytest
+
+from app.missions.fleet.interface import (
+    FleetEvent,
+    Position,
+    VehicleReport,
+    WaypointOrder,
+    WaypointReport,
+    WaypointStatus,
+)
+from app.missions.fleet.links.sim import Launch, SimFleetLink
+from app.missions.settings import SimulationSettings
+from app.missions.spec.mission import Sensor
+from simulator import seafloors
+from simulator.battery import BatterySpec
+from tests.support.missions.specs import LAT, LON
+from tests.support.waiting import until
+
+FLOOR = seafloors.generate("harbour", 0, origin=(LAT, LON))
+NAME = "s"
+
+
+def launch(battery: BatterySpec) -> Launch:
+    start = FLOOR.frame.to_geodetic(50, 5)
+    return Launch(NAME, "m", Sensor.SINGLE_BEAM, (LAT, LON), 100, 100, start=start, noise=0.005, battery=battery)
+
+
+def order(step: int, east_m: float, north_m: float, speed_mps: float = 1.0) -> WaypointOrder:
+    lat, lon = FLOOR.frame.to_geodetic(east_m, north_m)
+    return WaypointOrder("m", step, NAME, Position(lat, lon, 1.0), speed_mps, 4.0, 1.0)
+
+
+async def test_it_tells_its_energy_and_the_current() -> None:
+    link = SimFleetLink(SimulationSettings(), 20.0, current=(0.1, -0.2))
+    link.launch(launch(BatterySpec(endurance_min=100.0, level_pct=50.0)))
+    (info,) = link.vehicles()
+    assert info.report is not None
+    assert info.report.battery_pct == 50.0
+    assert info.report.energy_left_s == 3000.0
+    assert info.report.current_mps == (0.1, -0.2)
+
+
+async def test_one_without_energy_goes_nowhere_until_it_is_charged() -> None:
+    events: list[FleetEvent] = []
+    link = SimFleetLink(SimulationSettings(), 50.0)
+    await link.start(events.append)
+    try:
+        link.launch(launch(BatterySpec(endurance_min=2.0, level_pct=10.0)))
+        await link.engage(NAME)
+        await link.order(order(1, 50, 80))
+        await until(
+            lambda: any(isinstance(e, VehicleReport) and e.battery_pct == 0.0 and e.speed_mps == 0.0 for e in events),
+            "it lies still",
+        )
+        link.recharge(NAME, 100.0)
+        await link.order(order(2, 50, 20))
+        await until(
+            lambda: any(isinstance(e, WaypointReport) and e.status is WaypointStatus.REACHED for e in events),
+            "it has arrived",
+        )
+    finally:
+        await link.close()
+
+
+@pytest.mark.parametrize("current", [(0.5, 0.0), (-0.35, 0.35), (0.0, -0.5)])
+async def test_it_arrives_against_and_across_half_its_speed(current: tuple[float, float]) -> None:
+    events: list[FleetEvent] = []
+    link = SimFleetLink(SimulationSettings(), 50.0, current=current)
+    await link.start(events.append)
+
+    def has_reached(step: int) -> bool:
+        reports = [e for e in events if isinstance(e, WaypointReport) and e.status is WaypointStatus.REACHED]
+        return step in [report.step for report in reports]
+
+    try:
+        link.launch(launch(BatterySpec()))
+        await link.engage(NAME)
+        for step, (east, north) in enumerate([(50, 60), (80, 60), (20, 60), (20, 20)]):
+            await link.order(order(step, east, north))
+            await until(partial(has_reached, step), f"step {step} is reached")
+    finally:
+        await link.close()
