@@ -54,7 +54,7 @@ def test_home_outside_is_reached_along_a_corridor() -> None:
     start = np.array([10.0, 190.0])
     way = way_home(ground, start, home)
     assert way is not None
-    free = Polygon(SQUARE).union(LineString([(100, 0), home]).buffer(CORRIDOR_M + 1e-6))
+    free = Polygon(SQUARE).union(LineString(np.array([[100.0, 0.0], home])).buffer(CORRIDOR_M + 1e-6))
     assert free.covers(LineString(np.vstack([start, way])))
     assert homeward_ground(Constraints(SQUARE), np.array([50.0, 50.0])).area is SQUARE
 
