@@ -106,6 +106,12 @@ class SimulationSettings(Section):
         le=10,
         description="Growth of the variance of a submerged vehicle's position, m2/s; LAUVs report 0.02; 0: none",
     )
+    current_mps: tuple[float, float] = Field(
+        default=(0.0, 0.0), description="Velocity of the water over ground, [east, north], m/s"
+    )
+    consumption_factor: float = Field(
+        default=1.0, gt=0, le=10, description="How much more energy vehicles use than their endurance says"
+    )
 
 
 class ProviderSettings(Section):

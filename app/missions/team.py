@@ -22,7 +22,7 @@ from app.missions.fleet.interface import (
 from app.missions.flown import Flown
 from app.missions.recovery.energy import Energy
 from app.missions.recovery.failsafes import Active
-from app.missions.spec.failsafes import Failsafe, Response
+from app.missions.spec.failsafes import Response
 from app.missions.spec.mission import Limits, MissionSpec, VehicleKind, VehicleSpec
 
 SETTLED = frozenset({WaypointStatus.REACHED, WaypointStatus.REFUSED, WaypointStatus.MISSED})
@@ -114,8 +114,8 @@ class Member:
     energy: Energy = field(default_factory=lambda: Energy(1.0))
     return_needs_s: float | None = None
     """How long its way home takes from where it is; None: it has none, or it is not known yet."""
-    faults: dict[Failsafe, str] = field(default_factory=dict)
-    """What it reports of itself that is wrong, in its words."""
+    way_home_m: NDArray[np.float64] | None = None
+    """The corners of its way home from about where it is, (n, 2); None: it has none, or it is not known yet."""
     failsafes: list[Active] = field(default_factory=list)
     """What is in force for it, the strongest response first."""
     leg_start_m: NDArray[np.float64] | None = None

@@ -165,8 +165,8 @@ async def test_a_paused_mission_is_finished_at_home_too(service: MissionService)
 
 
 async def test_vehicles_turn_back_in_time(service: MissionService) -> None:
-    """Five minutes of energy: it is home long before its steps are done, with some of it left."""
-    vehicles = [{"name": "a", "kind": "sim", "endurance_min": 5.0}]
+    """Ten minutes of energy: it is home long before its steps are done, with some of it left."""
+    vehicles = [{"name": "a", "kind": "sim", "endurance_min": 10.0}]
     spec = recovered(point=OUTSIDE, vehicles=vehicles, steps=1000)
     mission = await service.create(spec)
     await act(service, mission.id, "start")

@@ -11,6 +11,7 @@ import structlog
 from app.missions.fleet.hub import FleetHub
 from app.missions.fleet.interface import LinkState, VehicleInfo, VehicleRefusedError
 from app.missions.live.mission import LiveMission
+from app.missions.spec.failsafes import Response
 from app.missions.team import Member
 from app.missions.views.mission import Level
 
@@ -85,6 +86,9 @@ class Engagement:
                 # It was out of reach when its waypoint was to be sent.
                 await self._send(member)
             is_out = member.withdrawal is not None and member.withdrawal.over
+            if info.goes_home:
+                # To engage it ends that: then it is led home from here.
+                self._live.withdraw(member, Response.RETURN, "it heard nobody and went home by itself")
             if not member.engaged and not is_out and member.name not in self._asking and self._due(member):
                 task = asyncio.create_task(self._ask(member))
                 self._asking[member.name] = task

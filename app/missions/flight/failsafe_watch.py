@@ -8,7 +8,7 @@ from itertools import combinations
 import numpy as np
 
 from app.missions.fleet.hub import FleetHub
-from app.missions.fleet.interface import LinkState
+from app.missions.fleet.interface import FaultKind, LinkState
 from app.missions.flight.range_left import RangeLeft
 from app.missions.live.mission import LiveMission
 from app.missions.recovery.failsafes import (
@@ -32,6 +32,8 @@ PERIOD_S = 1.0
 
 FRESH_S = 5.0
 """Places of two vehicles are compared when they are not older, seconds of the vehicles' time."""
+
+FAULTS = {FaultKind.LEAK: Failsafe.LEAK, FaultKind.ERROR: Failsafe.VEHICLE_ERROR}
 
 TEAM = ""
 """In place of a vehicle's name: what concerns all of them."""
@@ -60,7 +62,9 @@ class FailsafeWatch:
         """Look once at everybody."""
         now_s = asyncio.get_running_loop().time() * self._time_scale
         too_close = self._too_close()
+        self._range.take_currents()
         for member in self._live.team:
+            member.way_home_m = self._range.way(member)
             member.return_needs_s = self._range.needs_s(member)
             over = member.withdrawal is not None and member.withdrawal.over
             detected = {} if over else self._detected(member) | too_close.get(member.name, {})
@@ -92,9 +96,9 @@ class FailsafeWatch:
 
     def _detected(self, member: Member) -> dict[Failsafe, str]:
         """Return what is wrong with a vehicle now, in words for the operator."""
-        found: dict[Failsafe, str] = dict(member.faults)
         report, limits = member.report, self._live.spec.limits
         link = self._hub.info(member.key)
+        found = {FAULTS[fault.kind]: f"it reports: {fault.reason}" for fault in link.faults}
         if link.state is LinkState.LOST and member.followed:
             return found | {Failsafe.LINK_LOST: f"its link is lost: {link.reason or 'silent'}"}
         if report is None:

@@ -21,6 +21,7 @@ from app.missions.flight.dispatch import Dispatch
 from app.missions.flight.elapsed_time import keep_time, save_elapsed
 from app.missions.flight.engagement import Engagement
 from app.missions.flight.failsafe_watch import FailsafeWatch
+from app.missions.flight.onboard_way import OnboardWays
 from app.missions.flight.own_legs import OwnLegs
 from app.missions.flight.range_left import RangeLeft
 from app.missions.flight.search_hooks import SearchHooks
@@ -64,6 +65,7 @@ class Runner:
         self._engagement = Engagement(live, hub, time_scale, self._dispatch.send)
         self._range = RangeLeft(live, constraints, self._committing)
         self._watch = FailsafeWatch(live, hub, self._range, time_scale)
+        self._onboard = OnboardWays(live, hub)
         self._withdrawals = Withdrawals(live, hub, self._committing, self._dispatch, self._range, time_scale)
 
     async def run(self) -> str:
@@ -78,12 +80,14 @@ class Runner:
             asyncio.create_task(keep_telemetry(live, self._time_scale)),
             asyncio.create_task(self._watch.keep()),
             asyncio.create_task(self._withdrawals.keep()),
+            asyncio.create_task(self._onboard.keep()),
         ]
         try:
             resumed = await self._recover()
             reason = await self._flight().fly(resumed=resumed)
             self._call_home(reason)
             await self._withdrawals.finished()
+            await self._onboard.drop()
             return reason
         finally:
             metrics.RUNNING.dec()

@@ -338,7 +338,7 @@ class LiveMission:
     def _count_energy(self, member: Member, report: VehicleReport) -> None:
         """Count what a vehicle has used since its last report."""
         energy, before = member.energy, member.report
-        energy.take_level(report.battery_pct)
+        energy.take_level(report.battery_pct, report.battery_confidence_pct, report.energy_left_s)
         if self.header.state not in AT_SEA:
             energy.begin()
             return

@@ -53,8 +53,12 @@ async def waypoint(
     found = newer()
     if found is not None and link is not None:
         link.has_waypoint(vehicle, found.step)
-        return live.waypoints.of(vehicle)
-    return found
+        found = live.waypoints.of(vehicle)
+    if found is None or member.way_home_m is None:
+        return found
+    lats, lons = live.frame.to_geographic(member.way_home_m[:, 0], member.way_home_m[:, 1])
+    way = [(float(lon), float(lat)) for lat, lon in zip(lats, lons, strict=True)]
+    return found.model_copy(update={"way_home": way})
 
 
 async def _wait_watching(live: LiveMission, condition: Callable[[], bool], timeout_s: float) -> None:

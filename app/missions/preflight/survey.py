@@ -10,6 +10,7 @@ from app.missions.clock import now
 from app.missions.fleet.interface import LinkState
 from app.missions.live.mission import LiveMission
 from app.missions.live.vehicles import local_place
+from app.missions.preflight.recovery import recovery_checks
 from app.missions.preflight.search import search_checks
 from app.missions.safety import WAITING_CIRCLE_M
 from app.missions.spec.mission import MissionSpec, VehicleSpec
@@ -28,6 +29,7 @@ def preflight(live: LiveMission) -> PreflightView:
     checks = [
         *_vehicles(live),
         *_batteries(live),
+        *recovery_checks(live),
         *_places(live),
         *_depths(live),
         *_room(live),

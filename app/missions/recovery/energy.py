@@ -20,8 +20,8 @@ TRUSTED_PCT = 40.0
 PRIOR_PCT = 5.0
 """The stated endurance counts as much as this much of the battery seen used."""
 
-PRIOR_SD = 0.3
-"""Relative standard deviation of a stated endurance: one battery in a few is a third worse than told."""
+PRIOR_SD = 0.2
+"""Relative standard deviation of a stated endurance: one battery in five is a third worse than told."""
 
 LEAST_USED_PCT = 2.0
 """Without a stated endurance nothing is known before this much was seen used."""
@@ -75,6 +75,8 @@ class Energy:
     _first_used_s: float = field(default=0.0, repr=False)
     _rate_pct_s: float | None = field(default=None, repr=False)
     """What was learned before it was charged, percent a nominal second."""
+    _told_pct_s: float | None = field(default=None, repr=False)
+    """What the vehicle itself says of that."""
 
     def begin(self) -> None:
         """Learn anew from here: nothing was counted until now."""
@@ -85,8 +87,10 @@ class Energy:
         ratio = 1.0 if speed_mps is None else min(abs(speed_mps) / self.speed_mps, FASTEST_SHARE)
         self.used_s += seconds * (HOTEL + (1 - HOTEL) * ratio**3)
 
-    def take_level(self, level_pct: float | None, confidence_pct: float | None = None) -> None:
-        """Take what the battery tells: its level, and how sure it is of that, percent."""
+    def take_level(
+        self, level_pct: float | None, confidence_pct: float | None = None, lasts_s: float | None = None
+    ) -> None:
+        """Take what the battery tells: its level, how sure it is of that, percent, and how long it says that lasts."""
         if level_pct is None or (confidence_pct is not None and confidence_pct < TRUSTED_PCT):
             return
         charged = self._level_pct is not None and level_pct > self._level_pct + CHARGED_PCT
@@ -95,6 +99,8 @@ class Energy:
         if charged or self._level_pct is None:
             self._first_pct, self._first_used_s = level_pct, self.used_s
         self._level_pct = level_pct
+        if lasts_s and level_pct > 0.0:
+            self._told_pct_s = level_pct / lasts_s
 
     @property
     def level_pct(self) -> float | None:
@@ -104,11 +110,18 @@ class Energy:
     @property
     def rate_pct_s(self) -> float | None:
         """Percent of the battery that a nominal second takes; None while nobody can know."""
-        prior = self._rate_pct_s or (None if self.endurance_s is None else 100.0 / self.endurance_s)
+        prior = self._prior_pct_s
         drop_pct, load_s = self._seen()
         if prior is not None:
             return (PRIOR_PCT + drop_pct) / (PRIOR_PCT / prior + load_s)
         return drop_pct / load_s if drop_pct >= LEAST_USED_PCT and load_s > 0 else None
+
+    @property
+    def _prior_pct_s(self) -> float | None:
+        """What is thought of the consumption before anything was seen: as before a charge, as stated, as told."""
+        if self._rate_pct_s is not None:
+            return self._rate_pct_s
+        return self._told_pct_s if self.endurance_s is None else 100.0 / self.endurance_s
 
     @property
     def left(self) -> EnergyLeft | None:
@@ -117,7 +130,7 @@ class Energy:
         if self._level_pct is not None and rate is not None:
             time_s = self._level_pct / rate
             drop_pct, _ = self._seen()
-            prior_pct = 0.0 if self.endurance_s is None and self._rate_pct_s is None else PRIOR_PCT
+            prior_pct = 0.0 if self._prior_pct_s is None else PRIOR_PCT
             known_pct = max(prior_pct + drop_pct, LEAST_USED_PCT)
             return EnergyLeft(
                 self._level_pct, time_s, time_s * math.hypot(UNCERTAIN_PCT, PRIOR_SD * prior_pct) / known_pct

@@ -139,6 +139,11 @@ class WaypointView(View):
     speed_mps: float
     arrival_radius_m: float
     min_altitude_m: float
+    way_home: list[tuple[Longitude, Latitude]] = Field(
+        default_factory=list,
+        description="Where it goes when it hears of nobody any more: corners as [longitude, latitude], the "
+        "last at its recovery point; told to vehicles that ask for their waypoint",
+    )
     status: WaypointStatus
     reason: str = ""
 

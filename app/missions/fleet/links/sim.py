@@ -195,10 +195,9 @@ class SimFleetLink(FleetLink):
     ----------
     time_scale
         How much faster than the wall clock they live.
-    current
-        Velocity of the water, (east, north) in m/s.
     battery
-        Of every vehicle that a mission deploys; its nominal speed is the one that the mission asks for.
+        Of every vehicle that a mission deploys; its nominal speed is the one that the mission asks for, its endurance
+        the vehicle's own where that is stated.
     """
 
     kind = "sim"
@@ -209,12 +208,10 @@ class SimFleetLink(FleetLink):
         settings: SimulationSettings,
         time_scale: float,
         *,
-        current: tuple[float, float] = (0.0, 0.0),
         battery: BatterySpec | None = None,
     ) -> None:
         self._settings = settings
-        self._current = current
-        self._battery = battery or BatterySpec()
+        self._battery = battery or BatterySpec(consumption_factor=settings.consumption_factor)
         self._time_scale = time_scale
         self._told_of_pace = False
         self._terrains: dict[tuple[float, float, float, float], Terrain] = {}
@@ -258,7 +255,11 @@ class SimFleetLink(FleetLink):
             lookout=None
             if world is None or mission.search is None
             else Lookout(world, mission.search.scanner.reach_m, mission.search.scanner.resolution_deg),
-            battery=replace(self._battery, nominal_mps=mission.speed_of(vehicle)),
+            battery=replace(
+                self._battery,
+                nominal_mps=mission.speed_of(vehicle),
+                endurance_min=vehicle.endurance_min or self._battery.endurance_min,
+            ),
         )
         try:
             self.launch(launch)
@@ -295,7 +296,7 @@ class SimFleetLink(FleetLink):
             noise=SonarNoise(relative_sd=launch.noise),
             start_time_s=started_s,
             drift_m2ps=self._settings.drift_m2ps,
-            current=self._current,
+            current=self._settings.current_mps,
             limits=None if launch.lookout is None else BOAT,
             battery=launch.battery,
         )

@@ -35,7 +35,7 @@ def order(step: int, east_m: float, north_m: float, speed_mps: float = 1.0) -> W
 
 
 async def test_it_tells_its_energy_and_the_current() -> None:
-    link = SimFleetLink(SimulationSettings(), 20.0, current=(0.1, -0.2))
+    link = SimFleetLink(SimulationSettings(current_mps=(0.1, -0.2)), 20.0)
     link.launch(launch(BatterySpec(endurance_min=100.0, level_pct=50.0)))
     (info,) = link.vehicles()
     assert info.report is not None
@@ -69,7 +69,7 @@ async def test_one_without_energy_goes_nowhere_until_it_is_charged() -> None:
 @pytest.mark.parametrize("current", [(0.5, 0.0), (-0.35, 0.35), (0.0, -0.5)])
 async def test_it_arrives_against_and_across_half_its_speed(current: tuple[float, float]) -> None:
     events: list[FleetEvent] = []
-    link = SimFleetLink(SimulationSettings(), 50.0, current=current)
+    link = SimFleetLink(SimulationSettings(current_mps=current), 50.0)
     await link.start(events.append)
 
     def has_reached(step: int) -> bool:

@@ -1,0 +1,78 @@
+"""The lines of the checklist about coming home."""
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from app.missions.flight.commit import home_of
+from app.missions.flight.decision import make_constraints
+from app.missions.live.mission import LiveMission
+from app.missions.recovery.failsafes import with_reserve_s
+from app.missions.recovery.way_home import homeward_ground, way_home, way_time_s
+from app.missions.team import Member
+from app.missions.views.mission import CheckStatus, CheckView
+
+OK, NOTE, WARNING, PROBLEM = CheckStatus.OK, CheckStatus.NOTE, CheckStatus.WARNING, CheckStatus.PROBLEM
+STILL = (0.0, 0.0)
+
+
+def recovery_checks(live: LiveMission) -> Iterator[CheckView]:
+    """Return what there is to say of every vehicle's way home, and of what its energy lasts for."""
+    homeless = [m.name for m in live.team if live.spec.recovery_of(m.spec) is None and not m.capabilities.simulated]
+    if homeless:
+        yield CheckView(
+            id="recovery",
+            title="Coming home",
+            status=NOTE,
+            message=f"no recovery point for {', '.join(homeless)}: they stop where they are",
+            remedy="Give recovery.point to have them come home",
+        )
+    for member in live.team:
+        yield from _way(live, member)
+
+
+def _way(live: LiveMission, member: Member) -> Iterator[CheckView]:
+    home_m = home_of(member, live.spec)
+    if home_m is None:
+        return
+    name, title = f"recovery.{member.name}", f"Way home of {member.name}"
+    constraints = make_constraints(live.spec)
+    ground = homeward_ground(constraints, home_m)
+    speed_mps = live.spec.speed_of(member.spec)
+    corners = [np.asarray(corner) for corner in constraints.area]
+    ways = [(corner, way_home(ground, corner, home_m)) for corner in corners]
+    if any(way is None for _, way in ways):
+        yield CheckView(
+            id=name,
+            title=title,
+            status=PROBLEM,
+            message="no way leads home from all of the area that keeps clear of the keep-out zones",
+            remedy="Move the recovery point, or change the zones",
+        )
+        return
+    farthest_s = max(way_time_s(corner, way, speed_mps, STILL) for corner, way in ways if way is not None)
+    left, words = member.energy.left, f"at most {math.ceil(farthest_s / 60):.0f} min"
+    if left is None:
+        yield CheckView(
+            id=name,
+            title=title,
+            status=NOTE,
+            message=f"{words}; how long its energy lasts is not known",
+            remedy="Give its endurance_min: without it the vehicle does not turn back in time",
+        )
+        return
+    way_m = live.spec.allowance(member.spec).most_m(live.spec.limits.max_step_m)
+    needs_s = way_m / speed_mps + with_reserve_s(farthest_s)
+    status = OK if left.time_s >= needs_s else WARNING
+    if left.time_s < with_reserve_s(farthest_s):
+        status = PROBLEM
+    yield CheckView(
+        id=name,
+        title=title,
+        status=status,
+        message=f"{words}; its energy lasts {left.time_s / 60:.0f} min, and {needs_s / 60:.0f} min are asked for",
+        remedy=""
+        if status is OK
+        else "Charge it or make the mission shorter: it turns back before its part is done",
+    )
