@@ -158,6 +158,8 @@ class Node:
 
         self.entities: dict[int, str] | None = None
         self.entities_asked_at = -math.inf
+        self.lost_comms_task: str | None = None
+        """Name of the task that starts a plan when no console is heard; None where it does not run or is not known."""
         self.lost_comms: LostComms | None = None
         self.lost_comms_asked = 0
         """How often it was asked for that."""
@@ -231,7 +233,7 @@ class Node:
 
     def _forget_entities(self) -> None:
         """It may be configured otherwise now."""
-        self.entities = self.lost_comms = None
+        self.entities = self.lost_comms_task = self.lost_comms = None
         self.entities_asked_at, self.lost_comms_asked = -math.inf, 0
 
     def _forget_plan(self) -> None:
@@ -395,11 +397,7 @@ class Node:
     def take_entities(self, message: Message) -> None:
         """EntityList report: ``Name=id;…``."""
         self.entities = listed_entities(message) or self.entities
-
-    @property
-    def lost_comms_task(self) -> str | None:
-        """Name of the task that starts a plan when no console is heard, None where it does not run or is not known."""
-        return next(filter(is_lost_comms, (self.entities or {}).values()), None)
+        self.lost_comms_task = next(filter(is_lost_comms, (self.entities or {}).values()), None)
 
     def take_parameters(self, message: Message) -> None:
         """EntityParameters of that task."""

@@ -605,6 +605,9 @@ class FakeDune:
     def _on_plan_control(self, message: imcpy.Message, now_s: float) -> None:
         if isinstance(message, imcpy.PlanControl) and message.dst == self.imc_id:
             self.plan.on_plan_control(message, now_s)
+            note = self.database.note_started(message, now_s)
+            if note is not None:
+                self.send(note, PLAN_DATABASE)
 
     def _look_for_consoles(self, supervisor: LostComms, now_s: float) -> None:
         submerged = self.vehicle.vehicle.motion.depth_m > SURFACE_DEPTH_M

@@ -18,6 +18,7 @@ class PlanDatabase:
 
     def __init__(self) -> None:
         self.plans: dict[str, imcpy.PlanSpecification] = {}
+        self._noted = 0
 
     def answer(self, request: imcpy.PlanDB, now_s: float) -> list[imcpy.PlanDB]:
         """Carry a request out and return the replies to it."""
@@ -30,6 +31,19 @@ class PlanDatabase:
             replies.append(_reply(request, _Type.IN_PROGRESS, "in progress"))
         replies.append(_reply(request, _Type.FAILURE if problem else _Type.SUCCESS, problem or done, argument))
         return replies
+
+    def note_started(self, request: imcpy.PlanControl, now_s: float) -> imcpy.PlanDB | None:
+        """Keep a plan that comes with the request to start it; return what everyone is told of that."""
+        plan, kinds = request.arg, imcpy.PlanControl
+        starts = request.type == kinds.TypeEnum.REQUEST and request.op == kinds.OperationEnum.START
+        if not starts or not isinstance(plan, imcpy.PlanSpecification):
+            return None
+        storing = imcpy.PlanDB()
+        storing.op, storing.plan_id, storing.request_id = _Operation.SET, request.plan_id, self._noted
+        storing.arg = plan
+        self._noted = (self._noted + 1) & 0xFFFF
+        problem, done, information = self._carry_out(storing, now_s)
+        return None if problem else _reply(storing, _Type.SUCCESS, done, information)
 
     def _carry_out(self, request: imcpy.PlanDB, now_s: float) -> tuple[str, str, imcpy.Message | None]:
         """Return what is wrong with a request, or what to say to it and what to send with that."""

@@ -77,6 +77,15 @@ def test_plans_are_set_read_and_deleted(bench: Bench) -> None:
     assert ask(bench, Operation.DEL)[-1] == (Type.FAILURE, "undefined plan")
 
 
+def test_a_plan_that_is_started_is_kept_and_everyone_told(bench: Bench) -> None:
+    bench.say(start_request())
+    (told,) = bench.all(imcpy.PlanDB)
+    assert (told.type, told.op, told.plan_id, told.info, told.dst) == (
+        Type.SUCCESS, Operation.SET, "cao", "OK (new entry)", 0xFFFF,
+    )  # fmt: skip
+    assert list(bench.node.database.plans) == ["cao"]
+
+
 def test_wrong_requests_are_refused(bench: Bench) -> None:
     assert ask(bench, Operation.SET, way_home(bench, "other")) == [(Type.FAILURE, "plan id mismatch")]
     assert ask(bench, Operation.SET) == [(Type.FAILURE, "no plan specification given")]

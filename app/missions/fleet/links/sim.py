@@ -13,6 +13,8 @@ from app.missions.fleet.interface import (
     BeamGeometry,
     Deployment,
     EventSink,
+    FaultKind,
+    FaultReport,
     FleetEvent,
     FleetLink,
     LinkCapabilities,
@@ -143,6 +145,7 @@ class _Swimmer:
         self.raised = False
         self.reported_s = -math.inf
         self.report: VehicleReport | None = None
+        self.faults: dict[FaultKind, FaultReport] = {}
 
     @property
     def battery(self) -> Battery:
@@ -314,6 +317,19 @@ class SimFleetLink(FleetLink):
         """Fill a vehicle's battery up to a level."""
         self._swimmers[vehicle].battery.recharge(level_pct)
 
+    def fail(self, vehicle: str, kind: FaultKind, reason: str) -> None:
+        """Let something break on board."""
+        swimmer = self._swimmers[vehicle]
+        fault = swimmer.faults[kind] = FaultReport(vehicle, swimmer.body.time_s, kind, reason)
+        self._sink(fault)
+
+    def mend(self, vehicle: str, kind: FaultKind) -> None:
+        """Repair what is broken on board; nothing happens when that is not."""
+        swimmer = self._swimmers[vehicle]
+        fault = swimmer.faults.pop(kind, None)
+        if fault is not None:
+            self._sink(replace(fault, time_s=swimmer.body.time_s, over=True))
+
     def put_away(self, vehicle: str) -> None:
         """Take a vehicle out of the world; nothing happens when it is not there."""
         self._swimmers.pop(vehicle, None)
@@ -337,7 +353,15 @@ class SimFleetLink(FleetLink):
     def vehicles(self) -> Sequence[VehicleInfo]:
         """Every vehicle that was launched."""
         return [
-            VehicleInfo(name, self.kind, s.state, AGROUND if s.aground else "", age_s=0.0, report=s.report)
+            VehicleInfo(
+                name,
+                self.kind,
+                s.state,
+                AGROUND if s.aground else "",
+                age_s=0.0,
+                report=s.report,
+                faults=tuple(s.faults.values()),
+            )
             for name, s in self._swimmers.items()
         ]
 

@@ -5,6 +5,8 @@ from functools import partial
 import pytest
 
 from app.missions.fleet.interface import (
+    FaultKind,
+    FaultReport,
     FleetEvent,
     Position,
     VehicleReport,
@@ -42,6 +44,23 @@ async def test_it_tells_its_energy_and_the_current() -> None:
     assert info.report.battery_pct == 50.0
     assert info.report.energy_left_s == 3000.0
     assert info.report.current_mps == (0.1, -0.2)
+
+
+async def test_what_breaks_is_told_and_when_it_is_mended() -> None:
+    events: list[FleetEvent] = []
+    link = SimFleetLink(SimulationSettings(), 1.0)
+    await link.start(events.append)
+    try:
+        link.launch(launch(BatterySpec()))
+        link.mend(NAME, FaultKind.LEAK)
+        link.fail(NAME, FaultKind.LEAK, "water in the nose")
+        (info,) = link.vehicles()
+        assert [(fault.kind, fault.reason) for fault in info.faults] == [(FaultKind.LEAK, "water in the nose")]
+        link.mend(NAME, FaultKind.LEAK)
+        assert link.vehicles()[0].faults == ()
+    finally:
+        await link.close()
+    assert [event.over for event in events if isinstance(event, FaultReport)] == [False, True]
 
 
 async def test_one_without_energy_goes_nowhere_until_it_is_charged() -> None:
