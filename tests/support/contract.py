@@ -55,6 +55,8 @@ CONTRACT = {
     "DELETE /session": "signOut",
     "DELETE /missions/{mission_id}": "deleteMission",
     "POST /missions/{mission_id}/vehicles/{name}/rejoin": "rejoinVehicle",
+    "POST /missions/{mission_id}/vehicles/{name}/return": "returnVehicle",
+    "POST /missions/{mission_id}/vehicles/{name}/resume": "resumeVehicle",
     "GET /planners": "listPlanners",
     "GET /layers": "listLayers",
     "GET /health": "getHealth",

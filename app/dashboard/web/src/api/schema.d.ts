@@ -4324,6 +4324,14 @@ export interface components {
             arrival_radius_m: number;
             /** Min Altitude M */
             min_altitude_m: number;
+            /**
+             * Way Home
+             * @description Where it goes when it hears of nobody any more: corners as [longitude, latitude], the last at its recovery point; told to vehicles that ask for their waypoint
+             */
+            way_home: [
+                number,
+                number
+            ][];
             status: components["schemas"]["WaypointStatus"];
             /**
              * Reason
