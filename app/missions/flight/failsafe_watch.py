@@ -18,6 +18,7 @@ from app.missions.recovery.failsafes import (
     LOW_PCT,
     POSITION_LOST_M,
     Active,
+    LAST_S,
     FailsafeJudge,
     with_reserve_s,
 )
@@ -131,7 +132,7 @@ class FailsafeWatch:
         if left is None:
             return {}
         found = {}
-        if left.time_s < needs_s:
+        if left.time_s < min(needs_s, LAST_S):
             found[Failsafe.CRITICAL_ENERGY] = (
                 f"its energy lasts {left.time_s:.0f} s, and its way home takes {needs_s:.0f} s"
                 if math.isfinite(needs_s)

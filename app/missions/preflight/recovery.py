@@ -72,7 +72,5 @@ def _way(live: LiveMission, member: Member) -> Iterator[CheckView]:
         title=title,
         status=status,
         message=f"{words}; its energy lasts {left.time_s / 60:.0f} min, and {needs_s / 60:.0f} min are asked for",
-        remedy=""
-        if status is OK
-        else "Charge it or make the mission shorter: it turns back before its part is done",
+        remedy="" if status is OK else "Charge it or make the mission shorter: it turns back before its part is done",
     )

@@ -33,6 +33,9 @@ class Rule:
 LOW_RATIO, LOW_RESERVE_S = 1.1, 60.0
 """A vehicle turns back when what it has for sure is this many times its way home, and so much more."""
 
+LAST_S = 90.0
+"""A vehicle that will not get home goes on towards it until so little is left, then it comes up while it still can."""
+
 LINK_LOST_S = 300.0
 """After so long a silence DUNE's own supervisor brings a vehicle home: so does the service, as soon as it is heard."""
 
@@ -51,7 +54,8 @@ POSITION_LOST_M = 50.0
 TABLE: Mapping[Failsafe, Rule] = {
     Failsafe.LEAK: Rule("the vehicle reports water inside", Response.SURFACE, "alarm: leak"),
     Failsafe.CRITICAL_ENERGY: Rule(
-        f"what it has left does not last for its way home; without one a battery below {CRITICAL_PCT:g} %",
+        f"what it has left does not last for its way home, and less than {LAST_S:g} s; without a way home a battery "
+        f"below {CRITICAL_PCT:g} %",
         Response.SURFACE,
         "alarm: it cannot come home",
         after_s=10.0,

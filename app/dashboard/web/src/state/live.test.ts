@@ -60,6 +60,7 @@ const waypoint = (name: string, step: number, status: WaypointView["status"]): W
   depth_m: 2,
   speed_mps: 1,
   arrival_radius_m: 3,
+  way_home: [],
   min_altitude_m: 1,
 });
 
