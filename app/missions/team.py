@@ -97,6 +97,10 @@ class Member:
     reason: str = ""
     surfacing: bool = False
     """Whether its waypoint brings it up for a fix."""
+    submerged_s: float = 0.0
+    """How long it has been under water since its last fix at the surface, by its clock."""
+    surfaced_s: float = 0.0
+    """How long it has been at the surface now, by its clock."""
     risings: int = 0
     """How often it was sent up for one."""
     pursuing: str | None = None

@@ -1,7 +1,7 @@
 """Whether everybody comes home: ``python -m benchmarks.service.homecoming [--missions 20 --at-once 4]``.
 
 Seeded missions of the service with its simulated vehicles: areas of 100 to 300 m, two or three vehicles with 20 to 60
-minutes of endurance each, a recovery point inside or outside the area, sometimes a keep-out zone, currents up to 0.5 m/s
+minutes of endurance each, a recovery point inside or outside the area, at times a keep-out zone, currents to 0.5 m/s
 (``--still``: none), in every fifth mission batteries that empty 30 % faster than told, in every third one that
 joins later. The missions' length is no limit: energy is. Told are, by vehicle: how far from its recovery point it
 ended, what was left of its energy, and which part of the time that its energy allowed after the way home it surveyed.

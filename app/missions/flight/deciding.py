@@ -148,6 +148,7 @@ def place_of(member: Member, live: LiveMission) -> Place:
         report.position_sd_m if report is not None and report.position_sd_m is not None else math.nan,
         report.position.depth_m if member.surfacing and report is not None else math.nan,
         member.capabilities.keeps_depth,
+        submerged_s=member.submerged_s,
     )
 
 

@@ -58,6 +58,8 @@ class Place:
     """Whether it gets a leg now; where not, it has enough of them and ``en_m`` is where they end."""
     left_m: float = math.nan
     """How far it may still fly; NaN: as many steps as the mission has left."""
+    submerged_s: float = 0.0
+    """How long it has been under water since its last fix at the surface, by its clock."""
 
     @property
     def surfacing(self) -> bool:
@@ -277,28 +279,39 @@ def decide(
 def surfacing(team: list[Place], policy: SurfacePolicy | None) -> tuple[list[bool], dict[str, str]]:
     """Return which vehicles come up or stay up for a fix, and what is to be said of those that begin or end it.
 
-    A vehicle that does not say how well it knows where it is never comes up for that.
+    A vehicle that does not say how well it knows where it is comes up by the clock only.
     """
     if policy is None:
         return [False] * len(team), {}
     sd = np.array([place.position_sd_m for place in team])
-    due = due_to_rise(Localization(sd, sd / RISE_AT, policy.max_position_sd_m))
+    limit_m = math.inf if policy.max_position_sd_m is None else policy.max_position_sd_m
+    every_s = math.inf if policy.every_min is None else 60.0 * policy.every_min
+    due = due_to_rise(Localization(sd, sd / RISE_AT, limit_m))
     up: list[bool] = []
     told: dict[str, str] = {}
     for place, late in zip(team, due, strict=True):
         if not place.moving:
             up.append(False)
             continue
-        stays = place.surfacing and not place.position_sd_m <= policy.until_sd_m
-        up.append(bool(late or stays))
-        if up[-1] and not place.surfacing:
+        by_clock = place.submerged_s >= every_s
+        # Who says no more how well it knows where it is stays up, unless the clock sees to that.
+        says = math.isfinite(place.position_sd_m) or policy.every_min is None
+        poor = policy.max_position_sd_m is not None and says and not place.position_sd_m <= policy.until_sd_m
+        stays = place.surfacing and (by_clock or poor)
+        up.append(bool(late or by_clock or stays))
+        if by_clock and not late and not place.surfacing:
+            told[place.vehicle] = (
+                f"{place.vehicle} comes up for a fix: it was under water for {place.submerged_s / 60:.0f} min"
+            )
+        elif up[-1] and not place.surfacing:
             told[place.vehicle] = (
                 f"{place.vehicle} comes up for a fix: it knows its position to {place.position_sd_m:.2g} m, "
                 f"{policy.max_position_sd_m:g} m are allowed"
             )
         elif place.surfacing and not up[-1]:
+            knows = f": it knows its position to {place.position_sd_m:.2g} m"
             told[place.vehicle] = (
-                f"{place.vehicle} goes down again: it knows its position to {place.position_sd_m:.2g} m"
+                f"{place.vehicle} goes down again{knows if math.isfinite(place.position_sd_m) else ''}"
             )
     return up, told
 

@@ -15,10 +15,10 @@ from app.missions.recovery.failsafes import (
     ALTITUDE_SHARE,
     CRITICAL_PCT,
     DEPTH_OVERSHOOT_M,
+    LAST_S,
     LOW_PCT,
     POSITION_LOST_M,
     Active,
-    LAST_S,
     FailsafeJudge,
     with_reserve_s,
 )

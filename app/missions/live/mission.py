@@ -73,6 +73,9 @@ LONGEST_GAP_S = 60.0
 FASTEST_MPS = 10.0
 """A position that is farther from the last one than this speed makes was corrected, not flown to."""
 
+SURFACE_M = 0.7
+"""Who is not deeper can receive satellites."""
+
 LONGEST_SILENCE_S = 6 * 3600.0
 """A vehicle was under way, and used energy, in a silence that was not longer."""
 
@@ -345,7 +348,19 @@ class LiveMission:
         passed_s = 0.0 if before is None else report.time_s - before.time_s
         if 0.0 < passed_s <= LONGEST_SILENCE_S:
             energy.pass_time(passed_s, report.speed_mps)
+            self._count_submersion(member, report.position.depth_m, passed_s)
         member.flown.used_s = energy.used_s
+
+    def _count_submersion(self, member: Member, depth_m: float, passed_s: float) -> None:
+        """Count how long a vehicle has been under water, or up again; what counts as a fix the policy says."""
+        policy = self.spec.surface_policy
+        if depth_m > SURFACE_M:
+            member.surfaced_s = 0.0
+            member.submerged_s += passed_s
+            return
+        member.surfaced_s += passed_s
+        if policy is None or member.surfaced_s >= policy.stay_s:
+            member.submerged_s = 0.0
 
     def _energy_of(self, vehicle: VehicleSpec) -> Energy:
         endurance_s = None if vehicle.endurance_min is None else 60.0 * vehicle.endurance_min

@@ -132,7 +132,7 @@ def _position_quality(sd_m: float | None, policy: SurfacePolicy | None) -> Posit
     """Return how good a position of this deviation is by the mission's policy."""
     if sd_m is None:
         return PositionQuality.UNTOLD
-    if policy is None:
+    if policy is None or policy.max_position_sd_m is None:
         return PositionQuality.STATED
     if sd_m <= policy.until_sd_m:
         return PositionQuality.GOOD

@@ -113,3 +113,37 @@ async def test_a_running_mission_brings_its_vehicles_up_and_down_again(harbour: 
     assert "goes down again" in said[1]
     assert 0.0 in depths
     assert max(depths) == pytest.approx(2.0)
+
+
+CLOCK: dict[str, Any] = {"surface_policy": {"every_min": 20, "stay_s": 60}}
+
+
+def test_by_the_clock_a_vehicle_comes_up_and_goes_down_again_whatever_it_says() -> None:
+    for sd in (math.nan, 50.0):
+        late = replace(place("a", 10, 10), position_sd_m=sd, submerged_s=1201.0)
+        decision = decided([late], [[15.0, 12.0, 9.0]], **CLOCK)
+        assert [leg.surfacing for leg in decision.legs] == [True]
+        assert "it was under water for 20 min" in decision.fixes["a"]
+        up = replace(late, surfacing_depth_m=0.1)
+        assert decided([up], [[15.0, 12.0, 9.0]], **CLOCK).legs[0].surfacing, "it has not been up for long enough"
+        fixed = replace(up, submerged_s=0.0)
+        decision = decided([fixed], [[15.0, 12.0, 9.0]], **CLOCK)
+        assert [leg.surfacing for leg in decision.legs] == [False]
+        assert "goes down again" in decision.fixes["a"]
+        early = replace(late, submerged_s=1199.0)
+        assert not decided([early], [[15.0, 12.0, 9.0]], **CLOCK).legs[0].surfacing
+
+
+async def test_a_mission_brings_its_vehicles_up_by_the_clock(harbour: Harbour, database: Database) -> None:
+    service = harbour.service
+    policy = {"every_min": 1.0, "stay_s": 5.0}
+    mission = await service.create(sim_spec("a", steps=40, side_m=60.0, surface_policy=policy))
+    await act(service, mission.id, "start")
+    ended = await until_state(service, mission.id, MissionState.FINISHED)
+    assert ended.vehicles[0].risings >= 2
+
+
+@pytest.mark.parametrize("policy", [{}, {"every_min": 10, "good_position_sd_m": 1.0}, {"stay_s": 5.0}])
+def test_a_policy_says_when(policy: dict[str, float]) -> None:
+    with pytest.raises(ValidationError, match="max_position_sd_m"):
+        make_spec(surface_policy=policy)
