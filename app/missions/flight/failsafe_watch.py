@@ -6,6 +6,7 @@ from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
+import structlog
 
 from app.missions.fleet.hub import FleetHub
 from app.missions.fleet.interface import FaultKind, LinkState
@@ -40,6 +41,9 @@ TEAM = ""
 """In place of a vehicle's name: what concerns all of them."""
 
 
+log = structlog.get_logger(__name__)
+
+
 class FailsafeWatch:
     """Judges the vehicles of one running mission by the table."""
 
@@ -56,7 +60,10 @@ class FailsafeWatch:
     async def keep(self) -> None:
         """Go on until cancelled."""
         while True:
-            await self.look()
+            try:
+                await self.look()
+            except Exception:
+                log.exception("the failsafes could not be looked at")
             await asyncio.sleep(PERIOD_S / self._time_scale)
 
     async def look(self) -> None:

@@ -3,6 +3,7 @@
 import asyncio
 
 import numpy as np
+import structlog
 
 from app.missions import safety
 from app.missions.fleet.hub import FleetHub
@@ -29,6 +30,9 @@ RISING_S = 120.0
 
 DEEP_M = 1.0
 """Who is not deeper is at the surface."""
+
+
+log = structlog.get_logger(__name__)
 
 
 class Withdrawals:
@@ -63,7 +67,11 @@ class Withdrawals:
         while True:
             for member in self._live.team:
                 if member.withdrawal is not None and not member.withdrawal.over and not self._live.halted:
-                    await self._lead(member, member.withdrawal)
+                    try:
+                        await self._lead(member, member.withdrawal)
+                    except Exception:
+                        # Whatever keeps one from being led now keeps nobody else, and is tried again.
+                        log.exception("a vehicle could not be led", vehicle=member.name)
             if any(member.withdrawal is not None for member in self._live.team):
                 await self._dispatch.settle_late()
             await asyncio.sleep(PERIOD_S / self._time_scale)
