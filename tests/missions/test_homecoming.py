@@ -133,6 +133,28 @@ async def test_a_vehicle_goes_home_for_a_battery_and_comes_back(service: Mission
     await act(service, mission.id, "abort")
 
 
+async def test_vehicles_that_fly_in_steps_of_the_whole_team_come_home_too(service: MissionService) -> None:
+    spec = recovered("a", "b", point=OUTSIDE, steps=1000, limits={"max_step_m": 8.0, "com_range_m": 500.0})
+    mission = await service.create(spec)
+    await act(service, mission.id, "start")
+    await until_step(service, mission.id, 2)
+    live = await service.get(mission.id)
+    await call_home(live, "a", "Ana")
+
+    async def is_home() -> bool:
+        return await phase_of(service, mission, "a") is Phase.HOME
+
+    await until(is_home, "a is home")
+    step = live.header.step
+    await until_step(service, mission.id, step + 2)
+    await service.send_on(live, "a", "Ana")
+    flown = live.team.members["a"].legs
+    await until(lambda: live.team.members["a"].legs > flown, "a takes part again")
+    await act(service, mission.id, "finish")
+    ended = await until_ended(service, mission.id)
+    assert {vehicle.phase for vehicle in ended.vehicles} == {Phase.HOME}
+
+
 async def test_a_service_that_restarts_goes_on_bringing_everybody_home(harbour: Harbour) -> None:
     service = harbour.service
     mission = await service.create(recovered("a", "b", point=lon_lat(15.0, -300.0), steps=1000))

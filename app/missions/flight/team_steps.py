@@ -69,6 +69,8 @@ class TeamSteps:
                 )
                 await self._lookout.look_round()
                 decision = await self._decide_to_fly()
+                if decision is None:
+                    continue
             for member in live.team.surveying:
                 member.set_order(None)
                 member.status = None
@@ -85,15 +87,19 @@ class TeamSteps:
                 return "everybody is back at the entry"
         return "every step is done"
 
-    async def _decide_to_fly(self) -> Decision:
-        """Decide a step that at least one vehicle flies: one in which nobody may go anywhere is no step."""
-        while True:
+    async def _decide_to_fly(self) -> Decision | None:
+        """Decide a step that at least one vehicle flies: one in which nobody may go anywhere is no step.
+
+        None where nobody is there to fly any more.
+        """
+        while self._live.team.present:
             number = self._live.header.step + 1
             decision = await self._decider.decide_to_fly(number, self._places(), self._lookout.task(number))
             if decision:
                 return decision[0]
             await asyncio.sleep(DECIDE_AGAIN_S / self._time_scale)
             await self._waiting.for_team()
+        return None
 
     async def _travel(self) -> Decision | None:
         """Wait until the vehicles arrived; returns the next step's decision when it could be made on the way.
