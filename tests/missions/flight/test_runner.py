@@ -70,6 +70,10 @@ async def test_a_step_that_every_vehicle_turns_down_is_sent_again(
     assert {row.status for rows in steps for row in rows} == {"reached"}
 
 
+INSIDE = {"max_step_m": 8.0, "border_margin_m": 8.0}
+"""No vehicle is carried out of the area by its turns, from where its next leg would be barred."""
+
+
 async def test_a_waypoint_that_is_committed_while_the_link_is_away_is_sent(
     service: MissionService, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -81,7 +85,7 @@ async def test_a_waypoint_that_is_committed_while_the_link_is_away_is_sent(
             member.link = LinkState.LOST
 
     monkeypatch.setattr(LegCommit, "commit", committed_in_a_gap)
-    mission = (await service.create(sim_spec(steps=2, step_deadline_s=200))).id
+    mission = (await service.create(sim_spec(steps=2, side_m=60.0, step_deadline_s=200, limits=INSIDE))).id
     await act(service, mission, "start", actor="Ana")
     await until_state(service, mission, MissionState.FINISHED)
     async with service._database.reading() as session:
