@@ -18,6 +18,8 @@ export type Severity = Schemas["Severity"];
 export type Level = Schemas["Level"];
 export type MissionAction = Schemas["Action"];
 export type Phase = Schemas["Phase"];
+export type Failsafe = Schemas["Failsafe"];
+export type FailsafeView = Schemas["FailsafeView"];
 export type BatteryState = Schemas["BatteryState"];
 
 export type PolygonGeometry = Schemas["PolygonGeometry"];

@@ -4,6 +4,7 @@ import type { ComponentChildren } from "preact";
 import { useEffect } from "preact/hooks";
 import type { ActionView, StopView } from "../api/types";
 import { refusal, said } from "../state/session";
+import { MISSION_WORDS } from "../state/words";
 import { Button } from "./Controls";
 import { Dialog } from "./Dialog";
 
@@ -20,48 +21,75 @@ interface StopDialogProps {
   send: () => Promise<ActionView | null>;
   confirm: (sending: boolean) => ComponentChildren;
   confirmId: string;
+  /** Brings vehicles home first, beside what stops them now; undefined where none can. */
+  sendHome?: (() => Promise<ActionView | null>) | undefined;
   /** What it means, before it is confirmed. */
   children: (sending: boolean) => ComponentChildren;
 }
 
 /** Asks once before vehicles are stopped, then stays until it has shown what every vehicle answered. */
-export function StopDialog({ open, what, question, done, send, children, ...rest }: StopDialogProps) {
+export function StopDialog({
+  open,
+  what,
+  question,
+  done,
+  send,
+  sendHome,
+  children,
+  ...rest
+}: StopDialogProps) {
   const { confirm, confirmId, name, ...frame } = rest;
-  const stops = useSignal<readonly StopView[] | null>(null);
+  const answer = useSignal<ActionView | null>(null);
   const sending = useSignal(false);
   useEffect(() => {
-    if (open) stops.value = null;
+    if (open) answer.value = null;
   }, [open, what]);
-  const stop = async () => {
+  const ask = async (how: () => Promise<ActionView | null>) => {
     sending.value = true;
     try {
-      const answer = await send();
-      if (answer) stops.value = answer.stops;
+      answer.value = await how();
     } finally {
       sending.value = false;
     }
   };
   const confirming = (
-    <Button
-      id={confirmId}
-      kind={name === "abort" ? "abort" : "command primary"}
-      disabled={sending.value}
-      onClick={() => void stop()}
-    >
-      {confirm(sending.value)}
-    </Button>
+    <>
+      {sendHome ? (
+        <Button id={`${name}-return`} disabled={sending.value} onClick={() => void ask(sendHome)}>
+          Return home
+        </Button>
+      ) : null}
+      <Button
+        id={confirmId}
+        kind={name === "abort" ? "abort" : "command primary"}
+        disabled={sending.value}
+        onClick={() => void ask(send)}
+      >
+        {confirm(sending.value)}
+      </Button>
+    </>
   );
+  const ending = answer.value?.mission.ending;
   return (
     <Dialog
       {...frame}
       open={open}
       name={name}
-      heading={stops.value ? done : question}
+      heading={ending ? "Returning home" : answer.value ? done : question}
       fault={refusal.value?.what === what ? said(refusal.value.error) : ""}
-      closing={stops.value ? "Close" : "Keep going"}
-      actions={stops.value ? null : confirming}
+      closing={answer.value ? "Close" : "Keep going"}
+      actions={answer.value ? null : confirming}
     >
-      {stops.value ? <Receipts stops={stops.value} /> : children(sending.value)}
+      {ending ? (
+        <p data-testid={`${name}-returning`}>
+          The vehicles are on their way home; the mission is {MISSION_WORDS[ending].toLowerCase()} once all
+          are there. Stop now, above, stops them where they are.
+        </p>
+      ) : answer.value ? (
+        <Receipts stops={answer.value.stops} />
+      ) : (
+        children(sending.value)
+      )}
     </Dialog>
   );
 }
