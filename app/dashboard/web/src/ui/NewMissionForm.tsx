@@ -4,7 +4,7 @@ import { useEffect } from "preact/hooks";
 import { api, ServiceError } from "../api/client";
 import type { PlannerView, VehicleSpec, VehicleView } from "../api/types";
 import { polygonOf, sizeOf } from "../map/area";
-import type { SearchMark } from "../map/site";
+import type { PlaceMark } from "../map/marks";
 import {
   areaOf,
   copyOf,
@@ -198,7 +198,7 @@ function Kind() {
 }
 
 /** Places of a search that is being described, as far as they are given. */
-function draftMarks(draft: Draft): SearchMark[] {
+function draftMarks(draft: Draft): PlaceMark[] {
   const [goal, entry] = [placeOf(draft.goal), placeOf(draft.entry)];
   const radius_m = Number(draft.goal_radius_m);
   return [
