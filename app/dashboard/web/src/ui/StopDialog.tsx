@@ -1,7 +1,7 @@
 import "./StopDialog.css";
 import { useSignal } from "@preact/signals";
 import type { ComponentChildren } from "preact";
-import { useEffect } from "preact/hooks";
+import { useEffect, useRef } from "preact/hooks";
 import type { ActionView, StopView } from "../api/types";
 import { refusal, said } from "../state/session";
 import { MISSION_WORDS } from "../state/words";
@@ -40,32 +40,44 @@ export function StopDialog({
 }: StopDialogProps) {
   const { confirm, confirmId, name, ...frame } = rest;
   const answer = useSignal<ActionView | null>(null);
-  const sending = useSignal(false);
+  const sending = useSignal<"stop" | "home" | null>(null);
+  // An answer counts for what was asked last: one that comes late takes no stop out of reach.
+  const last = useRef(0);
   useEffect(() => {
-    if (open) answer.value = null;
+    last.current++;
+    answer.value = null;
+    sending.value = null;
   }, [open, what]);
-  const ask = async (how: () => Promise<ActionView | null>) => {
-    sending.value = true;
+  const ask = async (which: "stop" | "home", how: () => Promise<ActionView | null>) => {
+    last.current++;
+    const mine = last.current;
+    sending.value = which;
     try {
-      answer.value = await how();
+      const found = await how();
+      if (mine === last.current) answer.value = found;
     } finally {
-      sending.value = false;
+      if (mine === last.current) sending.value = null;
     }
   };
+  const stopping = sending.value === "stop";
   const confirming = (
     <>
       {sendHome ? (
-        <Button id={`${name}-return`} disabled={sending.value} onClick={() => void ask(sendHome)}>
+        <Button
+          id={`${name}-return`}
+          disabled={sending.value !== null}
+          onClick={() => void ask("home", sendHome)}
+        >
           Return home
         </Button>
       ) : null}
       <Button
         id={confirmId}
         kind={name === "abort" ? "abort" : "command primary"}
-        disabled={sending.value}
-        onClick={() => void ask(send)}
+        disabled={stopping}
+        onClick={() => void ask("stop", send)}
       >
-        {confirm(sending.value)}
+        {confirm(stopping)}
       </Button>
     </>
   );
@@ -88,7 +100,7 @@ export function StopDialog({
       ) : answer.value ? (
         <Receipts stops={answer.value.stops} />
       ) : (
-        children(sending.value)
+        children(stopping)
       )}
     </Dialog>
   );
