@@ -107,9 +107,9 @@ function label(
   context.lineWidth = 3.2;
   context.setLineDash([]);
   context.strokeStyle = paper.casing;
-  context.strokeText(words, at.x(place[0]) + 11, at.y(place[1]));
+  context.strokeText(words, at.x(place[0]) + 14, at.y(place[1]));
   context.fillStyle = paper.ink;
-  context.fillText(words, at.x(place[0]) + 11, at.y(place[1]));
+  context.fillText(words, at.x(place[0]) + 14, at.y(place[1]));
 }
 
 /** Outlines of signs about their place, pixels: a star, a door, a mast and a house. */

@@ -8,6 +8,7 @@ import {
   flownWords,
   hasEnded,
   isAllowed,
+  isSaid,
   lengthWords,
   missionWords,
   rangeWords,
@@ -134,6 +135,13 @@ describe("a vehicle that surveys no more", () => {
     const warned = { ...surveying, failsafes: [{ ...low, response: "warn" as const }] };
     expect(vehicleState(warned, undefined).tone).toBe("warning");
     expect(failsafeWords(low)).toBe("Low energy");
+    expect(vehicleState({ ...away, phase: "home", failsafes: [low] }, undefined).tone).toBe("warning");
+  });
+
+  it("does not say twice what only differs in its figures", () => {
+    const failsafes = [{ ...low, message: "its energy lasts 81 s" }];
+    expect(isSaid("its energy lasts 122.5 s", { failsafes })).toBe(true);
+    expect(isSaid("called home by Ana", { failsafes })).toBe(false);
   });
 
   it("is brought home with its mission as long as it is not there", () => {
@@ -154,17 +162,24 @@ describe("how far a vehicle still goes", () => {
   const now = Date.parse("2026-03-01T12:00:00Z");
 
   it("is told in minutes, with when it has to turn back", () => {
-    const range = { energy_left_s: 2500, turn_back_at: "2026-03-01T12:31:30Z", return_needs_s: 40 };
+    const range = {
+      ...surveying,
+      energy_left_s: 2500,
+      turn_back_at: "2026-03-01T12:31:30Z",
+      return_needs_s: 40,
+    };
     expect(rangeWords(range, now)).toEqual([
       "41 min left",
-      "turn back at 12:31 UTC (in 31 min)",
       "way home takes < 1 min",
+      "turn back at 12:31 UTC (in 31 min)",
     ]);
-    expect(rangeWords({ ...range, turn_back_at: "2026-03-01T11:59:59Z" }, now)[1]).toContain("(now)");
+    expect(rangeWords({ ...range, turn_back_at: "2026-03-01T11:59:59Z" }, now)[2]).toContain("(now)");
   });
 
   it("is left out where it is not known", () => {
-    expect(rangeWords({ energy_left_s: null, turn_back_at: null, return_needs_s: null }, now)).toEqual([]);
+    expect(
+      rangeWords({ ...surveying, energy_left_s: null, turn_back_at: null, return_needs_s: null }, now),
+    ).toEqual([]);
   });
 });
 

@@ -113,6 +113,8 @@ export const isThere = ({ withdrawn, phase, failsafes }: Withdrawn): boolean =>
   withdrawn !== "" &&
   (phase === "home" || (phase === "stopped" && !failsafes.some(({ response }) => response === "hold")));
 
+const isHome = (vehicle: Withdrawn): boolean => isThere(vehicle) && vehicle.phase === "home";
+
 type Homing = Withdrawn & Pick<VehicleView, "active" | "recovery_point">;
 
 /** Whether any vehicle can be brought home before its mission ends. */
@@ -126,16 +128,16 @@ interface Told {
   tone: Tone;
 }
 
-/** How loud a failsafe is. */
-export const failsafeTone = ({ response }: FailsafeView): "warning" | "alarm" =>
-  response === "warn" ? "warning" : "alarm";
+/** How loud a failsafe is; one that sent its vehicle home is less so once that is there. */
+export const failsafeTone = ({ response }: FailsafeView, of: VehicleView): "warning" | "alarm" =>
+  response === "warn" || (response === "return" && isHome(of)) ? "warning" : "alarm";
 
 export const failsafeWords = ({ failsafe }: FailsafeView): string => capital(failsafe.replaceAll("_", " "));
 
 /** A vehicle's state as one short line and how loud it is. */
 export function vehicleState(vehicle: VehicleView, waypoint: WaypointView | undefined): Told {
   const found = stateOf(vehicle, waypoint);
-  const tones = vehicle.active ? vehicle.failsafes.map(failsafeTone) : [];
+  const tones = vehicle.active ? vehicle.failsafes.map((one) => failsafeTone(one, vehicle)) : [];
   if (tones.includes("alarm")) return { ...found, tone: "alarm" };
   return tones.length > 0 && found.tone !== "alarm" ? { ...found, tone: "warning" } : found;
 }
@@ -143,7 +145,7 @@ export function vehicleState(vehicle: VehicleView, waypoint: WaypointView | unde
 function stateOf(vehicle: VehicleView, waypoint: WaypointView | undefined): Told {
   if (!vehicle.active) return { words: "Left the mission", tone: "calm" };
   if (vehicle.breach) return { words: capital(vehicle.breach), tone: "alarm" };
-  if (vehicle.withdrawn && vehicle.phase === "home") return { words: "Home", tone: "good" };
+  if (isHome(vehicle)) return { words: "Home", tone: "good" };
   // It is launched when the mission starts and put away when that ends: nothing to worry about.
   if (vehicle.kind === "sim" && vehicle.link === "unknown")
     return { words: vehicle.lat_deg === null ? "Not launched" : "Simulation over", tone: "calm" };
@@ -173,21 +175,28 @@ const BATTERY_SIGNS: Record<BatteryState, string> = { ok: "", low: "▲ ", criti
 export const batteryWords = ({ battery, battery_pct }: VehicleView): string =>
   `${BATTERY_SIGNS[battery ?? "ok"]}${percent(battery_pct)}`;
 
-type Range = Pick<VehicleView, "energy_left_s" | "turn_back_at" | "return_needs_s">;
+type Range = Withdrawn & Pick<VehicleView, "energy_left_s" | "turn_back_at" | "return_needs_s">;
 
-/** How long a vehicle's energy lasts, when it has to turn back, and how far it is from home; what is not known is left out. */
-export function rangeWords({ energy_left_s, turn_back_at, return_needs_s }: Range, now: number): string[] {
+/** How long a vehicle's energy lasts, how far it is from home, and when it has to turn back; what is not known is left out. */
+export function rangeWords(vehicle: Range, now: number): string[] {
+  const { energy_left_s, turn_back_at, return_needs_s } = vehicle;
   const parts: string[] = [];
   if (energy_left_s !== null) parts.push(`${minutes(energy_left_s)} left`);
+  if (return_needs_s !== null && !isThere(vehicle)) parts.push(`way home takes ${minutes(return_needs_s)}`);
   if (turn_back_at !== null) {
     const at = new Date(turn_back_at);
     const in_s = (at.getTime() - now) / 1000;
     const when = in_s > 0 ? `in ${minutes(in_s)}` : "now";
     parts.push(`turn back at ${clock(at, "utc").slice(0, 5)} UTC (${when})`);
   }
-  if (return_needs_s !== null) parts.push(`way home takes ${minutes(return_needs_s)}`);
   return parts;
 }
+
+const withoutFigures = (words: string) => words.replace(/[\d.]+/g, "");
+
+/** Whether a failsafe of a vehicle says this already, be it with other figures. */
+export const isSaid = (words: string, { failsafes }: Pick<VehicleView, "failsafes">): boolean =>
+  failsafes.some(({ message }) => withoutFigures(message).includes(withoutFigures(words)));
 
 type Allowed = Pick<MissionView, "allowed_actions">;
 

@@ -57,10 +57,12 @@ export function TopBar() {
         {present ? (
           <>
             <Figure label={past ? "Elapsed then" : "Elapsed"} value={duration(elapsed())} id="elapsed" />
-            <Figure
-              label="Remaining"
-              value={present.state === "running" && !past ? duration(present.progress.eta_s) : "–"}
-            />
+            {present.ending ? null : (
+              <Figure
+                label="Remaining"
+                value={present.state === "running" && !past ? duration(present.progress.eta_s) : "–"}
+              />
+            )}
           </>
         ) : null}
         <LinkSummary />
@@ -71,7 +73,7 @@ export function TopBar() {
       <AccountButton />
       <div class="commands">
         <Command action="start" label="Start" />
-        <Command action="pause" label="Pause" />
+        {present?.ending ? null : <Command action="pause" label="Pause" />}
         <Command action="resume" label="Resume" />
         <StopNow />
       </div>
@@ -108,7 +110,7 @@ function MissionLine() {
   const words = missionWords(present);
   return (
     <p
-      class={`state ${live ? present.state : "unknown"}`}
+      class={`state ${live ? present.state : "unknown"}${present.ending ? " ending" : ""}`}
       data-testid="mission-state"
       data-state={present.state}
       data-live={live}

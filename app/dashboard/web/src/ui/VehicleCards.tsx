@@ -21,9 +21,11 @@ import {
   failsafeTone,
   failsafeWords,
   hasEnded,
+  isSaid,
   isThere,
   PHASE_WORDS,
   rangeWords,
+  type Tone,
   vehicleState,
   WAYPOINT_WORDS,
 } from "../state/words";
@@ -59,7 +61,6 @@ function Card({ vehicle }: { vehicle: Vehicle }) {
   const away = v.kind === "sim" && v.link === "unknown";
   const ended = mission.value !== null && hasEnded(mission.value);
   const byEndurance = v.battery_pct === null && v.energy_left_pct !== null;
-  const said = (words: string) => v.failsafes.some(({ message }) => message.includes(words));
   return (
     <article
       class={`card ${state.tone}${v.active ? "" : " left"}${vehicle.stale && !away ? " stale" : ""}`}
@@ -96,6 +97,7 @@ function Card({ vehicle }: { vehicle: Vehicle }) {
         </div>
       </dl>
       {v.active && !ended ? <Range of={v} /> : null}
+      <Reasons vehicle={vehicle} tone={state.tone} />
       <p class="small">
         {[
           v.kind === "imc"
@@ -144,30 +146,42 @@ function Card({ vehicle }: { vehicle: Vehicle }) {
           Add again
         </Button>
       ) : null}
+    </article>
+  );
+}
+
+/** What is wrong with a vehicle, and why it does what it does. */
+function Reasons({ vehicle: { view: v, waypoint }, tone }: { vehicle: Vehicle; tone: Tone }) {
+  const present = mission.value;
+  const over = present !== null && (present.ending !== null || hasEnded(present));
+  const plain = v.phase === "returning" || v.phase === "home";
+  return (
+    <>
       {v.active && v.failsafes.length > 0 ? (
         <ul class="failsafes">
           {v.failsafes.map((one) => (
             <li
               key={one.failsafe}
-              class={`reason ${failsafeTone(one)}`}
+              class={`reason ${failsafeTone(one, v)}`}
               data-testid={`failsafe-${one.failsafe}-${v.name}`}
             >
               <b>
-                <span aria-hidden="true">{one.response === "warn" ? "▲" : "✕"}</span> {failsafeWords(one)}
+                <span aria-hidden="true">{failsafeTone(one, v) === "warning" ? "▲" : "✕"}</span>{" "}
+                {failsafeWords(one)}
               </b>{" "}
               {one.message}
             </li>
           ))}
         </ul>
       ) : null}
-      {v.withdrawn && v.active && !said(v.withdrawn) ? (
+      {v.withdrawn && v.active && !(over && plain) && !isSaid(v.withdrawn, v) ? (
         <p class="reason" data-testid={`withdrawn-${v.name}`}>
           Surveys no more: {v.withdrawn}
         </p>
       ) : null}
-      {v.reason && !said(v.reason) ? <p class={`reason ${state.tone}`}>{v.reason}</p> : null}
-      {vehicle.waypoint?.reason ? <p class={`reason ${state.tone}`}>{vehicle.waypoint.reason}</p> : null}
-    </article>
+      {v.reason && !isSaid(v.reason, v) ? <p class={`reason ${tone}`}>{v.reason}</p> : null}
+      {waypoint?.reason ? <p class={`reason ${tone}`}>{waypoint.reason}</p> : null}
+    </>
   );
 }
 
