@@ -88,7 +88,9 @@ def test_a_vehicle_turns_back_in_time_and_says_why(page: Page, service: Service)
     vehicles = [{"name": "sim-1", "kind": "sim", "sensor": "dvl", "endurance_min": 4.0}]
     under_way(page, service, "Low on energy", SOUTH, vehicles=vehicles)
     expect(by_id(page, "energy-sim-1")).to_have_text(re.compile(r"^\d+ %$"))
-    expect(by_id(page, "range-sim-1")).to_have_text(re.compile(r"min.left · turn.back.at.\d\d:\d\d.UTC.+way.home"))
+    expect(by_id(page, "range-sim-1")).to_have_text(
+        re.compile(r"min.left · way.home.takes.+turn.back.at.\d\d:\d\d.UTC")
+    )
     alarm = by_id(page, "failsafe-low_energy-sim-1")
     expect(alarm).to_contain_text("Low energy")
     expect(alarm).to_have_class(re.compile("alarm"))
