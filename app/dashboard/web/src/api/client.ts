@@ -115,6 +115,7 @@ function post<T>(path: string, body?: unknown): Promise<T> {
 }
 
 const missionPath = (id: string) => `/missions/${encodeURIComponent(id)}`;
+const vehiclePath = (id: string, name: string) => `${missionPath(id)}/vehicles/${encodeURIComponent(name)}`;
 
 export const api = {
   session: () => request<SessionView>("/session"),
@@ -127,7 +128,9 @@ export const api = {
   layers: () => request<LayerView[]>("/layers"),
   planners: () => request<PlannerView[]>("/planners"),
   create: (mission: NewMission) => post<MissionView>("/missions", mission),
-  act: (id: string, action: MissionAction) => post<ActionView>(`${missionPath(id)}/${action}`),
+  /** `home`: whether vehicles go home before the mission ends; undefined: as the service does it. */
+  act: (id: string, action: MissionAction, home?: boolean) =>
+    post<ActionView>(`${missionPath(id)}/${action}`, home === undefined ? undefined : { return: home }),
   log: readLog,
   mission: (id: string) => request<MissionView>(missionPath(id)),
   deleteMission: (id: string) => remove(missionPath(id)),
@@ -146,10 +149,10 @@ export const api = {
   telemetry: (id: string) => request<TelemetryView>(`${missionPath(id)}/telemetry`),
   tracks: (id: string) => request<TimedTracks>(`${missionPath(id)}/tracks.geojson`),
   note: (id: string, text: string) => post<EventView>(`${missionPath(id)}/notes`, { text }),
-  abortVehicle: (id: string, name: string) =>
-    post<ActionView>(`${missionPath(id)}/vehicles/${encodeURIComponent(name)}/abort`),
-  rejoin: (id: string, name: string) =>
-    post<MissionView>(`${missionPath(id)}/vehicles/${encodeURIComponent(name)}/rejoin`),
+  abortVehicle: (id: string, name: string) => post<ActionView>(`${vehiclePath(id, name)}/abort`),
+  rejoin: (id: string, name: string) => post<MissionView>(`${vehiclePath(id, name)}/rejoin`),
+  returnVehicle: (id: string, name: string) => post<MissionView>(`${vehiclePath(id, name)}/return`),
+  resumeVehicle: (id: string, name: string) => post<MissionView>(`${vehiclePath(id, name)}/resume`),
   soundings: (id: string, after: number, state?: SoundingState) =>
     request<SoundingPage>(
       `${missionPath(id)}/soundings?limit=200&after=${after}${state ? `&state=${state}` : ""}`,

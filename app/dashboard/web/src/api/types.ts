@@ -18,6 +18,8 @@ export type Severity = Schemas["Severity"];
 export type Level = Schemas["Level"];
 export type MissionAction = Schemas["Action"];
 export type Phase = Schemas["Phase"];
+export type Failsafe = Schemas["Failsafe"];
+export type FailsafeView = Schemas["FailsafeView"];
 export type BatteryState = Schemas["BatteryState"];
 
 export type PolygonGeometry = Schemas["PolygonGeometry"];
@@ -58,6 +60,8 @@ export type FieldProblem = Complete<Schemas["FieldProblem"]>;
 export type VehicleSpec = Pick<Schemas["VehicleSpec"], "name" | "kind" | "sensor"> & {
   depth_m?: number;
   speed_mps?: number;
+  endurance_min?: number;
+  recovery_point?: LngLat;
 };
 export type PlannerOptions = Partial<Schemas["PlannerOptions"]>;
 
@@ -75,6 +79,7 @@ export type NewMission = Pick<Schemas["MissionSpec"], "name" | "area" | "keep_ou
     "goal" | "goal_radius_m" | "entry" | "window_s" | "safety_m" | "scanner" | "obstacles"
   >;
   tide?: { level_m: number; source: string };
+  recovery?: { point: LngLat } & Partial<Schemas["Recovery"]>;
 };
 
 /** Where a vehicle was and when, as the tracks' GeoJSON says. */

@@ -7,13 +7,13 @@ import "maplibre-gl/dist/maplibre-gl.css";
 import { Map as MapLibreMap, Marker, NavigationControl, ScaleControl, setWorkerUrl } from "maplibre-gl";
 import workerUrl from "maplibre-gl/dist/maplibre-gl-worker.mjs?url";
 import type { LngLat, PolygonGeometry } from "../api/types";
-import { type Bounds, boundsOf, type Graticule, graticule, graticuleStep } from "./geo";
+import { type Bounds, boundsOf, type Graticule, graticule, graticuleStep, widened } from "./geo";
 import { type LivelyContent, NOTHING, paintLively, type Sketch } from "./lively";
-import type { Route, Spot, Track } from "./marks";
+import type { PlaceMark, Route, Spot, Track } from "./marks";
 import { type Look, PAPER } from "./paper";
 import type { PictureResult } from "./picture.worker";
 import { Sheets } from "./sheets";
-import { type SearchMark, type Site, sitePicture } from "./site";
+import { type Site, sitePicture } from "./site";
 import { imageOf, paintStill, type StillContent } from "./still";
 import type { TargetMark } from "./targets";
 
@@ -142,8 +142,14 @@ export class Chart {
     this.#map.addLayer({ id: "tiles", type: "raster", source: "tiles" });
   }
 
-  setMission(area: PolygonGeometry | null, keepOut: readonly PolygonGeometry[]): void {
-    this.#areaBounds = boundsOf(area?.coordinates[0] ?? []);
+  /** `homes`: places about the area that are to be in sight, too, where they are not far away. */
+  setMission(
+    area: PolygonGeometry | null,
+    keepOut: readonly PolygonGeometry[],
+    homes: readonly LngLat[],
+  ): void {
+    const bounds = boundsOf(area?.coordinates[0] ?? []);
+    this.#areaBounds = bounds && widened(bounds, homes);
     this.#lay({ area, keepOut });
   }
 
@@ -211,8 +217,8 @@ export class Chart {
     });
   }
 
-  /** The places of a search. */
-  setSearch(marks: readonly SearchMark[]): void {
+  /** Places with a name: those of a search, and where vehicles come home to. */
+  setPlaces(marks: readonly PlaceMark[]): void {
     this.#show({ marks });
   }
 

@@ -1,6 +1,6 @@
 import { describe, expect, it } from "vitest";
 import type { LngLat } from "../api/types";
-import { boundsOf, graticule, graticuleStep, metresPerDegree, rectangle } from "./geo";
+import { boundsOf, graticule, graticuleStep, metresPerDegree, rectangle, widened } from "./geo";
 
 describe("metres per degree", () => {
   it.each([
@@ -45,4 +45,9 @@ describe("the graticule", () => {
       expect(new Set(labels).size).toBe(labels.length);
     },
   );
+});
+
+it("bounds are widened by places near them only", () => {
+  expect(widened([0, 0, 1, 1], [[1.5, -0.5]])).toEqual([0, -0.5, 1.5, 1]);
+  expect(widened([0, 0, 1, 1], [[3, 0]])).toEqual([0, 0, 1, 1]);
 });

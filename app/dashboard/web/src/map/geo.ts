@@ -42,6 +42,20 @@ export function boundsOf(points: readonly LngLat[]): Bounds | null {
   return [Math.min(...lngs), Math.min(...lats), Math.max(...lngs), Math.max(...lats)];
 }
 
+/** Bounds together with those places that make them no more than twice as wide or high. */
+export function widened(bounds: Bounds, places: readonly LngLat[]): Bounds {
+  const [west, south, east, north] = bounds;
+  return places.reduce((found, [lng, lat]) => {
+    const more: Bounds = [
+      Math.min(found[0], lng),
+      Math.min(found[1], lat),
+      Math.max(found[2], lng),
+      Math.max(found[3], lat),
+    ];
+    return more[2] - more[0] <= 2 * (east - west) && more[3] - more[1] <= 2 * (north - south) ? more : found;
+  }, bounds);
+}
+
 /** Metres between two places, and the direction from one to the other in degrees from north; for short ways. */
 export function wayBetween(from: LngLat, to: LngLat): { metres: number; bearing_deg: number } {
   const scale = metresPerDegree((from[1] + to[1]) / 2);

@@ -2,11 +2,10 @@
 
 import type { LngLat, PolygonGeometry } from "../api/types";
 import { circle } from "./geo";
-import type { Route, Spot, Track } from "./marks";
+import type { PlaceMark, Route, Spot, Track } from "./marks";
 import type { Paper } from "./paper";
 import { dot, line, stroke, trace, way } from "./pen";
 import type { Projection } from "./projection";
-import type { SearchMark } from "./site";
 import type { TargetMark } from "./targets";
 
 const SKETCH = "#1d5c94";
@@ -23,7 +22,7 @@ export interface LivelyContent {
   tails: readonly Track[];
   routes: readonly Route[];
   targets: readonly TargetMark[];
-  marks: readonly SearchMark[];
+  marks: readonly PlaceMark[];
   spots: readonly Spot[];
   measure: readonly LngLat[];
   sketch: Sketch | null;
@@ -108,13 +107,13 @@ function label(
   context.lineWidth = 3.2;
   context.setLineDash([]);
   context.strokeStyle = paper.casing;
-  context.strokeText(words, at.x(place[0]) + 11, at.y(place[1]));
+  context.strokeText(words, at.x(place[0]) + 14, at.y(place[1]));
   context.fillStyle = paper.ink;
-  context.fillText(words, at.x(place[0]) + 11, at.y(place[1]));
+  context.fillText(words, at.x(place[0]) + 14, at.y(place[1]));
 }
 
-/** Outlines of a search's signs about their place, pixels: a star, a door and a mast. */
-const SIGNS: Record<SearchMark["sign"], readonly (readonly [number, number])[]> = {
+/** Outlines of signs about their place, pixels: a star, a door, a mast and a house. */
+const SIGNS: Record<PlaceMark["sign"], readonly (readonly [number, number])[]> = {
   goal: [...Array(10).keys()].map((i) => {
     const away = i % 2 === 0 ? 9 : 4;
     return [away * Math.sin((i * Math.PI) / 5), -away * Math.cos((i * Math.PI) / 5)] as const;
@@ -130,16 +129,25 @@ const SIGNS: Record<SearchMark["sign"], readonly (readonly [number, number])[]> 
     [5, -10],
     [-5, -10],
   ],
+  home: [
+    [0, -10],
+    [10, -1],
+    [7, -1],
+    [7, 8],
+    [-7, 8],
+    [-7, -1],
+    [-10, -1],
+  ],
 };
 
 function paintMark(
   context: CanvasRenderingContext2D,
   at: Projection,
-  { at: place, sign, words, radius_m }: SearchMark,
+  { at: place, sign, words, radius_m }: PlaceMark,
   paper: Paper,
 ): void {
   if (radius_m > 0) {
-    const dash = sign === "goal" ? [9, 5] : [2, 6];
+    const dash = sign === "transmitter" ? [2, 6] : [9, 5];
     line(context, at, circle(place, radius_m, 96), { colour: paper.casing, width: 4, opacity: 0.6 });
     line(context, at, circle(place, radius_m, 96), { colour: paper.ink, width: 2, dash });
   }

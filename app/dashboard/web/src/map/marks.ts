@@ -1,4 +1,4 @@
-/** What is drawn on the map: lines of vehicles, and soundings under review. */
+/** What is drawn on the map: lines of vehicles, places with a name, and soundings under review. */
 
 import type { LngLat, Place } from "../api/types";
 
@@ -19,4 +19,12 @@ export interface Spot {
   at: LngLat;
   state: string;
   chosen: boolean;
+}
+
+/** A place with a name; with a radius, what is about it. */
+export interface PlaceMark {
+  words: string;
+  sign: "goal" | "entry" | "transmitter" | "home";
+  at: LngLat;
+  radius_m: number;
 }

@@ -1,6 +1,7 @@
 /** The site of a search: what is known of each cell, as a picture, and the places that matter. Pure but for atob. */
 
 import type { LngLat, SearchGridView } from "../api/types";
+import type { PlaceMark } from "./marks";
 
 /** What is known of a cell, as the service counts. */
 export const CELL = { explored: 1, unexplored: 2, known: 3, found: 4 } as const;
@@ -56,14 +57,6 @@ export function sitePicture({ rows, cols, cells }: Site): {
   return { pixels, width: cols, height: rows };
 }
 
-/** A place that a search knows by name; with a radius, what is about it. */
-export interface SearchMark {
-  words: string;
-  sign: "goal" | "entry" | "transmitter";
-  at: LngLat;
-  radius_m: number;
-}
-
 interface Places {
   goal: readonly [number, number];
   goal_radius_m: number;
@@ -72,9 +65,9 @@ interface Places {
   transmitter_range_m: number;
 }
 
-export function searchMarks(search: Places): SearchMark[] {
+export function searchMarks(search: Places): PlaceMark[] {
   const { goal, entry, transmitter } = search;
-  const marks: SearchMark[] = [
+  const marks: PlaceMark[] = [
     { words: "Goal", sign: "goal", at: [goal[0], goal[1]], radius_m: search.goal_radius_m },
     { words: "Entry", sign: "entry", at: [entry[0], entry[1]], radius_m: 0 },
   ];

@@ -83,7 +83,10 @@ it.each([
   ["vehicles.0.name", "simulated"],
   ["area.coordinates.0", "ring"],
   ["budget.steps", "steps"],
-  ["vehicles.0.speed_mps", "simulated"],
+  ["vehicles.0.speed_mps", "own"],
+  ["vehicles.12.recovery_point", "own"],
+  ["recovery.point.0", "recovery"],
+  ["recovery.radius_m", "recovery_radius_m"],
   ["tide.level_m", "tide_m"],
   ["sounding_noise", null],
 ])("the service's field %s is shown at %s", (service, own) => {
@@ -150,18 +153,25 @@ describe("the length of a mission", () => {
     ["km_per_vehicle", { km_per_vehicle: "0.6" }, { seconds: 600, metres: 1200 }],
     ["steps", { steps: "60" }, { seconds: 600, metres: 1200 }],
   ] as const)("in %s is that of the vehicle that takes longest", (length, text, expected) => {
-    expect(estimate({ ...two, ...text, length, speeds: { "sim-1": "2" } }, 10_000)).toMatchObject(expected);
+    expect(estimate({ ...two, ...text, length, own: { "sim-1": { speed_mps: "2" } } }, 10_000)).toMatchObject(
+      expected,
+    );
   });
 
   it("may be flown by each vehicle at its own speed", () => {
     const chosen = [{ name: "lauv-1", kind: "imc", sensor: "dvl" }] as const;
-    const fleet = { ...draft, chosen, simulated: "1", speeds: { "lauv-1": "0.8", gone: "9" } };
-    expect(faultsOf({ ...fleet, speeds: { "sim-1": "6" } }).speeds).toContain("Speed of sim-1");
+    const fleet = {
+      ...draft,
+      chosen,
+      simulated: "1",
+      own: { "lauv-1": { speed_mps: "0.8" }, gone: { speed_mps: "9" } },
+    };
+    expect(faultsOf({ ...fleet, own: { "sim-1": { speed_mps: "6" } } }).own).toContain("Speed of sim-1");
     expect(faultsOf(fleet)).toEqual({});
     const mission = toMission(fleet);
     expect(mission.vehicles.map((vehicle) => vehicle.speed_mps)).toEqual([0.8, undefined]);
     const spec = { tide: {}, search: null, ...mission } as unknown as MissionView["spec"];
-    expect(copyOf({ name: "Quay", spec }).speeds).toEqual({ "lauv-1": "0.8" });
+    expect(copyOf({ name: "Quay", spec }).own).toEqual({ "lauv-1": { speed_mps: "0.8" }, "sim-1": {} });
   });
 });
 
@@ -212,4 +222,47 @@ it("a copy keeps what the form does not show, and its vehicles as they are descr
   expect(again).not.toHaveProperty("steps");
   expect(again.limits).toMatchObject({ keep_out_margin_m: 25, com_range_m: null });
   expect(again.area).toEqual(original.area);
+});
+
+describe("recovery", () => {
+  const homing = {
+    ...draft,
+    simulated: "2",
+    recovery: "41.184, -8.705",
+    recovery_radius_m: "40",
+    on_lost_link: "stop",
+    own: { "sim-2": { endurance_min: "90", recovery_point: "41.1845, -8.706" } },
+  };
+
+  it("is sent with its point as [longitude, latitude], and copied with what vehicles have of their own", () => {
+    const mission = toMission(homing);
+    expect(mission.recovery).toEqual({
+      point: [-8.705, 41.184],
+      radius_m: 40,
+      on_finish: "return",
+      on_low_energy: "return",
+      on_lost_link: "stop",
+    });
+    expect(mission.vehicles[1]).toMatchObject({ endurance_min: 90, recovery_point: [-8.706, 41.1845] });
+    const spec = { tide: {}, search: null, ...mission } as unknown as MissionView["spec"];
+    const copy = copyOf({ name: "Quay", spec });
+    expect([copy.recovery, copy.recovery_radius_m]).toEqual(["41.184000, -8.705000", "40"]);
+    expect(toMission(copy)).toMatchObject({ recovery: mission.recovery, vehicles: mission.vehicles });
+    expect(toMission({ ...copy, recovery: "" })).not.toHaveProperty("recovery");
+  });
+
+  it("is left out without a point, whatever else stands in the form", () => {
+    expect(faultsOf({ ...homing, recovery: " ", recovery_radius_m: "wide" })).toEqual({});
+    expect(toMission({ ...homing, recovery: "" })).not.toHaveProperty("recovery");
+  });
+
+  it("has its faults named", () => {
+    expect(faultsOf({ ...homing, recovery: "quay" }).recovery).toContain("Pick the recovery point");
+    expect(faultsOf({ ...homing, own: { "sim-1": { endurance_min: "0" } } }).own).toContain(
+      "Endurance of sim-1",
+    );
+    expect(faultsOf({ ...homing, own: { "sim-1": { recovery_point: "91, 0" } } }).own).toContain(
+      "Recovery point of sim-1",
+    );
+  });
 });

@@ -18,11 +18,17 @@ import {
   startTexts,
   type Texts,
   textsOf,
+  VEHICLE_FIELDS,
+  type VehicleField,
+  vehicleFieldsOf,
   withTexts,
 } from "./fields";
 
 /** How the area is given: typed as a rectangle, or as a ring that was drawn or came in a file. */
 export type AreaSource = "typed" | "drawn";
+
+/** What one vehicle has of its own, as typed; `recovery_point` as "latitude, longitude". */
+export type Own = Partial<Record<VehicleField | "recovery_point", string>>;
 
 /** As typed. */
 export interface Draft extends Texts {
@@ -33,6 +39,8 @@ export interface Draft extends Texts {
   goal: string;
   entry: string;
   obstacles: readonly (readonly LngLat[])[];
+  /** Where vehicles come home to, as "latitude, longitude"; empty: they stop where they are. */
+  recovery: string;
   source: AreaSource;
   ring: readonly LngLat[];
   keepOut: readonly (readonly LngLat[])[];
@@ -48,8 +56,8 @@ export interface Draft extends Texts {
   /** Of the simulated vehicles, separated by commas; empty: sim-1, sim-2 and so on. */
   names: string;
   chosen: readonly VehicleSpec[];
-  /** By vehicle, where it is another one than the mission's. */
-  speeds: Readonly<Record<string, string>>;
+  /** By vehicle. */
+  own: Readonly<Record<string, Own>>;
   /** What a mission that is copied has and the form does not show. */
   base: Partial<NewMission>;
 }
@@ -84,6 +92,7 @@ export function emptyDraft(middle: LngLat): Draft {
     goal: "",
     entry: "",
     obstacles: [],
+    recovery: "",
     source: "typed",
     ring: [],
     keepOut: [],
@@ -95,7 +104,7 @@ export function emptyDraft(middle: LngLat): Draft {
     options: {},
     names: "",
     chosen: [],
-    speeds: {},
+    own: {},
     base: {},
   };
   return { ...draft, ...centred(draft, middle) };
@@ -125,12 +134,24 @@ export function copyOf({ spec, name }: Pick<MissionView, "spec" | "name">): Draf
     tide_source: texts.tide_m === "" ? "" : tide.source,
     planner: spec.planner.name,
     options: spec.planner.options as PlannerOptions,
+    recovery: spec.recovery ? typedPlace(spec.recovery.point as LngLat) : "",
     simulated: "0",
-    chosen: spec.vehicles.map(({ speed_mps: _, ...vehicle }) => vehicle as VehicleSpec),
-    speeds: Object.fromEntries(
-      spec.vehicles.flatMap(({ name, speed_mps }) => (speed_mps == null ? [] : [[name, String(speed_mps)]])),
+    chosen: spec.vehicles.map(
+      ({ speed_mps: _s, endurance_min: _e, recovery_point: _p, ...vehicle }) => vehicle as VehicleSpec,
     ),
+    own: Object.fromEntries(spec.vehicles.map((vehicle) => [vehicle.name, ownOf(vehicle as VehicleSpec)])),
     base: base as Partial<NewMission>,
+  };
+}
+
+/** What a vehicle that is described has of its own. */
+function ownOf({ recovery_point, ...vehicle }: VehicleSpec): Own {
+  const numbers = (Object.keys(VEHICLE_FIELDS) as VehicleField[]).flatMap((name) =>
+    vehicle[name] == null ? [] : [[name, String(vehicle[name])]],
+  );
+  return {
+    ...Object.fromEntries(numbers),
+    ...(recovery_point ? { recovery_point: typedPlace(recovery_point) } : {}),
   };
 }
 
@@ -193,7 +214,12 @@ export function faultsOf(draft: Draft): Faults {
   if (draft.source === "typed") {
     for (const [field, label, schema] of CORNER) note(field, numberFault(label, draft[field], schema));
   }
-  for (const [name, field] of fieldsOf(draft.kind, draft.length)) note(name, fieldFault(field, draft[name]));
+  for (const [name, field] of fieldsOf(draft.kind, draft.length)) {
+    if (field.part !== "recovery" || draft.recovery.trim() !== "") note(name, fieldFault(field, draft[name]));
+  }
+  if (draft.recovery.trim() !== "" && !placeOf(draft.recovery)) {
+    faults.recovery = `Pick the recovery point on the map, or type ${PLACE_SAMPLE}`;
+  }
   note("simulated", numberFault("Simulated vehicles", draft.simulated, VEHICLES));
   if (draft.source === "drawn") {
     const fault = areaFault(draft.ring, faults.cell_m ? 0 : Number(draft.cell_m));
@@ -208,7 +234,7 @@ export function faultsOf(draft: Draft): Faults {
       ["goal", "the goal"],
       ["entry", "the entry"],
     ] as const) {
-      if (!placeOf(draft[field])) faults[field] = `Pick ${words} on the map, or type "41.1852, -8.7046"`;
+      if (!placeOf(draft[field])) faults[field] = `Pick ${words} on the map, or type ${PLACE_SAMPLE}`;
     }
     draft.obstacles.forEach((ring, i) => {
       const fault = areaFault(ring, 0);
@@ -230,11 +256,21 @@ export function faultsOf(draft: Draft): Faults {
   if (!faults.simulated && Number(draft.simulated) + draft.chosen.length === 0) {
     faults.simulated = "Choose at least one vehicle, or simulate some";
   }
-  for (const name of draft.kind === "survey" ? vehicleNames(draft) : []) {
-    const text = draft.speeds[name] ?? "";
-    if (text.trim() !== "") note("speeds", numberFault(`Speed of ${name}`, text, SPEC["vehicles.speed_mps"]));
-  }
+  for (const name of vehicleNames(draft)) note("own", ownFault(name, draft.own[name] ?? {}, draft.kind));
   return faults;
+}
+
+const PLACE_SAMPLE = '"41.1852, -8.7046"';
+
+/** What is wrong with what a vehicle has of its own. */
+function ownFault(name: string, own: Own, kind: MissionKind): string {
+  const fault = vehicleFieldsOf(kind)
+    .map(([field, declared]) =>
+      fieldFault({ ...declared, label: `${declared.label} of ${name}`, optional: true }, own[field] ?? ""),
+    )
+    .find((words) => words !== "");
+  const point = own.recovery_point?.trim() ?? "";
+  return fault ?? (point === "" || placeOf(point) ? "" : `Recovery point of ${name}: type ${PLACE_SAMPLE}`);
 }
 
 /** A place typed as "latitude, longitude" in decimal degrees; null when it is none. */
@@ -271,10 +307,11 @@ export function cornersOf(draft: Draft): LngLat[] {
 export function toMission(draft: Draft): NewMission {
   const area = areaOf(draft);
   if (!area) throw new Error("the draft has faults");
-  const { search, budget: _, ...base } = draft.base;
+  const { search, budget: _, recovery: before, ...base } = draft.base;
+  const point = placeOf(draft.recovery);
   const simulated = simulatedNames(draft).map((name): VehicleSpec => ({ name, kind: "sim", sensor: "dvl" }));
   const all = [...draft.chosen, ...simulated];
-  const vehicles = draft.kind === "search" ? all : all.map((vehicle) => withSpeed(vehicle, draft));
+  const vehicles = all.map((vehicle) => withOwn(vehicle, draft));
   const mission = {
     ...base,
     name: draft.name.trim(),
@@ -289,12 +326,19 @@ export function toMission(draft: Draft): NewMission {
       ? searchOf(draft, vehicles)
       : { planner: { name: draft.planner, options: draft.options } }),
   };
-  return withTexts(mission, draft, draft.kind, draft.length) as unknown as NewMission;
+  const { recovery, ...made } = withTexts(mission, draft, draft.kind, draft.length);
+  const homing = point ? { recovery: { ...before, ...(recovery as object), point } } : {};
+  return { ...made, ...homing } as unknown as NewMission;
 }
 
-function withSpeed(vehicle: VehicleSpec, { speeds }: Draft): VehicleSpec {
-  const text = speeds[vehicle.name]?.trim();
-  return text ? { ...vehicle, speed_mps: Number(text) } : vehicle;
+function withOwn(vehicle: VehicleSpec, { own: all, kind }: Draft): VehicleSpec {
+  const own = all[vehicle.name] ?? {};
+  const numbers = vehicleFieldsOf(kind).flatMap(([name]) => {
+    const text = own[name]?.trim();
+    return text ? [[name, Number(text)]] : [];
+  });
+  const point = placeOf(own.recovery_point ?? "");
+  return { ...vehicle, ...Object.fromEntries(numbers), ...(point ? { recovery_point: point } : {}) };
 }
 
 /** What only a search has: its places, and vehicles at the surface. Planner and length are left to the service. */
@@ -317,7 +361,7 @@ export function estimate(
   area_m2: number,
 ): { seconds: number; metres: number; spacing_m: number } | null {
   const ways = vehicleNames(draft).map((name) => {
-    const speed = Number(draft.speeds[name]?.trim() || draft.speed_mps);
+    const speed = Number(draft.own[name]?.speed_mps?.trim() || draft.speed_mps);
     const way = wayOf(draft, speed);
     return { metres: way, seconds: way / speed };
   });
@@ -338,8 +382,11 @@ const OTHERS: [path: string, field: keyof Draft][] = [
   ["search.goal", "goal"],
   ["search.entry", "entry"],
   ["search.obstacles", "obstacles"],
+  ["recovery", "recovery"],
   ["planner", "planner"],
   ["tide", "tide_m"],
+  ["vehicles.recovery_point", "own"],
+  ...Object.values(VEHICLE_FIELDS).map(({ path }): [string, keyof Draft] => [path, "own"]),
   ["vehicles", "simulated"],
   ["keep_out", "keepOut"],
   ["area", "ring"],
@@ -349,6 +396,7 @@ const OTHERS: [path: string, field: keyof Draft][] = [
 /** Which of the form's fields a field of the service's refusal stands for. */
 export function fieldOf(serviceField: string): keyof Draft | null {
   const plain = Object.entries(FIELDS).map(([name, { path }]) => [path, name as FieldName] as const);
-  const found = [...plain, ...OTHERS].find(([path]) => `${serviceField}.`.startsWith(`${path}.`));
+  const path = serviceField.replace(/^vehicles\.\d+/, "vehicles");
+  const found = [...plain, ...OTHERS].find(([known]) => `${path}.`.startsWith(`${known}.`));
   return found?.[1] ?? null;
 }

@@ -22,7 +22,7 @@ const valueAt = (mission: NewMission, path: string): unknown =>
 
 function draftWith(changes: Partial<Draft>, kind: Draft["kind"] = "survey"): Draft {
   const empty = emptyDraft([-8.705, 41.185]);
-  const places = { goal: "41.1853, -8.7045", entry: "41.1851, -8.7049" };
+  const places = { goal: "41.1853, -8.7045", entry: "41.1851, -8.7049", recovery: "41.1851, -8.705" };
   return { ...empty, ...turnedInto(kind, empty), name: "Quay", ...places, ...changes };
 }
 
@@ -38,18 +38,21 @@ describe.each(ENTRIES)("the field %s", (name, field) => {
   const schema = schemaOf(field);
   const least = schema.minimum ?? schema.exclusiveMinimum ?? 0;
   const inside = Math.ceil(0.3 * least + 0.7 * (schema.maximum ?? least + 20));
-  const text = String(inside / (field.factor ?? 1));
+  const other = schema.enum?.find((choice) => choice !== schema.default);
+  const text = other ?? String(inside / (field.factor ?? 1));
   const length = field.part === "length" ? { length: name as LengthUnit } : {};
 
   it("begins with what the service takes where nothing is said", () => {
     const begun = draftWith({}, kind)[name];
     const usual = schema.default ?? schema.example;
-    expect(begun).toBe(field.optional ? "" : String(Number(usual) / (field.factor ?? 1)));
+    const begins = typeof usual === "number" ? usual / (field.factor ?? 1) : usual;
+    expect(begun).toBe(field.optional ? "" : String(begins));
     expect(faultsOf(draftWith(length, kind))).toEqual({});
   });
 
   it("is held to the service's bounds", () => {
-    const wrong = [least - 1, ...(schema.maximum === undefined ? [] : [schema.maximum + 1])];
+    const past = [least - 1, ...(schema.maximum === undefined ? [] : [schema.maximum + 1])];
+    const wrong = other ? [] : past;
     for (const value of wrong) {
       const faults = faultsOf(draftWith({ ...length, [name]: String(value / (field.factor ?? 1)) }, kind));
       expect(faults[name]).toContain(`${field.label} must be`);
@@ -63,7 +66,7 @@ describe.each(ENTRIES)("the field %s", (name, field) => {
       kind,
     );
     const mission = toMission(draft);
-    expect(valueAt(mission, field.path)).toBe(Number(text) * (field.factor ?? 1));
+    expect(valueAt(mission, field.path)).toBe(other ?? Number(text) * (field.factor ?? 1));
     expect(copyOf(shown(mission))).toMatchObject({ ...length, [name]: text });
     expect(fieldOf(field.path)).toBe(name);
   });
@@ -128,6 +131,7 @@ it.each([
   // Corners, digits.
   ["ui/NewMissionForm.tsx", ["1", "2"]],
   ["ui/SearchFields.tsx", ["1"]],
+  ["ui/VehicleFields.tsx", []],
   ["ui/Fields.tsx", []],
 ])("%s has no number of a mission", (file, exceptions) => {
   const numbers = numbersIn(`${import.meta.dirname}/../${file}`);

@@ -24,7 +24,7 @@ export interface Field {
   /** Where the value stands in a mission. */
   path: keyof typeof SPEC;
   /** Where it stands in the form. */
-  part: "length" | "limits" | "search" | "tide";
+  part: "length" | "limits" | "search" | "tide" | "recovery";
   label: string;
   unit?: string;
   placeholder?: string;
@@ -92,7 +92,25 @@ export const FIELDS = {
     placeholder: "none",
     optional: true,
   },
+  recovery_radius_m: { path: "recovery.radius_m", part: "recovery", label: "Radius", unit: "m" },
+  on_finish: { path: "recovery.on_finish", part: "recovery", label: "On finish" },
+  on_low_energy: { path: "recovery.on_low_energy", part: "recovery", label: "On low energy" },
+  on_lost_link: { path: "recovery.on_lost_link", part: "recovery", label: "On a lost link" },
 } as const satisfies Record<string, Field>;
+
+/** The numbers that a single vehicle may have of its own. */
+export const VEHICLE_FIELDS = {
+  speed_mps: { path: "vehicles.speed_mps", label: "Speed", unit: "m/s", kind: "survey" },
+  endurance_min: { path: "vehicles.endurance_min", label: "Endurance", unit: "min" },
+} as const satisfies Record<string, Omit<Field, "part">>;
+
+export type VehicleField = keyof typeof VEHICLE_FIELDS;
+
+/** Those that vehicles have in this kind of mission. */
+export function vehicleFieldsOf(kind: MissionKind): [VehicleField, Omit<Field, "part">][] {
+  const all = Object.entries(VEHICLE_FIELDS) as [VehicleField, Omit<Field, "part">][];
+  return all.filter(([, field]) => (field.kind ?? kind) === kind);
+}
 
 export type FieldName = keyof typeof FIELDS;
 /** Units of a mission's length; one of these fields is sent. */
@@ -167,7 +185,7 @@ function put(tree: Tree, [key = "", ...rest]: string[], value: unknown): Tree {
 }
 
 /** What is wrong with a typed text; empty when nothing is. */
-export function fieldFault(field: Field, text: string): string {
+export function fieldFault(field: Omit<Field, "part">, text: string): string {
   const schema = schemaOf(field);
   const isNumber = schema.type === "number" || schema.type === "integer";
   if (!isNumber || (field.optional && text.trim() === "")) return "";

@@ -27,6 +27,11 @@ export function duration(seconds: number | null | undefined): string {
   return `${Math.floor(s / 3600)} h ${pad(Math.floor((s % 3600) / 60))} min`;
 }
 
+/** Under a minute, 7 min, 2 h 05 min. */
+export function minutes(seconds: number): string {
+  return seconds < 60 ? "< 1 min" : seconds < 3600 ? `${Math.floor(seconds / 60)} min` : duration(seconds);
+}
+
 export function age(seconds: number | null): string {
   if (seconds === null) return "never";
   return seconds < 10 ? `${seconds.toFixed(1)} s` : duration(seconds);
@@ -46,11 +51,11 @@ export type CoordinateFormat = "decimal" | "minutes";
 /** A place as charts and radios say it: decimal degrees, or degrees and decimal minutes. */
 export function place([lng, lat]: readonly [number, number], format: CoordinateFormat): string {
   if (format === "decimal") return `${latitude(lat)} ${longitude(lng)}`;
-  return `${minutes(lat, 2)} ${lat < 0 ? "S" : "N"} ${minutes(lng, 3)} ${lng < 0 ? "W" : "E"}`;
+  return `${arcMinutes(lat, 2)} ${lat < 0 ? "S" : "N"} ${arcMinutes(lng, 3)} ${lng < 0 ? "W" : "E"}`;
 }
 
 /** 41°11.1234′, rounded before it is split so that no 60 appears. */
-function minutes(degrees: number, width: number): string {
+function arcMinutes(degrees: number, width: number): string {
   const tenThousandths = Math.round(Math.abs(degrees) * 600_000);
   const whole = Math.floor(tenThousandths / 600_000);
   const rest = (tenThousandths % 600_000) / 10_000;

@@ -247,13 +247,16 @@ export async function fetchTelemetry(): Promise<void> {
   if (selectedId.peek() === id) telemetry.value = found;
 }
 
-/** Sends a command for the selected mission. Returns the service's answer, or null when it was refused. */
-export async function act(action: MissionAction): Promise<ActionView | null> {
+/**
+ * Sends a command for the selected mission; `home`: whether vehicles go home first when that ends it. Returns the
+ * service's answer, or null when it was refused.
+ */
+export async function act(action: MissionAction, home?: boolean): Promise<ActionView | null> {
   const id = selectedId.value;
   if (!id) return null;
   busyWith.value = action;
   try {
-    return await send(action, api.act(id, action));
+    return await send(action, api.act(id, action, home));
   } finally {
     busyWith.value = null;
   }
@@ -269,6 +272,18 @@ export async function abortVehicle(name: string): Promise<ActionView | null> {
 export async function rejoin(name: string): Promise<void> {
   const id = selectedId.value;
   if (id) await send(`taking ${name} back`, api.rejoin(id, name));
+}
+
+/** Sends a vehicle home in the middle of the mission. */
+export async function returnVehicle(name: string): Promise<void> {
+  const id = selectedId.value;
+  if (id) await send(`return of ${name}`, api.returnVehicle(id, name));
+}
+
+/** Lets a vehicle survey again that went home or was stopped. */
+export async function resumeVehicle(name: string): Promise<void> {
+  const id = selectedId.value;
+  if (id) await send(`sending ${name} on`, api.resumeVehicle(id, name));
 }
 
 /** Deletes a mission in which nothing was measured. */

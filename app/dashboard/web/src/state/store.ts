@@ -17,9 +17,10 @@ import type {
 } from "../api/types";
 import { kept } from "../kept";
 import { fittingRange, type Range } from "../map/layers";
+import type { PlaceMark } from "../map/marks";
 import { type DepthPalette, vehicleColour } from "../map/palette";
 import type { SeaFloor } from "../map/seafloor";
-import type { SearchMark, Site } from "../map/site";
+import type { Site } from "../map/site";
 import type { CoordinateFormat } from "./format";
 import { ageSeconds, EMPTY_VIEW, type LiveView } from "./live";
 
@@ -162,8 +163,8 @@ export const measured = signal<readonly LngLat[] | null>(null);
 export interface DraftShapes {
   area: PolygonGeometry | null;
   keepOut: readonly PolygonGeometry[];
-  /** Places of a search. */
-  marks: readonly SearchMark[];
+  /** Places of a search, and where vehicles come home to. */
+  marks: readonly PlaceMark[];
 }
 /** A place that is to be clicked on the map next. */
 export const picking = signal<{ what: string; onPicked: (at: LngLat) => void } | null>(null);

@@ -1,7 +1,19 @@
 import { describe, expect, it } from "vitest";
 import type { VehicleView, WaypointView } from "../api/types";
 import { age, clock, count, distance, duration, latitude, longitude, metres } from "./format";
-import { batteryWords, flownWords, hasEnded, isAllowed, lengthWords, vehicleState } from "./words";
+import {
+  batteryWords,
+  canReturn,
+  failsafeWords,
+  flownWords,
+  hasEnded,
+  isAllowed,
+  isSaid,
+  lengthWords,
+  missionWords,
+  rangeWords,
+  vehicleState,
+} from "./words";
 
 describe("numbers", () => {
   it.each([
@@ -51,8 +63,18 @@ describe("how far a mission has come", () => {
   });
 });
 
+const surveying = {
+  active: true,
+  link: "engaged",
+  phase: "survey",
+  withdrawn: "",
+  recovery_point: null,
+  failsafes: [],
+} as unknown as VehicleView;
+
 describe("a vehicle's state in words", () => {
-  const vehicle = (link: VehicleView["link"], active = true) => ({ link, active }) as VehicleView;
+  const vehicle = (link: VehicleView["link"], active = true) =>
+    ({ ...surveying, link, active }) as VehicleView;
   it("is loudest about a vehicle that is where it must not be", () => {
     const inside = { ...vehicle("engaged"), breach: "in keep-out zone 1" } as VehicleView;
     expect(vehicleState(inside, undefined)).toEqual({ words: "In keep-out zone 1", tone: "alarm" });
@@ -93,4 +115,75 @@ it.each([
   [null, null, "–"],
 ] as const)("a battery that the service calls %s is written as %s", (battery, battery_pct, words) => {
   expect(batteryWords({ battery, battery_pct } as VehicleView)).toBe(words);
+});
+
+describe("a vehicle that surveys no more", () => {
+  const away = { ...surveying, withdrawn: "called home by Ana" };
+  const low = { failsafe: "low_energy", response: "return", message: "enough for the way home" } as const;
+
+  it.each([
+    ["returning", "Returning home"],
+    ["surfacing", "Surfacing"],
+    ["home", "Home"],
+    ["stopped", "Stopped"],
+  ] as const)("is %s: %s", (phase, words) => {
+    expect(vehicleState({ ...away, phase }, undefined)).toEqual({ words, tone: "good" });
+  });
+
+  it("is loud about what is wrong with it, and less so where it was only warned", () => {
+    expect(vehicleState({ ...away, phase: "returning", failsafes: [low] }, undefined).tone).toBe("alarm");
+    const warned = { ...surveying, failsafes: [{ ...low, response: "warn" as const }] };
+    expect(vehicleState(warned, undefined).tone).toBe("warning");
+    expect(failsafeWords(low)).toBe("Low energy");
+    expect(vehicleState({ ...away, phase: "home", failsafes: [low] }, undefined).tone).toBe("warning");
+  });
+
+  it("does not say twice what only differs in its figures", () => {
+    const failsafes = [{ ...low, message: "its energy lasts 81 s" }];
+    expect(isSaid("its energy lasts 122.5 s", { failsafes })).toBe(true);
+    expect(isSaid("called home by Ana", { failsafes })).toBe(false);
+  });
+
+  it("is brought home with its mission as long as it is not there", () => {
+    const mission = { state: "running", ending: null } as const;
+    const homing = { ...surveying, recovery_point: [-8.7, 41.2] as [number, number] };
+    expect(canReturn(mission, [surveying, homing])).toBe(true);
+    expect(canReturn({ state: "ready", ending: null }, [homing])).toBe(false);
+    expect(canReturn({ ...mission, ending: "finished" }, [homing])).toBe(false);
+    expect(canReturn(mission, [{ ...homing, withdrawn: "called home", phase: "home" }])).toBe(false);
+    const hold = { ...low, response: "hold" as const };
+    expect(canReturn(mission, [{ ...homing, withdrawn: "held", phase: "stopped", failsafes: [hold] }])).toBe(
+      true,
+    );
+  });
+});
+
+describe("how far a vehicle still goes", () => {
+  const now = Date.parse("2026-03-01T12:00:00Z");
+
+  it("is told in minutes, with when it has to turn back", () => {
+    const range = {
+      ...surveying,
+      energy_left_s: 2500,
+      turn_back_at: "2026-03-01T12:31:30Z",
+      return_needs_s: 40,
+    };
+    expect(rangeWords(range, now)).toEqual([
+      "41 min left",
+      "way home takes < 1 min",
+      "turn back at 12:31 UTC (in 31 min)",
+    ]);
+    expect(rangeWords({ ...range, turn_back_at: "2026-03-01T11:59:59Z" }, now)[2]).toContain("(now)");
+  });
+
+  it("is left out where it is not known", () => {
+    expect(
+      rangeWords({ ...surveying, energy_left_s: null, turn_back_at: null, return_needs_s: null }, now),
+    ).toEqual([]);
+  });
+});
+
+it("a mission that is ending says what it becomes", () => {
+  expect(missionWords({ state: "running", ending: "aborted" })).toBe("Returning home; then aborted");
+  expect(missionWords({ state: "running", ending: null })).toBe("Running");
 });

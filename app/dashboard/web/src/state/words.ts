@@ -2,6 +2,7 @@
 
 import type {
   BatteryState,
+  FailsafeView,
   LinkState,
   MissionAction,
   MissionState,
@@ -12,7 +13,7 @@ import type {
   WaypointStatus,
   WaypointView,
 } from "../api/types";
-import { percent } from "./format";
+import { clock, minutes, percent } from "./format";
 
 export const MISSION_WORDS: Record<MissionState, string> = {
   draft: "Draft, needs a vehicle",
@@ -24,8 +25,14 @@ export const MISSION_WORDS: Record<MissionState, string> = {
   failed: "Failed",
 };
 
+type Stage = Pick<MissionView, "state" | "ending">;
+
+/** What a mission is at; one that is ending brings its vehicles home first. */
+export const missionWords = ({ state, ending }: Stage): string =>
+  ending ? `Returning home; then ${MISSION_WORDS[ending].toLowerCase()}` : MISSION_WORDS[state];
+
 /** A shape for each state, so that colour is never the only sign. */
-export const MISSION_SIGNS: Record<MissionState, string> = {
+const MISSION_SIGNS: Record<MissionState, string> = {
   draft: "◌",
   ready: "○",
   running: "▶",
@@ -34,6 +41,8 @@ export const MISSION_SIGNS: Record<MissionState, string> = {
   aborted: "■",
   failed: "✕",
 };
+
+export const missionSign = ({ state, ending }: Stage): string => (ending ? "⌂" : MISSION_SIGNS[state]);
 
 export const WAYPOINT_WORDS: Record<WaypointStatus, string> = {
   planned: "planned, not sent yet",
@@ -48,7 +57,7 @@ export const PHASE_WORDS: Record<Phase, string> = {
   transit: "in transit",
   survey: "surveying",
   surfacing: "surfacing",
-  returning: "returning",
+  returning: "returning home",
   home: "home",
   stopped: "stopped",
 };
@@ -97,17 +106,52 @@ const LINK_TONES: Record<LinkState, Tone> = {
   engaged: "good",
 };
 
+type Withdrawn = Pick<VehicleView, "withdrawn" | "phase" | "failsafes">;
+
+/** Whether a vehicle has come to where it was sent instead of surveying: home, up, stopped. */
+export const isThere = ({ withdrawn, phase, failsafes }: Withdrawn): boolean =>
+  withdrawn !== "" &&
+  (phase === "home" || (phase === "stopped" && !failsafes.some(({ response }) => response === "hold")));
+
+const isHome = (vehicle: Withdrawn): boolean => isThere(vehicle) && vehicle.phase === "home";
+
+type Homing = Withdrawn & Pick<VehicleView, "active" | "recovery_point">;
+
+/** Whether any vehicle can be brought home before its mission ends. */
+export const canReturn = (mission: Stage, vehicles: readonly Homing[]): boolean =>
+  (mission.state === "running" || mission.state === "paused") &&
+  mission.ending === null &&
+  vehicles.some((v) => v.active && v.recovery_point !== null && !isThere(v));
+
+interface Told {
+  words: string;
+  tone: Tone;
+}
+
+/** How loud a failsafe is; one that sent its vehicle home is less so once that is there. */
+export const failsafeTone = ({ response }: FailsafeView, of: VehicleView): "warning" | "alarm" =>
+  response === "warn" || (response === "return" && isHome(of)) ? "warning" : "alarm";
+
+export const failsafeWords = ({ failsafe }: FailsafeView): string => capital(failsafe.replaceAll("_", " "));
+
 /** A vehicle's state as one short line and how loud it is. */
-export function vehicleState(
-  vehicle: VehicleView,
-  waypoint: WaypointView | undefined,
-): { words: string; tone: Tone } {
+export function vehicleState(vehicle: VehicleView, waypoint: WaypointView | undefined): Told {
+  const found = stateOf(vehicle, waypoint);
+  const tones = vehicle.active ? vehicle.failsafes.map((one) => failsafeTone(one, vehicle)) : [];
+  if (tones.includes("alarm")) return { ...found, tone: "alarm" };
+  return tones.length > 0 && found.tone !== "alarm" ? { ...found, tone: "warning" } : found;
+}
+
+function stateOf(vehicle: VehicleView, waypoint: WaypointView | undefined): Told {
   if (!vehicle.active) return { words: "Left the mission", tone: "calm" };
   if (vehicle.breach) return { words: capital(vehicle.breach), tone: "alarm" };
+  if (isHome(vehicle)) return { words: "Home", tone: "good" };
   // It is launched when the mission starts and put away when that ends: nothing to worry about.
   if (vehicle.kind === "sim" && vehicle.link === "unknown")
     return { words: vehicle.lat_deg === null ? "Not launched" : "Simulation over", tone: "calm" };
   const tone = LINK_TONES[vehicle.link];
+  if (vehicle.withdrawn && vehicle.phase && vehicle.link !== "lost")
+    return { words: capital(PHASE_WORDS[vehicle.phase]), tone };
   if (vehicle.link !== "engaged" || !waypoint) return { words: LINK_WORDS[vehicle.link], tone };
   switch (waypoint.status) {
     case "acknowledged":
@@ -130,6 +174,29 @@ const BATTERY_SIGNS: Record<BatteryState, string> = { ok: "", low: "▲ ", criti
 /** A battery's level, with a sign where the service calls it low. */
 export const batteryWords = ({ battery, battery_pct }: VehicleView): string =>
   `${BATTERY_SIGNS[battery ?? "ok"]}${percent(battery_pct)}`;
+
+type Range = Withdrawn & Pick<VehicleView, "energy_left_s" | "turn_back_at" | "return_needs_s">;
+
+/** How long a vehicle's energy lasts, how far it is from home, and when it has to turn back; what is not known is left out. */
+export function rangeWords(vehicle: Range, now: number): string[] {
+  const { energy_left_s, turn_back_at, return_needs_s } = vehicle;
+  const parts: string[] = [];
+  if (energy_left_s !== null) parts.push(`${minutes(energy_left_s)} left`);
+  if (return_needs_s !== null && !isThere(vehicle)) parts.push(`way home takes ${minutes(return_needs_s)}`);
+  if (turn_back_at !== null) {
+    const at = new Date(turn_back_at);
+    const in_s = (at.getTime() - now) / 1000;
+    const when = in_s > 0 ? `in ${minutes(in_s)}` : "now";
+    parts.push(`turn back at ${clock(at, "utc").slice(0, 5)} UTC (${when})`);
+  }
+  return parts;
+}
+
+const withoutFigures = (words: string) => words.replace(/[\d.]+/g, "");
+
+/** Whether a failsafe of a vehicle says this already, be it with other figures. */
+export const isSaid = (words: string, { failsafes }: Pick<VehicleView, "failsafes">): boolean =>
+  failsafes.some(({ message }) => withoutFigures(message).includes(withoutFigures(words)));
 
 type Allowed = Pick<MissionView, "allowed_actions">;
 

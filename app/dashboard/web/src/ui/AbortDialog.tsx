@@ -1,6 +1,6 @@
 import { abortVehicle, act } from "../state/session";
 import { abortDialogOpen, abortOne, mission, type Vehicle, vehicles } from "../state/store";
-import { hasEnded } from "../state/words";
+import { canReturn, hasEnded } from "../state/words";
 import { Button } from "./Controls";
 import { StopDialog } from "./StopDialog";
 
@@ -11,6 +11,13 @@ export function AbortDialog() {
   const again = only !== null && mission.value !== null && hasEnded(mission.value);
   const verb = again ? "Stop" : "Abort";
   const team = open ? vehicles.value.filter((v) => v.view.active) : [];
+  const home =
+    only === null &&
+    mission.value !== null &&
+    canReturn(
+      mission.value,
+      team.map((v) => v.view),
+    );
   const asked = team.filter((v) => only === null || v.view.name === only);
   return (
     <StopDialog
@@ -26,12 +33,27 @@ export function AbortDialog() {
       question={`${verb} ${only ?? mission.value?.name ?? "the mission"}?`}
       done={doneTitle(only, again)}
       send={() => (only ? abortVehicle(only) : act("abort"))}
-      confirm={(sending) => (sending ? "Aborting…" : only ? `${verb} ${only}` : "Abort mission")}
+      sendHome={home ? () => act("abort", true) : undefined}
+      confirm={(sending) =>
+        sending
+          ? "Aborting…"
+          : only
+            ? `${verb} ${only}`
+            : home || mission.value?.ending
+              ? "Stop now"
+              : "Abort mission"
+      }
       confirmId="abort-confirm"
     >
       {(sending) => (
         <>
           <p>{consequence(only, again)}</p>
+          {home ? (
+            <p>
+              With <b>Return home</b> they go to their recovery points first, and the mission is aborted once
+              all are there.
+            </p>
+          ) : null}
           <ul class="receipts" aria-live="polite">
             {asked.map((vehicle) => (
               <Asked

@@ -2,14 +2,16 @@
 
 import { type ComponentChildren, createContext } from "preact";
 import { useContext } from "preact/hooks";
-import type { Draft, Faults } from "../state/draft";
+import { type Draft, type Faults, typedPlace } from "../state/draft";
 import { type Field, type FieldName, fieldsOf, schemaOf } from "../state/fields";
-import { Choice, same } from "./Controls";
+import { picking } from "../state/store";
+import { Button, Choice, same } from "./Controls";
 
 export interface FormState {
   draft: Draft;
   faults: Faults;
-  set: (change: Partial<Draft>) => void;
+  /** A change that follows from what there is then is a function of it. */
+  set: (change: Partial<Draft> | ((draft: Draft) => Partial<Draft>)) => void;
 }
 
 export const Form = createContext<FormState | null>(null);
@@ -49,6 +51,63 @@ export function Text({ field, label, placeholder = "", numeric = false, hint = "
       />
       <Fault field={field} />
     </label>
+  );
+}
+
+interface PlaceProps {
+  id: string;
+  label: ComponentChildren;
+  text: string;
+  onText: (text: string) => void;
+  placeholder?: string;
+  invalid?: boolean;
+  children?: ComponentChildren;
+}
+
+/** A place that is typed, or picked on the map. */
+export function Place({ id, label, text, onText, placeholder, invalid = false, children }: PlaceProps) {
+  const waiting = picking.value?.what === id;
+  return (
+    <div class="picked">
+      <label class="field">
+        {label}
+        <input
+          type="text"
+          autocomplete="off"
+          value={text}
+          placeholder={placeholder ?? "latitude, longitude"}
+          aria-invalid={invalid ? "true" : "false"}
+          data-testid={`field-${id}`}
+          onInput={(event) => onText(event.currentTarget.value)}
+        />
+        {children}
+      </label>
+      <Button
+        id={`pick-${id}`}
+        aria-pressed={waiting}
+        onClick={() => {
+          picking.value = waiting ? null : { what: id, onPicked: (at) => onText(typedPlace(at)) };
+        }}
+      >
+        {waiting ? "Click on the map…" : "Pick"}
+      </Button>
+    </div>
+  );
+}
+
+/** A place of the mission. */
+export function PlaceField({ field, label }: { field: "goal" | "entry" | "recovery"; label: string }) {
+  const { draft, faults, set } = useForm();
+  return (
+    <Place
+      id={field}
+      label={label}
+      text={draft[field]}
+      onText={(text) => set({ [field]: text })}
+      invalid={faults[field] !== undefined}
+    >
+      <Fault field={field} />
+    </Place>
   );
 }
 

@@ -23,6 +23,7 @@ import {
   site,
 } from "../state/store";
 import { Button, Choice, into, titles } from "./Controls";
+import { STAGES, VehicleShape } from "./marks";
 
 /** Layer switch, colour scale and its range, which stays what the operator set until changed. */
 export function Legend() {
@@ -54,6 +55,7 @@ export function Legend() {
       )}
       {map ? <Options shown={shown} /> : null}
       {site.value && showSite.value ? <SiteStates /> : null}
+      {mission.value.vehicles.some((v) => v.recovery_point !== null) ? <Stages /> : null}
     </section>
   );
 }
@@ -133,6 +135,19 @@ function SiteStates() {
           </li>
         );
       })}
+    </ul>
+  );
+}
+
+/** What the vehicles' shapes on the map mean. */
+function Stages() {
+  return (
+    <ul class="landmarks stages" data-testid="stage-legend">
+      {STAGES.map((stage) => (
+        <li key={stage}>
+          <VehicleShape stage={stage} colour="#8a9ca8" heading_deg={0} size={18} /> {stage}
+        </li>
+      ))}
     </ul>
   );
 }

@@ -5,7 +5,7 @@ import { whyNotCommand } from "../state/access";
 import { count } from "../state/format";
 import { deleteMission, selectMission } from "../state/session";
 import { copied, describing, fleetOpen, mission, missions, selectedId, serviceFault } from "../state/store";
-import { capital, lengthWords, MISSION_SIGNS, MISSION_WORDS } from "../state/words";
+import { capital, lengthWords, missionSign, missionWords } from "../state/words";
 import { Button, sets } from "./Controls";
 import { NewMissionForm } from "./NewMissionForm";
 
@@ -48,7 +48,7 @@ function MissionList() {
             >
               <b>{m.name}</b>
               <span class={`state ${m.state}`}>
-                <span aria-hidden="true">{MISSION_SIGNS[m.state]}</span> {MISSION_WORDS[m.state]}
+                <span aria-hidden="true">{missionSign(m)}</span> {missionWords(m)}
               </span>
               <small>
                 {capital(lengthWords(m.progress))} · {count(m.progress.soundings)} soundings

@@ -2,9 +2,10 @@ import "./NewMissionForm.css";
 import { useSignal, useSignalEffect } from "@preact/signals";
 import { useEffect } from "preact/hooks";
 import { api, ServiceError } from "../api/client";
-import type { PlannerView, VehicleSpec, VehicleView } from "../api/types";
+import type { PlannerView } from "../api/types";
 import { polygonOf, sizeOf } from "../map/area";
-import type { SearchMark } from "../map/site";
+import type { PlaceMark } from "../map/marks";
+import { recoveryMarks } from "../map/recovery";
 import {
   areaOf,
   copyOf,
@@ -17,19 +18,19 @@ import {
   fieldOf,
   PLANNER_PRESETS,
   placeOf,
-  simulatedNames,
   toMission,
   turnedInto,
   vehicleNames,
 } from "../state/draft";
 import { distance, duration } from "../state/format";
 import { createMission, said } from "../state/session";
-import { copied, describing, draftShapes, drawing, fleet, mapCentre } from "../state/store";
+import { copied, describing, draftShapes, drawing, mapCentre, picking } from "../state/store";
 import { AreaFields } from "./AreaFields";
 import { Button, Choice, FileButton, same, useEscape } from "./Controls";
-import { Fault, Form, Part, Text, useForm } from "./Fields";
+import { Fault, Form, type FormState, Part, PlaceField, Text, useForm } from "./Fields";
 import { Forecast } from "./Forecast";
 import { SearchFields } from "./SearchFields";
+import { VehicleFields } from "./VehicleFields";
 
 export function NewMissionForm() {
   const original = copied.peek();
@@ -42,10 +43,11 @@ export function NewMissionForm() {
     draftShapes.value = {
       area: areaOf(draft.value),
       keepOut: draft.value.keepOut.filter((zone) => zone.length > 2).map(polygonOf),
-      marks: draft.value.kind === "search" ? draftMarks(draft.value) : [],
+      marks: draftMarks(draft.value),
     };
   });
   useEscape(drawing);
+  useEscape(picking);
   useEffect(
     () => () => {
       draftShapes.value = null;
@@ -57,7 +59,8 @@ export function NewMissionForm() {
     describing.value = false;
     copied.value = null;
   };
-  const set = (change: Partial<Draft>) => {
+  const set: FormState["set"] = (how) => {
+    const change = typeof how === "function" ? how(draft.value) : how;
     draft.value = { ...draft.value, ...change };
     const found = faultsOf(draft.value);
     // What was drawn is judged at once, typed fields only after the first try.
@@ -109,20 +112,8 @@ export function NewMissionForm() {
         <Text field="name" label="Name" placeholder="Leixões quay" />
         <Kind />
         <AreaFields />
-        <fieldset>
-          <legend>Vehicles</legend>
-          <FleetChoice />
-          <div class="pair">
-            <Text field="simulated" label="Simulated vehicles" numeric />
-            <Text
-              field="names"
-              label="Their names"
-              placeholder={simulatedNames({ ...draft.value, names: "" }).join(", ")}
-              hint="Separated by commas; empty: sim-1, sim-2 and so on"
-            />
-          </div>
-          {draft.value.kind === "survey" ? <Speeds /> : null}
-        </fieldset>
+        <VehicleFields />
+        <RecoveryFields />
         {draft.value.kind === "search" ? (
           <SearchFields />
         ) : (
@@ -197,16 +188,42 @@ function Kind() {
   );
 }
 
-/** Places of a search that is being described, as far as they are given. */
-function draftMarks(draft: Draft): SearchMark[] {
-  const [goal, entry] = [placeOf(draft.goal), placeOf(draft.entry)];
-  const radius_m = Number(draft.goal_radius_m);
+/** Places of a mission that is being described, as far as they are given. */
+function draftMarks(draft: Draft): PlaceMark[] {
+  const length_m = (text: string) => (Number(text) > 0 ? Number(text) : 0);
+  const [goal, entry, point] = [placeOf(draft.goal), placeOf(draft.entry), placeOf(draft.recovery)];
+  const radius_m = length_m(draft.recovery_radius_m);
+  const vehicles = vehicleNames(draft).map((name) => ({
+    name,
+    recovery_point: placeOf(draft.own[name]?.recovery_point ?? ""),
+  }));
+  const homes = recoveryMarks({ recovery: point && { point, radius_m }, vehicles }, radius_m);
+  if (draft.kind !== "search") return homes;
   return [
+    ...homes,
     ...(goal
-      ? [{ words: "Goal", sign: "goal" as const, at: goal, radius_m: radius_m > 0 ? radius_m : 0 }]
+      ? [{ words: "Goal", sign: "goal" as const, at: goal, radius_m: length_m(draft.goal_radius_m) }]
       : []),
     ...(entry ? [{ words: "Entry", sign: "entry" as const, at: entry, radius_m: 0 }] : []),
   ];
+}
+
+/** Where vehicles come home to, and what sends them there. */
+function RecoveryFields() {
+  const { draft } = useForm();
+  return (
+    <fieldset>
+      <legend>Recovery</legend>
+      <PlaceField field="recovery" label="Recovery point" />
+      {draft.recovery.trim() === "" ? (
+        <p class="hint">Without one vehicles stop and come up where they are.</p>
+      ) : (
+        <div class="pair">
+          <Part of="recovery" />
+        </div>
+      )}
+    </fieldset>
+  );
 }
 
 const LENGTHS = [
@@ -231,35 +248,6 @@ function Length() {
         />
       </label>
     </div>
-  );
-}
-
-/** Vehicles that fly at another speed than the mission's. */
-function Speeds() {
-  const { draft, set } = useForm();
-  const names = vehicleNames(draft);
-  if (names.length === 0) return null;
-  return (
-    <details>
-      <summary>Speeds of single vehicles, m/s</summary>
-      <div class="pair">
-        {names.map((name) => (
-          <label key={name} class="field">
-            {name}
-            <input
-              type="text"
-              inputMode="decimal"
-              autocomplete="off"
-              value={draft.speeds[name] ?? ""}
-              placeholder={draft.speed_mps}
-              data-testid={`speed-${name}`}
-              onInput={(event) => set({ speeds: { ...draft.speeds, [name]: event.currentTarget.value } })}
-            />
-          </label>
-        ))}
-      </div>
-      <Fault field="speeds" />
-    </details>
   );
 }
 
@@ -389,69 +377,4 @@ function Options({ schema }: { schema: Record<string, unknown> | undefined }) {
       ))}
     </div>
   );
-}
-
-/** Real vehicles that the service hears and that are free. */
-function FleetChoice() {
-  const { draft, set } = useForm();
-  const free = fleet.value.filter((v) => v.mission_id === null && v.kind !== "sim");
-  const chosen = new Set(draft.chosen.map((v) => v.name));
-  // Of a copy: as they are described there, heard or not.
-  const described = draft.chosen.filter((spec) => !free.some((v) => v.name === spec.name));
-  if (free.length === 0 && described.length === 0) {
-    return <p class="empty">No real vehicle is heard. Switch one on, or simulate some:</p>;
-  }
-  const toggle = (vehicle: VehicleView, on: boolean) =>
-    set({
-      chosen: on ? [...draft.chosen, asSpec(vehicle)] : draft.chosen.filter((v) => v.name !== vehicle.name),
-    });
-  return (
-    <>
-      {described.map((spec) => (
-        <Described key={draft.chosen.indexOf(spec)} spec={spec} />
-      ))}
-      {free.map((v) => (
-        <label key={v.name} class="check">
-          <input
-            type="checkbox"
-            checked={chosen.has(v.name)}
-            onChange={(event) => toggle(v, event.currentTarget.checked)}
-          />
-          {v.name} <small>{v.kind === "imc" ? "IMC" : v.kind}</small>
-        </label>
-      ))}
-    </>
-  );
-}
-
-/** A vehicle of the mission that is copied: it can be called otherwise, or left out. */
-function Described({ spec }: { spec: VehicleSpec }) {
-  const { draft, set } = useForm();
-  const change = (next: VehicleSpec[]) =>
-    set({
-      chosen: draft.chosen.flatMap((one) => (one === spec ? next : [one])),
-      speeds: {
-        ...draft.speeds,
-        ...Object.fromEntries(next.map(({ name }) => [name, draft.speeds[spec.name] ?? ""])),
-      },
-    });
-  return (
-    <div class="chosen-vehicle field">
-      <input
-        type="text"
-        aria-label={`Name of ${spec.name}`}
-        value={spec.name}
-        data-testid={`vehicle-${spec.name}`}
-        onInput={(event) => change([{ ...spec, name: event.currentTarget.value.trim() }])}
-      />
-      <small>{spec.kind === "imc" ? "IMC" : spec.kind}</small>
-      <Button kind="tool small" aria-label={`Leave ${spec.name} out`} onClick={() => change([])}>
-        ✕
-      </Button>
-    </div>
-  );
-}
-
-function asSpec(vehicle: VehicleView): VehicleSpec {
-  return { name: vehicle.name, kind: vehicle.kind, sensor: vehicle.sensor ?? "single_beam" };
 }

@@ -1,16 +1,12 @@
-import "./SearchFields.css";
 import { useSignal } from "@preact/signals";
 import { areasIn } from "../map/area";
-import { typedPlace } from "../state/draft";
-import { picking } from "../state/store";
-import { Button, FileButton, useEscape } from "./Controls";
-import { Fault, Part, Text, useForm } from "./Fields";
+import { Button, FileButton } from "./Controls";
+import { Fault, Part, PlaceField, useForm } from "./Fields";
 
 /** What a search looks for, where its vehicles enter, how long they have, and what is known to stand there. */
 export function SearchFields() {
   const { draft, set } = useForm();
   const note = useSignal("");
-  useEscape(picking);
   const read = (name: string, text: string) => {
     try {
       const { area, keepOut, others } = areasIn(name, text);
@@ -24,8 +20,8 @@ export function SearchFields() {
   return (
     <fieldset>
       <legend>Search</legend>
-      <Place field="goal" label="Goal" />
-      <Place field="entry" label="Entry and exit" />
+      <PlaceField field="goal" label="Goal" />
+      <PlaceField field="entry" label="Entry and exit" />
       <div class="pair">
         <Part of="search" />
       </div>
@@ -51,26 +47,5 @@ export function SearchFields() {
       ) : null}
       <Fault field="obstacles" />
     </fieldset>
-  );
-}
-
-function Place({ field, label }: { field: "goal" | "entry"; label: string }) {
-  const { set } = useForm();
-  const waiting = picking.value?.what === field;
-  return (
-    <div class="picked">
-      <Text field={field} label={label} placeholder="latitude, longitude" />
-      <Button
-        id={`pick-${field}`}
-        aria-pressed={waiting}
-        onClick={() => {
-          picking.value = waiting
-            ? null
-            : { what: field, onPicked: (at) => set({ [field]: typedPlace(at) }) };
-        }}
-      >
-        {waiting ? "Click on the map…" : "Pick"}
-      </Button>
-    </div>
   );
 }

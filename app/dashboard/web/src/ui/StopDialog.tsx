@@ -1,9 +1,10 @@
 import "./StopDialog.css";
 import { useSignal } from "@preact/signals";
 import type { ComponentChildren } from "preact";
-import { useEffect } from "preact/hooks";
+import { useEffect, useRef } from "preact/hooks";
 import type { ActionView, StopView } from "../api/types";
 import { refusal, said } from "../state/session";
+import { MISSION_WORDS } from "../state/words";
 import { Button } from "./Controls";
 import { Dialog } from "./Dialog";
 
@@ -20,48 +21,87 @@ interface StopDialogProps {
   send: () => Promise<ActionView | null>;
   confirm: (sending: boolean) => ComponentChildren;
   confirmId: string;
+  /** Brings vehicles home first, beside what stops them now; undefined where none can. */
+  sendHome?: (() => Promise<ActionView | null>) | undefined;
   /** What it means, before it is confirmed. */
   children: (sending: boolean) => ComponentChildren;
 }
 
 /** Asks once before vehicles are stopped, then stays until it has shown what every vehicle answered. */
-export function StopDialog({ open, what, question, done, send, children, ...rest }: StopDialogProps) {
+export function StopDialog({
+  open,
+  what,
+  question,
+  done,
+  send,
+  sendHome,
+  children,
+  ...rest
+}: StopDialogProps) {
   const { confirm, confirmId, name, ...frame } = rest;
-  const stops = useSignal<readonly StopView[] | null>(null);
-  const sending = useSignal(false);
+  const answer = useSignal<ActionView | null>(null);
+  const sending = useSignal<"stop" | "home" | null>(null);
+  // An answer counts for what was asked last: one that comes late takes no stop out of reach.
+  const last = useRef(0);
   useEffect(() => {
-    if (open) stops.value = null;
+    last.current++;
+    answer.value = null;
+    sending.value = null;
   }, [open, what]);
-  const stop = async () => {
-    sending.value = true;
+  const ask = async (which: "stop" | "home", how: () => Promise<ActionView | null>) => {
+    last.current++;
+    const mine = last.current;
+    sending.value = which;
     try {
-      const answer = await send();
-      if (answer) stops.value = answer.stops;
+      const found = await how();
+      if (mine === last.current) answer.value = found;
     } finally {
-      sending.value = false;
+      if (mine === last.current) sending.value = null;
     }
   };
+  const stopping = sending.value === "stop";
   const confirming = (
-    <Button
-      id={confirmId}
-      kind={name === "abort" ? "abort" : "command primary"}
-      disabled={sending.value}
-      onClick={() => void stop()}
-    >
-      {confirm(sending.value)}
-    </Button>
+    <>
+      {sendHome ? (
+        <Button
+          id={`${name}-return`}
+          disabled={sending.value !== null}
+          onClick={() => void ask("home", sendHome)}
+        >
+          Return home
+        </Button>
+      ) : null}
+      <Button
+        id={confirmId}
+        kind={name === "abort" ? "abort" : "command primary"}
+        disabled={stopping}
+        onClick={() => void ask("stop", send)}
+      >
+        {confirm(stopping)}
+      </Button>
+    </>
   );
+  const ending = answer.value?.mission.ending;
   return (
     <Dialog
       {...frame}
       open={open}
       name={name}
-      heading={stops.value ? done : question}
+      heading={ending ? "Returning home" : answer.value ? done : question}
       fault={refusal.value?.what === what ? said(refusal.value.error) : ""}
-      closing={stops.value ? "Close" : "Keep going"}
-      actions={stops.value ? null : confirming}
+      closing={answer.value ? "Close" : "Keep going"}
+      actions={answer.value ? null : confirming}
     >
-      {stops.value ? <Receipts stops={stops.value} /> : children(sending.value)}
+      {ending ? (
+        <p data-testid={`${name}-returning`}>
+          The vehicles are on their way home; the mission is {MISSION_WORDS[ending].toLowerCase()} once all
+          are there. Stop now, above, stops them where they are.
+        </p>
+      ) : answer.value ? (
+        <Receipts stops={answer.value.stops} />
+      ) : (
+        children(stopping)
+      )}
     </Dialog>
   );
 }

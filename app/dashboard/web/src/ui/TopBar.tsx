@@ -7,6 +7,7 @@ import { act, busyWith } from "../state/session";
 import {
   abortDialogOpen,
   abortOne,
+  finishOpen,
   linksOpen,
   mission,
   now,
@@ -19,7 +20,7 @@ import {
   view,
 } from "../state/store";
 import { decidingFor } from "../state/waiting";
-import { isAllowed, MISSION_SIGNS, MISSION_WORDS, type Tone } from "../state/words";
+import { isAllowed, MISSION_WORDS, missionSign, missionWords, type Tone } from "../state/words";
 import { AccountButton } from "./Account";
 import { Button, flips, sets } from "./Controls";
 
@@ -56,10 +57,12 @@ export function TopBar() {
         {present ? (
           <>
             <Figure label={past ? "Elapsed then" : "Elapsed"} value={duration(elapsed())} id="elapsed" />
-            <Figure
-              label="Remaining"
-              value={present.state === "running" && !past ? duration(present.progress.eta_s) : "–"}
-            />
+            {present.ending ? null : (
+              <Figure
+                label="Remaining"
+                value={present.state === "running" && !past ? duration(present.progress.eta_s) : "–"}
+              />
+            )}
           </>
         ) : null}
         <LinkSummary />
@@ -70,8 +73,9 @@ export function TopBar() {
       <AccountButton />
       <div class="commands">
         <Command action="start" label="Start" />
-        <Command action="pause" label="Pause" />
+        {present?.ending ? null : <Command action="pause" label="Pause" />}
         <Command action="resume" label="Resume" />
+        <StopNow />
       </div>
       <Button
         id="abort"
@@ -103,16 +107,16 @@ function MissionLine() {
   if (!present) return null;
   const live = socketStatus.value?.kind === "open";
   const waiting = decidingFor.value;
-  const words = MISSION_WORDS[present.state];
+  const words = missionWords(present);
   return (
     <p
-      class={`state ${live ? present.state : "unknown"}`}
+      class={`state ${live ? present.state : "unknown"}${present.ending ? " ending" : ""}`}
       data-testid="mission-state"
       data-state={present.state}
       data-live={live}
       title={present.reason}
     >
-      <span aria-hidden="true">{live ? MISSION_SIGNS[present.state] : "?"}</span>{" "}
+      <span aria-hidden="true">{live ? missionSign(present) : "?"}</span>{" "}
       {live ? words : `${words} when last heard`}
       {live && waiting !== null ? (
         <span class="reason" data-testid="deciding">
@@ -204,6 +208,29 @@ function Command({ action, label }: { action: MissionAction; label: string }) {
       }}
     >
       {busyWith.value === action ? `${label}…` : label}
+    </Button>
+  );
+}
+
+/** While vehicles are on their way home: they can be stopped where they are, which ends the mission now. */
+function StopNow() {
+  const ending = mission.value?.ending;
+  if (!ending) return null;
+  return (
+    <Button
+      id="stop-now"
+      kind="command stop-now"
+      commands
+      title="Stop the vehicles where they are, and end the mission now"
+      onClick={() => {
+        if (ending === "finished") finishOpen.value = true;
+        else {
+          abortOne.value = null;
+          abortDialogOpen.value = true;
+        }
+      }}
+    >
+      Stop now
     </Button>
   );
 }

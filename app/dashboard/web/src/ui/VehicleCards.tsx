@@ -1,19 +1,34 @@
 import "./VehicleCards.css";
-import { age, clock, distance, metres } from "../state/format";
+import type { VehicleView } from "../api/types";
+import { age, clock, distance, metres, percent } from "../state/format";
 import { localizationWords } from "../state/localization";
 import { replayed } from "../state/replay";
-import { rejoin } from "../state/session";
+import { rejoin, resumeVehicle, returnVehicle } from "../state/session";
 import {
   abortDialogOpen,
   abortOne,
   mission,
+  now,
   replayStep,
   socketStatus,
   unstopped,
   type Vehicle,
   vehicles,
 } from "../state/store";
-import { batteryWords, capital, hasEnded, PHASE_WORDS, vehicleState, WAYPOINT_WORDS } from "../state/words";
+import {
+  batteryWords,
+  capital,
+  failsafeTone,
+  failsafeWords,
+  hasEnded,
+  isSaid,
+  isThere,
+  PHASE_WORDS,
+  rangeWords,
+  type Tone,
+  vehicleState,
+  WAYPOINT_WORDS,
+} from "../state/words";
 import { Button } from "./Controls";
 import { WaypointShape } from "./marks";
 import { SearchCard } from "./SearchCard";
@@ -45,6 +60,7 @@ function Card({ vehicle }: { vehicle: Vehicle }) {
   const state = vehicleState(v, vehicle.waypoint);
   const away = v.kind === "sim" && v.link === "unknown";
   const ended = mission.value !== null && hasEnded(mission.value);
+  const byEndurance = v.battery_pct === null && v.energy_left_pct !== null;
   return (
     <article
       class={`card ${state.tone}${v.active ? "" : " left"}${vehicle.stale && !away ? " stale" : ""}`}
@@ -70,14 +86,18 @@ function Card({ vehicle }: { vehicle: Vehicle }) {
           <dd>{metres(v.altitude_m)}</dd>
         </div>
         <div class={v.battery ?? ""}>
-          <dt>Battery</dt>
-          <dd>{batteryWords(v)}</dd>
+          <dt>{byEndurance ? "Energy" : "Battery"}</dt>
+          <dd data-testid={`energy-${v.name}`}>
+            {byEndurance ? percent(v.energy_left_pct) : batteryWords(v)}
+          </dd>
         </div>
         <div class={vehicle.stale && !away ? "late" : ""}>
           <dt>Heard</dt>
           <dd>{age(vehicle.age_s)}</dd>
         </div>
       </dl>
+      {v.active && !ended ? <Range of={v} /> : null}
+      <Reasons vehicle={vehicle} tone={state.tone} />
       <p class="small">
         {[
           v.kind === "imc"
@@ -108,19 +128,7 @@ function Card({ vehicle }: { vehicle: Vehicle }) {
           {WAYPOINT_WORDS[vehicle.waypoint.status]}
         </p>
       ) : null}
-      {v.active && mission.value && (!ended || unstopped.value.has(v.name)) ? (
-        <Button
-          id={`abort-${v.name}`}
-          kind="abort-one"
-          commands
-          onClick={() => {
-            abortOne.value = v.name;
-            abortDialogOpen.value = true;
-          }}
-        >
-          {ended ? `Stop ${v.name} again` : `Abort ${v.name}`}
-        </Button>
-      ) : null}
+      {v.active ? <Orders of={v} ended={ended} /> : null}
       {v.active ? null : (
         <p class="small left-at" data-testid={`left-${v.name}`}>
           Left{v.left_at ? ` at ${clock(new Date(v.left_at), "utc")} UTC` : ""}; it is shown where it was
@@ -138,9 +146,109 @@ function Card({ vehicle }: { vehicle: Vehicle }) {
           Add again
         </Button>
       ) : null}
-      {v.reason ? <p class={`reason ${state.tone}`}>{v.reason}</p> : null}
-      {vehicle.waypoint?.reason ? <p class={`reason ${state.tone}`}>{vehicle.waypoint.reason}</p> : null}
     </article>
+  );
+}
+
+/** What is wrong with a vehicle, and why it does what it does. */
+function Reasons({ vehicle: { view: v, waypoint }, tone }: { vehicle: Vehicle; tone: Tone }) {
+  const present = mission.value;
+  const over = present !== null && (present.ending !== null || hasEnded(present));
+  const plain = v.phase === "returning" || v.phase === "home";
+  return (
+    <>
+      {v.active && v.failsafes.length > 0 ? (
+        <ul class="failsafes">
+          {v.failsafes.map((one) => (
+            <li
+              key={one.failsafe}
+              class={`reason ${failsafeTone(one, v)}`}
+              data-testid={`failsafe-${one.failsafe}-${v.name}`}
+            >
+              <b>
+                <span aria-hidden="true">{failsafeTone(one, v) === "warning" ? "▲" : "✕"}</span>{" "}
+                {failsafeWords(one)}
+              </b>{" "}
+              {one.message}
+            </li>
+          ))}
+        </ul>
+      ) : null}
+      {v.withdrawn && v.active && !(over && plain) && !isSaid(v.withdrawn, v) ? (
+        <p class="reason" data-testid={`withdrawn-${v.name}`}>
+          Surveys no more: {v.withdrawn}
+        </p>
+      ) : null}
+      {v.reason && !isSaid(v.reason, v) ? <p class={`reason ${tone}`}>{v.reason}</p> : null}
+      {waypoint?.reason ? <p class={`reason ${tone}`}>{waypoint.reason}</p> : null}
+    </>
+  );
+}
+
+/** How long its energy lasts beside what its way home takes; nothing where neither is known. */
+function Range({ of: v }: { of: VehicleView }) {
+  const words = rangeWords(v, now.value);
+  if (words.length === 0) return null;
+  const { energy_left_pct: left_pct, energy_left_s: left_s, return_needs_s: needs_s } = v;
+  const needs_pct = left_pct && left_s && needs_s !== null ? (left_pct * needs_s) / left_s : null;
+  return (
+    <div class="range-left" data-testid={`range-${v.name}`}>
+      {left_pct === null ? null : (
+        <div
+          class="energy-bar"
+          role="img"
+          aria-label={`Energy of ${v.name}: ${percent(left_pct)}`}
+          title={needs_pct === null ? "" : "The mark is what its way home needs"}
+        >
+          <i style={{ width: `${left_pct}%` }} />
+          {needs_pct === null ? null : <b style={{ left: `${Math.min(needs_pct, 100)}%` }} />}
+        </div>
+      )}
+      <p class="small">{words.map((part) => part.replaceAll(" ", "\u00a0")).join(" · ")}</p>
+    </div>
+  );
+}
+
+/** What can be asked of a vehicle that takes part. */
+function Orders({ of: v, ended }: { of: VehicleView; ended: boolean }) {
+  const present = mission.value;
+  const again = ended && unstopped.value.has(v.name);
+  if (!present || (ended && !again)) return null;
+  const led = present.state === "running" && present.ending === null;
+  return (
+    <div class="orders">
+      {led && v.recovery_point !== null && v.withdrawn === "" ? (
+        <Button
+          id={`return-${v.name}`}
+          commands
+          title="Send it home to its recovery point; the others go on"
+          onClick={() => void returnVehicle(v.name)}
+        >
+          Return
+        </Button>
+      ) : null}
+      {led && isThere(v) ? (
+        <Button
+          id={`resume-${v.name}`}
+          commands
+          title="Let it survey again, for example with a new battery"
+          onClick={() => void resumeVehicle(v.name)}
+        >
+          Resume survey
+        </Button>
+      ) : null}
+      <Button
+        id={`abort-${v.name}`}
+        kind="abort-one"
+        commands
+        onClick={() => {
+          abortOne.value = v.name;
+          abortDialogOpen.value = true;
+        }}
+      >
+        {ended ? `Stop ${v.name} again` : `Abort ${v.name}`}
+      </Button>
+    </div>
   );
 }
 

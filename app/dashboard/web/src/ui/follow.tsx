@@ -2,7 +2,8 @@
 
 import { effect, type Signal } from "@preact/signals";
 import { render } from "preact";
-import type { LngLat, Place, WaypointView } from "../api/types";
+import SPEC from "../api/mission.json";
+import type { LngLat, MissionView, Place, WaypointView } from "../api/types";
 import type { Chart, Padding, Pin } from "../map/chart";
 import { contourInterval } from "../map/contours";
 import { paletteOf } from "../map/layers";
@@ -10,6 +11,7 @@ import type { Route, Track } from "../map/marks";
 import { Painter } from "../map/painter";
 import { lookupTable } from "../map/palette";
 import type { Look } from "../map/paper";
+import { recoveryMarks } from "../map/recovery";
 import type { SeaFloor } from "../map/seafloor";
 import { searchMarks } from "../map/site";
 import { targetMarks } from "../map/targets";
@@ -53,6 +55,8 @@ function markOnce(name: string): void {
 
 const look = (): Look => (theme.value === "contrast" ? "contrast" : isDark.value ? "dark" : "light");
 
+const homesOf = (spec: MissionView["spec"]) => recoveryMarks(spec, SPEC["recovery.radius_m"].default);
+
 /** Returns what ends it. */
 export function follow(chart: Chart): () => void {
   let shownMission = "";
@@ -63,7 +67,8 @@ export function follow(chart: Chart): () => void {
       const present = mission.value;
       if ((present?.id ?? "") === shownMission) return;
       shownMission = present?.id ?? "";
-      chart.setMission(present?.spec.area ?? null, present?.spec.keep_out ?? []);
+      const { area = null, keep_out = [] } = present?.spec ?? {};
+      chart.setMission(area, keep_out, present ? homesOf(present.spec).map(({ at }) => at) : []);
       // What lies over the map is laid out first.
       requestAnimationFrame(() => {
         chart.fit(overlaid);
@@ -96,8 +101,12 @@ export function follow(chart: Chart): () => void {
     ),
     effect(() => chart.setSite(showSite.value && replayStep.value === null ? site.value : null)),
     effect(() => {
-      const search = mission.value?.spec.search;
-      chart.setSearch([...(search ? searchMarks(search) : []), ...(draftShapes.value?.marks ?? [])]);
+      const spec = mission.value?.spec;
+      chart.setPlaces([
+        ...(spec?.search ? searchMarks(spec.search) : []),
+        ...(spec ? homesOf(spec) : []),
+        ...(draftShapes.value?.marks ?? []),
+      ]);
     }),
     effect(() =>
       chart.setSpots(

@@ -1,7 +1,7 @@
 /** Vehicles and waypoints as shapes on the map. */
 
 import "./marks.css";
-import type { LngLat, WaypointStatus, WaypointView } from "../api/types";
+import type { LngLat, VehicleView, WaypointStatus, WaypointView } from "../api/types";
 import { wayBetween } from "../map/geo";
 import { age } from "../state/format";
 import type { Vehicle } from "../state/store";
@@ -26,6 +26,7 @@ export function VehicleMark({ vehicle, past }: { vehicle?: Vehicle; past?: Past 
   return (
     <Mark
       name={name}
+      stage={stageOf(vehicle.view)}
       colour={vehicle.colour}
       heading_deg={heading_deg}
       stale={vehicle.stale || !active}
@@ -37,8 +38,40 @@ export function VehicleMark({ vehicle, past }: { vehicle?: Vehicle; past?: Past 
   );
 }
 
+/** What a vehicle's shape on the map tells of it. */
+export const STAGES = ["surveying", "returning", "home"] as const;
+type Stage = (typeof STAGES)[number];
+
+const stageOf = ({ active, withdrawn, phase }: VehicleView): Stage =>
+  active && withdrawn !== "" && (phase === "returning" || phase === "home") ? phase : "surveying";
+
+interface ShapeProps {
+  stage: Stage;
+  colour: string;
+  heading_deg: number | null;
+  size?: number;
+}
+
+/** Full while it surveys, hollow on its way home, a house there. */
+export function VehicleShape({ stage, colour, heading_deg, size = 34 }: ShapeProps) {
+  const hollow = stage === "returning";
+  const paint = hollow ? { class: "hollow", stroke: colour } : { class: "outline", fill: colour };
+  return (
+    <svg viewBox="-16 -16 32 32" width={size} height={size} aria-hidden="true">
+      {stage === "home" ? (
+        <path d="M0,-11 L12,0 H8 V10 H-8 V0 H-12 Z" {...paint} />
+      ) : heading_deg === null ? (
+        <circle r="8" {...paint} />
+      ) : (
+        <path d="M0,-13 L8.5,10 L0,5.5 L-8.5,10 Z" transform={`rotate(${heading_deg})`} {...paint} />
+      )}
+    </svg>
+  );
+}
+
 interface MarkProps {
   name: string;
+  stage?: Stage;
   colour: string;
   heading_deg: number | null;
   stale?: boolean;
@@ -52,6 +85,7 @@ interface MarkProps {
 
 function Mark({
   name,
+  stage = "surveying",
   colour,
   heading_deg,
   stale = false,
@@ -64,23 +98,14 @@ function Mark({
     <div
       class={`vehicle-mark${stale ? " stale" : ""}${alarm ? " alarm" : ""}`}
       data-testid={`vehicle-mark-${name}`}
+      data-stage={stage}
       title={title}
     >
-      <svg viewBox="-16 -16 32 32" width="34" height="34" aria-hidden="true">
-        {heading_deg === null ? (
-          <circle r="8" fill={colour} class="outline" />
-        ) : (
-          <path
-            d="M0,-13 L8.5,10 L0,5.5 L-8.5,10 Z"
-            transform={`rotate(${heading_deg})`}
-            fill={colour}
-            class="outline"
-          />
-        )}
-      </svg>
+      <VehicleShape stage={stage} colour={colour} heading_deg={heading_deg} />
       <span class="mark-label">
         {name}
         {left ? " left" : ""}
+        {stage === "surveying" ? "" : ` ${stage}`}
         {old ? <b> {old} old</b> : null}
         {alarm ? <b> ✕ {alarm}</b> : null}
       </span>

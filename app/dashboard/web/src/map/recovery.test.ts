@@ -1,0 +1,14 @@
+import { expect, it } from "vitest";
+import { recoveryMarks } from "./recovery";
+
+const point = [-8.7, 41.2] as const;
+const own = [-8.6, 41.1] as const;
+
+it("the mission's recovery point and a vehicle's own are marked with their radius", () => {
+  const vehicles = [{ name: "sim-1" }, { name: "sim-2", recovery_point: own }];
+  expect(recoveryMarks({ recovery: { point, radius_m: 40 }, vehicles }, 25)).toEqual([
+    { words: "Recovery", sign: "home", at: point, radius_m: 40 },
+    { words: "Recovery of sim-2", sign: "home", at: own, radius_m: 40 },
+  ]);
+  expect(recoveryMarks({ recovery: null, vehicles }, 25).map(({ radius_m }) => radius_m)).toEqual([25]);
+});

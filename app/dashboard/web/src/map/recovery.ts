@@ -1,0 +1,24 @@
+/** Where vehicles come home to, as places on the map. Pure. */
+
+import type { PlaceMark } from "./marks";
+
+type At = readonly [number, number];
+
+interface Homes {
+  recovery?: { point: At; radius_m: number } | null;
+  vehicles: readonly { name: string; recovery_point?: At | null }[];
+}
+
+/** The mission's recovery point and those of single vehicles; `usual_m` is the radius where the mission has none. */
+export function recoveryMarks({ recovery, vehicles }: Homes, usual_m: number): PlaceMark[] {
+  const mark = (words: string, [lng, lat]: At): PlaceMark => ({
+    words,
+    sign: "home",
+    at: [lng, lat],
+    radius_m: recovery?.radius_m ?? usual_m,
+  });
+  return [
+    ...(recovery ? [mark("Recovery", recovery.point)] : []),
+    ...vehicles.flatMap(({ name, recovery_point: own }) => (own ? [mark(`Recovery of ${name}`, own)] : [])),
+  ];
+}

@@ -1,0 +1,135 @@
+import type { VehicleSpec, VehicleView } from "../api/types";
+import { type Own, simulatedNames, vehicleNames } from "../state/draft";
+import { schemaOf, vehicleFieldsOf } from "../state/fields";
+import { fleet } from "../state/store";
+import { Button } from "./Controls";
+import { Fault, Place, Text, useForm } from "./Fields";
+
+/** Who takes part: real vehicles that are free, simulated ones, and what each has of its own. */
+export function VehicleFields() {
+  const { draft } = useForm();
+  return (
+    <fieldset>
+      <legend>Vehicles</legend>
+      <FleetChoice />
+      <div class="pair">
+        <Text field="simulated" label="Simulated vehicles" numeric />
+        <Text
+          field="names"
+          label="Their names"
+          placeholder={simulatedNames({ ...draft, names: "" }).join(", ")}
+          hint="Separated by commas; empty: sim-1, sim-2 and so on"
+        />
+      </div>
+      <Singles />
+    </fieldset>
+  );
+}
+
+/** What single vehicles have of their own: another speed, how long their energy lasts, where they come home to. */
+function Singles() {
+  const { draft, set } = useForm();
+  const names = vehicleNames(draft);
+  if (names.length === 0) return null;
+  const change = (name: string, field: keyof Own, text: string) =>
+    set(({ own }) => ({ own: { ...own, [name]: { ...own[name], [field]: text } } }));
+  return (
+    <details>
+      <summary>Single vehicles: speed, endurance, recovery point</summary>
+      {names.map((name) => (
+        <fieldset key={name} class="single-vehicle">
+          <legend>{name}</legend>
+          <div class="pair">
+            {vehicleFieldsOf(draft.kind).map(([field, { path, label, unit }]) => (
+              <label key={field} class="field" title={schemaOf({ path }).description}>
+                {label}, {unit}
+                <input
+                  type="text"
+                  inputMode="decimal"
+                  autocomplete="off"
+                  value={draft.own[name]?.[field] ?? ""}
+                  placeholder={field === "speed_mps" ? draft.speed_mps : "not known"}
+                  data-testid={`${field}-${name}`}
+                  onInput={(event) => change(name, field, event.currentTarget.value)}
+                />
+              </label>
+            ))}
+          </div>
+          <Place
+            id={`recovery_point-${name}`}
+            label="Its own recovery point"
+            placeholder="the mission's"
+            text={draft.own[name]?.recovery_point ?? ""}
+            onText={(text) => change(name, "recovery_point", text)}
+          />
+        </fieldset>
+      ))}
+      <Fault field="own" />
+    </details>
+  );
+}
+
+/** Real vehicles that the service hears and that are free. */
+function FleetChoice() {
+  const { draft, set } = useForm();
+  const free = fleet.value.filter((v) => v.mission_id === null && v.kind !== "sim");
+  const chosen = new Set(draft.chosen.map((v) => v.name));
+  // Of a copy: as they are described there, heard or not.
+  const described = draft.chosen.filter((spec) => !free.some((v) => v.name === spec.name));
+  if (free.length === 0 && described.length === 0) {
+    return <p class="empty">No real vehicle is heard. Switch one on, or simulate some:</p>;
+  }
+  const toggle = (vehicle: VehicleView, on: boolean) =>
+    set({
+      chosen: on ? [...draft.chosen, asSpec(vehicle)] : draft.chosen.filter((v) => v.name !== vehicle.name),
+    });
+  return (
+    <>
+      {described.map((spec) => (
+        <Described key={draft.chosen.indexOf(spec)} spec={spec} />
+      ))}
+      {free.map((v) => (
+        <label key={v.name} class="check">
+          <input
+            type="checkbox"
+            checked={chosen.has(v.name)}
+            onChange={(event) => toggle(v, event.currentTarget.checked)}
+          />
+          {v.name} <small>{v.kind === "imc" ? "IMC" : v.kind}</small>
+        </label>
+      ))}
+    </>
+  );
+}
+
+/** A vehicle of the mission that is copied: it can be called otherwise, or left out. */
+function Described({ spec }: { spec: VehicleSpec }) {
+  const { draft, set } = useForm();
+  const change = (next: VehicleSpec[]) =>
+    set({
+      chosen: draft.chosen.flatMap((one) => (one === spec ? next : [one])),
+      own: {
+        ...draft.own,
+        ...Object.fromEntries(next.map(({ name }) => [name, draft.own[spec.name] ?? {}])),
+      },
+    });
+  return (
+    <div class="chosen-vehicle field">
+      <input
+        type="text"
+        aria-label={`Name of ${spec.name}`}
+        value={spec.name}
+        data-testid={`vehicle-${spec.name}`}
+        onInput={(event) => change([{ ...spec, name: event.currentTarget.value.trim() }])}
+      />
+      <small>{spec.kind === "imc" ? "IMC" : spec.kind}</small>
+      <Button kind="tool small" aria-label={`Leave ${spec.name} out`} onClick={() => change([])}>
+        ✕
+      </Button>
+    </div>
+  );
+}
+
+function asSpec(vehicle: VehicleView): VehicleSpec {
+  return { name: vehicle.name, kind: vehicle.kind, sensor: vehicle.sensor ?? "single_beam" };
+}
