@@ -3539,15 +3539,26 @@ export interface components {
         };
         /**
          * SurfacePolicy
-         * @description When a vehicle comes up for a GPS fix: by how well it says that it knows where it is (``position_sd_m``).
+         * @description When a vehicle comes up for a GPS fix: by how well it says that it knows where it is, by the clock, or both.
          */
         SurfacePolicy: {
             /**
              * Max Position Sd M
-             * @description Standard deviation of its position that a vehicle should not exceed; at 90 % of it it comes up
+             * @description Standard deviation of its position (position_sd_m) that a vehicle should not exceed; it comes up at 90 % of it. null: never because of it
              * @example 3
              */
-            max_position_sd_m: number;
+            max_position_sd_m?: number | null;
+            /**
+             * Every Min
+             * @description Minutes after which a vehicle comes up, also one that does not say how well it knows where it is. null: never because of the clock
+             */
+            every_min?: number | null;
+            /**
+             * Stay S
+             * @description How long a vehicle stays up that comes up by the clock
+             * @default 60
+             */
+            stay_s: number;
             /**
              * Good Position Sd M
              * @description It stays at the surface until its position is known this well; null: a third of the limit
