@@ -4,8 +4,7 @@ import numpy as np
 from scipy.ndimage import gaussian_filter
 
 from app.arrays import FloatArray
-from app.evaluation.survey.world import Log, terrain_grid
-from app.mapping.gp import GaussianProcessMap
+from app.evaluation.survey.world import Log, default_map, terrain_grid
 from app.mapping.types import Soundings
 from simulator.terrain import Terrain
 
@@ -27,7 +26,7 @@ def oracle_soundings(log: Log, terrain: Terrain, count: int, depth_m: float) -> 
     known = np.isfinite(truth)
     first = max(min(count, 4), int(FIRST_PART * count))
     _sound(log, spread_points(first, terrain), depth_m)
-    left, gp = count - first, GaussianProcessMap()
+    left = count - first
     for k in range(ROUNDS):
         batch = left // (ROUNDS - k)
         left -= batch
@@ -35,9 +34,7 @@ def oracle_soundings(log: Log, terrain: Terrain, count: int, depth_m: float) -> 
             continue
         squared = known.astype(np.float64)
         if len(log.soundings):
-            # What it learned of the floor at first tells well enough where more soundings are due.
-            estimate = gp.fit(log.soundings, learn=False).predict(grid)
-            squared = np.where(known, (estimate.depth_m.ravel() - truth) ** 2, 0.0)
+            squared = np.where(known, (default_map(log.soundings, grid).depth_m.ravel() - truth) ** 2, 0.0)
         apart = np.sqrt(known.sum() * grid.cell_m**2 / count)
         worth = gaussian_filter(squared.reshape(grid.rows, grid.cols), 0.5 * apart / grid.cell_m, mode="nearest")
         _sound(log, centres[_largest(worth.ravel() * known, centres, batch, LEAST_APART * apart)], depth_m)
