@@ -15,7 +15,7 @@ from app.arrays import BoolArray, FloatArray
 from app.estimation import SingleBeam
 from app.evaluation.survey.flown import ARRIVAL_RADIUS_M, LEAST_SD_M
 from app.evaluation.survey.world import SPEED_MPS, Log, MapSoFar, SurveyScenario
-from app.exploration.core.problem import Situation
+from app.exploration.core.problem import Belief, Situation
 from app.exploration.core.track import along_leg
 from app.exploration.planner.options import PlannerOptions
 from app.exploration.planners import create_planner
@@ -128,12 +128,13 @@ def fly_planner_at_sea(
     options: PlannerOptions,
     minutes: float,
     progress: Callable[[int], None] = lambda step: None,
+    known: Belief | None = None,
 ) -> SeaTrack:
-    """Let a planner lead the vehicles for so many minutes."""
+    """Let a planner lead the vehicles for so many minutes; it is given ``known`` instead of what was sounded."""
     until_s, log, crafts = 60.0 * minutes, scenario.log(1), _crafts(scenario, 1)
     turning = options.model_copy(update={"turn_radius_m": options.turn_radius_m or TURN_S * SPEED_MPS})
     chooser = create_planner(planner, turning, SingleBeam(scenario.relative_noise))
-    rng, so_far = np.random.default_rng([scenario.seed, 0]), MapSoFar(scenario.belief_grid)
+    rng, so_far = np.random.default_rng([scenario.seed, 0]), MapSoFar(scenario.belief_grid, known)
     plan_s: list[float] = []
     decided: list[tuple[_Craft, FloatArray]] = []
     ready_s, now_s, step = np.inf, 0.0, 0
