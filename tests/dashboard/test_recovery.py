@@ -12,8 +12,8 @@ from tests.support.dashboard.steps import by_id, expect_state, show
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(400)]
 
 PAIR = [{"name": f"sim-{n}", "kind": "sim", "sensor": "dvl"} for n in (1, 2)]
-NEAR, SOUTH, FAR = [-8.7046, 41.1849], [-8.7046, 41.1841], [-8.7046, 41.1800]
-"""Just outside the area, a minute away, and so far that nobody gets there during a test."""
+NEAR, FAR = [-8.7046, 41.1849], [-8.7046, 41.1800]
+"""Just outside the area, and so far from it that nobody gets there during a test."""
 
 
 def under_way(page: Page, service: Service, name: str, point: list[float], **changes: object) -> str:
@@ -72,7 +72,9 @@ def test_vehicles_on_their_way_home_are_stopped(
 
 
 def test_one_vehicle_goes_home_and_surveys_again(page: Page, service: Service) -> None:
-    under_way(page, service, "One goes home", NEAR)
+    under_way(page, service, "One goes home", NEAR, vehicles=[PAIR[0], PAIR[1] | {"endurance_min": 90.0}])
+    words = r"min.left · way.home.takes.+turn.back.at.\d\d:\d\d.UTC"
+    expect(by_id(page, "range-sim-2")).to_have_text(re.compile(words))
     by_id(page, "return-sim-1").click()
     expect(by_id(page, "vehicle-mark-sim-1")).to_have_attribute("data-stage", "returning")
     expect(by_id(page, "withdrawn-sim-1")).to_contain_text("called home by")
@@ -85,12 +87,9 @@ def test_one_vehicle_goes_home_and_surveys_again(page: Page, service: Service) -
 
 
 def test_a_vehicle_turns_back_in_time_and_says_why(page: Page, service: Service) -> None:
-    vehicles = [{"name": "sim-1", "kind": "sim", "sensor": "dvl", "endurance_min": 4.0}]
-    under_way(page, service, "Low on energy", SOUTH, vehicles=vehicles)
+    vehicles = [{"name": "sim-1", "kind": "sim", "sensor": "dvl", "endurance_min": 11.5}]
+    under_way(page, service, "Low on energy", FAR, vehicles=vehicles)
     expect(by_id(page, "energy-sim-1")).to_have_text(re.compile(r"^\d+ %$"))
-    expect(by_id(page, "range-sim-1")).to_have_text(
-        re.compile(r"min.left · way.home.takes.+turn.back.at.\d\d:\d\d.UTC")
-    )
     alarm = by_id(page, "failsafe-low_energy-sim-1")
     expect(alarm).to_contain_text("Low energy")
     expect(alarm).to_have_class(re.compile("alarm"))
