@@ -22,7 +22,7 @@ def returns(live: LiveMission, action: Action, asked: bool | None) -> bool:
     homes = {member.name: live.spec.recovery_of(member.spec) for member in out}
     able = live.header.state in AT_SEA and any(homes.values())
     if asked:
-        if not any(homes.values()):
+        if out and not any(homes.values()):
             raise ConflictError("no vehicle has a recovery point to return to", "give recovery.point, or stop them")
         return able
     if asked is not None or action is Action.ABORT or live.ending is not None:
