@@ -78,12 +78,13 @@ def drawn(seed: int, *, still: bool) -> tuple[MissionSpec, SimulationSettings, V
     return spec, sea, VehicleSpec.model_validate(late) if seed % 3 == 2 else None
 
 
-async def fly(seed: int, options: argparse.Namespace) -> dict[str, Any]:
-    """Fly one mission to its end; what became of its vehicles."""
+async def fly(seed: int, options: argparse.Namespace, migrating: asyncio.Lock) -> dict[str, Any]:
+    """Fly one mission to its end; what became of its vehicles. One database is made at a time."""
     spec, sea, late = drawn(seed, still=options.still)
     with tempfile.TemporaryDirectory() as folder:
         url = f"sqlite+aiosqlite:///{Path(folder) / 'mission.db'}"
-        await prepare_database(url, may_upgrade=True)
+        async with migrating:
+            await prepare_database(url, may_upgrade=True)
         database = Database(url)
         settings = ServiceSettings(
             database_url=url, imc=ImcSettings(enabled=False), time_scale=options.time_scale, simulation=sea
@@ -141,12 +142,12 @@ async def fly(seed: int, options: argparse.Namespace) -> dict[str, Any]:
 
 async def fly_all(options: argparse.Namespace) -> dict[str, Any]:
     """Fly all missions, some at once; what became of them together."""
-    room = asyncio.Semaphore(options.at_once)
+    room, migrating = asyncio.Semaphore(options.at_once), asyncio.Lock()
     done: list[dict[str, Any]] = []
 
     async def one(seed: int) -> None:
         async with room:
-            done.append(await fly(seed, options))
+            done.append(await fly(seed, options, migrating))
             print(json.dumps(done[-1]), flush=True)
 
     begun = time.monotonic()
