@@ -29,6 +29,9 @@ from app.missions.spec.recovery import Homecoming
 from app.missions.team import Member
 from app.missions.views.mission import Level
 
+LEAST_PERIOD_S = 0.1
+"""No more often by the wall clock, however fast vehicles live."""
+
 PERIOD_S = 1.0
 """How often is looked, seconds of the vehicles' time."""
 
@@ -64,7 +67,7 @@ class FailsafeWatch:
                 await self.look()
             except Exception:
                 log.exception("the failsafes could not be looked at")
-            await asyncio.sleep(PERIOD_S / self._time_scale)
+            await asyncio.sleep(max(PERIOD_S / self._time_scale, LEAST_PERIOD_S))
 
     async def look(self) -> None:
         """Look once at everybody."""

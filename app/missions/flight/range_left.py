@@ -1,6 +1,7 @@
 """How far vehicles may go on, so that their energy lasts for the way home from there."""
 
 import math
+import time
 
 import numpy as np
 
@@ -9,8 +10,11 @@ from app.exploration.core.constraints import Constraints
 from app.missions.flight.commit import LegCommit, home_of
 from app.missions.live.mission import LiveMission
 from app.missions.recovery.failsafes import with_reserve_s
-from app.missions.recovery.way_home import homeward_ground, way_home, way_time_s
+from app.missions.recovery.way_home import WaysHome, way_time_s
 from app.missions.team import Member
+
+LAND_PERIOD_S = 10.0
+"""How often is looked whether the map shows other shallows, seconds of the wall clock."""
 
 MOVED_M = 5.0
 """The way home is looked for anew when its vehicle is so far from where that was done last."""
@@ -30,6 +34,10 @@ class RangeLeft:
         self._constraints = constraints
         self._committing = committing
         self._found: dict[str, tuple[FloatArray, FloatArray | None]] = {}
+        self._ways: dict[tuple[float, float], tuple[WaysHome, WaysHome | None]] = {}
+        """By recovery point: all ways, and those that keep off what is known to be too shallow, if anything is."""
+        self._land = b""
+        self._looked_s = -math.inf
         self.current_mps = (0.0, 0.0)
         """Velocity of the water, east and north."""
 
@@ -56,11 +64,32 @@ class RangeLeft:
 
     def way_from(self, here_m: FloatArray, home_m: FloatArray) -> FloatArray | None:
         """Return the corners of the way home from a place, (n, 2); None: there is none."""
-        least_m = self._live.spec.limits.min_altitude_m + LEAST_DEPTH_M
-        ground = homeward_ground(self._constraints, home_m)
-        way_m = way_home(ground, here_m, home_m, self._committing.bottom, least_m)
+        self._look_for_land()
+        key = (float(home_m[0]), float(home_m[1]))
+        if key not in self._ways:
+            bottom, least_m = self._committing.bottom, self._least_m
+            off_land = WaysHome(self._constraints, home_m, bottom, least_m) if self._land else None
+            self._ways[key] = WaysHome(self._constraints, home_m), off_land
+        anyhow, off_land = self._ways[key]
+        way_m = None if off_land is None else off_land.way(here_m)
         # Better over ground that looks too shallow, at the surface, than not at all.
-        return way_home(ground, here_m, home_m) if way_m is None else way_m
+        return anyhow.way(here_m) if way_m is None else way_m
+
+    @property
+    def _least_m(self) -> float:
+        return self._live.spec.limits.min_altitude_m + LEAST_DEPTH_M
+
+    def _look_for_land(self) -> None:
+        """Find ways anew where the map shows other shallows than before, not too often."""
+        now_s = time.monotonic()
+        if now_s - self._looked_s < LAND_PERIOD_S:
+            return
+        self._looked_s = now_s
+        shallow = self._committing.bottom.depth_m < self._least_m
+        land = shallow.tobytes() if shallow.any() else b""
+        if land != self._land:
+            self._land = land
+            self._ways.clear()
 
     def needs_s(self, member: Member) -> float | None:
         """Return how long a vehicle's way home takes from where it is, by its clock; None: not known."""

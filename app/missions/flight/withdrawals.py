@@ -19,6 +19,9 @@ from app.missions.views.mission import Level
 from app.storage import missions as mission_queries
 from app.storage.uncancellable import to_the_end
 
+LEAST_PERIOD_S = 0.1
+"""No more often by the wall clock, however fast vehicles live."""
+
 PERIOD_S = 1.0
 """How often is looked who is to be led where, seconds of the vehicles' time."""
 
@@ -74,7 +77,7 @@ class Withdrawals:
                         log.exception("a vehicle could not be led", vehicle=member.name)
             if any(member.withdrawal is not None for member in self._live.team):
                 await self._dispatch.settle_late()
-            await asyncio.sleep(PERIOD_S / self._time_scale)
+            await asyncio.sleep(max(PERIOD_S / self._time_scale, LEAST_PERIOD_S))
 
     async def finished(self) -> None:
         """Wait until every vehicle that was called home is there, or is out of reach for long."""
@@ -89,7 +92,7 @@ class Withdrawals:
                     words = f"{member.name} did not come home: it cannot be reached"
                     await self._live.journal.log(Level.ALARM, "recovery", words, vehicle=member.name)
                 return
-            await asyncio.sleep(PERIOD_S / self._time_scale)
+            await asyncio.sleep(max(PERIOD_S / self._time_scale, LEAST_PERIOD_S))
 
     def _is_done(self, member: Member) -> bool:
         withdrawal = member.withdrawal

@@ -9,7 +9,7 @@ from app.missions.flight.commit import home_of
 from app.missions.flight.decision import make_constraints
 from app.missions.live.mission import LiveMission
 from app.missions.recovery.failsafes import with_reserve_s
-from app.missions.recovery.way_home import homeward_ground, way_home, way_time_s
+from app.missions.recovery.way_home import WaysHome, way_time_s
 from app.missions.team import Member
 from app.missions.views.mission import CheckStatus, CheckView
 
@@ -38,10 +38,10 @@ def _way(live: LiveMission, member: Member) -> Iterator[CheckView]:
         return
     name, title = f"recovery.{member.name}", f"Way home of {member.name}"
     constraints = make_constraints(live.spec)
-    ground = homeward_ground(constraints, home_m)
+    ways_home = WaysHome(constraints, home_m)
     speed_mps = live.spec.speed_of(member.spec)
     corners = [np.asarray(corner) for corner in constraints.area]
-    ways = [(corner, way_home(ground, corner, home_m)) for corner in corners]
+    ways = [(corner, ways_home.way(corner)) for corner in corners]
     if any(way is None for _, way in ways):
         yield CheckView(
             id=name,

@@ -13,7 +13,7 @@ from shapely.geometry.base import BaseGeometry
 from shapely.geometry.polygon import orient
 from shapely.ops import nearest_points, unary_union
 
-from app.arrays import FloatArray
+from app.arrays import BoolArray, FloatArray
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.constraints import Constraints
 
@@ -59,51 +59,67 @@ def homeward_ground(constraints: Constraints, home_m: FloatArray) -> Constraints
     return replace(constraints, area=np.asarray(ground.exterior.coords)[:-1])
 
 
-def way_home(
-    ground: Constraints, start_m: FloatArray, home_m: FloatArray, bottom: Bottom | None = None, least_m: float = 0.0
-) -> FloatArray | None:
-    """Return the corners of the shortest way home, (n, 2), the last of them home; None when there is none.
+class WaysHome:
+    """All ways to one recovery point: found once, asked often.
 
     Parameters
     ----------
-    ground
-        From :func:`homeward_ground`.
-    start_m, home_m : (2,)
-        A vehicle outside the ground, or in a zone's margin, leaves that by the shortest way first.
+    constraints
+        Of the mission: the area is widened by :func:`homeward_ground`.
+    home_m : (2,)
     bottom
         Pessimistic sea floor; where it is shallower than ``least_m`` counts as land.
     """
-    free: BaseGeometry = Polygon(ground.area)
-    blocked: list[BaseGeometry] = [Polygon(zone) for zone in ground.keep_out]
-    blocked += [] if bottom is None else _land(bottom, least_m)
-    if blocked:
-        free = free.difference(unary_union(blocked))
-    inner = free.buffer(-CLEARANCE_M, quad_segs=2).simplify(DETAIL_M)
-    home = Point(home_m)
-    if inner.is_empty or inner.distance(home) > CLEARANCE_M + 1e-9:
-        return None
-    first = start_m if inner.covers(Point(start_m)) else _coords(nearest_points(inner, Point(start_m))[0])
-    last = _coords(nearest_points(inner, home)[0])
-    rings = [ring for part in _polygons(inner) for ring in (part.exterior, *part.interiors)]
-    corners = np.concatenate([np.asarray(ring.coords)[:-1] for ring in rings])
-    nodes = np.vstack([first, last, corners])
-    a, b = np.triu_indices(len(nodes), 1)
-    lines = shapely.linestrings(np.stack([nodes[a], nodes[b]], axis=1))
-    roomy = inner.buffer(1e-3)
-    shapely.prepare(roomy)
-    seen = shapely.covers(roomy, lines)
-    length = np.hypot(*(nodes[a[seen]] - nodes[b[seen]]).T)
-    graph = csr_array((np.maximum(length, 1e-9), (a[seen], b[seen])), shape=(len(nodes), len(nodes)))
-    away, before = dijkstra(graph, directed=False, indices=[0], return_predecessors=True)
-    if not np.isfinite(away[0, 1]):
-        return None
-    way, node = [home_m], 1
-    while (node := int(before[0, node])) >= 0:
-        way.append(nodes[node])
-    way.reverse()
-    if np.allclose(way[0], start_m):
-        way = way[1:] or [home_m]
-    return np.array(way)
+
+    def __init__(
+        self, constraints: Constraints, home_m: FloatArray, bottom: Bottom | None = None, least_m: float = 0.0
+    ) -> None:
+        ground = homeward_ground(constraints, home_m)
+        free: BaseGeometry = Polygon(ground.area)
+        blocked: list[BaseGeometry] = [Polygon(zone) for zone in ground.keep_out]
+        blocked += [] if bottom is None else _land(bottom, least_m)
+        if blocked:
+            free = free.difference(unary_union(blocked))
+        self._home_m = home_m
+        self._inner = inner = free.buffer(-CLEARANCE_M, quad_segs=2).simplify(DETAIL_M)
+        self._reachable = not inner.is_empty and inner.distance(Point(home_m)) <= CLEARANCE_M + 1e-9
+        if not self._reachable:
+            return
+        self._roomy = inner.buffer(1e-3)
+        shapely.prepare([self._inner, self._roomy])
+        last = _coords(nearest_points(inner, Point(home_m))[0])
+        rings = [ring for part in _polygons(inner) for ring in (part.exterior, *part.interiors)]
+        self._nodes = nodes = np.vstack([last, *(np.asarray(ring.coords)[:-1] for ring in rings)])
+        a, b = np.triu_indices(len(nodes), 1)
+        seen = self._sees(nodes[a], nodes[b])
+        length = np.hypot(*(nodes[a[seen]] - nodes[b[seen]]).T)
+        graph = csr_array((np.maximum(length, 1e-9), (a[seen], b[seen])), shape=(len(nodes), len(nodes)))
+        away, before = dijkstra(graph, directed=False, indices=[0], return_predecessors=True)
+        self._away_m, self._before = away[0], before[0]
+
+    def way(self, start_m: FloatArray) -> FloatArray | None:
+        """Return the corners of the shortest way home, (n, 2), the last of them home; None when there is none.
+
+        A vehicle outside the ground, or in a zone's margin, leaves that by the shortest way first.
+        """
+        if not self._reachable:
+            return None
+        inside = self._inner.covers(Point(start_m))
+        first = start_m if inside else _coords(nearest_points(self._inner, Point(start_m))[0])
+        total_m = np.hypot(*(self._nodes - first).T) + self._away_m
+        total_m[~self._sees(np.broadcast_to(first, self._nodes.shape), self._nodes)] = np.inf
+        node = int(np.argmin(total_m))
+        if not np.isfinite(total_m[node]):
+            return None
+        way = [] if inside else [first]
+        while node > 0:
+            way.append(self._nodes[node])
+            node = int(self._before[node])
+        return np.array([*way, self._home_m])
+
+    def _sees(self, from_m: FloatArray, to_m: FloatArray) -> BoolArray:
+        lines = shapely.linestrings(np.stack([from_m, to_m], axis=1))
+        return np.asarray(shapely.covers(self._roomy, lines), dtype=np.bool_)
 
 
 def berth_m(home_m: FloatArray, slot: int, radius_m: float, separation_m: float) -> FloatArray:

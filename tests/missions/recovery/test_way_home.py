@@ -12,7 +12,7 @@ from shapely.geometry import LineString, Point, Polygon
 from app.arrays import FloatArray
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.constraints import Constraints
-from app.missions.recovery.way_home import CORRIDOR_M, berth_m, homeward_ground, way_home, way_time_s
+from app.missions.recovery.way_home import CORRIDOR_M, WaysHome, berth_m, homeward_ground, way_time_s
 
 SQUARE = np.array([[0.0, 0.0], [200.0, 0.0], [200.0, 200.0], [0.0, 200.0]])
 
@@ -38,7 +38,7 @@ def test_a_way_keeps_clear_of_a_zone_and_is_hardly_longer_than_around_it(
     around = Polygon(zone).buffer(1.0)
     if around.contains(Point(start)) or around.contains(Point(home)):
         return
-    way = way_home(homeward_ground(constraints, home), start, home)
+    way = WaysHome(constraints, home).way(start)
     assert way is not None
     np.testing.assert_allclose(way[-1], home)
     assert not LineString(np.vstack([start, way])).intersects(Polygon(zone))
@@ -50,9 +50,8 @@ def test_a_way_keeps_clear_of_a_zone_and_is_hardly_longer_than_around_it(
 
 def test_home_outside_is_reached_along_a_corridor() -> None:
     home = np.array([100.0, -300.0])
-    ground = homeward_ground(Constraints(SQUARE), home)
     start = np.array([10.0, 190.0])
-    way = way_home(ground, start, home)
+    way = WaysHome(Constraints(SQUARE), home).way(start)
     assert way is not None
     free = Polygon(SQUARE).union(LineString(np.array([[100.0, 0.0], home])).buffer(CORRIDOR_M + 1e-6))
     assert free.covers(LineString(np.vstack([start, way])))
@@ -61,11 +60,11 @@ def test_home_outside_is_reached_along_a_corridor() -> None:
 
 def test_a_wall_across_leaves_no_way() -> None:
     wall = Constraints(SQUARE, (box(-10, 90, 210, 110),))
-    assert way_home(wall, np.array([100.0, 150.0]), np.array([100.0, 20.0])) is None
+    assert WaysHome(wall, np.array([100.0, 20.0])).way(np.array([100.0, 150.0])) is None
 
 
 def test_a_vehicle_outside_comes_in_first() -> None:
-    way = way_home(Constraints(SQUARE), np.array([-20.0, 100.0]), np.array([150.0, 100.0]))
+    way = WaysHome(Constraints(SQUARE), np.array([150.0, 100.0])).way(np.array([-20.0, 100.0]))
     assert way is not None
     assert way[0][0] == pytest.approx(0.5, abs=0.1)
 
@@ -74,7 +73,7 @@ def test_known_shallows_are_gone_around() -> None:
     depth = np.full((20, 20), 15.0)
     depth[8:12, 0:15] = 0.5
     start, home = np.array([30.0, 180.0]), np.array([30.0, 20.0])
-    way = way_home(Constraints(SQUARE), start, home, Bottom(0.0, 0.0, 10.0, depth), least_m=1.5)
+    way = WaysHome(Constraints(SQUARE), home, Bottom(0.0, 0.0, 10.0, depth), least_m=1.5).way(start)
     assert way is not None
     assert not LineString(np.vstack([start, way])).intersects(Polygon(box(0, 80, 150, 120)))
 
