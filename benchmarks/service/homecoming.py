@@ -3,8 +3,9 @@
 Seeded missions of the service with its simulated vehicles: areas of 100 to 300 m, two or three vehicles with 20 to 60
 minutes of endurance each, a recovery point inside or outside the area, at times a keep-out zone, currents to 0.5 m/s
 (``--still``: none), in every fifth mission batteries that empty 30 % faster than told, in every third one that
-joins later. The missions' length is no limit: energy is. Told are, by vehicle: how far from its recovery point it
-ended, what was left of its energy, and which part of the time that its energy allowed after the way home it surveyed.
+joins later. The missions' length is no limit: energy is. Told are, by vehicle: how far from its recovery point it was
+when it was home, what was left of its energy then, and which part of what it did not need for the way home it used
+before it turned back.
 """
 
 import argparse
@@ -105,27 +106,19 @@ async def fly(seed: int, options: argparse.Namespace, migrating: asyncio.Lock) -
         finally:
             await service.shutdown()
             await database.close()
-    began = min(line.time for line in lines if line.message.startswith("running"))
     found = {}
     for vehicle in view.vehicles:
-        member = live.team.members[vehicle.name]
         own = [line for line in lines if line.data.get("vehicle") == vehicle.name]
-        began = min((line.time for line in own if line.message.endswith("follows")), default=began)
-        turned = max((line.time for line in own if "goes home" in line.message), default=None)
-        home = max((line.time for line in own if "is home" in line.message), default=None)
-        east, north = vehicle.east_m or 0.0, vehicle.north_m or 0.0
-        lon, lat = vehicle.recovery_point or (0.0, 0.0)
-        point = live.frame.to_local(np.array(lat), np.array(lon))
-        endurance_s = 60.0 * (member.spec.endurance_min or 0.0) / sea.consumption_factor
+        turned = max((line for line in own if "goes home" in line.message), key=lambda line: line.time, default=None)
+        arrival = max((line for line in own if "is home" in line.message), key=lambda line: line.time, default=None)
         share = None
-        if turned is not None and home is not None:
-            survey_s = (turned - began).total_seconds() * options.time_scale
-            way_s = (home - turned).total_seconds() * options.time_scale
-            share = round(100 * survey_s / (endurance_s - way_s), 1)
+        if turned is not None and arrival is not None:
+            left_pct = turned.data["energy_left_pct"]
+            share = round(100 * (100.0 - left_pct) / (100.0 - (left_pct - arrival.data["energy_left_pct"])), 1)
         found[vehicle.name] = {
             "phase": str(vehicle.phase),
-            "from_point_m": round(math.hypot(east - float(point[0]), north - float(point[1])), 1),
-            "energy_left_pct": vehicle.battery_pct,
+            "from_point_m": None if arrival is None else arrival.data["from_point_m"],
+            "energy_left_pct": None if arrival is None else arrival.data["energy_left_pct"],
             "surveyed_pct": share,
             "why": vehicle.withdrawn,
         }
@@ -157,7 +150,7 @@ async def fly_all(options: argparse.Namespace) -> dict[str, Any]:
     return {
         "missions": len(done),
         "vehicles": len(vehicles),
-        "home": sum(v["phase"] == "home" and v["from_point_m"] <= 25.0 for v in vehicles),
+        "home": sum(v["from_point_m"] is not None and v["from_point_m"] <= 25.0 for v in vehicles),
         "with_energy_left": sum((v["energy_left_pct"] or 0.0) > 0.0 for v in vehicles),
         "least_energy_left_pct": min((v["energy_left_pct"] or 0.0 for v in vehicles), default=None),
         "surveyed_pct": {"median": float(np.median(shares)), "least": min(shares)} if shares else None,

@@ -16,6 +16,7 @@ from app.missions.flight.decision import Decision, Leg
 from app.missions.live.mission import RISES, LiveMission
 from app.missions.recovery.way_home import berth_m, homeward_ground
 from app.missions.spec.mission import Guidance, MissionSpec
+from app.missions.spec.recovery import Recovery
 from app.missions.team import CommittedLeg, Member
 from app.missions.views.mission import Level
 from app.storage import missions as mission_queries
@@ -270,12 +271,16 @@ def home_of(member: Member, spec: MissionSpec) -> FloatArray | None:
     recovery = spec.recovery_of(member.spec)
     if recovery is None:
         return None
-    lon, lat = recovery.point
-    east, north = spec.frame().to_local(np.array(lat), np.array(lon))
-    point_m = np.array([float(east), float(north)])
     # A point of its own is nobody else's.
     slot = 0 if member.spec.recovery_point is not None else member.slot
-    return berth_m(point_m, slot, recovery.radius_m, spec.limits.min_separation_m)
+    return berth_m(point_of(recovery, spec), slot, recovery.radius_m, spec.limits.min_separation_m)
+
+
+def point_of(recovery: Recovery, spec: MissionSpec) -> FloatArray:
+    """Return a recovery point in the mission's frame, (2,)."""
+    lon, lat = recovery.point
+    east, north = spec.frame().to_local(np.array(lat), np.array(lon))
+    return np.array([float(east), float(north)])
 
 
 def committed_leg(row: WaypointRow, *, surfacing: bool = False) -> CommittedLeg:

@@ -1,6 +1,7 @@
 """Leads vehicles that survey no more: home, up, or to a stop."""
 
 import asyncio
+from typing import Any
 
 import numpy as np
 import structlog
@@ -8,10 +9,11 @@ import structlog
 from app.missions import safety
 from app.missions.fleet.hub import FleetHub
 from app.missions.fleet.interface import WaypointReport, WaypointStatus
-from app.missions.flight.commit import LegCommit, home_of
+from app.missions.flight.commit import LegCommit, home_of, point_of
 from app.missions.flight.dispatch import Dispatch
 from app.missions.flight.range_left import RangeLeft
 from app.missions.live.mission import LiveMission, phase_of
+from app.missions.live.vehicles import energy_left_pct
 from app.missions.recovery.failsafes import LINK_LOST_S
 from app.missions.spec.failsafes import Response
 from app.missions.team import Member, Withdrawal
@@ -130,7 +132,8 @@ class Withdrawals:
             Response.STOP: "is stopped",
         }
         words = f"{member.name} {does[withdrawal.response]}: {withdrawal.why}"
-        await self._live.journal.log(Level.INFO, "recovery", words, vehicle=member.name, response=withdrawal.response)
+        facts = {"response": withdrawal.response, "energy_left_pct": energy_left_pct(member)}
+        await self._live.journal.log(Level.INFO, "recovery", words, vehicle=member.name, **facts)
         if withdrawal.response is Response.HOLD and member.present:
             await self._dispatch.hold(member)
 
@@ -152,7 +155,9 @@ class Withdrawals:
             return
         away_m = float(np.hypot(*(home_m - here_m)))
         if away_m <= recovery.radius_m and (self._at_surface(member) or self._waited_to_rise(member)):
-            await self._end(member, withdrawal, f"{member.name} is home, {away_m:.0f} m from its place")
+            from_point_m = float(np.hypot(*(point_of(recovery, spec) - here_m)))
+            facts = {"from_point_m": round(from_point_m, 1), "energy_left_pct": energy_left_pct(member)}
+            await self._end(member, withdrawal, f"{member.name} is home, {away_m:.0f} m from its place", **facts)
             return
         if away_m <= recovery.radius_m and member.name in self._rising_since_s:
             return
@@ -182,7 +187,7 @@ class Withdrawals:
     def _at_surface(self, member: Member) -> bool:
         return member.report is not None and member.report.position.depth_m <= DEEP_M
 
-    async def _end(self, member: Member, withdrawal: Withdrawal, words: str) -> None:
+    async def _end(self, member: Member, withdrawal: Withdrawal, words: str, **facts: Any) -> None:
         """Stop a vehicle that is where it was to go."""
         self._ending.add(member.name)
         withdrawal.over = True
@@ -194,7 +199,7 @@ class Withdrawals:
         stop = await self._hub.stop(member.key)
         await self._keep(member, withdrawal)
         level = Level.INFO if stop.acknowledged else Level.ALARM
-        await self._live.journal.log(level, "recovery", f"{words}; {stop.detail}", vehicle=member.name)
+        await self._live.journal.log(level, "recovery", f"{words}; {stop.detail}", vehicle=member.name, **facts)
         self._ending.discard(member.name)
         self._live.changed.set()
         self._live.publish_summary()

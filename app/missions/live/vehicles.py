@@ -112,7 +112,7 @@ class VehicleViews:
         active = [FailsafeView(failsafe=a.failsafe, response=a.response, message=a.message) for a in member.failsafes]
         return {
             "withdrawn": "" if member.withdrawal is None else member.withdrawal.why,
-            "energy_left_pct": rounded(member.energy.level_pct if left is None else left.pct, 1),
+            "energy_left_pct": energy_left_pct(member),
             "energy_left_s": None if left is None else round(left.safe_s),
             "recovery_point": None if recovery is None else recovery.point,
             "return_needs_s": None if needs_s is None or not math.isfinite(needs_s) else round(needs_s),
@@ -152,6 +152,12 @@ def local_place(frame: LocalFrame, position: Position) -> tuple[float, float] | 
     except ValueError:
         return None
     return float(east), float(north)
+
+
+def energy_left_pct(member: Member) -> float | None:
+    """Return what is left of a vehicle's energy, by its battery or else by the clock; None: not known."""
+    left = member.energy.left
+    return rounded(member.energy.level_pct if left is None else left.pct, 1)
 
 
 def rounded(value: float | None, digits: int) -> float | None:
