@@ -186,9 +186,11 @@ async def test_a_paused_mission_is_finished_at_home_too(service: MissionService)
     assert [vehicle.phase for vehicle in ended.vehicles] == [Phase.HOME]
 
 
-async def test_vehicles_turn_back_in_time(service: MissionService) -> None:
-    """Ten minutes of energy: it is home long before its steps are done, with some of it left."""
-    vehicles = [{"name": "a", "kind": "sim", "endurance_min": 10.0}]
+async def test_vehicles_turn_back_in_time(harbour_closed: Harbour) -> None:
+    """Seven minutes of energy: it is home long before its steps are done, with some of it left."""
+    # Its reserve is a minute: a machine that is busy for a second may not use that up.
+    service = await harbour_closed.open(time_scale=12.0)
+    vehicles = [{"name": "a", "kind": "sim", "endurance_min": 7.0}]
     spec = recovered(point=OUTSIDE, vehicles=vehicles, steps=1000)
     mission = await service.create(spec)
     await act(service, mission.id, "start")
@@ -197,7 +199,7 @@ async def test_vehicles_turn_back_in_time(service: MissionService) -> None:
     assert vehicle.phase is Phase.HOME
     assert ended.progress.step < 1000
     assert vehicle.energy_left_pct is not None
-    assert 0.0 < vehicle.energy_left_pct < 50.0
+    assert 0.0 < vehicle.energy_left_pct < 70.0
 
 
 async def test_the_way_home_keeps_clear_of_zones(service: MissionService) -> None:

@@ -148,9 +148,7 @@ def run_survey_at_sea(
         lambda metres: best_even_survey(scenario, metres, turns),
     )
     flown = [fly_pattern_at_sea(scenario, routes_of, minutes) for routes_of in patterns]
-    walk = fly_planner_at_sea(
-        scenario, "random", PlannerOptions(), minutes, known=unknown_belief(scenario.belief_grid)
-    )
+    walk = fly_planner_at_sea(scenario, "random", PlannerOptions(), minutes, known=unknown_belief(scenario.belief_grid))
     usual, coverage, even, random = (
         judge(scenario, track.soundings, track.flown_m, yardstick=True) for track in (*flown, walk)
     )
