@@ -8,6 +8,7 @@ import structlog
 from app.arrays import FloatArray
 from app.missions.fleet.hub import FleetHub
 from app.missions.fleet.interface import Position, VehicleRefusedError
+from app.missions.flight.range_left import RangeLeft
 from app.missions.live.mission import LiveMission
 from app.missions.spec.mission import MissionSpec
 from app.missions.team import Member
@@ -25,7 +26,8 @@ log = structlog.get_logger(__name__)
 class OnboardWays:
     """Keeps the ways home of one running mission's vehicles on board, and takes them away with its end."""
 
-    def __init__(self, live: LiveMission, hub: FleetHub) -> None:
+    def __init__(self, live: LiveMission, hub: FleetHub, range_left: RangeLeft) -> None:
+        self._range = range_left
         self._live = live
         self._hub = hub
         self._kept: dict[str, FloatArray] = {}
@@ -55,7 +57,7 @@ class OnboardWays:
         if kept is not None and kept.shape == way_m.shape and float(np.abs(kept - way_m).max()) < CHANGED_M:
             return
         spec = self._live.spec
-        places = positions(spec, way_m, member.cruise_depth_m(spec.limits))
+        places = positions(spec, way_m, self._range.depths_m(member, member.place_m(self._live.frame), way_m))
         try:
             await self._hub.keep_way_home(member.key, places, spec.speed_of(member.spec))
         except VehicleRefusedError as error:
@@ -74,8 +76,8 @@ class OnboardWays:
             log.warning("a way home stays on board", vehicle=member.name, error=str(error))
 
 
-def positions(spec: MissionSpec, way_m: FloatArray, depth_m: float) -> list[Position]:
-    """Return a way's corners, (n, 2), as places: at a depth, the last one at the surface."""
+def positions(spec: MissionSpec, way_m: FloatArray, depths_m: list[float]) -> list[Position]:
+    """Return a way's corners, (n, 2), as places: at these depths, the last one at the surface."""
     lats, lons = spec.frame().to_geographic(way_m[:, 0], way_m[:, 1])
-    depths = [depth_m] * (len(way_m) - 1) + [0.0]
+    depths = [*depths_m[:-1], 0.0]
     return [Position(float(lat), float(lon), d) for lat, lon, d in zip(lats, lons, depths, strict=True)]

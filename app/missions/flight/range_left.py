@@ -2,11 +2,13 @@
 
 import math
 import time
+from itertools import pairwise
 
 import numpy as np
 
 from app.arrays import FloatArray
 from app.exploration.core.constraints import Constraints
+from app.missions import safety
 from app.missions.flight.commit import LegCommit, home_of
 from app.missions.live.mission import LiveMission
 from app.missions.recovery.failsafes import with_reserve_s
@@ -75,6 +77,15 @@ class RangeLeft:
         # Better over ground that looks too shallow, at the surface, than not at all.
         return anyhow.way(here_m) if way_m is None else way_m
 
+    def depths_m(self, member: Member, here_m: FloatArray, way_m: FloatArray) -> list[float]:
+        """Return how deep a vehicle travels to each corner of a way, (n, 2): less over a shallow bottom."""
+        limits, bottom = self._live.spec.limits, self._committing.bottom
+        wanted_m = min(member.cruise_depth_m(limits), limits.max_depth_m)
+        return [
+            safety.travel_depth_m(a, b, wanted_m, bottom, limits.min_altitude_m)
+            for a, b in pairwise(np.vstack([here_m, way_m]))
+        ]
+
     @property
     def _least_m(self) -> float:
         return self._live.spec.limits.min_altitude_m + LEAST_DEPTH_M
@@ -90,6 +101,7 @@ class RangeLeft:
         if land != self._land:
             self._land = land
             self._ways.clear()
+            self._found.clear()
 
     def needs_s(self, member: Member) -> float | None:
         """Return how long a vehicle's way home takes from where it is, by its clock; None: not known."""
@@ -99,11 +111,6 @@ class RangeLeft:
         here_m, speed_mps = member.place_m(self._live.frame), self._live.spec.speed_of(member.spec)
         up_s = member.report.position.depth_m / ASCENT_MPS
         return way_time_s(here_m, way_m, speed_mps, self.current_mps) + up_s
-
-    def slack_s(self, member: Member) -> float | None:
-        """Return how long a vehicle may stay as far from home as it is, by its clock; None: not known."""
-        needs_s, left = self.needs_s(member), member.energy.left
-        return None if needs_s is None or left is None else left.safe_s - with_reserve_s(needs_s)
 
     def beyond_m(self, member: Member) -> float | None:
         """Return how far a vehicle may be sent beyond its legs, by its energy; None: as far as the mission likes."""

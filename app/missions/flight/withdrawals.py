@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 import structlog
 
-from app.missions import safety
 from app.missions.fleet.hub import FleetHub
 from app.missions.fleet.interface import WaypointReport, WaypointStatus
 from app.missions.flight.commit import LegCommit, home_of, point_of
@@ -167,15 +166,9 @@ class Withdrawals:
             await self._live.journal.log(Level.ALARM, "recovery", f"{member.name}: {words}", vehicle=member.name)
             member.withdrawal = Withdrawal(Response.SURFACE, words)
             return
-        corners = [(corner, self._depth_m(member, here_m, corner)) for corner in way_m]
-        self._committing.lead_home(member, [*corners, (home_m, 0.0)])
+        depths_m = self._range.depths_m(member, here_m, way_m)
+        self._committing.lead_home(member, [*zip(way_m, depths_m, strict=True), (home_m, 0.0)])
         await self._dispatch.begin()
-
-    def _depth_m(self, member: Member, here_m: np.ndarray, corner_m: np.ndarray) -> float:
-        """Return how deep a vehicle travels to a corner of its way: as ever where that is known to be safe."""
-        limits = self._live.spec.limits
-        wanted_m = min(member.cruise_depth_m(limits), limits.max_depth_m)
-        return safety.travel_depth_m(here_m, corner_m, wanted_m, self._committing.bottom, limits.min_altitude_m)
 
     def _waited_to_rise(self, member: Member) -> bool:
         """Whether a vehicle was sent up at home, and had time for that."""
@@ -195,12 +188,15 @@ class Withdrawals:
         member.ahead.clear()
         member.set_order(None)
         self._rising_since_s.pop(member.name, None)
+        self._stranded.discard(member.name)
         member.flown.phase = phase_of(withdrawal)
-        stop = await self._hub.stop(member.key)
-        await self._keep(member, withdrawal)
-        level = Level.INFO if stop.acknowledged else Level.ALARM
-        await self._live.journal.log(level, "recovery", f"{words}; {stop.detail}", vehicle=member.name, **facts)
-        self._ending.discard(member.name)
+        try:
+            stop = await self._hub.stop(member.key)
+            await self._keep(member, withdrawal)
+            level = Level.INFO if stop.acknowledged else Level.ALARM
+            await self._live.journal.log(level, "recovery", f"{words}; {stop.detail}", vehicle=member.name, **facts)
+        finally:
+            self._ending.discard(member.name)
         self._live.changed.set()
         self._live.publish_summary()
 

@@ -82,6 +82,11 @@ class Energy:
         """Learn anew from here: nothing was counted until now."""
         self._first_pct, self._first_used_s = self._level_pct or 0.0, self.used_s
 
+    def renew(self) -> None:
+        """Take a vehicle that tells no level to be charged: it has its whole endurance again."""
+        if self._level_pct is None:
+            self.used_s = 0.0
+
     def pass_time(self, seconds: float, speed_mps: float | None) -> None:
         """Count time under way at a speed; None: the usual one."""
         ratio = 1.0 if speed_mps is None else min(abs(speed_mps) / self.speed_mps, FASTEST_SHARE)

@@ -56,6 +56,8 @@ async def send_on(live: LiveMission, supervisor: MissionSupervisor, name: str, a
     async with supervisor.acting(live.id):
         async with live.database.writing() as session:
             await mission_queries.keep_withdrawal(session, live.id, name, None)
+        if member.is_home:
+            member.energy.renew()
         member.withdrawal = None
         member.ahead.clear()
         member.set_order(None)

@@ -70,3 +70,12 @@ def test_a_charged_battery_lasts_as_the_last_one_did() -> None:
     left = energy.left
     assert left is not None
     assert left.time_s == pytest.approx(700.0, rel=0.05)
+
+
+def test_only_a_vehicle_that_tells_no_level_is_taken_to_be_charged() -> None:
+    told, silent = Energy(1.0, 1000.0), Energy(1.0, 1000.0)
+    told.take_level(40.0)
+    for energy in (told, silent):
+        energy.pass_time(900.0, 1.0)
+        energy.renew()
+    assert (told.used_s, silent.used_s) == (900.0, 0.0)
