@@ -1,0 +1,26 @@
+"""How ways home are flown: no deeper than the known bottom allows on each piece of them."""
+
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+
+from app.exploration.core.bottom import Bottom
+from app.missions.flight.decision import make_constraints
+from app.missions.flight.range_left import RangeLeft
+from app.missions.service import MissionService
+from tests.support.missions.harbour import sim_spec
+
+
+async def test_each_piece_of_a_way_keeps_its_height_above_the_bottom(service: MissionService) -> None:
+    """A shoal beside the straight line to a corner is on the piece before it; its depth counts for no other piece."""
+    limits = {"min_depth_m": 6.0, "max_depth_m": 20.0, "min_altitude_m": 1.0, "max_step_m": 20.0}
+    view = await service.create(sim_spec("a", side_m=100.0, limits=limits))
+    live = await service.get(view.id)
+    depth = np.full((10, 10), 30.0)
+    depth[8:, 4:6] = 4.0
+    bottom = Bottom(0.0, 0.0, 10.0, depth)
+    range_left = RangeLeft(live, make_constraints(live.spec), cast("Any", SimpleNamespace(bottom=bottom)))
+    way = np.array([[5.0, 95.0], [95.0, 95.0], [95.0, 5.0]])
+    member = live.team.members["a"]
+    assert range_left.depths_m(member, np.array([5.0, 5.0]), way) == [6.0, 3.0, 6.0]
