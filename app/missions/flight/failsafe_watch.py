@@ -11,6 +11,7 @@ import structlog
 from app.missions.fleet.hub import FleetHub
 from app.missions.fleet.interface import FaultKind, LinkState
 from app.missions.flight.range_left import RangeLeft
+from app.missions.flight.waiting import until_next_look
 from app.missions.live.mission import LiveMission
 from app.missions.recovery.failsafes import (
     ALTITUDE_SHARE,
@@ -28,12 +29,6 @@ from app.missions.spec.mission import MissionSpec
 from app.missions.spec.recovery import Homecoming
 from app.missions.team import Member
 from app.missions.views.mission import Level
-
-LEAST_PERIOD_S = 0.1
-"""No more often by the wall clock, however fast vehicles live."""
-
-PERIOD_S = 1.0
-"""How often is looked, seconds of the vehicles' time."""
 
 FRESH_S = 5.0
 """Places of two vehicles are compared when they are not older, seconds of the vehicles' time."""
@@ -67,7 +62,7 @@ class FailsafeWatch:
                 await self.look()
             except Exception:
                 log.exception("the failsafes could not be looked at")
-            await asyncio.sleep(max(PERIOD_S / self._time_scale, LEAST_PERIOD_S))
+            await until_next_look(self._time_scale)
 
     async def look(self) -> None:
         """Look once at everybody."""

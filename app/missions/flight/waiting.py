@@ -6,6 +6,12 @@ from collections.abc import Callable
 from app.missions.live.mission import LiveMission
 from app.missions.views.mission import Level
 
+LOOK_S = 1.0
+"""How often is looked how each vehicle is, seconds of the vehicles' time."""
+
+LEAST_LOOK_S = 0.1
+"""No more often by the wall clock, however fast vehicles live."""
+
 
 class Waiting:
     """Waits on behalf of one running mission."""
@@ -51,3 +57,8 @@ class Waiting:
         """Whether there are vehicles, and all of them are on their way home or out of action."""
         team = self._live.team
         return bool(list(team)) and not team.surveying
+
+
+async def until_next_look(time_scale: float) -> None:
+    """Wait until it is time to look at every vehicle again."""
+    await asyncio.sleep(max(LOOK_S / time_scale, LEAST_LOOK_S))

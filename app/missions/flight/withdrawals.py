@@ -11,6 +11,7 @@ from app.missions.fleet.interface import WaypointReport, WaypointStatus
 from app.missions.flight.commit import LegCommit, home_of, point_of
 from app.missions.flight.dispatch import Dispatch
 from app.missions.flight.range_left import RangeLeft
+from app.missions.flight.waiting import until_next_look
 from app.missions.live.mission import LiveMission, phase_of
 from app.missions.live.vehicles import energy_left_pct
 from app.missions.recovery.failsafes import LINK_LOST_S
@@ -19,12 +20,6 @@ from app.missions.team import Member, Withdrawal
 from app.missions.views.mission import Level
 from app.storage import missions as mission_queries
 from app.storage.uncancellable import to_the_end
-
-LEAST_PERIOD_S = 0.1
-"""No more often by the wall clock, however fast vehicles live."""
-
-PERIOD_S = 1.0
-"""How often is looked who is to be led where, seconds of the vehicles' time."""
 
 PATIENCE_S = 0.5
 """How long vehicles wait for the disk."""
@@ -78,7 +73,7 @@ class Withdrawals:
                         log.exception("a vehicle could not be led", vehicle=member.name)
             if any(member.withdrawal is not None for member in self._live.team):
                 await self._dispatch.settle_late()
-            await asyncio.sleep(max(PERIOD_S / self._time_scale, LEAST_PERIOD_S))
+            await until_next_look(self._time_scale)
 
     async def finished(self) -> None:
         """Wait until every vehicle that was called home is there, or is out of reach for long."""
@@ -93,7 +88,7 @@ class Withdrawals:
                     words = f"{member.name} did not come home: it cannot be reached"
                     await self._live.journal.log(Level.ALARM, "recovery", words, vehicle=member.name)
                 return
-            await asyncio.sleep(max(PERIOD_S / self._time_scale, LEAST_PERIOD_S))
+            await until_next_look(self._time_scale)
 
     def _is_done(self, member: Member) -> bool:
         withdrawal = member.withdrawal
