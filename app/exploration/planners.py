@@ -20,11 +20,15 @@ from app.exploration.site_search import SearchTask
 from app.exploration.site_search.cao import CaoSearch, SpsaSearch
 from app.exploration.site_search.frontier import FrontierSearch
 from app.exploration.site_search.random_flights import RandomFlights
+from app.exploration.swath.planner import SwathPlanner
 
 PLANNERS: dict[str, type[PlannerBase]] = {
     planner.name: planner
     for planner in (CaoPlanner, LawnmowerPlanner, PcaoPlanner, RandomPlanner, RolloutPlanner, SpsaPlanner, FdsaPlanner)
 }
+
+COVERERS: dict[str, type[PlannerBase]] = {planner.name: planner for planner in (SwathPlanner,)}
+"""The planners of surveys whose vehicles all have swath sonars."""
 
 SEARCHERS: dict[str, type[PlannerBase]] = {
     planner.name: planner for planner in (FrontierSearch, CaoSearch, SpsaSearch, RandomFlights)
@@ -65,9 +69,10 @@ def create_planner(
     if name in ONLY_IN_SIMULATION:
         raise ValueError(f"planner: {REFUSAL.format(name=name)}")
     try:
-        planner = PLANNERS[name]
+        planner = (PLANNERS | COVERERS)[name]
     except KeyError:
-        raise ValueError(f"planner: there is no {name!r}; choose one of {', '.join(sorted(PLANNERS))}") from None
+        there = ", ".join(sorted(PLANNERS | COVERERS))
+        raise ValueError(f"planner: there is no {name!r}; choose one of {there}") from None
     if isinstance(sensor, Scanner):
         return _searcher(name)(options, sensor)
     if planner is LawnmowerPlanner and isinstance(sensor, RangeSensor):

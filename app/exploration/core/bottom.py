@@ -9,6 +9,12 @@ from app.arrays import FloatArray
 
 MAX_CELLS_PER_SIDE = 128
 
+LEG_CHECKS = 4
+"""At so many points of a leg, evenly spaced up to its end, its height above the bottom is looked at."""
+
+DEPTH_MARGIN_M = 1e-3
+"""By how much more than the least height depths of travel are chosen."""
+
 
 @dataclass(frozen=True)
 class Bottom:
@@ -69,3 +75,23 @@ class Bottom:
         safe_row = np.where(known, row, 0).astype(int)
         safe_col = np.where(known, col, 0).astype(int)
         return np.where(known, self.depth_m[safe_row, safe_col], np.nan)
+
+    def deepest_end_m(self, origin: FloatArray, leg_m: FloatArray, min_altitude_m: float) -> FloatArray:
+        """Return how deep legs may end for vehicles to keep their height above the bottom; inf where it is unknown.
+
+        A vehicle is taken to change its depth evenly along the leg, and at once where it ends less deep than it begins.
+
+        Parameters
+        ----------
+        origin : (..., 3)
+            Where legs begin, with the depth there.
+        leg_m : (..., 2)
+            Ways east and north.
+        """
+        deepest = np.full(leg_m.shape[:-1], np.inf)
+        for k in range(1, LEG_CHECKS + 1):
+            part = k / LEG_CHECKS
+            room = self.at(origin[..., :2] + part * leg_m) - min_altitude_m - DEPTH_MARGIN_M
+            rising = (room - (1.0 - part) * origin[..., 2]) / part
+            deepest = np.fmin(deepest, np.fmin(room, rising))
+        return deepest

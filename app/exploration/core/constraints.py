@@ -15,11 +15,10 @@ from numba import njit
 from shapely import Polygon
 
 from app.arrays import BoolArray, FloatArray, IntArray
-from app.exploration.core.bottom import Bottom
+from app.exploration.core.bottom import LEG_CHECKS, Bottom
 from app.exploration.core.geometry import convex, enters, leaves, signed_distance
 
 TOLERANCE_M = 1e-6
-LEG_CHECKS = 4
 
 
 class Limit(IntEnum):

@@ -11,6 +11,7 @@ import numpy as np
 
 from app.arrays import BoolArray, FloatArray, IntArray
 from app.exploration.core.constraints import Constraints
+from app.exploration.core.coverage import SwathTask
 from app.exploration.core.dynamic import Localization, Targets
 from app.exploration.core.search_task import SearchTask
 
@@ -85,6 +86,8 @@ class Situation:
         last of these ends, and a proposal leaves them there.
     left_m : (n_vehicles,) or None
         How far each may still fly from its position; None: the remaining steps, each as long as a step may be.
+    swath : SwathTask or None
+        What is to be ensonified, in a survey with swath sonars.
     """
 
     step: int
@@ -101,6 +104,7 @@ class Situation:
     search: SearchTask | None = None
     moving: BoolArray | None = None
     left_m: FloatArray | None = None
+    swath: SwathTask | None = None
 
     @property
     def moves(self) -> BoolArray:
@@ -125,12 +129,14 @@ class Proposal:
     """A planner's answer: the next team configuration, (n_vehicles, 3), and figures for the operator.
 
     ``errands`` (detours) names vehicles that left the plan, with the number of their target; negative: the surface.
+    ``done`` names vehicles for which nothing is left to do as things stand; they hold.
     """
 
     positions: FloatArray
     objective: float
     terms: dict[str, float] = field(default_factory=dict)
     errands: dict[str, int] = field(default_factory=dict)
+    done: frozenset[str] = frozenset()
 
 
 class Planner(Protocol):

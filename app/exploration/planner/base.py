@@ -10,13 +10,12 @@ import numpy as np
 from app.arrays import FloatArray
 from app.estimation import RangeSensor, Sensor
 from app.exploration.core.bottom import Bottom
-from app.exploration.core.constraints import LEG_CHECKS, Constraints
+from app.exploration.core.constraints import Constraints
 from app.exploration.core.detours import Errand, Errands, errand_move
 from app.exploration.core.problem import Proposal, Situation
 from app.exploration.core.snapshot_codec import pack, unpack
 from app.exploration.planner.options import PlannerOptions
 
-DEPTH_MARGIN_M = 1e-3
 PASSES = 2
 FRACTIONS = (1.0, 0.75, 0.5, 0.25, 0.1)
 
@@ -174,10 +173,7 @@ def at_depth(
     reach = constraints.max_step_m * (1.0 - 1e-9)
     drop = np.zeros(leg.shape[:-1])
     for _ in range(PASSES):  # a shortened leg lies over other ground
-        deepest = np.full(leg.shape[:-1], constraints.max_depth_m)
-        for k in range(1, LEG_CHECKS + 1):
-            floor = bottom.at(origin[:, :2] + (k / LEG_CHECKS) * leg)
-            deepest = np.fmin(deepest, floor - constraints.min_altitude_m - DEPTH_MARGIN_M)
+        deepest = np.minimum(constraints.max_depth_m, bottom.deepest_end_m(origin, leg, constraints.min_altitude_m))
         depth = np.maximum(np.minimum(wish_m, deepest), constraints.min_depth_m)
         drop = np.clip(depth - origin[:, 2], -reach, reach)
         length = np.hypot(leg[..., 0], leg[..., 1])

@@ -1,0 +1,215 @@
+"""Where the next line may lie: as far from what was ensonified as its swath reaches back to it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from scipy.ndimage import find_objects, label, uniform_filter1d
+
+from app.arrays import BoolArray, FloatArray, IntArray
+from app.exploration.swath.raster import Flying, LineRaster
+
+STEEPEST = 0.3
+"""A line may bend away from its direction by so much, as a tangent: its swath stays across it."""
+
+BRIDGED_RADII = 6.0
+"""A line is flown on over ground that is done where that is shorter than so many turning circles' radii."""
+
+MOST_OVERLAP, ALMOST = 0.1, 0.03
+"""Lines overlap by more than they must, up to the first share, where that leaves as many; a part of a line that is
+smaller than the second needs no line of its own."""
+
+MOST_LEFT, COME_AGAIN_RADII = 6, 10.0
+"""So many pieces of ground are left for later, where they hold a line back by more than the way to come again for them:
+so many turning circles' radii, and their length."""
+
+STRIP = 0.6
+"""What is left open is swept in lines where it is wider than this part of a swath; the rest is filled in the end."""
+
+
+@dataclass(frozen=True)
+class Line:
+    """One line across columns of a raster.
+
+    Attributes
+    ----------
+    columns : (n,)
+        Successive columns of the raster.
+    across_m : (n,)
+        Where it lies in each.
+    """
+
+    columns: IntArray
+    across_m: FloatArray
+
+    def path(self, raster: LineRaster) -> FloatArray:
+        """Return its vertices (k, 2), east and north, by increasing ``along``, ends at the outer sides of columns."""
+        along_m = raster.along_m[self.columns]
+        half = 0.5 * raster.cell_m
+        along_m = (
+            np.concatenate([[along_m[0] - half], along_m[1:-1], [along_m[-1] + half]])
+            if len(along_m) > 1
+            else (np.array([along_m[0] - half, along_m[0] + half]))
+        )
+        across_m = self.across_m if len(self.across_m) > 1 else np.repeat(self.across_m, 2)
+        return raster.axes.to_en(np.column_stack([along_m, across_m]))
+
+
+def lines(
+    raster: LineRaster, open_cells: BoolArray, sign: int, flying: Flying, near_m: FloatArray | None = None
+) -> list[Line]:
+    """Return the lines that may be flown next over open cells (along, across), swept towards ``sign`` (1 or -1).
+
+    In each column the line lies so far beyond the first open cell that its swath just reaches back to it: how far that
+    is follows from the depth there, which the last line has measured. A line bends gently. Where one line sees all that
+    is left of a column it lies as close to ``near_m`` (along), metres across, as that lets it, else in the middle.
+    """
+    first, last, has = _extent(open_cells, sign)
+    if not has.any():
+        return []
+    columns = np.flatnonzero(has)
+    edge_m = _sides(raster, first[columns], -sign)
+    width_m = _reach_m(raster, columns, first[columns], edge_m, sign, flying)
+    overlap = _even_overlap(raster, open_cells, columns, flying)
+    target_m = edge_m + sign * (1.0 - overlap) * width_m
+    far_m = _sides(raster, last[columns], sign)
+    back_m = far_m - sign * (1.0 - flying.overlap) * _reach_m(raster, columns, last[columns], far_m, -sign, flying)
+    wish_m = 0.5 * (edge_m + far_m) if near_m is None else near_m[columns]
+    target_m = np.where(
+        sign * back_m < sign * target_m,
+        sign * np.clip(sign * wish_m, sign * back_m, sign * target_m),
+        target_m,
+    )
+    bridge = max(1, int(BRIDGED_RADII * flying.radius_m / raster.cell_m))
+    parted = (np.diff(columns) > bridge) | (
+        np.abs(np.diff(edge_m)) > 1.5 * np.maximum(width_m[1:], width_m[:-1]) + raster.cell_m
+    )
+    found = []
+    for part in np.split(np.arange(len(columns)), np.flatnonzero(parted) + 1):
+        whole = np.arange(columns[part[0]], columns[part[-1]] + 1)
+        wish = np.full(len(whole), np.inf)
+        wish[columns[part] - whole[0]] = sign * target_m[part]
+        width = np.interp(whole, columns[part], width_m[part])
+        wish = _worth(wish, width, raster.cell_m, flying)
+        found.append(Line(whole, sign * gentle(wish, raster.cell_m, bend_radius_m(width, flying))))
+    return found
+
+
+def needed_lines(raster: LineRaster, cells: BoolArray, flying: Flying) -> FloatArray:
+    """Return how many lines see the cells (along, across) of each column, parts of lines included."""
+    width_m = np.maximum(raster.half_width_m(flying), 0.5 * raster.cell_m)
+    return np.asarray((cells * raster.cell_m / ((2.0 - flying.overlap) * width_m)).sum(axis=1))
+
+
+def _even_overlap(raster: LineRaster, open_cells: BoolArray, columns: IntArray, flying: Flying) -> FloatArray:
+    """Return the overlaps (n,) with which a whole number of lines sees what is left of each column."""
+    needed = needed_lines(raster, open_cells, flying)[columns]
+    spacing = 1.0 - 0.5 * flying.overlap
+    whole = np.ceil(float(needed.max()) - ALMOST)
+    even = np.minimum(needed / max(whole, 1.0), 1.0)
+    return np.asarray(np.clip(2.0 - 2.0 * spacing * even, flying.overlap, max(flying.overlap, MOST_OVERLAP)))
+
+
+def gentle(wish: FloatArray, cell_m: float, radius_m: float) -> FloatArray:
+    """Return a line (n,) not above the wishes (n,), one a cell, that turns no farther than ``STEEPEST`` and smoothly.
+
+    It is the largest one whose valleys have the radius; its tops are rounded by a mean over half of that.
+    """
+    # What wishes farther away than a bend allow rises evenly, what nearer ones allow as the circle does.
+    bent_m = STEEPEST * radius_m
+    bent = int(np.ceil(bent_m / cell_m))
+    padded = np.pad(wish, bent, constant_values=np.inf)
+    away_m = cell_m * np.abs(np.arange(-bent, bent + 1))
+    rise_m = np.where(away_m < bent_m, away_m**2 / (2.0 * radius_m), STEEPEST * (away_m - 0.5 * bent_m))
+    level = (sliding_window_view(padded, 2 * bent + 1) + rise_m).min(axis=1)
+    if len(wish) > bent:
+        level[bent:] = np.minimum(level[bent:], _climbed(wish[: len(wish) - bent], cell_m) + rise_m[0])
+        level[: len(wish) - bent] = np.minimum(
+            level[: len(wish) - bent], _climbed(wish[: bent - 1 : -1] if bent else wish[::-1], cell_m)[::-1] + rise_m[0]
+        )
+    width = 2 * int(0.25 * radius_m / cell_m) + 1
+    return np.asarray(uniform_filter1d(level, min(width, 2 * ((len(level) - 1) // 2) + 1), mode="nearest"))
+
+
+def _climbed(wish: FloatArray, cell_m: float) -> FloatArray:
+    """Return the largest line (n,) not above the wishes at and before each cell that climbs no steeper than allowed."""
+    climb_m = STEEPEST * cell_m * np.arange(len(wish))
+    return np.asarray(np.minimum.accumulate(wish - climb_m) + climb_m)
+
+
+def _worth(wish: FloatArray, width_m: FloatArray, cell_m: float, flying: Flying) -> FloatArray:
+    """Return the wishes (n,) without those that hold the whole line back more than it costs to come again for them.
+
+    ``width_m`` (n,) is how far a line sees to either side.
+    """
+    radius_m = bend_radius_m(width_m, flying)
+    level = gentle(wish, cell_m, radius_m)
+    for _ in range(MOST_LEFT):
+        binding = np.flatnonzero(wish <= level + 0.25 * cell_m)
+        groups = np.split(binding, np.flatnonzero(np.diff(binding) > 1) + 1)
+        best_m, best = 0.0, None
+        for group in groups:
+            if not len(group) or len(group) > 0.4 * len(wish):
+                continue
+            first, last = group[0], group[-1]
+            # With it go its neighbours that would hold the line back as much.
+            near = np.zeros(len(wish), dtype=bool)
+            reach = int(0.5 * radius_m / cell_m) + 1
+            near[max(0, first - reach) : last + reach + 1] = True
+            near &= wish <= level[first : last + 1].max() + 0.3 * width_m
+            without = np.where(near, np.inf, wish)
+            if not np.isfinite(without).any():
+                continue
+            raised = gentle(without, cell_m, radius_m)
+            gained_m = float(((raised - level) / (2.0 * width_m)).sum()) * cell_m
+            again_m = COME_AGAIN_RADII * flying.radius_m + int(near.sum()) * cell_m + float(width_m.mean())
+            if gained_m - again_m > best_m:
+                best_m, best = gained_m - again_m, (without, raised)
+        if best is None:
+            break
+        wish, level = best
+    return wish
+
+
+def bend_radius_m(width_m: FloatArray, flying: Flying) -> float:
+    """Return the radius in which lines bend: the outer beams of successive pings stay close together."""
+    return max(float(np.median(width_m)), 2.0 * flying.radius_m)
+
+
+def strips(raster: LineRaster, flying: Flying) -> tuple[BoolArray, BoolArray]:
+    """Return which open cells are swept in lines, and which are left to fill: holes, and slivers of strips."""
+    number, count = label(raster.open, np.ones((3, 3)))
+    swept = np.zeros(count + 1, dtype=bool)
+    width_m = raster.half_width_m(flying)
+    for k, where in enumerate(find_objects(number), start=1):
+        inside = number[where] == k
+        thickest = int(inside.sum(axis=1).max()) * raster.cell_m
+        swept[k] = thickest > STRIP * 2.0 * float(np.median(width_m[where][inside]))
+    large = np.asarray(swept[number])
+    return large, np.asarray(raster.open & ~large)
+
+
+def _extent(open_cells: BoolArray, sign: int) -> tuple[IntArray, IntArray, BoolArray]:
+    """Return the first and last open cell of each column as swept, and which columns have any."""
+    has = np.asarray(open_cells.any(axis=1))
+    low = open_cells.argmax(axis=1)
+    high = open_cells.shape[1] - 1 - open_cells[:, ::-1].argmax(axis=1)
+    return (low, high, has) if sign > 0 else (high, low, has)
+
+
+def _sides(raster: LineRaster, rows: IntArray, side: int) -> FloatArray:
+    """Return where the outer side of cells lies."""
+    return np.asarray(raster.corner_m[1] + (rows + (side > 0)) * raster.cell_m)
+
+
+def _reach_m(
+    raster: LineRaster, columns: IntArray, rows: IntArray, edge_m: FloatArray, sign: int, flying: Flying
+) -> FloatArray:
+    """Return from how far a line sees the bottom at its edge, from the depth that its own bottom allows."""
+    bottom_m = raster.depth_m[columns, rows]
+    width_m = flying.half_width_m(bottom_m)
+    for _ in range(2):
+        over_m = raster.depth_m[columns, raster.rows_of(edge_m + sign * width_m)]
+        travels_m = over_m - flying.altitude_m(over_m)
+        width_m = flying.sonar.half_width_m(bottom_m - travels_m)
+    return np.maximum(width_m, 0.5 * raster.cell_m)

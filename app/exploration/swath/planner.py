@@ -1,0 +1,113 @@
+"""Full coverage as missions plan it: the survey's lines, kept inside the area and off its keep-out zones."""
+
+from typing import Any, ClassVar
+
+import numpy as np
+
+from app.arrays import FloatArray
+from app.estimation.swath import SwathSonar
+from app.exploration.core.bottom import Bottom
+from app.exploration.core.coverage import SwathTask
+from app.exploration.core.problem import Proposal, Situation
+from app.exploration.core.routes import FreeSpace
+from app.exploration.lines.lattice import longer_axis_rad
+from app.exploration.planner.base import PlannerBase, settle
+from app.exploration.swath.raster import Flying
+from app.exploration.swath.survey import SwathSurvey
+
+LEG_WIDTHS = 1.0
+"""Longest leg along a line, in half widths of the swath."""
+
+SHORTEST_LEG = 0.5
+"""Legs along a line are at least this part of the longest that a vehicle may be given."""
+
+GUESSED_ALTITUDE_M = 5.0
+"""How high above the bottom vehicles are taken to be as long as no depth is known."""
+
+
+class SwathPlanner(PlannerBase):
+    """Full coverage with swath sonars: lines as far apart as the measured depth allows, gaps filled last."""
+
+    name: ClassVar[str] = "swath"
+    runs_errands: ClassVar[bool] = False
+    plans_for_all = True
+    decides_apart = True
+
+    def __init__(self, options: Any, sensor: Any) -> None:
+        super().__init__(options, sensor)
+        self._survey: SwathSurvey | None = None
+        self._kept: dict[str, Any] | None = None
+        self._free: FreeSpace | None = None
+
+    def _decide(self, team: Situation, bottom: Bottom, seed: int) -> Proposal:
+        task = team.swath
+        if task is None:
+            return Proposal(team.positions.copy(), 0.0, done=frozenset(team.vehicles))
+        survey = self._begun(team, task)
+        wish = team.positions[:, :2].copy()
+        poses = {
+            name: np.array([*team.positions[i, :2], team.headings_rad[i]])
+            for i, name in enumerate(team.vehicles)
+            # What one without a way left was to see is everybody's.
+            if name in task.sonars and (team.left_m is None or team.left_m[i] > 0.0)
+        }
+        done = set(team.vehicles) - poses.keys()
+        for i, name in enumerate(team.vehicles):
+            if not team.moves[i] or name in done:
+                continue
+            flying = self._flying(team, name, task)
+            end = survey.next_leg(
+                name,
+                poses[name],
+                flying,
+                task.coverage,
+                poses,
+                self._leg_m(team, i, bottom, flying),
+                team.constraints.max_step_m,
+            )
+            if end is None:
+                done.add(name)
+                continue
+            space = self._space(team)
+            wish[i] = space.way(team.positions[i, :2], space.nearest(end))[0]
+        positions, _ = settle(team, bottom, self._at_cruise(team, bottom, wish)[None])
+        left_pct = 100.0 * float(task.coverage.left.sum()) / max(int(task.coverage.wanted.sum()), 1)
+        return Proposal(positions, 0.0, {"left_pct": left_pct}, done=frozenset(done))
+
+    def _begun(self, team: Situation, task: SwathTask) -> SwathSurvey:
+        if self._survey is None:
+            altitude_m = max(GUESSED_ALTITUDE_M, team.constraints.min_altitude_m)
+            guess_m = float(np.median(list(self._cruise.values()))) + altitude_m
+            along_rad = longer_axis_rad(team.constraints.area)
+            self._survey = SwathSurvey(along_rad, task.coverage.cell_m, guess_m, task.crosslines)
+            if self._kept is not None:
+                self._survey.recall(self._kept)
+                self._kept = None
+        return self._survey
+
+    def _flying(self, team: Situation, name: str, task: SwathTask) -> Flying:
+        sonar: SwathSonar = task.sonars[name]
+        radius_m = max(self.options.turn_radius_m, 0.5)
+        return Flying(sonar, self._cruise[name], team.constraints.min_altitude_m, radius_m, task.overlap)
+
+    def _leg_m(self, team: Situation, row: int, bottom: Bottom, flying: Flying) -> float:
+        below_m: FloatArray = bottom.at(team.positions[row : row + 1, :2])
+        most_m = team.constraints.max_step_m
+        if not np.isfinite(below_m).all():
+            return most_m
+        width_m = float(flying.half_width_m(below_m)[0])
+        return float(np.clip(LEG_WIDTHS * width_m, min(SHORTEST_LEG * most_m, 10.0), most_m))
+
+    def _space(self, team: Situation) -> FreeSpace:
+        if self._free is None:
+            self._free = FreeSpace(team.constraints, 0.0)
+        return self._free
+
+    def _remember(self) -> dict[str, Any]:
+        if self._survey is not None:
+            return {"survey": self._survey.remember()}
+        return {} if self._kept is None else {"survey": self._kept}
+
+    def _recall(self, state: dict[str, Any]) -> None:
+        self._kept = state.pop("survey", None)
+        self._survey = None

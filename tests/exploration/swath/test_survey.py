@@ -1,0 +1,228 @@
+"""A team's swath survey: everything is seen, nobody repeats, and a survey that is taken up goes on the same."""
+
+import json
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from app.arrays import FloatArray
+from app.estimation.swath import SwathSonar
+from app.exploration.core.bottom import Bottom
+from app.exploration.core.constraints import Constraints, inside_area
+from app.exploration.core.coverage import Coverage, SwathTask
+from app.exploration.core.problem import Belief, Situation
+from app.exploration.planner.options import PlannerOptions
+from app.exploration.planners import create_planner
+from app.exploration.swath.raster import Flying
+from app.exploration.swath.survey import SwathSurvey
+
+FLYING = Flying(SwathSonar(), 2.0, 1.0, 5.0, 0.06)
+
+
+TURN_M = 4.0
+
+
+class Sea:
+    """A floor that is seen as vehicles fly straight legs over it, to both sides as far as the swath goes."""
+
+    def __init__(self, depth_m: FloatArray) -> None:
+        self.depth_m = depth_m
+        self.seen = np.zeros(depth_m.shape, dtype=bool)
+        rows, cols = np.indices(depth_m.shape)
+        self._places = np.stack([cols + 0.5, rows + 0.5], axis=-1)
+
+    def fly(self, start: FloatArray, end: FloatArray) -> None:
+        leg = end - start
+        length = float(np.hypot(*leg))
+        if length < 1e-9:
+            return
+        along = (self._places - start) @ leg / length
+        aside = np.abs((self._places - start) @ np.array([-leg[1], leg[0]]) / length)
+        # Where legs meet at an angle a vehicle turns in an arc: no wedge is left out.
+        self.seen |= (along >= -TURN_M) & (along <= length + TURN_M) & (aside <= FLYING.half_width_m(self.depth_m))
+
+    def coverage(self) -> Coverage:
+        wanted = np.ones(self.seen.shape, dtype=bool)
+        return Coverage(0.0, 0.0, 1.0, wanted, self.seen.copy(), np.where(self.seen, self.depth_m, np.nan))
+
+
+def sweep(
+    sea: Sea, vehicles: int, *, interrupted: bool = False, crosslines: float = 0.0, refused: float = 0.0
+) -> tuple[float, list[FloatArray]]:
+    """Fly a survey to its end; the metres flown, and the legs' ends. ``refused``: share of legs that nobody flies."""
+    rng = np.random.default_rng(0)
+    survey = SwathSurvey(0.0, 1.0, 10.0, crosslines)
+    poses = {f"v{k}": np.array([2.0 + 5.0 * k, 2.0, np.nan]) for k in range(vehicles)}
+    flown, idle = 0.0, 0
+    ends: list[FloatArray] = []
+    for turn in range(2000):
+        name = f"v{turn % vehicles}"
+        if interrupted:
+            kept = json.loads(json.dumps(survey.remember()))
+            survey = SwathSurvey(1.0, 1.0, 10.0, crosslines)
+            survey.recall(kept)
+        end = survey.next_leg(name, poses[name], FLYING, sea.coverage(), dict(poses), 20.0)
+        idle = idle + 1 if end is None else 0
+        if idle > vehicles:
+            return flown, ends
+        if end is None or rng.random() < refused:
+            continue
+        leg = end - poses[name][:2]
+        sea.fly(poses[name][:2], end)
+        flown += float(np.hypot(*leg))
+        poses[name] = np.array([*end, math.atan2(*leg)])
+        ends.append(end)
+    raise AssertionError("it does not end")
+
+
+@settings(max_examples=4, deadline=None)
+@given(st.integers(60, 110), st.integers(60, 110), st.integers(1, 4), st.floats(6.0, 30.0), st.floats(-0.1, 0.1))
+def test_everything_is_seen(rows: int, cols: int, vehicles: int, depth_m: float, rise: float) -> None:
+    sea = Sea(np.maximum(depth_m + rise * np.tile(np.arange(cols), (rows, 1)), 4.0))
+    _, ends = sweep(sea, vehicles)
+    assert sea.seen.mean() > 0.99
+    assert (np.array(ends) > -2.0).all(), "hardly a cell beyond the area"
+    assert (np.array(ends) < [cols + 2.0, rows + 2.0]).all()
+
+
+def test_one_vehicle_flies_hardly_more_than_the_lines() -> None:
+    sea = Sea(np.full((180, 300), 20.0))
+    flown, _ = sweep(sea, 1)
+    assert flown < 1.3 * (3 * 300 + 2 * 60 + 30)
+
+
+def test_a_survey_that_is_taken_up_goes_on_the_same() -> None:
+    depth = np.maximum(9.0 + 4.0 * np.sin(np.arange(150) / 20.0)[None] + np.zeros((100, 1)), 4.0)
+    whole, parts = sweep(Sea(depth), 2), sweep(Sea(depth), 2, interrupted=True)
+    assert np.allclose(whole[1], parts[1])
+
+
+@pytest.mark.parametrize("refused", [0.1, 0.5])
+def test_what_was_refused_is_flown_later(refused: float) -> None:
+    depth = np.maximum(12.0 - 0.05 * np.arange(120)[None] + np.zeros((100, 1)), 4.0)
+    sea, calm = Sea(depth), Sea(depth)
+    flown, _ = sweep(sea, 2, refused=refused)
+    alone, _ = sweep(calm, 2)
+    assert sea.seen.mean() > 0.99
+    assert flown < 1.6 * alone, "without flying everything again"
+
+
+def test_a_line_whose_legs_are_never_flown_is_given_up() -> None:
+    sea = Sea(np.full((60, 80), 10.0))
+    sweep(sea, 1, refused=1.0)
+    assert not sea.seen.any()
+
+
+def test_who_is_past_the_end_of_its_line_takes_another_one() -> None:
+    sea = Sea(np.full((120, 200), 8.0))
+    survey = SwathSurvey(0.0, 1.0, 8.0)
+    pose = np.array([2.0, 2.0, np.nan])
+    for _ in range(3):
+        end = survey.next_leg("a", pose, FLYING, sea.coverage(), {"a": pose}, 20.0)
+        assert end is not None
+        sea.fly(pose[:2], end)
+        pose = np.array([*end, np.pi / 2])
+    swept_away = np.array([199.5, pose[1], np.pi / 2])
+    end = survey.next_leg("a", swept_away, FLYING, sea.coverage(), {"a": swept_away}, 20.0)
+    assert end is not None
+    assert np.isfinite(end).all()
+
+
+def test_a_hole_is_left_to_who_waits_nearest() -> None:
+    sea = Sea(np.full((100, 300), 8.0))
+    sea.seen[:] = True
+    sea.seen[40:48, 280:290] = False
+    survey = SwathSurvey(0.0, 1.0, 8.0)
+    far, near = np.array([5.0, 50.0, np.nan]), np.array([260.0, 50.0, np.nan])
+    team = {"far": far, "near": near}
+    assert survey.next_leg("far", far, FLYING, sea.coverage(), team, 20.0) is None
+    assert survey.next_leg("near", near, FLYING, sea.coverage(), team, 20.0) is not None
+
+
+def test_nothing_is_left_to_a_vehicle_that_has_no_way_left() -> None:
+    constraints = Constraints(np.array([[0.0, 0.0], [300.0, 0.0], [300.0, 100.0], [0.0, 100.0]]), (), max_step_m=25.0)
+    sea = Sea(np.full((100, 300), 8.0))
+    sea.seen[:] = True
+    sea.seen[40:48, 280:290] = False
+    both = situation(sea.coverage(), constraints, np.array([[5.0, 50.0], [260.0, 50.0]]))
+    first = replace(both, moving=np.array([True, False]))
+    for left_m, waits in ((500.0, True), (0.0, False)):
+        planner = create_planner("swath", PlannerOptions(turn_radius_m=5.0))
+        asked = replace(first, left_m=np.array([500.0, left_m]))
+        assert ("v0" in planner.propose(asked, np.random.default_rng(0)).done) == waits
+
+
+@pytest.mark.parametrize("interrupted", [False, True])
+def test_crosslines_are_flown_last(interrupted: bool) -> None:
+    depth = np.full((80, 140), 10.0)
+    plain, _ = sweep(Sea(depth), 2)
+    longer, ends = sweep(Sea(depth), 2, interrupted=interrupted, crosslines=0.3)
+    assert longer > plain + 2 * 70.0
+    last = np.array(ends[-12:])
+    east, north = np.ptp(last, axis=0)
+    assert north > 60.0, "across the area"
+    assert east < 140.0
+
+
+def situation(coverage: Coverage, constraints: Constraints, en_m: FloatArray) -> Situation:
+    names = tuple(f"v{k}" for k in range(len(en_m)))
+    nothing = Belief(
+        np.array([[50.0, 50.0]]), np.full(1, np.nan), np.full(1, np.inf), np.zeros(1, bool), np.ones(1), 9.0
+    )
+    return Situation(
+        1,
+        100,
+        names,
+        np.column_stack([en_m, np.full(len(en_m), 2.0)]),
+        np.full(len(en_m), np.nan),
+        nothing,
+        np.zeros((0, 2)),
+        constraints,
+        swath=SwathTask(coverage, dict.fromkeys(names, SwathSonar()), 0.06),
+    )
+
+
+AREA = np.array([[0.0, 0.0], [150.0, 0.0], [150.0, 120.0], [0.0, 120.0]])
+ZONE = np.array([[60.0, 40.0], [90.0, 40.0], [90.0, 80.0], [60.0, 80.0]])
+
+
+def test_legs_obey_the_limits_and_see_all_but_the_zone() -> None:
+    constraints = Constraints(AREA, (ZONE,), max_step_m=25.0, min_separation_m=0.0)
+    sea = Sea(np.full((120, 150), 12.0))
+    rows, cols = np.indices(sea.seen.shape)
+    wanted = inside_area(constraints, np.column_stack([cols.ravel() + 0.5, rows.ravel() + 0.5])).reshape(rows.shape)
+    planner = create_planner("swath", PlannerOptions(turn_radius_m=5.0))
+    here = np.array([[3.0, 3.0], [10.0, 3.0]])
+    for _ in range(400):
+        coverage = Coverage(0.0, 0.0, 1.0, wanted, sea.seen & wanted, np.where(sea.seen, sea.depth_m, np.nan))
+        asked = situation(coverage, constraints, here)
+        proposal = planner.propose(asked, np.random.default_rng(0))
+        if proposal.done == set(asked.vehicles):
+            break
+        assert (constraints.excess(asked.positions, proposal.positions[None], Bottom.unknown()) <= 1e-6).all()
+        for k in range(2):
+            sea.fly(here[k], proposal.positions[k, :2])
+        here = proposal.positions[:, :2].copy()
+    else:
+        raise AssertionError("it does not end")
+    assert sea.seen[wanted].mean() > 0.97
+
+
+def test_without_anything_to_ensonify_all_are_done() -> None:
+    coverage = Coverage(0.0, 0.0, 1.0, np.ones((20, 20), bool), np.ones((20, 20), bool), np.full((20, 20), 8.0))
+    square = Constraints(np.array([[0.0, 0.0], [20.0, 0.0], [20.0, 20.0], [0.0, 20.0]]))
+    planner = create_planner("swath", PlannerOptions())
+    asked = situation(coverage, square, np.array([[5.0, 5.0]]))
+    proposal = planner.propose(asked, np.random.default_rng(0))
+    assert proposal.done == {"v0"}
+    assert np.array_equal(proposal.positions, asked.positions)
+
+
+def test_a_damaged_memory_is_refused() -> None:
+    planner = create_planner("swath", PlannerOptions())
+    with pytest.raises(ValueError, match="memory"):
+        planner.restore(b"nonsense")
