@@ -55,6 +55,7 @@ def fuse(measured: BathymetricMap, prior: BathymetricMap) -> BathymetricMap:
         process_sd_m=total**-0.5,
         bound_sd_m=_together(measured.claim_sd_m * distrust, prior.claim_sd_m),
         prior=prior.prior,
+        precision=None,
         model=f"{measured.model}; with imported soundings ({prior.model})",
     )
 

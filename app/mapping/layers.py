@@ -8,7 +8,10 @@ import numpy as np
 from scipy.ndimage import distance_transform_edt
 
 from app.arrays import BoolArray, FloatArray, IntArray
-from app.mapping.s44 import Order, tvu_fraction
+from app.mapping.s44 import Order, thu_m, tvu_fraction, tvu_m
+from app.mapping.swath.density import LEAST_SOUNDINGS
+from app.mapping.swath.gridded import area_of, is_of_swaths
+from app.mapping.tiers import asked_of, by_depth
 from app.mapping.types import BathymetricMap
 
 INTERPOLATED, SOUNDED, PRIOR = 0, 1, 2
@@ -26,6 +29,7 @@ class Palette(StrEnum):
     MATTER = "matter"
     BALANCE = "balance"
     LANDMARKS = "landmarks"
+    CLASSES = "classes"
 
 
 class Fit(StrEnum):
@@ -52,6 +56,8 @@ class LayerSource:
         A reference grid's depths at the map's cells.
     live
         Returns the papers' interpolation of every sounding so far; None where there is none.
+    cell_of_depth
+        The share of its depth that a place's cell is judged by for density; None: all are judged by the map's cell.
     """
 
     map: BathymetricMap
@@ -60,6 +66,7 @@ class LayerSource:
     accuracy_m: float = 0.0
     reference_m: FloatArray | None = None
     live: Callable[[], BathymetricMap | None] = lambda: None
+    cell_of_depth: float | None = None
 
 
 @dataclass(frozen=True)
@@ -86,6 +93,8 @@ class LayerKind:
         Returns its values; None where the mission has none, which ``absence`` and ``remedy`` explain.
     range
         Values of the first and the last colour, where they do not follow the data.
+    classes
+        Words for the values 0, 1, 2 and so on of a layer that has no others.
     scale
         Tiles hold whole numbers, the value times this; None: no tile has it. Those not ``in_every_tile`` are asked for.
     in_json, in_pictures, in_files
@@ -102,6 +111,7 @@ class LayerKind:
     palette: Palette
     fit: Fit = Fit.FROM_ZERO
     range: tuple[float, float] | None = None
+    classes: tuple[str, ...] = ()
     scale: int | None = None
     in_every_tile: bool = False
     in_json: bool = True
@@ -170,6 +180,21 @@ def _difference(source: LayerSource) -> FloatArray | None:
     return None if source.reference_m is None else source.map.depth_m - source.reference_m
 
 
+def _density(source: LayerSource) -> FloatArray | None:
+    bathymetry = source.map
+    if not is_of_swaths(bathymetry):
+        return None
+    area = area_of(bathymetry)
+    asked = asked_of(bathymetry.depth_m, bathymetry.grid.cell_m, source.cell_of_depth)
+    count = by_depth(bathymetry.count, area, asked, lambda count, _: count)
+    return np.where(area, np.digitize(count, (1, LEAST_SOUNDINGS)), np.nan)
+
+
+def _thu(source: LayerSource) -> FloatArray | None:
+    horizontal = source.map.horizontal_sd_m
+    return None if horizontal is None else thu_m(horizontal)
+
+
 def _live(source: LayerSource) -> FloatArray | None:
     live = source.live()
     return None if live is None else live.depth_m
@@ -203,7 +228,7 @@ LAYERS = {
         LayerKind(
             "count",
             "Soundings",
-            "soundings in the cell",
+            "soundings in the cell, those of swath sonars' beams included",
             "1",
             lambda source: _inside(source.map, source.map.count),
             Palette.MATTER,
@@ -232,6 +257,19 @@ LAYERS = {
             _sounded,
             Palette.MATTER,
             in_pictures=False,
+        ),
+        LayerKind(
+            "density",
+            "Density",
+            f"0 missed, 1 fewer than {LEAST_SOUNDINGS} soundings in the cell, 2 as many as full coverage asks for",
+            "1",
+            _density,
+            Palette.CLASSES,
+            range=(0, 2),
+            classes=("no sounding", f"1 to {LEAST_SOUNDINGS - 1} soundings", f"{LEAST_SOUNDINGS} and more"),
+            scale=1,
+            absence="no swath sonar has measured in this mission",
+            remedy="Send pings of a vehicle with sensor multibeam, or start a mission with one",
         ),
         LayerKind(
             "slope",
@@ -265,6 +303,26 @@ LAYERS = {
             scale=100,
             absence="the mission has no reference grid to differ from",
             remedy="Send one: PUT /api/v1/missions/{id}/reference",
+        ),
+        LayerKind(
+            "tvu",
+            "TVU",
+            "estimated total vertical uncertainty, 95 %",
+            "metre",
+            lambda source: tvu_m(source.map.sd_m, source.common_sd_m),
+            Palette.VIOLET,
+            scale=1000,
+        ),
+        LayerKind(
+            "thu",
+            "THU",
+            "estimated total horizontal uncertainty of a cell's soundings, 95 %",
+            "metre",
+            _thu,
+            Palette.VIOLET,
+            scale=100,
+            absence="no swath sonar has measured in this mission, so nothing is known of places",
+            remedy="Send pings of a vehicle with sensor multibeam, or start a mission with one",
         ),
         LayerKind(
             "live",

@@ -1,12 +1,15 @@
 """Outlines of marked cells as polygons, and cells that polygons touch."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
+
+from app.mapping.georeference import LocalFrame
 
 
 def outlines(marked: NDArray[np.bool_], west_m: float, south_m: float, cell_m: float) -> list[Polygon]:
@@ -28,6 +31,17 @@ def outlines(marked: NDArray[np.bool_], west_m: float, south_m: float, cell_m: f
     # Runs of different lengths meet in the middle of each other's sides: such points are no corners.
     joined = shapely.simplify(shapely.union_all(runs), 0.0)
     return [part for part in shapely.get_parts(joined).tolist() if isinstance(part, Polygon)]
+
+
+def geographic_rings(polygon: Polygon, frame: LocalFrame) -> list[list[Any]]:
+    """Return a polygon's rings of [longitude, latitude], the outer one counter-clockwise, holes clockwise."""
+    turned = polygon if polygon.exterior.is_ccw else polygon.reverse()
+    rings = []
+    for ring in (turned.exterior, *turned.interiors):
+        east, north = np.asarray(ring.coords).T
+        lat, lon = frame.to_geographic(east, north)
+        rings.append(np.round(np.column_stack([lon, lat]), 8).tolist())
+    return rings
 
 
 def touched(shapes: Sequence[BaseGeometry], rows: int, cols: int, cell_m: float) -> NDArray[np.bool_]:

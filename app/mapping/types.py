@@ -102,6 +102,11 @@ class BathymetricMap:
     bound_sd_m
         What the deviation hardly exceeds, as far as soundings could tell; infinite where none supports the cell. None:
         the same as ``sd_m``.
+    precision
+        Sum of the soundings' inverse variances, whose mean weighted by them is the depth; None where the map is no such
+        mean.
+    horizontal_sd_m
+        Of each horizontal coordinate of a cell's soundings, NaN without any. None: it is not known.
     """
 
     grid: Grid
@@ -115,6 +120,8 @@ class BathymetricMap:
     prior: BoolArray | None = None
     process_sd_m: FloatArray | None = None
     bound_sd_m: FloatArray | None = None
+    precision: FloatArray | None = None
+    horizontal_sd_m: FloatArray | None = None
 
     @property
     def planning_sd_m(self) -> FloatArray:

@@ -9,6 +9,13 @@ from pyproj.exceptions import CRSError
 INSTANTANEOUS_WATER_LEVEL = 5831
 LOWEST_ASTRONOMICAL_TIDE = 5861
 
+S100_DATUMS = (
+    {5865: 1, 5864: 2, 5867: 5, 5863: 8, 5866: 12, 5873: 13, 5862: 27, 10678: 44}
+    | dict.fromkeys((5715, 9288, 10150, 10547, 10549, 10551, 10649), 3)
+    | dict.fromkeys((LOWEST_ASTRONOMICAL_TIDE, 9287, 10548, 10550, 10552, 10650), 23)
+)
+"""Numbers of vertical datums in the IHO's register for S-100, by the EPSG code of depths below them."""
+
 
 @dataclass(frozen=True)
 class VerticalDatum:
@@ -21,6 +28,11 @@ class VerticalDatum:
     def crs(self) -> pyproj.CRS:
         """The vertical coordinate reference system, depth positive down."""
         return pyproj.CRS.from_epsg(self.epsg)
+
+    @property
+    def s100(self) -> int | None:
+        """Its number in the IHO's register for S-100; None where that has none for it."""
+        return S100_DATUMS.get(self.epsg)
 
     def compound_with(self, horizontal: pyproj.CRS) -> pyproj.CRS:
         """Return the horizontal system with this datum as its third axis."""
