@@ -1,8 +1,10 @@
 """Map as Bathymetric Attributed Grid (BAG 1.6), the exchange format of hydrographic offices."""
 
+import io
 import tempfile
 from pathlib import Path
 
+import h5py
 import numpy as np
 import rasterio
 from rasterio.crs import CRS
@@ -17,7 +19,7 @@ NODATA = 1_000_000.0
 
 
 def bag(bathymetry: BathymetricMap, frame: LocalFrame, *, vertical_datum: VerticalDatum, title: str) -> bytes:
-    """Return a BAG with elevation (positive up: minus the depth) and its standard deviation.
+    """Return a BAG with elevation (positive up: minus the depth), its standard deviation and numbers of soundings.
 
     The vertical datum stands in the metadata; the library would call it unknown.
     """
@@ -44,8 +46,13 @@ def bag(bathymetry: BathymetricMap, frame: LocalFrame, *, vertical_datum: Vertic
             VAR_ABSTRACT=f"{title}. Elevations are minus the depth below {vertical_datum.statement}. "
             f"Uncertainty is one standard deviation. {bathymetry.model}",
             VAR_INDIVIDUAL_NAME="bathyfleet",
-            VAR_PROCESS_STEP_DESCRIPTION=f"Interpolated from soundings: {bathymetry.model}",
+            VAR_PROCESS_STEP_DESCRIPTION=f"Made of soundings: {bathymetry.model}",
         ) as file:
             for number, layer in enumerate(layers, start=1):
                 file.write(layer, number)
-        return path.read_bytes()
+        content = io.BytesIO(path.read_bytes())
+    with h5py.File(content, "r+") as file:
+        count = np.where(np.isfinite(bathymetry.depth_m), bathymetry.count, 0).astype("<u4")
+        numbers = file["BAG_root"].create_dataset("num_soundings", data=count, chunks=True, compression="gzip")
+        numbers.attrs["min_num_soundings"], numbers.attrs["max_num_soundings"] = count.min(), count.max()
+    return content.getvalue()

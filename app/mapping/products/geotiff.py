@@ -26,7 +26,6 @@ def geotiff(
 ) -> bytes:
     """Return a COG with one band per layer, north up, in the local frame with the vertical datum as its third axis."""
     grid = bathymetry.grid
-    outside = ~np.isfinite(bathymetry.depth_m)
     with MemoryFile() as memory:
         with memory.open(
             driver="COG",
@@ -41,7 +40,8 @@ def geotiff(
             predictor="YES",
         ) as file:
             for number, layer in enumerate(layers, start=1):
-                values = np.where(outside, NODATA, np.nan_to_num(layer.values, nan=NODATA)).astype(np.float32)
+                # Ground that was missed has no depth, and a density all the same.
+                values = np.nan_to_num(layer.values, nan=NODATA).astype(np.float32)
                 file.write(values[::-1], number)
                 file.set_band_description(number, layer.name)
                 file.set_band_unit(number, layer.unit)

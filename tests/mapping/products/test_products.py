@@ -3,6 +3,7 @@
 import io
 import json
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 
 import numpy as np
 import pyproj
@@ -23,6 +24,7 @@ from app.mapping.products.overlay import overlay_corners, overlay_png
 from app.mapping.products.picture import picture_png
 from app.mapping.products.text import map_xyz, soundings_xyz
 from app.mapping.s44 import Order
+from app.mapping.swath.gridded import MODEL
 from app.mapping.types import BathymetricMap, Grid, Soundings
 from app.mapping.vertical import VerticalDatum
 
@@ -64,7 +66,7 @@ def cog(bathymetry: BathymetricMap, reference_m: np.ndarray | None = None) -> by
 
 def test_geotiff_holds_all_layers_north_up(bathymetry: BathymetricMap) -> None:
     with MemoryFile(cog(bathymetry, bathymetry.depth_m - 0.5)) as memory, memory.open() as file:
-        names = ("depth", "uncertainty", "count", "sounded", "slope", "tvu_fraction", "difference")
+        names = ("depth", "uncertainty", "count", "sounded", "slope", "tvu_fraction", "difference", "tvu")
         assert file.descriptions == names
         assert file.units[0] == "metre"
         assert file.nodata == NODATA
@@ -80,6 +82,17 @@ def test_geotiff_holds_all_layers_north_up(bathymetry: BathymetricMap) -> None:
             file.read(5, masked=True).compressed(), np.degrees(np.arctan(np.hypot(0.1, 0.02))), rtol=1e-5
         )
         np.testing.assert_allclose(file.read(7, masked=True).compressed(), 0.5, rtol=1e-5)
+
+
+def test_geotiff_shows_what_a_swath_survey_missed(bathymetry: BathymetricMap) -> None:
+    missed = bathymetry.count == 0
+    swept = replace(bathymetry, model=MODEL, depth_m=np.where(missed, np.nan, bathymetry.depth_m))
+    with MemoryFile(cog(swept)) as memory, memory.open() as file:
+        density = file.read(file.descriptions.index("density") + 1, masked=True)[::-1]
+        depth = file.read(1, masked=True)[::-1]
+    assert not density.mask.any()
+    np.testing.assert_array_equal(density.data, np.where(missed, 0.0, 1.0))
+    np.testing.assert_array_equal(depth.mask, missed)
 
 
 def test_geotiff_lies_where_the_frame_says_below_the_stated_datum(bathymetry: BathymetricMap) -> None:
