@@ -6,6 +6,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 
+import numpy as np
+from numpy.typing import NDArray
+
 
 class NodeState(StrEnum):
     """How far the acquaintance with a node has come."""
@@ -142,6 +145,38 @@ class SoundingRefused:
     reason: str
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class SwathPing:
+    """One ping of a multibeam: where the sonar was, its attitude (starboard down and nose up are positive), its beams.
+
+    ``angles_rad`` (b,) are from straight down in the vehicle, positive to starboard; ``ranges_m`` (b,) slant ranges,
+    NaN where nothing was detected.
+    """
+
+    vehicle: str
+    time_s: float
+    lat_deg: float
+    lon_deg: float
+    depth_m: float
+    roll_rad: float
+    pitch_rad: float
+    yaw_rad: float
+    angles_rad: NDArray[np.float32]
+    ranges_m: NDArray[np.float32]
+    source: str
+    position_sd_m: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class PingRefused:
+    """A SonarData of a multibeam that did not become a ping, and why."""
+
+    vehicle: str
+    time_s: float
+    source: str
+    reason: str
+
+
 @dataclass(frozen=True, slots=True)
 class TargetRange:
     """A range that a vehicle measured by sound to a system named ``target``, and where the vehicle was then."""
@@ -225,6 +260,8 @@ BridgeEvent = (
     StateReport
     | Sounding
     | SoundingRefused
+    | SwathPing
+    | PingRefused
     | TargetRange
     | WaypointChange
     | LinkChange
@@ -287,6 +324,9 @@ class NodeView:
     rates_hz: Mapping[str, float] = field(default_factory=dict)
     soundings: int = 0
     refused: Mapping[str, int] = field(default_factory=dict)
+    """Distances that did not become soundings, by reason."""
+    pings: int = 0
+    pings_refused: Mapping[str, int] = field(default_factory=dict)
     echoes: int = 0
     relayed: int = 0
     foreign_address: int = 0

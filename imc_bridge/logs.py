@@ -17,7 +17,7 @@ from typing import cast
 
 import imcpy
 
-from imc_bridge.events import Sounding, SoundingRefused, StateReport
+from imc_bridge.events import PingRefused, Sounding, SoundingRefused, StateReport, SwathPing
 from imc_bridge.network.codec import (
     FOOTER_SIZE,
     HEADER_SIZE,
@@ -43,11 +43,11 @@ SIZE_OFFSET = 4
 UNREADABLE = (EOFError, gzip.BadGzipFile, zlib.error)
 """What a log raises that was cut off while it was written or copied."""
 
-OWN = ("EstimatedState", "Distance", "NavigationUncertainty", "EntityList", "EntityInfo", "FuelLevel")
+OWN = ("EstimatedState", "Distance", "NavigationUncertainty", "EntityList", "EntityInfo", "FuelLevel", "SonarData")
 IDENTIFYING = ("Announce", "EntityList", "EntityInfo")
 VEHICLE_SENDS = message_ids(("EstimatedState",))
 
-LogEvent = StateReport | Sounding | SoundingRefused
+LogEvent = StateReport | Sounding | SoundingRefused | SwathPing | PingRefused
 
 
 class LogError(Exception):
@@ -168,6 +168,7 @@ class VehicleLog:
     def __init__(self, path: Path, settings: BridgeSettings, vehicle: str | None = None) -> None:
         self.file = PacketFile(path)
         self.refused: Counter[str] = Counter()
+        self.pings_refused: Counter[str] = Counter()
         self._settings = settings
         self._decoder = Decoder(OWN)
         self._path = path
@@ -209,12 +210,13 @@ class VehicleLog:
         return own, names.get(own, ""), entities.get(own, {})
 
     def events(self) -> Iterator[LogEvent]:
-        """Yield states, soundings and refused Distances; the same file gives the same events every time."""
+        """Yield states, soundings and pings, and what was refused; the same file gives the same events every time."""
         node = Node(self.imc_id, self.vehicle, self._settings, 0.0)
         # A log has no arrival times and only one sender: a leap of the clock counts once it repeats.
         node.clock = VehicleClock(quiet_s=0.0)
         node.entities = dict(self._entities) or None
         self.refused.clear()
+        self.pings_refused.clear()
         for packet in self.file:
             header = self._decoder.header(packet)
             if header is None or header.src != self.imc_id or not self._decoder.wants(header):
@@ -222,14 +224,23 @@ class VehicleLog:
             message = self._decoder.message(packet)
             if message is not None:
                 yield from self._counted(_take(node, header, message))
-        yield from self._counted(node.intake.resolve(node.history, node.position_sd_m()))
+        yield from self._counted(_placed(node))
         yield from self._counted(node.intake.give_up())
+        yield from self._counted(node.pings.give_up())
 
     def _counted(self, events: Iterator[LogEvent]) -> Iterator[LogEvent]:
         for event in events:
             if isinstance(event, SoundingRefused):
                 self.refused[event.reason] += 1
+            elif isinstance(event, PingRefused):
+                self.pings_refused[event.reason] += 1
             yield event
+
+
+def _placed(node: Node) -> Iterator[LogEvent]:
+    """Yield what became of what was measured before the last state."""
+    yield from node.intake.resolve(node.history, node.position_sd_m())
+    yield from node.pings.resolve(node.history, node.position_sd_m())
 
 
 def _take(node: Node, header: Header, message: Message) -> Iterator[LogEvent]:
@@ -240,11 +251,15 @@ def _take(node: Node, header: Header, message: Message) -> Iterator[LogEvent]:
             report = node.take_state(message)
             if isinstance(report, StateReport):
                 yield report
-            yield from node.intake.resolve(node.history, node.position_sd_m())
+            yield from _placed(node)
         case "Distance":
             refused = offer_distance(node.intake, node.entity_name(header.src_ent), message)
             if refused is not None:
                 yield refused
+        case "SonarData":
+            lost = node.pings.offer(node.entity_name(header.src_ent), message)
+            if lost is not None:
+                yield lost
         case "NavigationUncertainty":
             node.take_uncertainty(message)
         case "FuelLevel":

@@ -8,7 +8,7 @@ import imcpy
 
 from imc_bridge.control.control import Control
 from imc_bridge.control.controls import Crew
-from imc_bridge.events import BridgeEvent, Fault, Restarted, Sounding
+from imc_bridge.events import BridgeEvent, Fault, PingRefused, Restarted, Sounding, SoundingRefused, SwathPing
 from imc_bridge.links import Links
 from imc_bridge.network.codec import BROADCAST_ID, Decoder, Header, Message, without_argument
 from imc_bridge.network.discovery import Announcement, read_announce
@@ -23,6 +23,7 @@ from imc_bridge.settings import BridgeSettings
 from imc_bridge.telemetry.faults import is_leak_sensor
 from imc_bridge.telemetry.ranges import MESSAGES as RANGE_MESSAGES
 from imc_bridge.telemetry.soundings import offer_distance
+from imc_bridge.telemetry.swaths import bottom_below
 
 WANTED = (
     "Abort",
@@ -39,6 +40,7 @@ WANTED = (
     "PlanControl",
     "PlanControlState",
     "PlanDB",
+    "SonarData",
     "TransmissionStatus",
     "VehicleMedium",
     "VehicleState",
@@ -299,7 +301,9 @@ class Hearing:
             case "EstimatedState":
                 self._take_state(node, control, message, now, address)
             case "Distance":
-                self._take_distance(node, message)
+                self._tell_refused(offer_distance(node.intake, node.entity_name(int(message.src_ent)), message))
+            case "SonarData":
+                self._tell_refused(node.pings.offer(node.entity_name(int(message.src_ent)), message))
             case "NavigationUncertainty":
                 node.take_uncertainty(message)
             case _ if name in RANGE_MESSAGES:
@@ -357,6 +361,10 @@ class Hearing:
             if control is not None and isinstance(result, Sounding):
                 control.guard.add(result.time_s, result.lat_deg, result.lon_deg, result.bottom_depth_m, now)
             self._tell(result)
+        for ping in node.pings.resolve(node.history, node.position_sd_m()):
+            if control is not None and isinstance(ping, SwathPing):
+                control.guard.add(ping.time_s, *bottom_below(ping), now)
+            self._tell(ping)
         for measured in node.ranges.resolve(node.history, node.position_sd_m()):
             self._tell(measured)
 
@@ -364,7 +372,6 @@ class Hearing:
         if fault is not None:
             self._tell(fault)
 
-    def _take_distance(self, node: Node, message: Message) -> None:
-        refused = offer_distance(node.intake, node.entity_name(int(message.src_ent)), message)
+    def _tell_refused(self, refused: SoundingRefused | PingRefused | None) -> None:
         if refused is not None:
             self._tell(refused)

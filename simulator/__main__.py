@@ -21,6 +21,7 @@ from simulator.dune.lost_comms import TIMEOUT_S
 from simulator.dune.node import DEFAULT_ANNOUNCE_PORTS
 from simulator.network import NetworkFaults
 from simulator.sensors import SensorKind, SonarNoise
+from simulator.swath import SwathSonar
 from simulator.targets import RangingNoise, TargetSpec
 from simulator.terrain import Terrain
 from simulator.terrain_files import load_terrain
@@ -47,6 +48,9 @@ def main(
     ] = None,
     speed: Annotated[float, typer.Option(help="Vehicle seconds per wall second.")] = 1.0,
     sensor: Annotated[SensorKind, typer.Option(help="Sonar on board.")] = SensorKind.SINGLE,
+    swath: Annotated[
+        str | None, typer.Option(help="DEGREES,BEAMS,HZ,METRES of a multibeam: aperture, beams, pings a second, range.")
+    ] = None,
     noise: Annotated[float, typer.Option(help="Relative standard deviation of ranges.")] = 0.005,
     outliers: Annotated[float, typer.Option(help="Share of false returns, 0 to 1.")] = 0.0,
     dropouts: Annotated[float, typer.Option(help="Share of missing returns, 0 to 1.")] = 0.0,
@@ -140,6 +144,7 @@ def main(
             vehicles=vehicles,
             speed=speed,
             sensor=sensor,
+            swath=None if swath is None else _swath(swath),
             noise=SonarNoise(noise, outliers, dropouts),
             drift=drift,
             current=current,
@@ -174,6 +179,7 @@ def _fleet(
     vehicles: int,
     speed: float,
     sensor: SensorKind,
+    swath: SwathSonar | None,
     noise: SonarNoise,
     drift: float,
     current: str,
@@ -198,6 +204,7 @@ def _fleet(
         specs,
         speed=speed,
         sensor=sensor,
+        swath=swath,
         noise=noise,
         drift_m2ps=drift,
         current=(east, north),
@@ -207,6 +214,11 @@ def _fleet(
         ranging=ranging,
         battery=battery,
     )
+
+
+def _swath(text: str) -> SwathSonar:
+    aperture_deg, beams, rate_hz, range_m = _numbers("swath", text, 4)
+    return SwathSonar(aperture_deg, int(beams), rate_hz, range_m)
 
 
 def _target(text: str) -> TargetSpec:

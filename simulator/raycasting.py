@@ -38,18 +38,26 @@ def march(
     north_m: float,
     depth_m: float,
     directions: FloatArray,
-    limit_m: float,
+    shoalest_m: float,
+    deepest_m: float,
     max_range_m: float,
 ) -> FloatArray:
-    """Distance along each ray, unit vectors (n, 3) east, north, down, to the sea floor; see ``cast_rays``."""
+    """Distance along each ray, unit vectors (n, 3) east, north, down, to the sea floor; see ``cast_rays``.
+
+    A ray that goes down meets the floor between the shoalest and the deepest point of it.
+    """
     step = 0.5 * cell_m
     halvings = max(1, math.ceil(math.log2(step / FINE_M)))
-    samples = math.ceil((limit_m + step) / step)
+    samples = math.ceil((max_range_m + step) / step)
     ranges = np.full(len(directions), np.nan)
     for ray in range(len(directions)):
         de, dn, dd = directions[ray, 0], directions[ray, 1], directions[ray, 2]
+        first, last = 0, samples
+        if dd > 0.0:
+            first = int(min(max((shoalest_m - depth_m) / dd / step - 1.0, 0.0), 1.0 * samples))
+            last = int(min(max((deepest_m - depth_m) / dd / step + 2.0, 0.0), 1.0 * samples))
         before = np.nan
-        for k in range(samples):
+        for k in range(first, last):
             at = k * step
             gap = depth_between(z_m, cell_m, east_m + at * de, north_m + at * dn) - (depth_m + at * dd)
             if gap <= 0.0:
@@ -73,4 +81,4 @@ def march(
 
 def warm_up() -> None:
     """Compile, or load from the cache, what would else be compiled while vehicles move."""
-    march(np.full((2, 2), 5.0), 1.0, 1.0, 1.0, 0.0, np.array([[0.0, 0.0, 1.0]]), 6.0, 10.0)
+    march(np.full((2, 2), 5.0), 1.0, 1.0, 1.0, 0.0, np.array([[0.0, 0.0, 1.0]]), 5.0, 5.0, 10.0)

@@ -1,4 +1,4 @@
-"""Sonars that look at the sea floor: single beam, four-beam DVL, multibeam swath."""
+"""Sonars that look at the sea floor with few beams: single beam, four-beam DVL. Swaths: :mod:`simulator.swath`."""
 
 from __future__ import annotations
 
@@ -72,18 +72,16 @@ class SonarNoise:
                 raise ValueError(f"sonar noise: {name} is {value}; it must be within 0 to {most:g}")
 
 
-def beams_of(kind: SensorKind, *, swath_rad: float = math.radians(120.0), swath_beams: int = 32) -> Beams:
-    """The beams of a kind of sonar.
+def beams_of(kind: SensorKind) -> Beams:
+    """The beams of a single beam sonar or a DVL.
 
-    The DVL's beams 0 to 3 point to heading +0, 90, 180, 270 degrees, 22.5 degrees off the vertical; the swath
-    lies across the heading, from port to starboard.
+    The DVL's beams 0 to 3 point to heading +0, 90, 180, 270 degrees, 22.5 degrees off the vertical.
     """
     if kind is SensorKind.SINGLE:
         return Beams(np.zeros(1), np.zeros(1))
     if kind is SensorKind.DVL:
         return Beams(np.full(4, DVL_TILT_RAD), np.radians([0.0, 90.0, 180.0, 270.0]))
-    across = np.linspace(-0.5 * swath_rad, 0.5 * swath_rad, swath_beams)
-    return Beams(np.abs(across), np.where(across < 0.0, -0.5 * math.pi, 0.5 * math.pi))
+    raise ValueError(f"sonar: kind is {kind}; it must be single or dvl")
 
 
 def to_local_frame(body: FloatArray, heading_rad: float, pitch_rad: float, roll_rad: float) -> FloatArray:
@@ -119,23 +117,17 @@ def cast_rays(
     -------
     Ranges in metres, shape (n,), NaN where nothing is hit within the range or the floor is unknown.
     """
-    down = directions[:, 2]
-    with np.errstate(divide="ignore"):
-        # A ray that goes down cannot pass the deepest point of the floor.
-        reach = np.where(down > 0.0, (terrain.max_depth_m - depth_m) / np.maximum(down, 1e-9), np.inf)
-    limit = min(max_range_m, float(np.max(np.minimum(reach, max_range_m))) + terrain.cell_m)
-    if limit <= 0.0:
-        return np.full(len(directions), np.nan)
-    return march(terrain.z_m, terrain.cell_m, east_m, north_m, depth_m, directions, limit, max_range_m)
+    shoalest, deepest = terrain.min_depth_m, terrain.max_depth_m
+    return march(terrain.z_m, terrain.cell_m, east_m, north_m, depth_m, directions, shoalest, deepest, max_range_m)
 
 
 class Sonar:
-    """One sonar on one vehicle.
+    """One sonar of few beams on one vehicle.
 
     Parameters
     ----------
     kind
-        Which one.
+        Which one: single beam or DVL.
     noise
         Its errors.
     rng
@@ -155,14 +147,12 @@ class Sonar:
         ping_period_s: float = 0.2,
         max_range_m: float = 100.0,
         min_range_m: float = 0.1,
-        swath_rad: float = math.radians(120.0),
-        swath_beams: int = 32,
     ) -> None:
         if not ping_period_s > 0.0:
             raise ValueError(f"sonar: ping_period_s is {ping_period_s}; it must be positive")
         self.kind = kind
         self.noise = noise
-        self.beams = beams_of(kind, swath_rad=swath_rad, swath_beams=swath_beams)
+        self.beams = beams_of(kind)
         self.ping_period_s = ping_period_s
         self.max_range_m = max_range_m
         self.min_range_m = min_range_m

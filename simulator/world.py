@@ -7,14 +7,16 @@ from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from simulator.arrays import FloatArray
 from simulator.battery import Battery, BatterySpec
 from simulator.navigation import Navigation
 from simulator.sensors import SensorKind, Sonar, SonarNoise, to_local_frame
+from simulator.swath import SwathErrors, SwathSonar, SwathSounder
 from simulator.terrain import Terrain
 from simulator.vehicle import STEP_S, Guidance, Motion, SteeringTarget, Vehicle, VehicleLimits
 
@@ -41,7 +43,7 @@ class BeamReturn:
     Attributes
     ----------
     vehicle, time_s, source, beam
-        Vehicle, time (the vehicle's clock, seconds), device ("Altimeter", "DVL", "Multibeam"), beam.
+        Vehicle, time (the vehicle's clock, seconds), device ("Altimeter", "DVL"), beam.
     range_m
         Along the beam; NaN when there was no return.
     position
@@ -70,6 +72,38 @@ class BeamReturn:
     def valid(self) -> bool:
         """Whether there was a return."""
         return self.footprint is not None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SwathPing:
+    """One ping of a swath sonar, which sits in the middle of its vehicle.
+
+    Attributes
+    ----------
+    vehicle, time_s, source
+        Vehicle, time (the vehicle's clock, seconds), device.
+    position
+        Where the vehicle believed to be.
+    heading_rad, pitch_rad, roll_rad
+        Its attitude.
+    angles_rad : (b,)
+        Of the beams from straight down in the vehicle, positive to starboard.
+    ranges_m : (b,)
+        Slant ranges, NaN where nothing was detected.
+    true_position
+        Where the vehicle really was.
+    """
+
+    vehicle: str
+    time_s: float
+    source: str
+    position: LocalPosition
+    heading_rad: float
+    pitch_rad: float
+    roll_rad: float
+    angles_rad: FloatArray
+    ranges_m: FloatArray
+    true_position: LocalPosition
 
 
 SOURCES = {
@@ -119,8 +153,10 @@ class SimulatedVehicle:
         Source of all its randomness; the same generator state gives the same run.
     noise, drift_m2ps, current, limits
         Sonar errors, growth of the position variance under water, water velocity (east, north), abilities.
-    ping_period_s
-        Simulated time between measurements.
+    ping_period_s, max_range_m
+        Simulated time between measurements, and how far they reach, of a sonar that is no swath sonar.
+    swath
+        What a swath sonar can do. Without any noise its ranges are exact.
     start_time_s
         The vehicle's clock at the start.
     battery
@@ -147,8 +183,7 @@ class SimulatedVehicle:
         limits: VehicleLimits | None = None,
         ping_period_s: float = 0.2,
         max_range_m: float = 100.0,
-        swath_rad: float = math.radians(120.0),
-        swath_beams: int = 32,
+        swath: SwathSonar | None = None,
         start_time_s: float = 0.0,
         battery: BatterySpec | None = None,
     ) -> None:
@@ -168,14 +203,11 @@ class SimulatedVehicle:
         sonar_rng, navigation_rng = rng.spawn(2)
         self.battery = None if battery is None else Battery(battery)
         self.navigation = Navigation(drift_m2ps, navigation_rng)
-        self.sonar = Sonar(
-            SensorKind(sensor),
-            noise or SonarNoise(),
-            sonar_rng,
-            ping_period_s=ping_period_s,
-            max_range_m=max_range_m,
-            swath_rad=swath_rad,
-            swath_beams=swath_beams,
+        noise = noise or SonarNoise()
+        self.sonar: Sonar | SwathSounder = (
+            SwathSounder(swath or SwathSonar(), SwathErrors.of(noise), sonar_rng)
+            if sensor == SensorKind.MULTIBEAM
+            else Sonar(SensorKind(sensor), noise, sonar_rng, ping_period_s=ping_period_s, max_range_m=max_range_m)
         )
         self.collisions: list[tuple[float, LocalPosition]] = []
         """Time and place of every contact with the bottom (one entry per contact, not per step)."""
@@ -288,19 +320,25 @@ class SimulatedVehicle:
         self.vehicle.target = None
 
     def advance(self, dt_s: float) -> list[BeamReturn]:
-        """Let simulated time pass and return what was measured, in time order.
+        """Let simulated time pass and return what a sonar of few beams measured, in time order.
 
         Whole steps of 0.1 s are integrated; a remainder is kept for the next call.
         """
+        return [measured for _ in self._live(dt_s) for measured in self.measure()]
+
+    def advance_swath(self, dt_s: float) -> list[SwathPing]:
+        """Let simulated time pass as :meth:`advance` and return the pings of a swath sonar."""
+        return [self.measure_swath() for _ in self._live(dt_s)]
+
+    def _live(self, dt_s: float) -> Iterator[None]:
+        """Let time pass; yields whenever a ping is due."""
         if not (math.isfinite(dt_s) and dt_s >= 0.0):
             raise ValueError(f"{self.name}: dt_s is {dt_s}; it must be a time of 0 or more seconds")
         self._pending_s += dt_s
-        out: list[BeamReturn] = []
         while self._pending_s >= STEP_S - 1e-9:
             self._pending_s -= STEP_S
             if self.step():
-                out += self.measure()
-        return out
+                yield
 
     def step(self) -> bool:
         """One step of 0.1 s; returns whether a ping is due."""
@@ -339,8 +377,28 @@ class SimulatedVehicle:
             return True
         return False
 
+    def measure_swath(self) -> SwathPing:
+        """One ping of a swath sonar now."""
+        if not isinstance(self.sonar, SwathSounder):
+            raise ValueError(f"{self.name}: its sonar is {self.sonar.kind}, not multibeam")
+        m = self.vehicle.motion
+        return SwathPing(
+            vehicle=self.name,
+            time_s=self.time_s,
+            source=SOURCES[self.sonar.kind],
+            position=self.position,
+            heading_rad=m.heading_rad,
+            pitch_rad=m.pitch_rad,
+            roll_rad=m.roll_rad,
+            angles_rad=self.sonar.angles_rad,
+            ranges_m=self.sonar.ping(self.terrain, m),
+            true_position=self.true_position,
+        )
+
     def measure(self) -> list[BeamReturn]:
-        """One ping now: a measurement per beam."""
+        """One ping of a sonar of few beams now: a measurement per beam."""
+        if isinstance(self.sonar, SwathSounder):
+            raise ValueError(f"{self.name}: its sonar is multibeam, which measures whole swaths")
         m = self.vehicle.motion
         ranges = self.sonar.ping(self.terrain, m)
         here, true = self.position, self.true_position

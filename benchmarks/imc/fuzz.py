@@ -38,13 +38,13 @@ from app.missions.soundings.corrections import Corrections
 from app.missions.soundings.gate import MAX_OCEAN_DEPTH_M, Gate
 from app.missions.spec.mission import Tide
 from benchmarks.common.report import IMC, make_parser, write_section
-from imc_bridge import Bridge, BridgeSettings, LinkChange, RefusedError, Sounding, StateReport, Waypoint
-from imc_bridge.events import SoundingRefused
+from imc_bridge import Bridge, BridgeSettings, LinkChange, RefusedError, Sounding, StateReport, SwathPing, Waypoint
+from imc_bridge.events import PingRefused, SoundingRefused
 from imc_bridge.network.codec import message_ids, message_name
 from imc_bridge.network.transport import Address
 from imc_bridge.receiver import WANTED
 
-VEHICLE_ID, VEHICLE, ALTIMETER = 0x1E, ("127.0.0.1", 6002), 11
+VEHICLE_ID, VEHICLE, ALTIMETER, MULTIBEAM = 0x1E, ("127.0.0.1", 6002), 11, 13
 PLACE_DEG = (41.185, -8.706)
 SIDE_M, MARGIN_M = 2000.0, 100.0
 EXTREMES = [0.0, -1.0, 1e9, -1e9, 1e38, float("inf"), float("-inf"), float("nan")]
@@ -110,13 +110,22 @@ def made_up() -> list[Any]:
                 message.sys_name, message.sys_type = "lauv-fuzz", imcpy.SystemType.UUV
                 message.services = f"imc+udp://{VEHICLE[0]}:{VEHICLE[1]}/"
             case "EntityList":
-                message.op, message.list = imcpy.EntityList.OperationEnum.REPORT, f"Altimeter={ALTIMETER};GPS=12"
+                message.op, message.list = (
+                    imcpy.EntityList.OperationEnum.REPORT,
+                    f"Altimeter={ALTIMETER};GPS=12;Multibeam={MULTIBEAM}",
+                )
             case "EstimatedState":
                 message.lat, message.lon = map(math.radians, PLACE_DEG)
                 message.depth, message.alt = 3.0, 10.0
             case "Distance":
                 message.src_ent, message.value = ALTIMETER, 10.0
                 message.validity = imcpy.Distance.ValidityEnum.VALID
+            case "SonarData":
+                message.src_ent, message.type = MULTIBEAM, imcpy.SonarData.TypeEnum.MULTIBEAM
+                message.bits_per_point, message.scale_factor = 16, 0.01
+                message.beam_config.append(imcpy.BeamConfig())
+                message.beam_config[0].beam_width = 0.1
+                message.data = struct.pack("<HfB20H", 20, -1.0, 0, *[1000] * 20)
             case "PlanControlState":
                 message.state = imcpy.PlanControlState.StateEnum.READY
         messages.append(message)
@@ -205,10 +214,12 @@ class Target:
     def _note(self, event: object) -> None:
         self.events += 1
         said = type(event).__name__
-        if isinstance(event, LinkChange | SoundingRefused):
+        if isinstance(event, LinkChange | PingRefused | SoundingRefused):
             said += f": {wordy(getattr(event, 'state', ''))} {wordy(event.reason)}"
-        if isinstance(event, StateReport | Sounding):
+        if isinstance(event, StateReport | Sounding | SwathPing):
             numbers = [value for value in dataclasses.astuple(event) if isinstance(value, float)]
+            if isinstance(event, SwathPing):
+                numbers += event.angles_rad.tolist()
             if not (all(map(math.isfinite, numbers)) and abs(event.lat_deg) <= 90.0):
                 self._count_impossible(event)
         if isinstance(event, Sounding):

@@ -38,6 +38,8 @@ END_WITHIN_M = 25.0
 OUTCOME_FAILURE = 2
 RADIO_SILENT_S = 3.0
 """After this long without a packet sound is tried."""
+RADIO_SILENT_WALL_S = 0.5
+"""The same in seconds of this machine, where that is longer."""
 SOUND_START_TIMEOUT_S = 90.0
 START_TIMEOUT_WALLS = 3.0
 """In units of the silence on the wall clock that is never a loss, however fast the vehicles live."""
@@ -94,7 +96,9 @@ class LegFollower(Control):
         self._send = send
 
     def _by_sound(self, now: float) -> bool:
-        return self.sound is not None and self._silence(now) > RADIO_SILENT_S
+        # Where vehicle time runs fast a moment's pause of this machine is no silence of the radio.
+        silent_s = max(RADIO_SILENT_S, RADIO_SILENT_WALL_S * self._settings.time_scale)
+        return self.sound is not None and self._silence(now) > silent_s
 
     def left_by_sound(self, what: str, now: float) -> None:
         """Note that the gateway has sent a message: the reception of a plan is not reported any further."""

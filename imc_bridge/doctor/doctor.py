@@ -385,13 +385,14 @@ def _sounding_findings(node: NodeView, *, live: bool) -> list[Finding]:
         if node.bottom_sensors
         else problem(
             Cause.NO_SOUNDINGS,
-            "no Distance from a bottom-looking sensor",
+            "no Distance from a bottom-looking sensor, and no SonarData of a multibeam",
             "Switch on the altimeter or DVL (entities Altimeter, DVL Filtered, DVL Beam 0..3)",
         )
     ]
     findings += [
-        note(Cause.SOUNDINGS_REFUSED, f"{count} Distances refused: {reason}")
-        for reason, count in sorted(node.refused.items())
+        note(Cause.SOUNDINGS_REFUSED, f"{count} {what} refused: {reason}")
+        for what, refused in (("Distances", node.refused), ("pings", node.pings_refused))
+        for reason, count in sorted(refused.items())
     ]
     return findings
 

@@ -29,6 +29,7 @@ from imc_bridge.telemetry.energy import Energy, read_fuel
 from imc_bridge.telemetry.faults import Faults
 from imc_bridge.telemetry.ranges import RangeIntake
 from imc_bridge.telemetry.soundings import SoundingIntake, StateHistory, StateSample, beam_table
+from imc_bridge.telemetry.swaths import PingIntake
 
 UNCERTAINTY_VALID_S = 10.0
 CURRENT_VALID_S = 3600.0
@@ -185,6 +186,7 @@ class Node:
         self.places = PlausiblePlace()
         self.report: StateReport | None = None
         self.intake = SoundingIntake(name, beam_table(settings.altimeter), settings.max_range_m)
+        self.pings = PingIntake(name)
         self.ranges = RangeIntake(name)
         self.faults = Faults(name)
         self._uncertainty: tuple[float, float] | None = None
@@ -284,6 +286,7 @@ class Node:
             self.places.clear()
             self.history.clear()
             self.intake.clear()
+            self.pings.clear()
             self.ranges.clear()
             self._uncertainty = None
             self._current = None

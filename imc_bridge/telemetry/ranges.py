@@ -18,7 +18,7 @@ import imcpy
 from imc_bridge.events import TargetRange
 from imc_bridge.network.codec import Message
 from imc_bridge.network.text_fields import text
-from imc_bridge.telemetry.soundings import MAX_WAIT_S, StateHistory
+from imc_bridge.telemetry.soundings import Awaiting, StateHistory
 
 MESSAGES = ("AcousticOperation", "LblRange", "LblRangeAcceptance", "UamRxRange", "UsblPositionExtended")
 
@@ -68,7 +68,7 @@ class RangeIntake:
         self.vehicle = vehicle
         self.accepted = 0
         self.refused = 0
-        self._pending: deque[RangePing] = deque(maxlen=MAX_PENDING)
+        self._pending: Awaiting[RangePing] = Awaiting(MAX_PENDING)
         self._last: deque[RangePing] = deque(maxlen=REMEMBERED)
 
     def clear(self) -> None:
@@ -89,19 +89,11 @@ class RangeIntake:
         if any(_same(ping, other) for other in self._last):
             return
         self._last.append(ping)
-        self._pending.append(ping)
+        self._pending.add(ping)
 
     def resolve(self, history: StateHistory, position_sd_m: float | None = None) -> Iterator[TargetRange]:
         """Yield the pending ranges that ``history`` can place now; those it never will are dropped."""
-        latest = history.latest
-        if latest is None:
-            return
-        for _ in range(len(self._pending)):
-            ping = self._pending.popleft()
-            if latest.time_s < ping.time_s < latest.time_s + MAX_WAIT_S:
-                self._pending.append(ping)
-                continue
-            state = history.at(ping.time_s)
+        for ping, state in self._pending.decided(history):
             if state is None:
                 self.refused += 1
                 continue

@@ -12,6 +12,7 @@ from bisect import bisect_left, bisect_right
 from collections import Counter, deque
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Generic, Protocol, TypeVar
 
 import imcpy
 from imcpy.coordinates import WGS84
@@ -34,6 +35,7 @@ MAX_WAIT_S = 3.0
 LONGEST_LEVER_M = 20.0
 """No sonar sits farther from its vehicle's reference point than this; what says so is damaged."""
 MAX_PENDING = 256
+NO_STATE = "no state of the vehicle around its time"
 HISTORY_LENGTH = 400
 REMEMBERED_TIMES = 128
 
@@ -206,6 +208,71 @@ class StateHistory:
         )
 
 
+class Timed(Protocol):
+    """Something measured at a time of the vehicle's clock."""
+
+    @property
+    def time_s(self) -> float:
+        """Unix seconds."""
+        ...
+
+
+Measured = TypeVar("Measured", bound=Timed)
+
+
+class Awaiting(Generic[Measured]):
+    """Measurements of one vehicle that await the states around their time; at most ``most`` of them."""
+
+    def __init__(self, most: int) -> None:
+        self._most = most
+        self._pending: deque[Measured] = deque()
+
+    def clear(self) -> None:
+        """Forget them."""
+        self._pending.clear()
+
+    def add(self, measured: Measured) -> Measured | None:
+        """Take one in; returns the oldest one where there are too many."""
+        self._pending.append(measured)
+        return self._pending.popleft() if len(self._pending) > self._most else None
+
+    def decided(self, history: StateHistory) -> Iterator[tuple[Measured, StateSample | None]]:
+        """Yield those that need to wait no longer, with the state at their time; None: there will be none."""
+        latest = history.latest
+        if latest is None:
+            return
+        for _ in range(len(self._pending)):
+            measured = self._pending.popleft()
+            if latest.time_s < measured.time_s < latest.time_s + MAX_WAIT_S:
+                self._pending.append(measured)
+            else:
+                yield measured, history.at(measured.time_s)
+
+    def given_up(self) -> Iterator[Measured]:
+        """Yield what is left: no further state will come."""
+        while self._pending:
+            yield self._pending.popleft()
+
+
+class Repeats:
+    """The last times at which each sensor measured, to know what comes twice."""
+
+    def __init__(self) -> None:
+        self._times: dict[str, deque[float]] = {}
+
+    def clear(self) -> None:
+        """Forget them."""
+        self._times.clear()
+
+    def has(self, source: str, time_s: float) -> bool:
+        """Whether this one came before; notes it if not."""
+        times = self._times.setdefault(source, deque(maxlen=REMEMBERED_TIMES))
+        if time_s in times:
+            return True
+        times.append(time_s)
+        return False
+
+
 @dataclass(frozen=True, slots=True)
 class Ping:
     """One Distance that awaits its state."""
@@ -236,13 +303,13 @@ class SoundingIntake:
         self.heard: Counter[str] = Counter()
         self._beams = beams
         self._max_range_m = max_range_m
-        self._pending: deque[Ping] = deque()
-        self._times: dict[str, deque[float]] = {}
+        self._pending: Awaiting[Ping] = Awaiting(MAX_PENDING)
+        self._repeats = Repeats()
 
     def clear(self) -> None:
         """Forget what is pending, as after a jump of the vehicle's clock."""
         self._pending.clear()
-        self._times.clear()
+        self._repeats.clear()
 
     def offer(
         self,
@@ -264,10 +331,8 @@ class SoundingIntake:
                 self.ignored[source] += 1
             return None
         self.heard[source] += 1
-        times = self._times.setdefault(source, deque(maxlen=REMEMBERED_TIMES))
-        if time_s in times:
+        if self._repeats.has(source, time_s):
             return self._refuse(time_s, source, range_m, "repeated")
-        times.append(time_s)
         if not valid:
             return self._refuse(time_s, source, range_m, "marked invalid by the sensor")
         if not math.isfinite(range_m):
@@ -278,27 +343,16 @@ class SoundingIntake:
             return self._refuse(time_s, source, range_m, f"beyond {self._max_range_m:g} m")
         if not all(abs(offset_m) <= LONGEST_LEVER_M for offset_m in lever_arm_m):
             lever_arm_m = (0.0, 0.0, 0.0)
-        self._pending.append(Ping(time_s, source, beam, range_m, lever_arm_m))
-        if len(self._pending) > MAX_PENDING:
-            lost = self._pending.popleft()
-            return self._refuse(lost.time_s, lost.source, lost.range_m, "no state of the vehicle around its time")
-        return None
+        lost = self._pending.add(Ping(time_s, source, beam, range_m, lever_arm_m))
+        return None if lost is None else self._refuse(lost.time_s, lost.source, lost.range_m, NO_STATE)
 
     def resolve(
         self, history: StateHistory, position_sd_m: float | None = None
     ) -> Iterator[Sounding | SoundingRefused]:
         """Yield what became of the pending Distances that ``history`` now decides."""
-        latest = history.latest
-        if latest is None:
-            return
-        for _ in range(len(self._pending)):
-            ping = self._pending.popleft()
-            if latest.time_s < ping.time_s < latest.time_s + MAX_WAIT_S:
-                self._pending.append(ping)
-                continue
-            state = history.at(ping.time_s)
+        for ping, state in self._pending.decided(history):
             if state is None:
-                yield self._refuse(ping.time_s, ping.source, ping.range_m, "no state of the vehicle around its time")
+                yield self._refuse(ping.time_s, ping.source, ping.range_m, NO_STATE)
                 continue
             lat, lon, depth = footprint(state, ping.beam, ping.range_m, ping.lever_arm_m)
             self.accepted += 1
@@ -324,9 +378,8 @@ class SoundingIntake:
 
     def give_up(self) -> Iterator[SoundingRefused]:
         """Refuse what is still pending: no further state will come, as at the end of a log."""
-        while self._pending:
-            ping = self._pending.popleft()
-            yield self._refuse(ping.time_s, ping.source, ping.range_m, "no state of the vehicle around its time")
+        for ping in self._pending.given_up():
+            yield self._refuse(ping.time_s, ping.source, ping.range_m, NO_STATE)
 
     def _refuse(self, time_s: float, source: str, range_m: float, reason: str) -> SoundingRefused:
         self.refused[reason] += 1

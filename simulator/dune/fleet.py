@@ -19,6 +19,7 @@ from simulator.dune.discovery import listen_for_announces
 from simulator.dune.node import DuneOptions, FakeDune
 from simulator.network import Address, UdpEndpoint
 from simulator.sensors import SensorKind, SonarNoise
+from simulator.swath import SwathSonar
 from simulator.targets import Ranging, RangingNoise, Target, TargetSpec
 from simulator.terrain import Terrain
 from simulator.vehicle import STEP_S, VehicleLimits
@@ -96,7 +97,7 @@ class DuneFleet:
         The vehicles.
     speed
         Vehicle seconds per wall second.
-    sensor, noise, drift_m2ps, current, limits, ping_period_s
+    sensor, noise, drift_m2ps, current, limits, ping_period_s, swath
         As for :class:`simulator.world.SimulatedVehicle`.
     options
         Network side of the nodes.
@@ -122,6 +123,7 @@ class DuneFleet:
         current: tuple[float, float] = (0.0, 0.0),
         limits: VehicleLimits | None = None,
         ping_period_s: float = 0.1,
+        swath: SwathSonar | None = None,
         options: DuneOptions | None = None,
         clock_offset_s: float = 0.0,
         seed: int = 0,
@@ -149,6 +151,7 @@ class DuneFleet:
                     current=current,
                     limits=limits,
                     ping_period_s=ping_period_s,
+                    swath=swath,
                     start_time_s=self._simulated_s,
                     battery=battery or BatterySpec(),
                 ),

@@ -499,24 +499,21 @@ class FakeDune:
         t = self._telemetry
         if t is None:
             return
-        vehicle, now_s, passes = self.vehicle, self._now_s, self.limiter.passes
+        vehicle, now_s, passes, logged = self.vehicle, self._now_s, self.limiter.passes, self._log is not None
         if vehicle.sonar.kind is SensorKind.MULTIBEAM:
             entity = self._entities["Multibeam"]
-            if passes("SonarData", entity, now_s):
-                swath = vehicle.measure()
-                beams = vehicle.sonar.beams
-                width = float(beams.tilt_rad[0] + beams.tilt_rad[-1])
-                self.send(t.sonar_data(swath, width, vehicle.sonar.max_range_m), entity)
+            by_radio = passes("SonarData", entity, now_s)
+            if by_radio or logged:
+                self.send(t.sonar_data(vehicle.measure_swath(), vehicle.sonar.max_range_m), entity, by_radio=by_radio)
         else:
             entities = (
                 [self._entities[f"DVL Beam {k}"] for k in range(4)]
                 if vehicle.sonar.kind is SensorKind.DVL
                 else [self._entities["Altimeter"]]
             )
-            by_radio = [passes("Distance", entity, now_s) for entity in entities]
-            logged = self._log is not None
-            if logged or any(by_radio):
-                for entity, send, measurement in zip(entities, by_radio, vehicle.measure(), strict=True):
+            passed = [passes("Distance", entity, now_s) for entity in entities]
+            if logged or any(passed):
+                for entity, send, measurement in zip(entities, passed, vehicle.measure(), strict=True):
                     if send or logged:
                         self.send(t.distance(measurement), entity, by_radio=send)
         forward = self._entities["Echo Sounder"]

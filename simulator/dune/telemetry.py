@@ -4,22 +4,20 @@ from __future__ import annotations
 
 import math
 import struct
-from collections.abc import Sequence
 from datetime import UTC, datetime
 
 import imcpy
+import numpy as np
 
 from simulator.battery import Battery
 from simulator.geodesy import LocalFrame
 from simulator.navigation import SURFACE_DEPTH_M
 from simulator.sensors import DVL_TILT_RAD
-from simulator.world import BeamReturn, SimulatedVehicle
+from simulator.world import BeamReturn, SimulatedVehicle, SwathPing
 
 GPS_VALIDITY = 511
 ALTITUDE_FILTER_S = 1.0
 """Time constant of ``EstimatedState.alt``, which lags behind the altimeter as DUNE's does."""
-RANGE_SCALE_M = 0.01
-"""Resolution of the ranges in SonarData."""
 
 
 class Telemetry:
@@ -165,19 +163,19 @@ class Telemetry:
         message.range = range_m
         return message
 
-    def sonar_data(self, swath: Sequence[BeamReturn], swath_rad: float, max_range_m: float) -> imcpy.SonarData:
+    def sonar_data(self, ping: SwathPing, max_range_m: float) -> imcpy.SonarData:
         """One multibeam ping in IMC's format: count, start angle, flags, 16-bit ranges (0 for no return)."""
         message = imcpy.SonarData()
         message.type = imcpy.SonarData.TypeEnum.MULTIBEAM
         message.frequency = 400_000
-        message.max_range = int(max_range_m)
+        message.max_range = math.ceil(max_range_m)
         message.bits_per_point = 16
-        message.scale_factor = RANGE_SCALE_M
+        message.scale_factor = max_range_m / 0xFFFF
         beam = imcpy.BeamConfig()
-        beam.beam_width = swath_rad / (len(swath) - 1)
+        beam.beam_width = float(ping.angles_rad[1] - ping.angles_rad[0])
         message.beam_config.append(beam)
-        units = [min(65535, round(m.range_m / RANGE_SCALE_M)) if m.valid else 0 for m in swath]
-        message.data = struct.pack(f"<HfB{len(units)}H", len(units), -0.5 * swath_rad, 0, *units)
+        units = np.nan_to_num(ping.ranges_m / message.scale_factor).round().astype("<u2")
+        message.data = struct.pack("<HfB", len(units), ping.angles_rad[0], 0) + units.tobytes()
         return message
 
     def _filtered_altitude(self) -> float:

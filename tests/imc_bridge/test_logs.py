@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from imcpy.coordinates import WGS84
 
-from imc_bridge import BridgeSettings, Sounding, SoundingRefused, StateReport
+from imc_bridge import BridgeSettings, PingRefused, Sounding, SoundingRefused, StateReport, SwathPing
 from imc_bridge.logs import LogError, VehicleLog
 from tests.support.imc import log_writer as writer
 
@@ -82,6 +82,25 @@ def test_the_beams_of_a_dvl_and_its_filtered_range_are_different_soundings(tmp_p
     packets += [writer.distance(at_s, 10.0, entity=70 + beam) for beam in range(5)]
     found = soundings_of(VehicleLog(writer.write(tmp_path / "Data.lsf", packets), SETTINGS))
     assert len({(sounding.time_s, sounding.beam) for sounding in found}) == 5
+
+
+def test_pings_of_a_multibeam_come_out_where_the_vehicle_was(tmp_path: Path) -> None:
+    packets = [*writer.survey(20)]
+    times = [writer.START_S + 1.03 + 0.2 * k for k in range(5)]
+    end_s = writer.START_S + 20 * writer.PING_PERIOD_S
+    pings = [writer.ping(at_s, 8.0) for at_s in (*times, times[0], end_s + 60.0)]
+    log = VehicleLog(writer.write(tmp_path / "Data.lsf", packets + pings), SETTINGS)
+    events = list(log.events())
+    found = [event for event in events if isinstance(event, SwathPing)]
+    assert [ping.time_s for ping in found] == times
+    for ping in found:
+        north_m = writer.SPEED_MPS * (ping.time_s - writer.START_S)
+        lat = math.degrees(WGS84.displace(writer.LAT_RAD, writer.LON_RAD, north_m, 5.0)[0])
+        assert ping.lat_deg == pytest.approx(lat, abs=1e-8)
+        np.testing.assert_allclose(ping.ranges_m * np.cos(ping.angles_rad), 8.0, atol=0.01)
+    assert log.pings_refused == {"repeated": 1, "no state of the vehicle around its time": 1}
+    assert sum(isinstance(event, PingRefused) for event in events) == 2
+    assert log.refused == {}, "of Distances"
 
 
 @pytest.mark.parametrize("name", ["Data.lsf", "Data.lsf.gz"])

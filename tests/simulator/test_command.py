@@ -63,6 +63,15 @@ def test_vehicles_can_be_named_numbered_and_placed() -> None:
     assert told["vehicles"][0]["lat"] == pytest.approx(40.0 + 20 / 111_035, abs=1e-6)
 
 
+def test_a_multibeam_can_be_described() -> None:
+    with launch("--sensor", "multibeam", "--swath", "90,64,2,50") as process:
+        told = json.loads(process.stdout.readline())
+        process.terminate()
+        out, err = process.communicate(timeout=30)
+    assert len(told["vehicles"]) == 2
+    assert (process.returncode, out, err) == (0, "", "")
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -79,6 +88,8 @@ def test_vehicles_can_be_named_numbered_and_placed() -> None:
         (["--noise", "-1"], "relative_sd is -1"),
         (["--dropouts", "2"], "dropout_rate is 2"),
         (["--loss", "2"], "loss is 2"),
+        (["--swath", "120,256"], "--swath is '120,256'; it must be 4 numbers"),
+        (["--swath", "120,1,5,100"], "beams is 1"),
         (["--drift", "-1"], "drift is -1"),
         (["--announce-ports", "x"], "--announce-ports is 'x'"),
         (["--bind", "0.0.0.0"], "bind address"),

@@ -97,14 +97,7 @@ def test_turning_keeps_lengths_and_angles(h: Any, p: Any, r: Any) -> None:
     np.testing.assert_allclose(turned @ turned.T, np.eye(3), atol=1e-12)
 
 
-def test_the_swath_lies_across_the_heading() -> None:
-    directions = to_local_frame(beams_of(SensorKind.MULTIBEAM, swath_beams=9).body, 0.0, 0.0, 0.0)
-    np.testing.assert_allclose(directions[:, 1], 0.0, atol=1e-12)
-    angles = np.degrees(np.arctan2(directions[:, 0], directions[:, 2]))
-    np.testing.assert_allclose(angles, np.linspace(-60, 60, 9), atol=1e-9)
-
-
-@pytest.mark.parametrize("kind", list(SensorKind))
+@pytest.mark.parametrize("kind", [SensorKind.SINGLE, SensorKind.DVL])
 def test_a_perfect_sonar_sees_the_floor(kind: SensorKind) -> None:
     sonar = Sonar(kind, PERFECT, np.random.default_rng(0))
     ranges = sonar.ping(FLAT, Motion(50.0, 50.0, 2.0, 0.7))
@@ -141,6 +134,11 @@ def test_out_of_range_is_no_return() -> None:
     sonar = Sonar(SensorKind.SINGLE, PERFECT, np.random.default_rng(0), max_range_m=5.0)
     assert np.isnan(sonar.ping(FLAT, Motion(50.0, 50.0, 0.0))[0])
     assert np.isnan(sonar.ping(FLAT, Motion(-50.0, 50.0, 0.0))[0]), "nothing is known out there"
+
+
+def test_a_multibeam_is_no_sonar_of_few_beams() -> None:
+    with pytest.raises(ValueError, match="it must be single or dvl"):
+        Sonar(SensorKind.MULTIBEAM, PERFECT, np.random.default_rng(0))
 
 
 @pytest.mark.parametrize("field", ["relative_sd", "outlier_rate", "dropout_rate"])

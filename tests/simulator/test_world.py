@@ -7,6 +7,7 @@ import pytest
 from simulator import seafloors
 from simulator.navigation import LEAST_VARIANCE_M2, Navigation
 from simulator.sensors import SonarNoise
+from simulator.swath import SwathSonar
 from simulator.terrain import Terrain
 from simulator.vehicle import Guidance
 from simulator.world import SimulatedVehicle
@@ -51,17 +52,29 @@ def test_a_new_target_replaces_the_old_one() -> None:
     assert v.state.guidance is Guidance.GOTO
 
 
-@pytest.mark.parametrize("sensor", ["single", "dvl", "multibeam"])
+@pytest.mark.parametrize("sensor", ["single", "dvl"])
 def test_footprints_lie_on_the_sea_floor(sensor: str) -> None:
     v = vehicle(sensor=sensor)
     v.go_to(60, 70, 2.0)
     measurements = v.advance(60.0)
-    assert {m.source for m in measurements} == {{"single": "Altimeter", "dvl": "DVL"}.get(sensor, "Multibeam")}
+    assert {m.source for m in measurements} == {{"single": "Altimeter", "dvl": "DVL"}[sensor]}
     for m in measurements[::7]:
         if m.valid:
             floor = float(HARBOUR.depth_at(m.footprint.east_m, m.footprint.north_m))
             assert m.footprint.depth_m == pytest.approx(floor, abs=2e-3)
-    assert sum(m.valid for m in measurements) > 0.9 * len(measurements) or sensor == "multibeam"
+    assert sum(m.valid for m in measurements) > 0.9 * len(measurements)
+
+
+def test_a_multibeam_measures_whole_swaths_at_its_rate() -> None:
+    v = vehicle(sensor="multibeam", swath=SwathSonar(beams=16, rate_hz=2.0), start_time_s=1000.0)
+    v.go_to(60, 70, 2.0)
+    pings = v.advance_swath(10.0)
+    np.testing.assert_allclose([ping.time_s for ping in pings], 1000.0 + np.arange(1, 21) * 0.5)
+    assert {(ping.vehicle, ping.source, len(ping.angles_rad)) for ping in pings} == {("one", "Multibeam", 16)}
+    with pytest.raises(ValueError, match="whole swaths"):
+        v.advance(1.0)
+    with pytest.raises(ValueError, match="not multibeam"):
+        vehicle().advance_swath(1.0)
 
 
 def test_measurements_come_at_the_ping_period_in_time_order() -> None:

@@ -11,6 +11,7 @@ from imc_bridge.bridge import Bridge
 from imc_bridge.doctor.diagnosis import Diagnosis
 from imc_bridge.doctor.doctor import Cause, diagnose, diagnose_recording, judge
 from imc_bridge.doctor.replay import RecordingError
+from imc_bridge.events import SwathPing
 from imc_bridge.settings import BridgeSettings
 from simulator.dune import DuneFleet, DuneOptions, VehicleSpec
 from simulator.network import NetworkFaults
@@ -86,6 +87,18 @@ async def test_address_where_nothing_listens() -> None:
         diagnosis = await examine(sea)
         assert diagnosis.causes == (Cause.UNREACHABLE,)
         assert "Connection refused" in diagnosis.text()
+
+
+async def test_a_multibeam_measures_the_bottom_too() -> None:
+    async with open_sea(sensor="multibeam") as sea:
+        (name,) = await sea.ready()
+        await until(lambda: any(event.vehicle == name for event in sea.of(SwathPing)), "it pings")
+        (node,) = sea.bridge.nodes()
+        assert node.bottom_sensors == ("Multibeam",)
+        diagnosis = judge(sea.bridge, 10.0)
+        assert diagnosis.causes == ()
+        assert "bottom measured by Multibeam" in diagnosis.text()
+        assert "pings refused: entity names not known yet" in diagnosis.text() or not node.pings_refused
 
 
 async def test_wrong_imc_version() -> None:

@@ -2,16 +2,21 @@
 
 import math
 import struct
+from pathlib import Path
 from typing import Any
 
 import imcpy
 import numpy as np
 import pytest
 
+from imc_bridge import BridgeSettings, SwathPing
+from imc_bridge.logs import VehicleLog
+from imc_bridge.telemetry.swaths import read_swath
 from simulator import seafloors
 from simulator.battery import BatterySpec
 from simulator.dune.contacts import service_addresses
 from simulator.dune.rates import RateLimiter, RateLimiterError, parse_limits
+from simulator.swath import SwathSonar
 from tests.support.imc.dune_bench import CONSOLE, CONSOLE_ID, Bench, announce, rate_limiters, start_request
 
 OTHER = ("127.0.0.1", 6199)
@@ -242,15 +247,33 @@ class TestTelemetry:
             depth = m.value * math.cos(tilt)
             assert float(floor.depth_at(*at)) == pytest.approx(depth, abs=0.01)
 
-    def test_a_multibeam_sends_swaths(self) -> None:
-        bench = Bench(sensor="multibeam").ready()
-        bench.run(1.0)
-        m = bench.last(imcpy.SonarData)
-        count, first, flags = struct.unpack_from("<HfB", m.data)
-        ranges = np.frombuffer(m.data, "<u2", offset=7) * m.scale_factor
-        angles = first + np.arange(count) * m.beam_config[0].beam_width
-        assert flags == 0
-        np.testing.assert_allclose(ranges * np.cos(angles), bench.vehicle.terrain.max_depth_m, rtol=2e-3)
+    def test_a_multibeam_sends_swaths_at_its_rate(self) -> None:
+        bench = Bench(sensor="multibeam", swath=SwathSonar(aperture_deg=100.0, beams=64, rate_hz=2.0)).ready()
+        bench.run(10.0)
+        sent = bench.all(imcpy.SonarData)
+        assert len(sent) == 20
+        assert {m.src_ent for m in sent} == {bench.node._entities["Multibeam"]}
+        swath = read_swath(sent[-1])
+        np.testing.assert_allclose(np.degrees(swath.angles_rad), np.linspace(-50.0, 50.0, 64), atol=1e-3)
+        depths = swath.ranges_m * np.cos(swath.angles_rad)
+        np.testing.assert_allclose(depths, bench.vehicle.terrain.max_depth_m, rtol=1e-3)
+        bench.say(rate_limiters("SonarData:0.5"))
+        bench.wire.sent.clear()
+        bench.run(10.0)
+        assert len(bench.all(imcpy.SonarData)) == 5
+
+    def test_a_multibeams_log_has_every_ping_and_radio_what_it_may(self, tmp_path: Path) -> None:
+        bench = Bench(sensor="multibeam", swath=SwathSonar(beams=32), log_dir=tmp_path).ready()
+        bench.say(rate_limiters("SonarData:1"))
+        bench.wire.sent.clear()
+        bench.run(10.0)
+        bench.node.stop()
+        assert len(bench.all(imcpy.SonarData)) == 10
+        (log,) = tmp_path.rglob("Data.lsf*")
+        events = list(VehicleLog(log, BridgeSettings()).events())
+        pings = [event for event in events if isinstance(event, SwathPing)]
+        assert len(pings) >= 50
+        assert np.diff([ping.time_s for ping in pings]).max() == pytest.approx(0.2, abs=1e-3)
 
 
 class TestRobustness:

@@ -12,6 +12,7 @@ from simulator import seafloors
 from simulator.battery import BatterySpec
 from simulator.clock import SimulationClock
 from simulator.dune.node import DuneOptions, FakeDune
+from simulator.swath import SwathSonar
 from simulator.terrain import Terrain
 from simulator.vehicle import STEP_S
 from simulator.world import SimulatedVehicle
@@ -122,6 +123,7 @@ class Bench:
         imc_id: int = VEHICLE_ID,
         battery: BatterySpec | None = None,
         current: tuple[float, float] = (0.0, 0.0),
+        swath: SwathSonar | None = None,
         **options: Any,
     ) -> None:
         self.wall_s = 0.0
@@ -137,6 +139,7 @@ class Bench:
             start_time_s=self.clock.now(),
             battery=battery,
             current=current,
+            swath=swath,
         )
         self.node = FakeDune(
             self.vehicle, imc_id, HOME[1], self.clock, DuneOptions(**options), np.random.default_rng(0)

@@ -6,18 +6,21 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import imcpy
+import numpy as np
 from imcpy.coordinates import WGS84
 
 from imc_bridge.network.codec import encode
+from tests.support.imc.sonar_data import sonar_data
 
 VEHICLE_ID, OTHER_ID = 0x1E, 0x1F
 NAME = "lauv-log-1"
-ALTIMETER, FORWARD = 58, 59
+ALTIMETER, FORWARD, MULTIBEAM = 58, 59, 60
 LAT_RAD, LON_RAD = math.radians(41.185), math.radians(-8.705)
 START_S = 1_795_225_140.0
 SPEED_MPS = 1.5
 STATE_PERIOD_S, PING_PERIOD_S = 0.1, 0.2
 VEHICLE_DEPTH_M = 2.0
+BEAMS, START_RAD, WIDTH_RAD = 9, -0.8, 0.2
 
 
 def bottom_m(north_m: float) -> float:
@@ -52,6 +55,13 @@ def distance(
     return packet(message, time_s, src, entity)
 
 
+def ping(time_s: float, height_m: float) -> bytes:
+    """Of a multibeam over flat ground."""
+    angles = START_RAD + WIDTH_RAD * np.arange(BEAMS)
+    points = np.round(100.0 * height_m / np.cos(angles)).astype(int).tolist()
+    return packet(sonar_data(points, start_rad=START_RAD, width_rad=WIDTH_RAD), time_s, entity=MULTIBEAM)
+
+
 def announce(time_s: float, name: str = NAME, src: int = VEHICLE_ID) -> bytes:
     message = imcpy.Announce()
     message.sys_name = name
@@ -63,7 +73,7 @@ def announce(time_s: float, name: str = NAME, src: int = VEHICLE_ID) -> bytes:
 def entities(time_s: float) -> bytes:
     message = imcpy.EntityList()
     message.op = imcpy.EntityList.OperationEnum.REPORT
-    message.list = f"Daemon=0;Altimeter={ALTIMETER};Echo Sounder={FORWARD}"
+    message.list = f"Daemon=0;Altimeter={ALTIMETER};Echo Sounder={FORWARD};Multibeam={MULTIBEAM}"
     return packet(message, time_s)
 
 
