@@ -1,10 +1,12 @@
 """Copies of a database while others write to it, checked, and put back in its place."""
 
+import dataclasses
 import os
 import shutil
 import sqlite3
 import subprocess
-from contextlib import closing
+from collections.abc import Iterator, Sequence
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -12,6 +14,7 @@ from pathlib import Path
 from sqlalchemy import URL, make_url
 
 from app.storage import private
+from app.storage.ping_files import PingFileError, PingFiles, digest_in
 
 SQLITE_MAGIC = b"SQLite format 3\0"
 ARCHIVE_MAGIC = b"PGDMP"
@@ -29,18 +32,32 @@ class BackupError(Exception):
 
 @dataclass(frozen=True)
 class Contents:
-    """What a backup holds: its schema's revision and the rows of every table; both empty for pg_dump's archives."""
+    """What a backup holds: its schema's revision and the rows of every table; both empty for pg_dump's archives.
+
+    ``ping_files`` is how many files of pings are beside it.
+    """
 
     size_bytes: int
     revision: str
     rows: dict[str, int]
+    ping_files: int = 0
 
 
-def back_up(url: str, target: Path) -> tuple[Path, Contents]:
+def files_beside(backup: Path) -> PingFiles:
+    """Return the files of pings that belong to a backup."""
+    return PingFiles(str(backup.with_name(f"{backup.name}-pings").resolve()))
+
+
+def back_up(url: str, target: Path, pings: PingFiles | None = None) -> tuple[Path, Contents]:
     """Copy the database to a file, or into a folder under a name with the time; returns the file and what it holds.
 
     SQLite's is one consistent state, however much is written meanwhile. The file appears under its name only when it
-    was checked and is on the disk; only its owner may read it.
+    was checked and is on the disk; only its owner may read it. Files of pings go into a folder beside it.
+
+    Parameters
+    ----------
+    pings
+        Where files of pings are; None: in the usual place.
 
     Raises
     ------
@@ -52,29 +69,49 @@ def back_up(url: str, target: Path) -> tuple[Path, Contents]:
         target /= f"bathyfleet-{datetime.now(UTC):%Y%m%dT%H%M%SZ}.{suffix}"
     if target.exists():
         raise BackupError(f"{target} exists", "Name another file: backups are not overwritten")
-    part = target.with_name(target.name + ".part")
+    part, copies = target.with_name(target.name + ".part"), files_beside(target)
     try:
         private.make_folder(target.parent)
         os.close(os.open(part, os.O_CREAT | os.O_TRUNC | os.O_WRONLY, 0o600))
         if suffix == "db":
             expected = _copy_sqlite(parsed, part)
-            contents = contents_of(part)
+            contents = _database_of(part)
             if contents.rows != expected:
                 raise BackupError(f"the copy has other rows than the database: {contents.rows}, not {expected}")
         else:
             _run_postgres("pg_dump", parsed, "--format=custom", *_WITHOUT_PROCESSES, f"--file={part}")
-            contents = contents_of(part)
+            contents = _database_of(part)
+        # Whatever is in the copy has had its file before.
+        source = pings or PingFiles.beside(url)
+        copied = source.copy_to(copies, source.names() if suffix == "dump" else _ping_files(part))
+        contents = dataclasses.replace(contents, ping_files=copied)
         _to_disk(part)
         part.rename(target)
+    except PingFileError as error:
+        raise BackupError(str(error), "Bring it back from an older backup, or set pings_url to where it is") from None
     except (OSError, sqlite3.Error) as error:
         raise BackupError(f"{target} cannot be written: {error}", "Is there room on that disk?") from None
     finally:
         part.unlink(missing_ok=True)
+        if not target.exists() and copies.folder is not None:
+            shutil.rmtree(copies.folder, ignore_errors=True)
     return target, contents
 
 
 def contents_of(file: Path) -> Contents:
-    """Check a backup from end to end and return what it holds. Raises BackupError."""
+    """Check a backup from end to end, with the files of pings beside it; returns what it holds. Raises BackupError."""
+    contents, beside = _database_of(file), files_beside(file)
+    names = _ping_files(file) if contents.revision else beside.names()
+    try:
+        for name in names:
+            beside.read(name, digest_in(name))
+    except PingFileError as error:
+        raise BackupError(str(error), "Use an older backup") from None
+    return dataclasses.replace(contents, ping_files=len(names))
+
+
+def _database_of(file: Path) -> Contents:
+    """Check a backup without the files beside it. Raises BackupError."""
     with file.open("rb") as opened:
         begin = opened.read(len(SQLITE_MAGIC))
     if begin.startswith(ARCHIVE_MAGIC):
@@ -99,8 +136,19 @@ def contents_of(file: Path) -> Contents:
     return Contents(file.stat().st_size, revision, rows)
 
 
-def restore_to(url: str, file: Path, *, replace: bool) -> tuple[Contents, Path | None]:
+def _ping_files(file: Path) -> list[str]:
+    """Return the names of the files of pings that belong to an SQLite database that nobody has open."""
+    with closing(sqlite3.connect(f"{file.resolve().as_uri()}?mode=ro&immutable=1", uri=True)) as connection:
+        if not connection.execute("SELECT 1 FROM sqlite_master WHERE name = 'ping_chunks'").fetchone():
+            return []  # of a version that had none
+        return [name for (name,) in connection.execute("SELECT name FROM ping_chunks ORDER BY id")]
+
+
+def restore_to(url: str, file: Path, *, replace: bool, pings: PingFiles | None = None) -> tuple[Contents, Path | None]:
     """Put a checked backup in the database's place; returns what it holds, and where what was there before is now.
+
+    ``pings`` are the files of pings, those of the backup are put there; None: in the usual place. What is there
+    already goes aside with the database.
 
     Raises
     ------
@@ -110,12 +158,15 @@ def restore_to(url: str, file: Path, *, replace: bool) -> tuple[Contents, Path |
     """
     contents = contents_of(file)
     parsed = make_url(url)
+    files, beside = pings or PingFiles.beside(url), files_beside(file)
+    before = f"before-{datetime.now(UTC):%Y%m%dT%H%M%SZ}"
     if parsed.get_backend_name() != "sqlite":
         if contents.revision:
             raise BackupError(f"{file} is an SQLite database and cannot be restored to PostgreSQL")
         options = ["--clean", "--if-exists"] if replace else []
         arguments = ["--exit-on-error", "--single-transaction", "--no-owner", *options, str(file)]
-        _run_postgres("pg_restore", parsed, *arguments)
+        with _put_back(files, beside, beside.names(), before if replace else ""):
+            _run_postgres("pg_restore", parsed, *arguments)
         return contents, None
     if not contents.revision:
         raise BackupError(f"{file} is an archive of pg_dump: name a PostgreSQL database with --database")
@@ -125,22 +176,40 @@ def restore_to(url: str, file: Path, *, replace: bool) -> tuple[Contents, Path |
         if not replace:
             raise BackupError(f"{path} exists", "--replace moves it aside")
         _close_for_good(path)
-        aside = path.with_name(f"{path.name}.before-{datetime.now(UTC):%Y%m%dT%H%M%SZ}")
+        aside = path.with_name(f"{path.name}.{before}")
         path.rename(aside)
         private.mend([aside])
     private.make_folder(path.parent)
     part = path.with_name(path.name + ".part")
     try:
-        with file.open("rb") as source, private.open_new(part, "wb") as copy:
-            shutil.copyfileobj(source, copy)
-        _to_disk(part)
-        part.rename(path)
+        with _put_back(files, beside, _ping_files(file), before if aside else ""):
+            with file.open("rb") as source, private.open_new(part, "wb") as copy:
+                shutil.copyfileobj(source, copy)
+            _to_disk(part)
+            part.rename(path)
     except OSError as error:
         part.unlink(missing_ok=True)
         if aside is not None:
             aside.rename(path)
         raise BackupError(f"{path} cannot be written: {error.strerror}", "Is there room on that disk?") from None
     return contents, aside
+
+
+@contextmanager
+def _put_back(files: PingFiles, beside: PingFiles, names: Sequence[str], aside: str) -> Iterator[None]:
+    """Put files of pings in their place before what refers to them is put in its own.
+
+    What is there already goes ``aside`` under a name with this; when the rest fails it comes back.
+    """
+    moved = files.move_aside(aside) if aside else None
+    try:
+        beside.copy_to(files, names)
+        yield
+    except BaseException:
+        if moved is not None and files.folder is not None:
+            shutil.rmtree(files.folder, ignore_errors=True)
+            moved.rename(files.folder)
+        raise
 
 
 def _copy_sqlite(url: URL, target: Path) -> dict[str, int]:

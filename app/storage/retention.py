@@ -1,5 +1,6 @@
 """Room in the database: missions that ended long ago go, and the disk gets its space back."""
 
+import asyncio
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 
@@ -8,6 +9,8 @@ from sqlalchemy.exc import OperationalError
 
 from app.storage.database import Database, make_engine
 from app.storage.models import MissionRow, SoundingRow
+from app.storage.ping_files import PingFiles
+from app.storage.pings import Totals, totals
 
 ENDED = ("finished", "aborted", "failed")
 
@@ -36,13 +39,30 @@ async def ended_before(database: Database, days: float) -> list[Ended]:
         return [Ended(*row) for row in await session.execute(query)]
 
 
-async def remove(database: Database, mission_id: str, days: float) -> bool:
-    """Remove a mission with all that belongs to it; False when it did not end long enough ago, after all."""
+async def remove(database: Database, mission_id: str, days: float, files: PingFiles | None = None) -> bool:
+    """Remove a mission with all that belongs to it; False when it did not end long enough ago, after all.
+
+    ``files`` are where its pings are; None: in the usual place.
+    """
+    files = files or PingFiles.beside(database.url)
     condition = (MissionRow.id == mission_id, MissionRow.state.in_(ENDED), MissionRow.updated_at < _moment(days))
+    async with database.reading() as session:
+        pings = await totals(session, mission_id) != Totals()
+    if pings:
+        await asyncio.to_thread(files.condemn, mission_id)
     async with database.writing() as session:
-        return (
-            await session.scalars(delete(MissionRow).where(*condition).returning(MissionRow.id))
-        ).first() is not None
+        removed = (await session.scalars(delete(MissionRow).where(*condition).returning(MissionRow.id))).first()
+    if pings:
+        await asyncio.to_thread(files.remove if removed else files.spare, mission_id)
+    return removed is not None
+
+
+async def finish_removing(database: Database, files: PingFiles) -> None:
+    """Remove the files of missions that were removed when a process was killed."""
+    for mission_id in await asyncio.to_thread(files.condemned):
+        async with database.reading() as session:
+            there = await session.scalar(select(MissionRow.id).where(MissionRow.id == mission_id))
+        await asyncio.to_thread(files.remove if there is None else files.spare, mission_id)
 
 
 async def give_space_back(url: str) -> str:

@@ -2,6 +2,7 @@
 
 import zlib
 from collections.abc import Collection, Sequence
+from dataclasses import dataclass
 from datetime import datetime
 from typing import Any
 
@@ -63,6 +64,16 @@ def accepted_query(
     return query if until_step is None else query.where(SoundingRow.step <= until_step)
 
 
+def track_query(mission_id: str) -> Select[*tuple[Any, ...]]:
+    """Return the query of accepted soundings along the vehicles' ways.
+
+    Columns are vehicle, the vehicle's time (s), east, north, depth and deviation (metres).
+    """
+    row = SoundingRow
+    columns = (row.vehicle, row.time_s, row.east_m, row.north_m, row.depth_m, row.sd_m)
+    return select(*columns).where(row.mission_id == mission_id, row.verdict == "accepted").order_by(row.id)
+
+
 async def ids_at(session: AsyncSession, mission_id: str, table: Sequence[NDArray[np.float64]]) -> list[list[int]]:
     """Return for every row (east, north, depth, ...) of a table the accepted soundings with these very values."""
     found: dict[tuple[float, float, float], list[int]] = {}
@@ -87,6 +98,32 @@ async def counts(session: AsyncSession, mission_id: str) -> dict[str, int]:
         .group_by(SoundingRow.verdict)
     )
     return {row.verdict: row.n for row in await session.execute(query)}
+
+
+@dataclass(frozen=True)
+class Extent:
+    """When the soundings of one verdict were made, and the largest deviation that their positions state.
+
+    ``position_sd_m`` is None where one of them states none.
+    """
+
+    first_time_s: float
+    last_time_s: float
+    position_sd_m: float | None
+
+
+async def extent(session: AsyncSession, mission_id: str, verdict: str) -> Extent | None:
+    """Return what soundings of a verdict span; None without any."""
+    position = SoundingRow.position_sd_m
+    query = select(
+        func.min(SoundingRow.time_s),
+        func.max(SoundingRow.time_s),
+        func.max(position),
+        func.count(position),
+        func.count(),
+    ).where(SoundingRow.mission_id == mission_id, SoundingRow.verdict == verdict)
+    first_s, last_s, worst_m, stated, number = (await session.execute(query)).one()
+    return Extent(first_s, last_s, worst_m if stated == number else None) if number else None
 
 
 async def all_soundings(session: AsyncSession, mission_id: str) -> Sequence[SoundingRow]:

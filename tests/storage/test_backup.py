@@ -17,9 +17,10 @@ from sqlalchemy import func, select
 from app.storage.backup import BackupError, back_up, contents_of, restore_to
 from app.storage.database import Database
 from app.storage.models import Base, MissionRow, SoundingRow
-from app.storage.retention import ended_before, give_space_back, remove
+from app.storage.ping_files import PingFiles
+from app.storage.retention import ended_before, finish_removing, give_space_back, remove
 from tests.support.databases import Databases
-from tests.support.rows import mission, one_of_each, sounding
+from tests.support.rows import PING_FILE, PING_FILE_NAME, mission, one_of_each, ping_chunk, sounding
 
 WRITER = """
 import sqlite3, sys
@@ -40,11 +41,16 @@ def path_of(url: str) -> Path:
     return Path(url.removeprefix("sqlite+aiosqlite:///"))
 
 
-async def fill(database: Database) -> None:
+async def fill(database: Database, files: PingFiles | None = None) -> None:
+    (files or PingFiles.beside(database.url)).write(PING_FILE_NAME, PING_FILE)
     async with database.writing() as session:
         for rows in one_of_each():
             session.add_all(rows)
             await session.flush()
+
+
+def beside(folder: Path, begin: str) -> list[Path]:
+    return list(folder.glob(f"{begin}*"))
 
 
 async def counts(url: str) -> dict[str, int]:
@@ -131,6 +137,61 @@ async def test_damage_is_noticed_and_nothing_is_restored_from_it(sqlite: Databas
         assert not (tmp_path / "new.db").exists()
 
 
+async def test_files_of_pings_are_backed_up_and_put_back_with_the_database(sqlite: Database, tmp_path: Path) -> None:
+    files = PingFiles(str(tmp_path / "pings"))
+    await fill(sqlite, files)
+    await sqlite.close()
+    copy, made = back_up(sqlite.url, tmp_path / "copy.db", files)
+    assert made.ping_files == contents_of(copy).ping_files == 1
+    assert all(file.stat().st_mode & 0o077 == 0 for file in (tmp_path / "copy.db-pings").rglob("*"))
+    files.write("m2/000000000001-later.parquet", b"of a mission that the backup does not know")
+    restore_to(sqlite.url, copy, replace=True, pings=files)
+    assert files.names() == [PING_FILE_NAME]
+    (aside,) = beside(tmp_path, "pings.before-")
+    assert len(PingFiles(str(aside)).names()) == 2, "with the database that was there"
+
+    file = tmp_path / "copy.db-pings" / PING_FILE_NAME
+    file.write_bytes(PING_FILE + b"?")
+    with pytest.raises(BackupError, match=f"{PING_FILE_NAME} is damaged"):
+        contents_of(copy)
+    file.unlink()
+    with pytest.raises(BackupError, match=f"{PING_FILE_NAME} is missing"):
+        restore_to(sqlite.url, copy, replace=True, pings=files)
+    assert files.names() == [PING_FILE_NAME]
+    files.remove("m1")
+    with pytest.raises(BackupError, match=f"{PING_FILE_NAME} is missing"):
+        back_up(sqlite.url, tmp_path / "again.db", files)
+    assert not beside(tmp_path, "again")
+
+
+async def test_a_mission_that_goes_takes_its_files_of_pings_along_whenever_the_process_is_killed(
+    database: Database, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    files, long_ago = PingFiles(str(tmp_path / "pings")), datetime.now(UTC) - timedelta(days=100)
+    async with database.writing() as session:
+        session.add_all(mission(name, state="finished", updated_at=long_ago) for name in ("m1", "m2"))
+        await session.flush()
+        session.add(ping_chunk())
+    for name in (PING_FILE_NAME, "m2/other.parquet"):
+        files.write(name, PING_FILE)
+
+    def killed(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as kill:
+        kill.setattr(Database, "writing", killed)
+        with pytest.raises(KeyboardInterrupt):
+            await remove(database, "m1", 30, files)
+    await finish_removing(database, files)
+    assert (len(files.names()), files.condemned()) == (2, []), "the mission is still there"
+    with monkeypatch.context() as kill:
+        kill.setattr(files, "remove", killed)
+        with pytest.raises(KeyboardInterrupt):
+            await remove(database, "m1", 30, files)
+    await finish_removing(database, files)
+    assert (files.names(), files.condemned()) == (["m2/other.parquet"], [])
+
+
 async def test_what_is_no_backup_of_ours_is_named(sqlite: Database, tmp_path: Path) -> None:
     (tmp_path / "notes.txt").write_text("nothing")
     with closing(sqlite3.connect(tmp_path / "other.db")) as connection:
@@ -153,13 +214,16 @@ async def test_postgresql_is_copied_by_its_own_programs(
         pytest.skip("pg_dump is not installed")
     url = databases.fresh("postgresql")
     database = Database(url)
-    await fill(database)
+    files, others = PingFiles(str(tmp_path / "files")), PingFiles(str(tmp_path / "others"))
+    await fill(database, files)
     await database.close()
     before = await counts(url)
-    copy, _ = await asyncio.to_thread(back_up, url, tmp_path / "fleet.dump")
-    assert contents_of(copy).size_bytes == copy.stat().st_size
+    copy, made = await asyncio.to_thread(back_up, url, tmp_path / "fleet.dump", files)
+    assert contents_of(copy) == made
+    assert (made.size_bytes, made.ping_files) == (copy.stat().st_size, 1)
     other = databases.fresh("postgresql")
-    await asyncio.to_thread(restore_to, other, copy, replace=True)
+    await asyncio.to_thread(restore_to, other, copy, replace=True, pings=others)
+    assert others.names() == [PING_FILE_NAME]
     assert before["processes"] > 0
     nobody = {"mission_owners": 0, "processes": 0}  # who lives now, and his secret, is not copied
     assert await counts(other) == before | nobody

@@ -47,6 +47,22 @@ async def test_a_sounding_is_known_by_vehicle_time_and_beam(database: Database) 
     assert {row.depth_m for row in rows} == {10.0}  # what was there first stays
 
 
+async def test_the_extent_of_soundings_is_that_of_one_verdict(database: Database) -> None:
+    await _two_missions(database)
+    rows = [sounding(time_s=float(t)) | {"position_sd_m": 0.5 * t} for t in (3, 1, 2)]
+    rejected = sounding(time_s=9.0) | {"verdict": "rejected", "position_sd_m": 40.0}
+    async with database.writing() as session:
+        await sounding_queries.insert_new(session, [*rows, rejected])
+    async with database.reading() as session:
+        assert await sounding_queries.extent(session, "m1", "accepted") == sounding_queries.Extent(1.0, 3.0, 1.5)
+        assert await sounding_queries.extent(session, "m2", "accepted") is None
+    async with database.writing() as session:
+        await sounding_queries.insert_new(session, [sounding(time_s=4.0)])
+    async with database.reading() as session:
+        found = await sounding_queries.extent(session, "m1", "accepted")
+    assert found == sounding_queries.Extent(1.0, 4.0, None), "one states no deviation of its position"
+
+
 async def test_unix_times_with_all_their_digits_are_told_apart_and_recognised(database: Database) -> None:
     await _two_missions(database)
     rng = random.Random(5)  # noqa: S311

@@ -1,5 +1,6 @@
 """One row of every table."""
 
+import hashlib
 from datetime import UTC, datetime
 from typing import Any
 
@@ -13,6 +14,8 @@ from app.storage.models import (
     MissionOwnerRow,
     MissionRow,
     MissionVehicleRow,
+    PingBlockRow,
+    PingChunkRow,
     PositionRow,
     ProcessRow,
     ReferenceRow,
@@ -27,6 +30,7 @@ from app.storage.models import (
     TokenRow,
     WaypointRow,
 )
+from app.storage.ping_files import file_name
 from app.storage.scans import pack_ranges
 from app.storage.soundings import pack
 
@@ -161,6 +165,48 @@ def scan(mission_id: str = "m1", time_s: float = 1.0) -> dict[str, Any]:
     }
 
 
+PING_FILE = b"a file of pings"
+_PING_DIGEST = hashlib.sha256(PING_FILE).hexdigest()
+PING_FILE_NAME = file_name("m1", 1, _PING_DIGEST)
+
+
+def ping_block(mission_id: str = "m1", **changes: Any) -> dict[str, Any]:
+    values: dict[str, Any] = {
+        "mission_id": mission_id,
+        "vehicle": "a",
+        "step": 0,
+        "received_at": TIME,
+        "source": "rest",
+        "first_time_s": 2.0,
+        "last_time_s": 2.0,
+        "pings": 1,
+        "beams": 3,
+        "rejected": 0,
+        "times": np.array([2.0]).tobytes(),
+        "content": b"pings",
+    }
+    return values | changes
+
+
+def ping_chunk(mission_id: str = "m1") -> PingChunkRow:
+    """What the database knows of the file :data:`PING_FILE`."""
+    return PingChunkRow(
+        mission_id=mission_id,
+        vehicle="a",
+        name=PING_FILE_NAME,
+        first_block=1,
+        last_block=1,
+        first_time_s=1.0,
+        last_time_s=1.0,
+        pings=1,
+        beams=3,
+        rejected=0,
+        times=np.array([1.0]).tobytes(),
+        digest=_PING_DIGEST,
+        size=len(PING_FILE),
+    )
+
+
 def one_of_each() -> list[list[Any]]:
     """Rows in the order in which foreign keys allow them."""
     return [
@@ -172,6 +218,8 @@ def one_of_each() -> list[list[Any]]:
             PositionRow(**position()),
             TargetRangeRow(**target_range()),
             ScanRow(**scan()),
+            PingBlockRow(**ping_block()),
+            ping_chunk(),
             TelemetryRow(
                 mission_id="m1", vehicle="a", at_s=5.0, depth_m=2.0, altitude_m=None, battery_pct=80.0, age_s=0.1
             ),

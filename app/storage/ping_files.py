@@ -1,0 +1,174 @@
+"""Files of pings, each written once and whole, below a folder on this machine or anywhere that fsspec reaches."""
+
+import hashlib
+import os
+from collections.abc import Collection, Iterable
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from sqlalchemy import make_url
+
+from app.storage import private
+
+FOLDER = "pings"
+PART = ".part"
+REMOVED = ".removed"
+"""Beside the folder of a mission that is being removed."""
+
+
+class PingFileError(Exception):
+    """A file of pings is missing or damaged; ``str()`` names it."""
+
+
+def file_name(mission_id: str, first_block: int, digest: str) -> str:
+    """Return what the file of some blocks with this SHA-256 is called; written again it has the same name."""
+    return f"{mission_id}/{first_block:012d}-{digest}.parquet"
+
+
+def digest_in(name: str) -> str:
+    """Return the SHA-256 that a file's name says it has."""
+    return name.rpartition("-")[2].removesuffix(".parquet")
+
+
+class PingFiles:
+    """The files of all missions.
+
+    Parameters
+    ----------
+    url
+        A folder, or a URL of fsspec such as ``s3://bucket/pings``.
+    """
+
+    def __init__(self, url: str) -> None:
+        self.url = url
+
+    @classmethod
+    def beside(cls, database_url: str, url: str = "") -> "PingFiles":
+        """Return those at ``url``; where none is given in a folder beside SQLite's file, or else here."""
+        parsed = make_url(database_url)
+        on_disk = parsed.get_backend_name() == "sqlite" and parsed.database and parsed.database != ":memory:"
+        return cls(url or str((Path(parsed.database).parent if on_disk and parsed.database else Path()) / FOLDER))
+
+    @cached_property
+    def _place(self) -> tuple[Any, str]:
+        import fsspec  # slow to import, and needed by those only who have pings
+
+        file_system, root = fsspec.core.url_to_fs(self.url)
+        return file_system, str(root).rstrip("/")
+
+    @property
+    def folder(self) -> Path | None:
+        """The folder, if it is one of this machine."""
+        file_system, root = self._place
+        kinds = file_system.protocol if isinstance(file_system.protocol, tuple) else (file_system.protocol,)
+        return Path(root) if "file" in kinds else None
+
+    def where(self, name: str) -> str:
+        """Return where a file is, for people."""
+        return f"{self.folder / name}" if self.folder else f"{self.url.rstrip('/')}/{name}"
+
+    def write(self, name: str, content: bytes) -> None:
+        """Write a file; it has its name only when all of it is on the disk."""
+        file_system, root = self._place
+        path = f"{root}/{name}"
+        if self.folder is None:
+            file_system.makedirs(path.rpartition("/")[0], exist_ok=True)
+            file_system.pipe_file(path + PART, content)
+            file_system.mv(path + PART, path)
+            return
+        file = Path(path)
+        private.make_folder(file.parent)
+        part = file.with_name(file.name + PART)
+        try:
+            with private.open_new(part, "wb") as out:
+                out.write(content)
+                out.flush()
+                os.fsync(out.fileno())
+            part.rename(file)
+        except BaseException:
+            part.unlink(missing_ok=True)
+            raise
+        for place in (file.parent, file.parent.parent):
+            descriptor = os.open(place, os.O_RDONLY)
+            try:
+                os.fsync(descriptor)
+            finally:
+                os.close(descriptor)
+
+    def read(self, name: str, digest: str) -> bytes:
+        """Return a file's content. Raises PingFileError when it is missing or not what was written."""
+        file_system, root = self._place
+        try:
+            content: bytes = file_system.cat_file(f"{root}/{name}")
+        except FileNotFoundError:
+            raise PingFileError(f"the file of pings {self.where(name)} is missing") from None
+        except OSError as error:
+            raise PingFileError(f"the file of pings {self.where(name)} cannot be read: {error}") from None
+        found = hashlib.sha256(content).hexdigest()
+        if found != digest:
+            raise PingFileError(
+                f"the file of pings {self.where(name)} is damaged: its SHA-256 is {found}, {digest} was written"
+            )
+        return content
+
+    def names(self, mission_id: str | None = None) -> list[str]:
+        """Return the names of a mission's files, or of all; of none that was not written to its end."""
+        return [name for name in self._found(mission_id) if not name.endswith((PART, REMOVED))]
+
+    def _found(self, mission_id: str | None) -> list[str]:
+        file_system, root = self._place
+        file_system.invalidate_cache()
+        below = root if mission_id is None else f"{root}/{mission_id}"
+        return sorted(str(path).removeprefix(f"{root}/") for path in file_system.find(below))
+
+    def tidy(self, mission_id: str, known: Collection[str]) -> list[str]:
+        """Remove a mission's files that are not ``known``, left behind by a process that was killed; returns which."""
+        file_system, root = self._place
+        left = [name for name in self._found(mission_id) if name not in known]
+        for name in left:
+            file_system.rm_file(f"{root}/{name}")
+        return left
+
+    def condemn(self, mission_id: str) -> None:
+        """Note that a mission is about to be removed: its files go with it, though this process may be killed first."""
+        if self._found(mission_id):
+            self.write(f"{mission_id}{REMOVED}", b"")
+
+    def remove(self, mission_id: str) -> None:
+        """Remove a mission's files."""
+        file_system, root = self._place
+        if self._found(mission_id):
+            file_system.rm(f"{root}/{mission_id}", recursive=True)
+        self.spare(mission_id)
+
+    def spare(self, mission_id: str) -> None:
+        """Note that a mission is not removed, after all."""
+        file_system, root = self._place
+        if file_system.exists(f"{root}/{mission_id}{REMOVED}"):
+            file_system.rm_file(f"{root}/{mission_id}{REMOVED}")
+
+    def condemned(self) -> list[str]:
+        """Return the missions that were about to be removed when a process ended."""
+        if "://" not in self.url and not Path(self.url).is_dir():
+            return []
+        file_system, root = self._place
+        if not file_system.isdir(root):
+            return []
+        names = [str(path).rpartition("/")[2] for path in file_system.ls(root, detail=False)]
+        return [name.removesuffix(REMOVED) for name in names if name.endswith(REMOVED)]
+
+    def copy_to(self, other: "PingFiles", names: Iterable[str]) -> int:
+        """Copy files, each checked by the digest in its name; returns how many. Raises PingFileError."""
+        copied = 0
+        for name in names:
+            other.write(name, self.read(name, digest_in(name)))
+            copied += 1
+        return copied
+
+    def move_aside(self, suffix: str) -> Path | None:
+        """Rename the folder, if it is one of this machine and there; returns what it is called now."""
+        folder = self.folder
+        if folder is None or not folder.is_dir():
+            return None
+        return folder.rename(folder.with_name(f"{folder.name}.{suffix}"))

@@ -1,0 +1,80 @@
+"""Files of pings are whole or not there, found again, and removed when nobody knows them; here and behind a URL."""
+
+import hashlib
+import os
+from pathlib import Path
+
+import pytest
+
+from app.storage.ping_files import PingFileError, PingFiles, digest_in, file_name
+
+CONTENT = b"pings"
+DIGEST = hashlib.sha256(CONTENT).hexdigest()
+NAME = file_name("m1", 7, DIGEST)
+
+
+@pytest.fixture(params=["folder", "url"])
+def files(request: pytest.FixtureRequest, tmp_path: Path) -> PingFiles:
+    return PingFiles(str(tmp_path / "pings") if request.param == "folder" else f"memory://{tmp_path.name}/pings")
+
+
+def test_a_file_is_read_as_it_was_written(files: PingFiles) -> None:
+    assert files.names() == []
+    files.write(NAME, CONTENT)
+    files.write(NAME, CONTENT)
+    assert files.read(NAME, DIGEST) == CONTENT
+    assert files.names() == files.names("m1") == [NAME]
+    assert files.names("m2") == []
+    assert digest_in(NAME) == DIGEST
+
+
+def test_a_missing_and_a_damaged_file_are_named(files: PingFiles) -> None:
+    with pytest.raises(PingFileError, match=rf"{NAME} is missing"):
+        files.read(NAME, DIGEST)
+    files.write(NAME, CONTENT[:-1])
+    with pytest.raises(PingFileError, match=rf"{NAME} is damaged: its SHA-256 is \w+, {DIGEST} was written"):
+        files.read(NAME, DIGEST)
+
+
+def test_what_nobody_knows_is_removed_from_this_mission_only(files: PingFiles) -> None:
+    names = [NAME, "m1/orphan.parquet", "m1/half.parquet.part", "m2/other.parquet"]
+    for name in names:
+        files.write(name, CONTENT)
+    assert files.tidy("m1", {NAME}) == ["m1/half.parquet.part", "m1/orphan.parquet"]
+    assert files.names() == [NAME, "m2/other.parquet"]
+    assert files.tidy("m3", set()) == []
+
+
+def test_a_mission_is_removed_with_all_its_files(files: PingFiles) -> None:
+    assert files.condemned() == []
+    for name in (NAME, "m2/other.parquet"):
+        files.write(name, CONTENT)
+    for mission_id in ("m1", "m2", "m3"):
+        files.condemn(mission_id)
+    assert files.condemned() == ["m1", "m2"]
+    files.spare("m2")
+    files.remove("m1")
+    files.remove("m3")
+    assert (files.names(), files.condemned()) == (["m2/other.parquet"], [])
+
+
+def test_files_are_their_owners_only_and_no_half_is_left(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    files = PingFiles(str(tmp_path / "pings"))
+    files.write(NAME, CONTENT)
+    place = tmp_path / "pings" / NAME
+    assert [path.stat().st_mode & 0o777 for path in (place, place.parent, tmp_path / "pings")] == [0o600, 0o700, 0o700]
+
+    def full(_descriptor: int) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(OSError, match="No space"):
+        files.write("m1/next.parquet", CONTENT)
+    assert [path.name for path in place.parent.iterdir()] == [place.name]
+
+
+def test_the_usual_place_is_beside_the_database(tmp_path: Path) -> None:
+    beside = PingFiles.beside(f"sqlite+aiosqlite:///{tmp_path / 'fleet.db'}")
+    assert beside.folder == tmp_path / "pings"
+    assert PingFiles.beside("postgresql+asyncpg://fleet@db/fleet").folder == Path.cwd() / "pings"
+    assert PingFiles.beside("sqlite+aiosqlite:///fleet.db", "memory://pings").folder is None
