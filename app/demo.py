@@ -204,6 +204,7 @@ class _Demo:
             self._outcome.mission_id = mission["id"]
             console.print(f"Dashboard: [bold]{url}/#/missions/{mission['id']}[/]", soft_wrap=True)
             await self._await_vehicles(api)
+            await self._await_compiling(api)
             await post(api, f"/missions/{mission['id']}/start")
             await self._watch(api, mission["id"])
             if self._outcome.state != "finished":
@@ -242,6 +243,12 @@ class _Demo:
                 if time.monotonic() > deadline:
                     reasons = "; ".join(f"{n}: {vehicles.get(n, {}).get('reason', 'not heard')}" for n in waiting)
                     raise DemoError(f"not every vehicle became ready: {reasons}; see vehicles.log and service.log")
+                await asyncio.sleep(POLL_S)
+
+    async def _await_compiling(self, api: httpx.AsyncClient) -> None:
+        """Wait for what is compiled once on each machine: vehicles would circle for slow decisions."""
+        with self._console.status("Compiling, once on a new machine …"):
+            while (await get(api, "/health"))["compiling"]:  # noqa: ASYNC110
                 await asyncio.sleep(POLL_S)
 
     async def _watch(self, api: httpx.AsyncClient, mission_id: str) -> None:

@@ -4,6 +4,7 @@ import asyncio
 import signal
 import socket
 import ssl
+import sys
 import threading
 import warnings
 from collections.abc import AsyncIterator, Callable, Iterator
@@ -31,6 +32,7 @@ from app.api import (
     measurements,
     missions,
     openapi,
+    pings,
     problems,
     searches,
     signing_in,
@@ -66,6 +68,9 @@ from app.storage.database import Database
 from app.storage.membership import MembershipLostError
 from app.storage.prepare import prepare_database
 from imc_bridge import PortInUseError
+
+SWITCH_S = 0.001
+"""How soon a thread gets its turn: planners in threads give theirs up at each of many short calls."""
 
 GRACE_S = 5
 """Seconds that open requests get to end when the process is asked to."""
@@ -161,6 +166,7 @@ def create_app(settings: Settings | None = None, *, port: int | None = None) -> 
         maps.router,
         maps.layers_router,
         soundings.router,
+        pings.router,
         targets.router,
         searches.router,
         streams.router,
@@ -354,6 +360,7 @@ async def serve(
     """
     check_certificate(settings)
     keep_memory_together()
+    sys.setswitchinterval(SWITCH_S)
     allow_descriptors(settings.max_connections)
     listening = listen(settings)
     try:

@@ -63,5 +63,8 @@ async def _summary(state: EdgeState) -> ComponentHealth:
     if stopping:
         components = components | {"process": "is shutting down"}
     return ComponentHealth(
-        status="ok" if ok and not stopping else "failing", version=__version__, components=components
+        status="ok" if ok and not stopping else "failing",
+        version=__version__,
+        components=components,
+        compiling=state.service.compiling,
     )

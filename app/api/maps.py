@@ -20,17 +20,37 @@ from app.api.state import EdgeState, Service, State
 from app.mapping.layers import LAYERS, Layer, LayerKind
 from app.mapping.products.overlay import overlay_png
 from app.mapping.s44 import Order
-from app.missions.maps.products import MAP, PRODUCTS, SEARCH, SOUNDINGS, TRACKS, Product, ProductOptions
+from app.missions.maps.products import (
+    CROSSOVERS,
+    GEOJSON,
+    MAP,
+    PRODUCTS,
+    SEARCH,
+    SOUNDINGS,
+    SWATHS,
+    TIERS,
+    TRACKS,
+    Product,
+    ProductOptions,
+    snapshot_holidays,
+)
 from app.missions.maps.snapshot import MapSnapshot, quality_of
+from app.missions.operations.crossovers import check_of, crossovers_view
 from app.missions.operations.mission_maps import export, map_tiles, newest_map
+from app.missions.operations.uncertainty_budget import uncertainty_budget
 from app.missions.spec.base import Name
+from app.missions.views.crossovers import CrossoversView
 from app.missions.views.map import LayerView, MapView, ProductView, QualityView
+from app.missions.views.uncertainty import UncertaintyBudgetView
 
 router = APIRouter(
     prefix=f"{API}/missions/{{mission_id}}",
     tags=["maps"],
     responses=problems("unauthenticated", "forbidden", "mission-not-found", "map-not-ready", "invalid-request"),
 )
+
+OVERLAY = "overlay.png"
+"""The file that has a path of its own: it is of one layer."""
 
 MAX_VALUE_M = 20_000.0
 """No sea is deeper."""
@@ -42,11 +62,7 @@ _Order = Annotated[Order, Query(description="Order of IHO S-44 that the TVU is c
 
 def _by_extension(resource: str) -> dict[str, str]:
     """Return the names of a resource's files by their extensions."""
-    return {
-        kind.extension: name
-        for name, kind in PRODUCTS.items()
-        if kind.resource == resource and "." not in kind.extension
-    }
+    return {kind.extension: name for name, kind in PRODUCTS.items() if kind.resource == resource and name != OVERLAY}
 
 
 async def _file_options(
@@ -145,7 +161,7 @@ async def get_map(
 
 
 @router.get(
-    "/map.overlay.png",
+    f"/map.{OVERLAY}",
     operation_id="getMapOverlay",
     summary="See the map as a transparent picture",
     response_class=Response,
@@ -233,6 +249,86 @@ async def get_quality(service: Service, reader: Reader, mission: Mission) -> Qua
     return await asyncio.to_thread(quality_of, await newest_map(mission, service.maps))
 
 
+@router.get("/uncertainty-budget", operation_id="getUncertaintyBudget", summary="See where uncertainty comes from")
+async def get_uncertainty_budget(service: Service, reader: Reader, mission: Mission) -> UncertaintyBudgetView:
+    """Return what each source of error adds to soundings of swath sonars, straight down and at 45 and 60 degrees.
+
+    It is computed for level ground at the mean depth of the newest map, from the mission's `uncertainty`.
+    """
+    snapshot = await newest_map(mission, service.maps, patient=False)
+    return await asyncio.to_thread(uncertainty_budget, mission, snapshot)
+
+
+@router.get(
+    "/holidays",
+    operation_id="getHolidays",
+    summary="See what swath sonars missed",
+    response_class=Response,
+    responses=problems("conflict")
+    | _NOT_MODIFIED
+    | {200: {"content": {GEOJSON: {}}, "description": "A FeatureCollection with the map's `version`"}},
+)
+async def get_holidays(
+    service: Service, state: State, reader: Reader, mission: Mission, if_none_match: _IfNoneMatch = None
+) -> Response:
+    """Return the outline of each holiday of the newest map with its `number`, largest first, area and middle."""
+    snapshot = await newest_map(mission, service.maps, patient=False)
+    tag = _tag(state, snapshot, (), "holidays")
+    if _matches(tag, if_none_match):
+        return _not_modified(tag)
+    return Response(await asyncio.to_thread(snapshot_holidays, snapshot), media_type=GEOJSON, headers=_caching(tag))
+
+
+@router.get(
+    "/crosslines",
+    operation_id="getCrosslines",
+    summary="See how well the survey agrees with itself",
+    response_model=CrossoversView,
+    responses=problems("pings-unreadable") | _NOT_MODIFIED,
+)
+async def get_crosslines(
+    service: Service,
+    state: State,
+    reader: Reader,
+    mission: Mission,
+    order: _Order = Order.ORDER_1A,
+    if_none_match: _IfNoneMatch = None,
+) -> Response:
+    """Return what the depths of lines differ where they cross, and crosslines' beams from the grid of the main lines.
+
+    Tide and sound speed are applied. Lines are found in the vehicles' ways: one ends at a gap or a turn. The worst
+    crossings are listed as GeoJSON. While the mission runs, the answer may be of an earlier map than the newest.
+    """
+    snapshot = await newest_map(mission, service.maps, patient=False)
+    found = await check_of(mission, snapshot)
+    tag = f'"{mission.id}-{state.run_id}-{found.tag}-crossovers{order}"'
+    if _matches(tag, if_none_match):
+        return _not_modified(tag)
+    content = await asyncio.to_thread(lambda: crossovers_view(found, snapshot, order).model_dump_json())
+    return Response(content, media_type="application/json", headers=_caching(tag))
+
+
+@router.get(
+    "/crossovers.csv",
+    operation_id="getCrossoversFile",
+    summary="Download the crossings",
+    response_class=Response,
+    responses=problems("pings-unreadable")
+    | {
+        200: {
+            "content": {"text/csv": {"schema": {"type": "string"}}},
+            "description": "A row for each crossing, the worst beside what the order allows first",
+        }
+    },
+)
+async def get_crossovers_file(
+    service: Service, reader: Reader, mission: Mission, order: _Order = Order.ORDER_1A
+) -> Response:
+    """Return where lines cross as a file, all crossings."""
+    options = ProductOptions(order)
+    return file_answer(await export(mission, service.maps, service.settings.provider, "crossovers.csv", options))
+
+
 @router.get("/products", operation_id="listProducts", summary="List the files", responses=problems("mission-not-found"))
 async def list_products(reader: Reader, mission: Mission) -> list[ProductView]:
     """Return every file that can be downloaded, with its path."""
@@ -243,10 +339,12 @@ async def list_products(reader: Reader, mission: Mission) -> list[ProductView]:
             title=kind.title,
             media_type=kind.media_type,
             href=f"{base}/{kind.resource}.{kind.extension}",
-            needs_map=MAP in kind.needs,
+            needs_map=not {MAP, CROSSOVERS}.isdisjoint(kind.needs),
         )
         for name, kind in PRODUCTS.items()
-        if SEARCH not in kind.needs or mission.spec.search is not None
+        if (SEARCH not in kind.needs or mission.spec.search is not None)
+        and (SWATHS not in kind.needs or mission.has_swath_sonars)
+        and (TIERS not in kind.needs or mission.spec.coverage.cell_of_depth is not None)
     ]
 
 
@@ -260,6 +358,18 @@ def file_answer(product: Product) -> Response:
             "Cache-Control": "no-cache",
         },
     )
+
+
+@router.get(
+    "/holidays.geojson",
+    operation_id="getHolidaysFile",
+    summary="Download the holidays",
+    response_class=Response,
+    responses=problems("conflict") | {200: {"content": {GEOJSON: {}}, "description": "A FeatureCollection"}},
+)
+async def get_holidays_file(service: Service, reader: Reader, mission: Mission) -> Response:
+    """Return what swath sonars missed as a file."""
+    return file_answer(await export(mission, service.maps, service.settings.provider, "holidays.geojson"))
 
 
 _FileOptions = Annotated[ProductOptions, Depends(_file_options)]
@@ -294,7 +404,7 @@ def _add_files(resource: str, operation_id: str, summary: str, description: str)
         operation_id=operation_id,
         summary=summary,
         response_class=Response,
-        responses=problems("mission-not-found", "map-not-ready", "format-not-found")
+        responses=problems("mission-not-found", "map-not-ready", "format-not-found", "conflict")
         | {
             200: {
                 "description": "; ".join(f"`.{ext}`: {PRODUCTS[name].title}" for ext, name in kinds.items()),

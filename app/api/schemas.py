@@ -139,7 +139,7 @@ class MeasurementBatch(BaseModel):
         },
     )
 
-    json_bounds: ClassVar = Bounds(values=500_000, texts=250_000)
+    json_bounds: ClassVar = Bounds(values=800_000, texts=250_000)
 
     items: Annotated[list[BatchItem], WrapValidator(_each_item)] = Field(min_length=1, max_length=MAX_BATCH)
 
@@ -180,6 +180,10 @@ class ComponentHealth(BaseModel):
     version: str = Field(description="Version of bathyfleet")
     components: dict[str, str] = Field(
         description="Each component: ok, or what is wrong with it", examples=[{"database": "ok", "imc": "ok"}]
+    )
+    compiling: bool = Field(
+        description="Whether what decisions and maps are computed with is still being compiled, as after the first "
+        "start on a machine: decisions are slow until then"
     )
 
 

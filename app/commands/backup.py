@@ -25,6 +25,7 @@ def backup(
 ) -> None:
     """Copy the database to a file while the service goes on writing, and check the copy."""
     from app.storage.backup import BackupError, back_up, contents_of
+    from app.storage.ping_files import PingFiles
 
     if verify is not None and file is not None:
         raise typer.BadParameter("check a backup or write one, not both", param_hint="--verify")
@@ -33,7 +34,8 @@ def backup(
             _tell(verify, contents_of(verify), "is sound")
             return
         settings = command_settings(database_url=database)
-        path, contents = back_up(settings.database_url, file or Path("backups"))
+        files = PingFiles.beside(settings.database_url, settings.pings_url)
+        path, contents = back_up(settings.database_url, file or Path("backups"), files)
     except BackupError as error:
         raise CommandError(str(error), error.remedy) from None
     # In the database, not in the copy: a copy of everything is worth an audit entry.
@@ -50,10 +52,12 @@ def restore(
 ) -> None:
     """Put a backup in the database's place, after checking it. Stop the service first."""
     from app.storage.backup import BackupError, restore_to
+    from app.storage.ping_files import PingFiles
 
     settings = command_settings(database_url=database)
     try:
-        contents, aside = restore_to(settings.database_url, file, replace=replace)
+        files = PingFiles.beside(settings.database_url, settings.pings_url)
+        contents, aside = restore_to(settings.database_url, file, replace=replace, pings=files)
     except BackupError as error:
         raise CommandError(str(error), error.remedy) from None
     asyncio.run(noted(settings, "restore", str(file)))
@@ -70,17 +74,20 @@ def prune(
     """Remove missions that ended long ago, with everything measured in them, and give the space back."""
     settings = command_settings(database_url=database)
     from app.storage.database import Database as Store
+    from app.storage.ping_files import PingFiles
     from app.storage.prepare import prepare_database
-    from app.storage.retention import Ended, ended_before, give_space_back, remove
+    from app.storage.retention import Ended, ended_before, finish_removing, give_space_back, remove
 
     async def run() -> tuple[list[Ended], str]:
         await prepare_database(settings.database_url, may_upgrade=settings.migrates_itself)
         store = Store(settings.database_url)
+        files = PingFiles.beside(settings.database_url, settings.pings_url)
         try:
+            await finish_removing(store, files)
             found = await ended_before(store, days)
             if not apply:
                 return found, ""
-            removed = [mission for mission in found if await remove(store, mission.id, days)]
+            removed = [mission for mission in found if await remove(store, mission.id, days, files)]
             for mission in removed:
                 await noted(settings, "prune", f"{mission.name}, ended {mission.ended:%Y-%m-%d}", mission.id)
             return removed, await give_space_back(settings.database_url)
@@ -105,4 +112,5 @@ def prune(
 def _tell(file: Path, contents: "Contents", what: str) -> None:
     counts = ", ".join(f"{count} {table}" for table, count in contents.rows.items() if count)
     known = f": revision {contents.revision}, {counts or 'no rows'}" if contents.revision else ""
-    typer.echo(f"{file} {what} ({contents.size_bytes} bytes){known}")
+    pings = f", and {contents.ping_files} files of pings" if contents.ping_files else ""
+    typer.echo(f"{file} {what} ({contents.size_bytes} bytes){known}{pings}")

@@ -2,6 +2,7 @@
 
 import asyncio
 from concurrent.futures import Executor, Future
+from contextlib import suppress
 
 import structlog
 
@@ -10,13 +11,16 @@ from app.estimation import Sensor, SingleBeam
 from app.exploration.planners import warm_up_planner
 from app.exploration.survey.local_search import warm_up as warm_up_search
 from app.mapping.gp import warm_up as warm_up_maps
+from app.mapping.quality.crossovers import warm_up as warm_up_crossings
 from app.missions.spec.mission import PlannerSpec
 
 log = structlog.get_logger(__name__)
 
 
 class Compilation:
-    """Compiles in the background: first the default planner, then what maps need, other planners when they are named.
+    """Compiles in the background: first the default planner, then what maps need, then what looks for crossings.
+
+    Other planners are compiled when they are named.
 
     A vehicle's first waypoint needs a planner and no map. A failure is logged: what is missing is then compiled when
     it is first used, and tells what is wrong with it.
@@ -41,6 +45,11 @@ class Compilation:
         """Return when a planner is compiled for a sensor."""
         await asyncio.wait([asyncio.wrap_future(self._planner(name, sensor))])
 
+    @property
+    def done(self) -> bool:
+        """Whether the default planner and what maps need are compiled, or the service ends."""
+        return self._maps.done()
+
     async def maps(self) -> None:
         """Return when the default planner and what maps need are compiled."""
         await asyncio.wait([asyncio.wrap_future(self._maps)])
@@ -59,7 +68,12 @@ class Compilation:
             self._maps.cancel()
             return
         begun.add_done_callback(_log_failure)
-        begun.add_done_callback(lambda _: self._maps.set_result(None))
+        begun.add_done_callback(lambda _: self._begin_checks())
+
+    def _begin_checks(self) -> None:
+        self._maps.set_result(None)
+        with suppress(RuntimeError):  # the service ends
+            self._executor.submit(warm_up_crossings).add_done_callback(_log_failure)
 
 
 def _warm_up_later() -> None:

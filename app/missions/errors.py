@@ -51,6 +51,14 @@ class SoundingNotFoundError(MissionError):
     """There is no such sounding in the mission."""
 
 
+class PingsNotFoundError(MissionError):
+    """The mission has no such file of pings."""
+
+
+class PingsUnreadableError(MissionError):
+    """A file of pings is missing or damaged."""
+
+
 class MapNotReadyError(MissionError):
     """No sounding was accepted yet, so there is no map."""
 

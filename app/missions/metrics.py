@@ -4,6 +4,8 @@ from prometheus_client import Counter, Gauge, Histogram
 
 STEPS = Counter("bathyfleet_steps_total", "Committed mission steps")
 SOUNDINGS = Counter("bathyfleet_soundings_total", "Soundings by verdict", ["verdict"])
+PINGS = Counter("bathyfleet_pings_total", "Pings of swath sonars by verdict", ["verdict"])
+BEAMS = Counter("bathyfleet_beams_total", "Beams of accepted pings that detected something")
 PLANNING_SECONDS = Histogram(
     "bathyfleet_planning_seconds",
     "Time to make the map and decide one step",

@@ -43,6 +43,8 @@ from app.storage import missions as mission_queries
 from app.storage.database import Database
 from app.storage.fast_read import AtOnce
 from app.storage.models import MissionRow
+from app.storage.ping_files import PingFiles
+from app.storage.retention import finish_removing
 
 WORKERS = 2
 
@@ -104,7 +106,10 @@ class MissionService:
         self._runs = self._supervisor.runs
         self.team_changes = TeamChanges(self.hub, self._claims, self._supervisor)
         """Vehicles that join missions and leave them."""
-        self._registry = MissionRegistry(database, self.hub, self._executor, self.maps, settings.time_scale)
+        self._ping_files = PingFiles.beside(settings.database_url, settings.pings_url)
+        self._registry = MissionRegistry(
+            database, self.hub, self._executor, self.maps, self._ping_files, settings.time_scale
+        )
         self.process = Ownership(database, url, certificate)
         """This process among those that share the database."""
         self._failover = Failover(database, self.hub, self.process, self._registry, self._supervisor, self._claims)
@@ -119,6 +124,7 @@ class MissionService:
     async def startup(self) -> None:
         """Open the links, join the processes that share the database and go on with missions that nobody has."""
         self._compilation.begin()
+        await finish_removing(self._database, self._ping_files)
         await self.hub.start()
         self._registry.share(self.process, self._failover.may_take_up, self._failover.resume)
         await self._failover.begin()
@@ -140,6 +146,11 @@ class MissionService:
         self._executor.shutdown(wait=True, cancel_futures=True)
         self.forecaster.close()
         self._at_once.close()
+
+    @property
+    def compiling(self) -> bool:
+        """Whether what missions compute with is still being compiled."""
+        return not self._compilation.done
 
     async def ready(self) -> tuple[bool, dict[str, str]]:
         """Tell whether requests can be served, and how each component is."""

@@ -147,6 +147,11 @@ class ServiceSettings(Section):
         default="sqlite+aiosqlite:///bathyfleet.db",
         description="SQLAlchemy URL: sqlite+aiosqlite:///FILE or postgresql+asyncpg://USER:PASSWORD@HOST/NAME",
     )
+    pings_url: str = Field(
+        default="",
+        description="Where files of swath sonars' pings are kept: a folder, or a URL of fsspec such as "
+        "s3://bucket/pings; empty: the folder pings beside SQLite's file, with PostgreSQL in the working directory",
+    )
     time_scale: float = Field(
         default=1.0, gt=0, le=1000, description="How much faster than wall time simulated vehicles live"
     )

@@ -41,6 +41,15 @@ class CommittedLeg:
     """Whether it brings its vehicle up for a fix."""
 
 
+@dataclass(frozen=True, slots=True)
+class Swath:
+    """How far a ping met the bottom to port and to starboard, metres; ``time_s`` by the vehicle's clock."""
+
+    time_s: float
+    port_m: float
+    starboard_m: float
+
+
 @dataclass
 class Withdrawal:
     """A vehicle surveys no more, for now or for good.
@@ -80,6 +89,8 @@ class Member:
     slot: int
     capabilities: LinkCapabilities = field(default_factory=LinkCapabilities)
     report: VehicleReport | None = None
+    swath: Swath | None = None
+    """What its swath sonar saw last."""
     heard_s: float | None = None
     """When that was, Unix seconds by the service's clock."""
     flown: Flown = field(default_factory=Flown)

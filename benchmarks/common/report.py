@@ -53,6 +53,17 @@ Every section is written by the command that stands in it (`--write`). Vehicles 
 share the cores of one machine.
 """,
 )
+COVERAGE = Page(
+    "coverage.md",
+    """# Full coverage with swath sonars: what was measured
+
+Every section is written by the command that stands in it (`--write`). Simulated time, no network; turns are flown, and
+the team's kilometres count from its start in the south-western corner. Each leg is decided 2.5 s before the last one
+ends. It is kinder than the sea: vehicles fly exactly where they are sent, nothing drifts, and every beam within range
+and aperture detects the bottom. Beams are evenly spaced on a flat bottom, and the speed lets two pings meet each cell.
+The floors called *own*, and seed 0 of the *unseen* ones, were looked at while the planner was made.
+""",
+)
 PLANNING = Page(
     "planning.md",
     """# Planners: what was measured

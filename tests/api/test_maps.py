@@ -1,9 +1,11 @@
 """The map as JSON, picture and files."""
 
 import io
+import zipfile
 from collections.abc import Callable
 from typing import Any
 
+import h5py
 import httpx
 import numpy as np
 import pytest
@@ -115,6 +117,7 @@ FILES = {
     "tracks.geojson": ("application/geo+json", b"{"),
     "tracks.kml": ("application/vnd.google-earth.kml+xml", b"<?xml"),
     "tracks.gpx": ("application/gpx+xml", b"<?xml"),
+    "crossovers.csv": ("text/csv", b"#"),
 }
 
 
@@ -135,10 +138,59 @@ async def test_every_file_is_downloaded_under_its_name(client: httpx.AsyncClient
 
 async def test_the_list_of_files_is_complete_and_every_path_answers(client: httpx.AsyncClient, measured: str) -> None:
     listed = {entry["href"].rpartition("/")[2]: entry for entry in (await client.get(f"{measured}/products")).json()}
-    assert set(FILES) | {"map.overlay.png", "soundings.geojson"} == set(listed)
+    assert set(FILES) | {"map.overlay.png", "map.s102", "soundings.geojson"} == set(listed)
+    refused = {"soundings.geojson": 422, "s102": 409}
     for entry in listed.values():
         answer = await client.get(entry["href"].removeprefix("/api/v1"))
-        assert answer.status_code == (422 if entry["name"] == "soundings.geojson" else 200)
+        assert answer.status_code == refused.get(entry["name"], 200)
+
+
+async def test_a_chart_surface_asks_for_a_chart_datum(client: httpx.AsyncClient, measured: str) -> None:
+    answer = await client.get(f"{measured}/map.s102")
+    assert (answer.status_code, answer.json()["type"]) == (409, "urn:bathyfleet:problem:conflict")
+    assert "instantaneous water level" in answer.json()["detail"]
+    assert "5861" in answer.json()["remedy"]
+
+    await client.put(f"{measured}/tide", json={"level_m": 1.2, "source": "gauge"})
+    answer = await client.get(f"{measured}/map.s102")
+    assert (answer.status_code, answer.headers["content-type"]) == (200, "application/x-hdf5")
+    identity = measured.rpartition("/")[2][:4].upper()
+    assert answer.headers["content-disposition"] == f'attachment; filename="102BF00HARBOUR_{identity}.h5"'
+    with h5py.File(io.BytesIO(answer.content)) as file:
+        (record,) = file["QualityOfBathymetryCoverage/featureAttributeTable"][:]
+        depths = file["BathymetryCoverage/BathymetryCoverage.01/Group_001/values"]["depth"]
+        assert file.attrs["verticalDatum"] == 23
+    assert record["surveyDateRange.dateStart"] == record["surveyDateRange.dateEnd"] == b"20261121"
+    shown = (await client.get(f"{measured}/map")).json()
+    sounded = np.array(shown["depth_m"], float)[np.array(shown["sounded"])]
+    np.testing.assert_allclose(np.unique(depths[depths < 1e6]), np.unique(np.round(sounded, 2)), atol=0.011)
+
+
+async def test_cells_by_depth_are_files_of_missions_that_ask_for_them(client: httpx.AsyncClient, measured: str) -> None:
+    for name in ("map.vr.bag", "map.tiers.zip"):
+        answer = await client.get(f"{measured}/{name}")
+        assert (answer.status_code, answer.json()["type"]) == (409, "urn:bathyfleet:problem:conflict")
+        assert "cell_of_depth" in answer.json()["remedy"]
+
+    spec = mission_spec(cell_m=0.5, coverage={"cell_of_depth": 0.05})
+    path = f"/missions/{(await client.post('/missions', json=spec)).json()['id']}"
+    assert (await client.get(path)).json()["spec"]["coverage"]["cell_of_depth"] == 0.05
+    items = [item | {"depth_m": 1.5} for item in soundings(12)]  # from 9.5 to 10.6 m
+    await client.post(f"{path}/measurements", json={"items": items})
+    listed = {one["name"]: one["href"] for one in (await client.get(f"{path}/products")).json()}
+    bag = await client.get(listed["vr.bag"].removeprefix("/api/v1"))
+    assert bag.headers["content-disposition"] == 'attachment; filename="harbour-basin.vr.bag"'
+    with h5py.File(io.BytesIO(bag.content)) as file:
+        assert np.isin(file["BAG_root/varres_metadata"]["resolution_x"], (-1.0, 0.5, 1.0)).all()
+    archive = await client.get(listed["tiers.zip"].removeprefix("/api/v1"))
+    with zipfile.ZipFile(io.BytesIO(archive.content)) as file:
+        assert file.namelist() == ["harbour-basin-0.5m.tif", "harbour-basin-1m.tif"]
+        for name, cell_m in zip(file.namelist(), (0.5, 1.0), strict=True):
+            with rasterio.MemoryFile(file.read(name)) as memory, memory.open() as raster:
+                assert raster.res == (cell_m, cell_m)
+                count = raster.read(raster.descriptions.index("count") + 1, masked=True)
+                assert (count.compressed() > 0).all()
+                assert (raster.read(1, masked=True).mask == count.mask).all()
 
 
 async def test_tracks_and_soundings_need_no_map(client: httpx.AsyncClient, mission: dict[str, Any]) -> None:
@@ -187,4 +239,7 @@ async def test_a_format_that_is_not_made_lists_those_that_are(client: httpx.Asyn
     for extension in ("shp", "exe", "t" * 300):
         answer = await client.get(f"{measured}/map.{extension}")
         assert (answer.status_code, answer.json()["type"]) == (404, "urn:bathyfleet:problem:format-not-found")
-        assert answer.json()["remedy"] == "Use one of .tif, .nc, .bag, .xyz, .csv, .geojson, .kml, .png"
+        assert (
+            answer.json()["remedy"]
+            == "Use one of .tif, .nc, .bag, .vr.bag, .tiers.zip, .s102, .xyz, .csv, .geojson, .kml, .png"
+        )

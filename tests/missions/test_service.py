@@ -19,7 +19,7 @@ from sqlalchemy import event, select
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.problem import Proposal, Situation
 from app.exploration.planner.random_walk import RandomPlanner
-from app.exploration.planners import PLANNERS
+from app.exploration.planners import COVERERS, PLANNERS
 from app.missions.errors import (
     ConflictError,
     InvalidRequestError,
@@ -61,6 +61,9 @@ from tests.support.waiting import until
 
 S = MissionState
 
+REFUSED = {"s102": "chart datum", "vr.bag": "one size", "tiers.zip": "one size"}
+"""Files of a mission without tide and without cells by depth."""
+
 
 async def step_numbers(database: Database, mission_id: str) -> list[int]:
     async with database.reading() as session:
@@ -88,6 +91,13 @@ async def started(service: MissionService, spec: MissionSpec) -> str:
 
 
 # Life
+
+
+async def test_a_mission_with_a_described_multibeam_runs_to_its_end(service: MissionService) -> None:
+    vehicles = [{"name": "a", "kind": "sim", "sensor": "multibeam", "sonar": {"aperture_deg": 90, "beams": 32}}]
+    mission_id = await started(service, sim_spec(steps=3, vehicles=vehicles))
+    ended = await until_state(service, mission_id, S.FINISHED)
+    assert ended.progress.step == 3
 
 
 async def test_a_mission_from_start_to_products(service: MissionService, database: Database) -> None:
@@ -122,6 +132,10 @@ async def test_a_mission_from_start_to_products(service: MissionService, databas
     assert (view.rows, view.cols, view.step) == (15, 15, 6)
     for extension, kind in PRODUCTS.items():
         if kind.resource != "map":
+            continue
+        if extension in REFUSED:
+            with pytest.raises(ConflictError, match=REFUSED[extension]):
+                await export(await service.get(created.id), service.maps, service.settings.provider, extension)
             continue
         product = await export(await service.get(created.id), service.maps, service.settings.provider, extension)
         assert (product.filename, product.media_type) == (f"quay.{extension}", kind.media_type)
@@ -831,7 +845,7 @@ async def test_missions_are_listed_newest_first_and_survive_leaving_memory(servi
 async def test_readiness_and_planners(service: MissionService) -> None:
     assert await service.ready() == (True, {"links": "ok", "database": "ok"})
     planners = {planner.name: planner for planner in planner_views()}
-    assert set(planners) == set(PLANNERS)
+    assert set(planners) == {*PLANNERS, *COVERERS}
     assert all(planner.summary and "properties" in planner.options for planner in planners.values())
 
 

@@ -11,6 +11,9 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import ClassVar, Protocol
 
+import numpy as np
+from numpy.typing import NDArray
+
 from app.missions.spec.mission import MissionSpec, VehicleSpec
 from simulator.obstacles import ObstacleWorld
 
@@ -155,6 +158,27 @@ class ScanReport:
     source: str
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class PingReport:
+    """One ping of a swath sonar.
+
+    ``position`` is where the sonar was. Roll is positive with starboard down, pitch with the nose up, heading clockwise
+    from true north. ``angles_rad`` (b,) are the beams' angles across the track, from straight down in the vehicle and
+    positive to starboard; ``ranges_m`` (b,) their slant ranges, NaN where nothing was detected.
+    """
+
+    vehicle: str
+    time_s: float
+    position: Position
+    roll_rad: float
+    pitch_rad: float
+    heading_rad: float
+    angles_rad: NDArray[np.float32]
+    ranges_m: NDArray[np.float32]
+    source: str
+    position_sd_m: float | None = None
+
+
 @dataclass(frozen=True, slots=True)
 class WaypointOrder:
     """One waypoint for one vehicle, checked by :mod:`app.missions.safety` before it reaches a link.
@@ -236,6 +260,7 @@ FleetEvent = (
     | SoundingReport
     | RangeReport
     | ScanReport
+    | PingReport
     | WaypointReport
     | LinkReport
     | FaultReport

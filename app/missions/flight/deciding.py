@@ -9,11 +9,13 @@ import numpy as np
 
 from app.arrays import FloatArray
 from app.exploration.core.constraints import Constraints
+from app.exploration.core.coverage import SwathTask
 from app.exploration.core.problem import Belief, Planner
+from app.exploration.planners import COVERERS
 from app.exploration.site_search import SearchTask
 from app.missions import metrics
 from app.missions.clock import now
-from app.missions.flight.decision import Decision, Place, decide
+from app.missions.flight.decision import Decision, Place, decide, swath_task
 from app.missions.flight.step_maps import StepMaps
 from app.missions.live.mission import LiveMission
 from app.missions.team import Member
@@ -69,6 +71,9 @@ class Decider:
         await live.journal.storage.done(live.ranges.flush)
         targets = live.ranges.tracking.told(live.ranges.times.now_s(), step_s)
 
+        swath: SwathTask | None = None
+        sounders = [member.spec for member in live.team]
+
         def decided(number: int, here: list[Place], belief: Belief, sounded: tuple[FloatArray, FloatArray]) -> Decision:
             sounded_m, doubtful_m = sounded
             return decide(
@@ -84,9 +89,13 @@ class Decider:
                 targets,
                 task,
                 self.attempt,
+                swath,
             )
 
         def work() -> list[Decision]:
+            nonlocal swath
+            if live.spec.planner.name in COVERERS:
+                swath = swath_task(live.spec, sounders, live.builder.coverage())
             belief, sounded = live.builder.belief(), live.builder.sounded_at_m()
             decisions = [decided(number, places, belief, sounded)]
             here = moved_on(places, decisions[0])

@@ -1,6 +1,7 @@
 """One step's decision, from the situation to waypoints that may be sent. Pure apart from the planner's memory."""
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -8,8 +9,10 @@ from shapely.geometry import Polygon
 
 from app.arrays import FloatArray
 from app.estimation import Sensor, SingleBeam
+from app.estimation.swath import SwathSonar
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.constraints import Constraints
+from app.exploration.core.coverage import Coverage, SwathTask
 from app.exploration.core.detours import due_to_rise
 from app.exploration.core.dynamic import Localization, Targets
 from app.exploration.core.problem import Belief, Planner, Situation
@@ -18,7 +21,9 @@ from app.exploration.planners import create_planner
 from app.exploration.site_search import SearchTask
 from app.missions import safety
 from app.missions.search.course import hold_before_hazards
+from app.missions.spec import mission
 from app.missions.spec.mission import MissionSpec, SurfacePolicy, VehicleSpec
+from app.missions.spec.sonar import SwathSonarSpec
 
 NEARBY_OUTSIDE_M = 10.0
 """A vehicle that drifted or overshot this little is planned for as if it were at the border."""
@@ -97,6 +102,8 @@ class Decision:
     """Vehicles that leave the mapping for a target, with its name."""
     origin_m: dict[str, FloatArray] = field(default_factory=dict)
     """Where every vehicle was, (2,)."""
+    done: frozenset[str] = frozenset()
+    """Vehicles that would get a leg, and for which nothing is left to do as things stand."""
 
 
 def make_constraints(spec: MissionSpec) -> Constraints:
@@ -133,6 +140,21 @@ def make_planner(spec: MissionSpec, sensor: Sensor | None = None) -> PlannerBase
     return create_planner(spec.planner.name, options, SingleBeam() if sensor is None else sensor)
 
 
+def swath_task(spec: MissionSpec, vehicles: Iterable[VehicleSpec], coverage: Coverage) -> SwathTask:
+    """Return what the swath sonars of a mission's vehicles have to ensonify."""
+    sonars = {vehicle.name: sonar for vehicle in vehicles if (sonar := swath_sonar(vehicle)) is not None}
+    asked = spec.coverage
+    return SwathTask(coverage, sonars, asked.overlap_pct / 100.0, asked.crosslines_pct / 100.0)
+
+
+def swath_sonar(vehicle: VehicleSpec) -> SwathSonar | None:
+    """Return the swath sonar of a vehicle; None where it has none."""
+    if vehicle.sensor is not mission.Sensor.MULTIBEAM:
+        return None
+    sonar = vehicle.sonar or SwathSonarSpec()
+    return SwathSonar(math.radians(sonar.aperture_deg), sonar.beams, sonar.rate_hz, sonar.range_m, equidistant=False)
+
+
 def planned_way_m(spec: MissionSpec, left_m: float) -> float:
     """Return how much of the way that a vehicle has left is planned for, metres.
 
@@ -156,6 +178,7 @@ def decide(
     targets: Targets | None = None,
     search: SearchTask | None = None,
     attempt: int = 0,
+    swath: SwathTask | None = None,
 ) -> Decision:
     """Decide one step for the vehicles at ``places``; vehicles far outside the area are sent to its border.
 
@@ -163,7 +186,8 @@ def decide(
     from the water level: below the datum it leaves them less room; above it the room to spare is not used.
     ``doubtful_en_m`` (k, 2) is where the map left soundings out as outliers.
     ``targets`` are the mission's, in the order of its description. ``search`` is what a search knows of its site.
-    ``attempt``: how often the same legs were decided and not flown; chance then falls out otherwise.
+    ``attempt``: how often the same legs were decided and not flown; chance then falls out otherwise. ``swath`` is what
+    there is to ensonify, in a survey that plans by that.
     """
     polygon = Polygon(constraints.area)
     where = {place.vehicle: place.en_m for place in places}
@@ -228,6 +252,7 @@ def decide(
         search=search,
         moving=None if moving.all() else moving,
         left_m=None if np.isnan(left_m).any() else left_m,
+        swath=swath,
     )
     proposal = planner.propose(situation, np.random.default_rng([spec.seed, step, *([attempt] if attempt else [])]))
     proposed = np.where(moving[:, None], np.array(proposal.positions, dtype=float), origin)
@@ -237,6 +262,8 @@ def decide(
         proposed[i, 2] = safety.travel_depth_m(
             place.en_m, proposed[i, :2], place.cruise_depth_m, cautious, constraints.min_altitude_m
         )
+        clear_m = bottom.deepest_end_m(origin[i], proposed[i, :2] - origin[i, :2], constraints.min_altitude_m)
+        proposed[i, 2] = min(proposed[i, 2], max(float(clear_m), 0.0))
         if up[i]:
             # It goes on along its leg while it rises; the checks below are the same for it as for everyone.
             proposed[i, 2] = min(proposed[i, 2], max(origin[i, 2] - RISE_OF_STEP * constraints.max_step_m, 0.0))
@@ -259,11 +286,11 @@ def decide(
         )
         proposed[i, 2] = min(proposed[i, 2], depth_m)
     checked = safety.check_step(names, origin, proposed, constraints, bottom)
-    resting = {place.vehicle for place in team if not place.moving}
+    resting = {place.vehicle for place in team if not place.moving or place.vehicle in proposal.done}
     told = (checked.corrections | checked.refusals).items()
     notes += [f"{name}: {reason}" for name, reason in told if name not in resting]
     for i, place in enumerate(team):
-        if not place.moving:
+        if place.vehicle in resting:
             continue
         refusal = checked.refusals.get(place.vehicle, "")
         if not refusal and place.keeps_depth:
@@ -272,7 +299,16 @@ def decide(
         legs.append(Leg(place.vehicle, checked.positions[i], refusal, bool(up[i])))
     pursuits = {name: spec.targets[number].name for name, number in proposal.errands.items() if number >= 0}
     return Decision(
-        legs, proposal.objective, dict(proposal.terms), planner.snapshot(), notes, fixes, cautious, pursuits, where
+        legs,
+        proposal.objective,
+        dict(proposal.terms),
+        planner.snapshot(),
+        notes,
+        fixes,
+        cautious,
+        pursuits,
+        where,
+        frozenset(place.vehicle for place in team if place.moving and place.vehicle in proposal.done),
     )
 
 

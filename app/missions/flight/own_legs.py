@@ -12,6 +12,7 @@ import numpy as np
 
 from app.arrays import FloatArray
 from app.exploration.core.constraints import Constraints
+from app.exploration.planners import COVERERS
 from app.missions.flight.commit import LegCommit
 from app.missions.flight.deciding import DECIDE_AGAIN_S, Decider, moved_on, place_ahead
 from app.missions.flight.decision import Decision, Leg, Place, planned_way_m
@@ -31,6 +32,9 @@ AHEAD = 2
 AHEAD_WHEN_WATCHED = 1
 """The same where targets move, or vehicles come up by what they say of their position: decisions follow closer."""
 
+LEAD_S = 2.0
+"""So long before its last leg ends, by its clock, a vehicle gets another one where what it measures decides on that."""
+
 DECISIONS_AHEAD = 3.0
 """How many decisions' time a vehicle's legs last at least."""
 
@@ -41,6 +45,9 @@ PATIENCE = 1
 
 LEAST_WAY_M = 1.0
 """A vehicle with less way left is done."""
+
+SOON = 1.3
+"""Whose legs last no longer than so many times that gets one together with another that needs one."""
 
 HARDLY_BEGUN = 0.6
 """Part of a leg that may be left when its vehicle gets a leg together with another that needs one."""
@@ -78,7 +85,9 @@ class OwnLegs:
         self._waiting = waiting
         self._time_scale = time_scale
         self._watched = bool(live.spec.targets) or live.spec.surface_policy is not None
-        self._ahead = AHEAD_WHEN_WATCHED if self._watched else AHEAD
+        self._measured = live.spec.planner.name in COVERERS
+        """Whether legs follow from what was measured on those just before."""
+        self._ahead = 0 if self._measured else AHEAD_WHEN_WATCHED if self._watched else AHEAD
         self._taking_part = {member.name for member in live.team if member.legs}
         """Vehicles that go on with their own numbers: they had legs, and were not away since."""
         self._absent_since_s: dict[str, float] = {}
@@ -86,6 +95,8 @@ class OwnLegs:
         """How often in a row vehicles got no leg because of others."""
         self._again_at_s: dict[str, float] = {}
         """When vehicles that got no leg are looked at again, the event loop's time."""
+        self._done: set[str] = set()
+        """Vehicles for which nothing was left to do when all that was flown had been looked at."""
 
     async def fly(self, *, resumed: bool) -> str:
         """Fly until every vehicle has used up its way; returns why nobody goes on.
@@ -107,7 +118,8 @@ class OwnLegs:
         finally:
             sending.cancel()
             await asyncio.gather(sending, return_exceptions=True)
-        return "every step is done"
+        left = any(self._wants_legs(member) for member in self._live.team.surveying)
+        return "nothing is left to ensonify" if left and self._done else "every step is done"
 
     async def _until_needed(self, sending: asyncio.Task[None]) -> None:
         if sending.done():
@@ -117,6 +129,8 @@ class OwnLegs:
         # Vehicles come nearer to the end of their legs without telling anything new.
         fastest_mps = max((self._spec.speed_of(member.spec) for member in self._live.team), default=1.0)
         soon_s = now_s + 0.5 * self._spec.limits.max_step_m / (fastest_mps * self._time_scale)
+        if self._measured:
+            soon_s = min(soon_s, now_s + 0.2 * self._lead_s)
         # The map is made while vehicles fly, decided for or not.
         self._maps.begin()
         await self._waiting.until(
@@ -130,14 +144,17 @@ class OwnLegs:
         names = {member.name for member in getting}
         numbers = {member.name: self._next_number(member) for member in getting}
         places = [self._place(member, moving=member.name in names) for member in live.team.present]
+        # What vehicles measure on legs that they are still to fly may leave something to do.
+        all_flown = not any((m.ordered or m.ahead) and not m.misses for m in live.team.present)
         planner = self._decider.planner
         memory, committed = planner.snapshot(), False
         self._decider.attempt = max(self._refusals.get(name, 0) for name in names)
         decisions = await self._decider.decide_to_fly(max(numbers.values()), places, legs=self._legs_at_once(getting))
         self._taking_part |= names
         self._again_at_s = {name: at_s for name, at_s in self._again_at_s.items() if name not in names}
-        if not decisions:
-            self._look_later(names)
+        done = names & frozenset().union(*(decision.done for decision in decisions[:1]))
+        self._done = (self._done - names) | done if all_flown else set()
+        self._look_later(names if not decisions else done)
         for later, decision in enumerate(decisions):
             starts = {place.vehicle: place.en_m for place in places}
             places = moved_on(places, decision)
@@ -196,7 +213,8 @@ class OwnLegs:
         if self._watched:
             return 1
         fastest_mps = max(self._spec.speed_of(member.spec) for member in self._live.team)
-        way_m = DECISIONS_AHEAD * self._decider.takes_s * self._time_scale * fastest_mps
+        way_m = (self._lead_s if self._measured else DECISIONS_AHEAD * self._decider.takes_s) * self._time_scale
+        way_m *= fastest_mps
         idle = any(not member.ordered and not member.ahead for member in getting)
         return min(max(math.ceil(way_m / self._spec.limits.max_step_m), 1 + self._ahead * idle), MOST_AHEAD)
 
@@ -236,7 +254,7 @@ class OwnLegs:
         return None
 
     def _place(self, member: Member, *, moving: bool) -> Place:
-        left_m = planned_way_m(self._spec, member.way_left_m(self._spec))
+        left_m = planned_way_m(self._spec, member.way_left_m(self._spec)) if self._wants_legs(member) else 0.0
         energy_m = self._range.beyond_m(member)
         if energy_m is not None:
             left_m = min(left_m, energy_m)
@@ -267,11 +285,22 @@ class OwnLegs:
     def _needs_leg(self, member: Member) -> bool:
         if not member.ordered and not member.ahead:
             return True
+        if self._measured:
+            return self._lasts_s(member) < self._lead_s
         if len(member.ahead) < self._ahead:
             return True
         return not self._watched and self._lasts_s(member) < DECISIONS_AHEAD * self._decider.takes_s
 
+    @property
+    def _lead_s(self) -> float:
+        """How long before a vehicle's legs end the next one is decided, on the wall clock, where they are measured."""
+        # A vehicle rather circles for a slow decision than gets all the next ones from what is not measured yet.
+        shortest_s = LEAD_S / self._time_scale
+        return shortest_s + DECISIONS_AHEAD * min(self._decider.takes_s, shortest_s)
+
     def _will_need_leg(self, member: Member) -> bool:
+        if self._measured:
+            return self._lasts_s(member) < SOON * self._lead_s
         left_m = self._left_of_leg_m(member)
         return len(member.ahead) <= self._ahead and left_m <= HARDLY_BEGUN * self._spec.limits.max_step_m
 
@@ -288,7 +317,7 @@ class OwnLegs:
     def _over(self) -> bool:
         """Whether everybody has flown its way; who does not get on, or is out of reach for long, keeps nobody."""
         team = self._live.team.surveying
-        left = [m for m in team if self._wants_legs(m) or m.ordered or m.ahead]
+        left = [m for m in team if (self._wants_legs(m) and m.name not in self._done) or m.ordered or m.ahead]
         if not left:
             return bool(list(self._live.team))
         somebody_is_done = any(m.present for m in team if m not in left)

@@ -69,6 +69,7 @@ class StepMaps:
         await live.journal.flush()
         await live.notice_imports()
         await live.whole.complete()
+        await live.swath.complete()
         if patient and live.builder.stale and (self._due or live.builder.newest is None):
             await self._make()
 
@@ -83,6 +84,7 @@ class StepMaps:
         started_s = loop.time()
         await live.journal.flush()
         await live.whole.complete()
+        await live.swath.complete()
         before = live.builder.newest
         built = await loop.run_in_executor(self._executor, live.builder.build)
         if built is not None and built is not before:

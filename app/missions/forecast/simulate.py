@@ -125,7 +125,9 @@ def _fly_over(
     stop: Callable[[], bool],
 ) -> Flown:
     until = time.thread_time() + budget_s
-    builder = MapBuilder(spec.local_area(), forecast_cell_m(spec), spec.accuracy_m)
+    builder = MapBuilder(
+        spec.local_area(), forecast_cell_m(spec), spec.accuracy_m, cell_of_depth=spec.coverage.cell_of_depth
+    )
     builder.arrivals.replace(np.zeros((0, 4)), prior)
     builder.build()
     steps = max(spec.steps - first_step + 1, 0)

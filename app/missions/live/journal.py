@@ -5,8 +5,8 @@ A sounding counts as accepted only when the transaction that stores it has commi
 
 import asyncio
 import math
-from collections.abc import Awaitable, Callable, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Awaitable, Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
 from itertools import pairwise
 from typing import Any, TypeVar
 
@@ -14,13 +14,15 @@ import numpy as np
 import structlog
 from sqlalchemy.ext.asyncio import AsyncSession
 
+from app.mapping.swath.pings import Pings
 from app.missions import metrics
 from app.missions.clock import now
-from app.missions.fleet.interface import ScanReport, SoundingReport, VehicleReport, WaypointReport
+from app.missions.fleet.interface import PingReport, ScanReport, SoundingReport, VehicleReport, WaypointReport
 from app.missions.large_batches import made_of
 from app.missions.live.broadcast import Broadcaster
 from app.missions.live.db_retry import DatabaseRetry
 from app.missions.live.write_behind import Committed, WriteBehind
+from app.missions.pings.store import JudgedBatch, PingStore, TakenPings
 from app.missions.soundings.corrections import NO_LEVEL, PlacedSounding
 from app.missions.soundings.gate import Gate
 from app.missions.views.messages import EventMessage
@@ -41,7 +43,7 @@ METRES_PER_DEGREE = 111_320.0
 TakeScans = Callable[[Sequence[ScanReport], int, AsyncSession], Awaitable[tuple[list[ItemVerdict], Committed]]]
 """Stores scans of a step in a transaction; returns the verdicts and what to call once it has committed."""
 
-Noted = SoundingReport | ScanReport | VehicleReport | WaypointReport | VehicleSample | EventRow
+Noted = SoundingReport | PingReport | ScanReport | VehicleReport | WaypointReport | VehicleSample | EventRow
 """What a journal writes; of a vehicle's report its place."""
 
 T = TypeVar("T")
@@ -51,10 +53,18 @@ log = structlog.get_logger(__name__)
 
 @dataclass(frozen=True, slots=True)
 class Counts:
-    """Soundings of a mission so far."""
+    """What a mission measured so far: soundings, and pings of swath sonars with their beams."""
 
     accepted: int = 0
     rejected: int = 0
+    pings: int = 0
+    """Accepted ones."""
+    beams: int = 0
+    rejected_pings: int = 0
+
+    def of_soundings(self, accepted: int, rejected: int) -> "Counts":
+        """Return the same with other numbers of soundings."""
+        return replace(self, accepted=accepted, rejected=rejected)
 
 
 class Journal(WriteBehind[Noted]):
@@ -64,6 +74,10 @@ class Journal(WriteBehind[Noted]):
     ----------
     on_accepted
         Called with every committed batch of accepted soundings, shape (n, 4): east, north, depth, sd.
+    pings
+        Keeps pings.
+    on_pings
+        Called with the accepted pings, by vehicle, of every transaction that committed.
     on_trouble
         Called when the database cannot be used any more, or can be again.
     take_scans
@@ -78,6 +92,8 @@ class Journal(WriteBehind[Noted]):
         counts: Counts,
         broadcaster: Broadcaster,
         on_accepted: Callable[[np.ndarray[Any, np.dtype[np.float64]]], None],
+        pings: PingStore,
+        on_pings: Callable[[Mapping[str, Pings]], None],
         on_trouble: Callable[[], None],
         take_scans: TakeScans | None = None,
     ) -> None:
@@ -87,6 +103,8 @@ class Journal(WriteBehind[Noted]):
         self._gate = gate
         self._broadcaster = broadcaster
         self._on_accepted = on_accepted
+        self._pings = pings
+        self._on_pings = on_pings
         self._take_scans = take_scans
         self.counts = counts
         self.travelled_m = 0.0
@@ -99,6 +117,10 @@ class Journal(WriteBehind[Noted]):
 
     def sounding(self, report: SoundingReport) -> None:
         """Note a sounding; it is written within a moment."""
+        self._note(report)
+
+    def ping(self, report: PingReport) -> None:
+        """Note a ping; it is written within a moment."""
         self._note(report)
 
     def scan(self, report: ScanReport) -> None:
@@ -142,6 +164,8 @@ class Journal(WriteBehind[Noted]):
 
     async def _store(self, noted: Sequence[Noted], session: AsyncSession) -> Committed:
         gated, new = await self._store_soundings(session, _of(SoundingReport, noted))
+        pings = _of(PingReport, noted)
+        _, pinged = await self.take_pings([await self._pings.judge(pings)] if pings else [], session)
         _, seen = await self.take_scans(_of(ScanReport, noted), session)
         positions = [position_row(self._mission_id, report) for report in _of(VehicleReport, noted)]
         await mission_queries.add_positions(session, positions)
@@ -157,11 +181,42 @@ class Journal(WriteBehind[Noted]):
 
         def committed() -> None:
             self._count(gated, new)
+            pinged()
             seen()
             for row in rows:
                 self.tell(row)
 
         return committed
+
+    async def take_pings(
+        self, batches: Sequence[JudgedBatch], session: AsyncSession
+    ) -> tuple[Sequence[ItemVerdict], Committed]:
+        """Store pings in the caller's transaction; the caller holds ``writing``.
+
+        Returns
+        -------
+        The verdicts in the order of the batches and in theirs, and what to call once the transaction has committed.
+        """
+        if not batches:
+            return [], lambda: None
+        taken = await self._pings.take(batches, self.step, session)
+        return taken.verdicts, lambda: self._count_pings(taken)
+
+    def _count_pings(self, taken: TakenPings) -> None:
+        new, counts = taken.totals, self.counts
+        self.counts = replace(
+            counts,
+            pings=counts.pings + new.pings,
+            beams=counts.beams + new.beams,
+            rejected_pings=counts.rejected_pings + new.rejected,
+        )
+        metrics.PINGS.labels(Verdict.ACCEPTED).inc(new.pings)
+        metrics.PINGS.labels(Verdict.REJECTED).inc(new.rejected)
+        metrics.PINGS.labels(Verdict.DUPLICATE).inc(sum(v.verdict is Verdict.DUPLICATE for v in taken.verdicts))
+        metrics.BEAMS.inc(new.beams)
+        self._pings.committed(taken)
+        if taken.accepted:
+            self._on_pings(taken.accepted)
 
     async def take_scans(
         self, reports: Sequence[ScanReport], session: AsyncSession
@@ -273,7 +328,7 @@ class Journal(WriteBehind[Noted]):
         no_level = next((item.reason for item in fresh if item.reason.startswith(NO_LEVEL)), "")
         if no_level and not self._told_of_missing_level:
             self._told_of_missing_level, self._untold = True, no_level.removeprefix(NO_LEVEL)
-        self.counts = Counts(self.counts.accepted + len(accepted), self.counts.rejected + rejected)
+        self.counts = self.counts.of_soundings(self.counts.accepted + len(accepted), self.counts.rejected + rejected)
         metrics.SOUNDINGS.labels(Verdict.ACCEPTED).inc(len(accepted))
         metrics.SOUNDINGS.labels(Verdict.REJECTED).inc(rejected)
         metrics.SOUNDINGS.labels(Verdict.DUPLICATE).inc(len(gated) - len(fresh))

@@ -2,6 +2,7 @@
 
 import asyncio
 from concurrent.futures import Executor
+from dataclasses import replace
 from functools import partial
 
 from app.mapping.tides import parse_tid
@@ -24,10 +25,16 @@ from app.storage import stored_maps
 from app.storage import telemetry as telemetry_queries
 from app.storage.database import Database
 from app.storage.models import MissionRow, PositionRow, TideTableRow
+from app.storage.ping_files import PingFiles
 
 
 async def take_up(
-    database: Database, hub: FleetHub, executor: Executor, row: MissionRow, time_scale: float = 1.0
+    database: Database,
+    hub: FleetHub,
+    executor: Executor,
+    row: MissionRow,
+    ping_files: PingFiles,
+    time_scale: float = 1.0,
 ) -> LiveMission:
     """Return the mission of a row, with its vehicles, its newest waypoints, its map and how far it had come."""
     async with database.reading() as session:
@@ -54,7 +61,10 @@ async def take_up(
     counts = Counts(stored.accepted, stored.rejected)
     # Which cells lie in the area is quick to tell of hundreds, and holds everyone up of millions.
     builder = await asyncio.to_thread(builder_of, spec)
-    live = LiveMission(database, hub, executor, row, spec, counts, table, time_scale, search, builder)
+    live = LiveMission(database, hub, executor, row, spec, counts, ping_files, table, time_scale, search, builder)
+    async with database.reading() as session:
+        pinged = await live.pings.open(session)
+    live.journal.counts = replace(counts, pings=pinged.pings, beams=pinged.beams, rejected_pings=pinged.rejected)
     if spec.targets:
         await loop.run_in_executor(executor, tracking_warm_up)
         async with database.reading() as session:

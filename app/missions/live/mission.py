@@ -2,19 +2,21 @@
 
 import asyncio
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from datetime import datetime
 from functools import partial
 from typing import Any, TypeVar
 
+import numpy as np
 import structlog
 from shapely.geometry import Polygon
 
 from app.arrays import FloatArray
 from app.estimation import Sensor, SingleBeam
 from app.mapping.georeference import LocalFrame
+from app.mapping.swath.pings import Pings, reach_m
 from app.mapping.tides import TideTable
 from app.missions.clock import now
 from app.missions.fleet.hub import FleetHub
@@ -22,6 +24,7 @@ from app.missions.fleet.interface import (
     FleetEvent,
     LinkReport,
     LinkState,
+    PingReport,
     RangeReport,
     RestartReport,
     ScanReport,
@@ -38,6 +41,7 @@ from app.missions.live.journal import Counts, Journal
 from app.missions.live.range_journal import RangeJournal
 from app.missions.live.remaining import remaining
 from app.missions.live.sounding_store import SoundingStore
+from app.missions.live.swath_intake import SwathIntake
 from app.missions.live.trails import Trails
 from app.missions.live.vehicles import VehicleViews, local_place
 from app.missions.live.waypoints import WaypointViews
@@ -45,6 +49,8 @@ from app.missions.maps.builder import BuiltMap, MapBuilder
 from app.missions.maps.live_grid import map_of
 from app.missions.maps.snapshot import NOT_MADE, MapSnapshot, MissionFacts
 from app.missions.maps.tiles import TileCache
+from app.missions.pings.gate import PingGate
+from app.missions.pings.store import PingStore
 from app.missions.recovery.energy import Energy
 from app.missions.recovery.failsafes import STRENGTH
 from app.missions.search.progress import progress_of
@@ -54,10 +60,11 @@ from app.missions.soundings.corrections import Corrections
 from app.missions.soundings.gate import Gate
 from app.missions.spec.failsafes import Response
 from app.missions.spec.mission import MissionSpec, VehicleSpec
+from app.missions.spec.mission import Sensor as SensorName
 from app.missions.states import AT_SEA, ENDED, MissionState
 from app.missions.targets.filters import TargetFilters
 from app.missions.targets.views import target_views
-from app.missions.team import Member, Team, Withdrawal
+from app.missions.team import Member, Swath, Team, Withdrawal
 from app.missions.views.messages import StateMessage
 from app.missions.views.mission import Level, MissionSummary, Progress
 from app.missions.views.search import SearchProgress
@@ -66,6 +73,7 @@ from app.storage import events as event_queries
 from app.storage import soundings as sounding_queries
 from app.storage.database import Database
 from app.storage.models import MissionRow
+from app.storage.ping_files import PingFiles
 from app.storage.single_flight import Shared
 
 LONGEST_GAP_S = 60.0
@@ -134,6 +142,7 @@ class LiveMission:
         row: MissionRow,
         spec: MissionSpec,
         counts: Counts,
+        ping_files: PingFiles,
         tide_table: TideTable | None = None,
         time_scale: float = 1.0,
         search: Search | None = None,
@@ -163,6 +172,9 @@ class LiveMission:
         """Set whenever a vehicle reported something that the flight may be waiting for."""
         self.search = search
         """What a mission of kind search knows of its site."""
+        self.pings = PingStore(database, row.id, PingGate(self.frame, self.gate.outside), ping_files)
+        """All its pings."""
+        self.builder.swath.place = corrections.beams
         take_scans = None if self.search is None else partial(take, self.search, row.id, self.changed.set)
         self.journal = Journal(
             database,
@@ -171,9 +183,13 @@ class LiveMission:
             counts,
             self.broadcaster,
             self._take_soundings,
+            self.pings,
+            self._take_pings,
             self.publish_summary,
             take_scans,
         )
+        self.swath = SwathIntake(self.builder.swath, self.pings, self.journal)
+        """Pings on their way into the map."""
         self.whole = SoundingStore(database, row.id, self.builder, self.journal)
         """All its soundings, and its map as it is stored."""
         self.ranges = RangeJournal(database, row.id, TargetFilters(spec, self.frame), self.journal, time_scale)
@@ -225,11 +241,21 @@ class LiveMission:
         async def read() -> Counts:
             async with self.database.reading() as session:
                 counted = await sounding_queries.counts(session, self.id)
+                pinged = await self.pings.open(session)
             self.whole.changed(newest_import=newest)
-            return Counts(counted.get("accepted", 0), counted.get("rejected", 0))
+            self.swath.correct(self.gate.corrections)
+            return Counts(
+                counted.get("accepted", 0), counted.get("rejected", 0), pinged.pings, pinged.beams, pinged.rejected
+            )
 
         await self.journal.count_again(read)
         self.publish_summary()
+
+    @property
+    def has_swath_sonars(self) -> bool:
+        """Whether pings came, or can come."""
+        carried = any(member.spec.sensor is SensorName.MULTIBEAM for member in self.team)
+        return carried or self.journal.counts.pings > 0
 
     @property
     def running(self) -> bool:
@@ -256,6 +282,7 @@ class LiveMission:
         """Correct soundings anew, as the database has them now; the caller holds the journal's ``writing``."""
         self.spec = spec
         self.gate.corrections = corrections
+        self.swath.correct(corrections)
         self.recount(counts)
         self.journal.tell_of_missing_level()
         self.revision += 1
@@ -300,6 +327,9 @@ class LiveMission:
                     self.ranges.times.heard(event.vehicle, event.time_s)
             case SoundingReport():
                 self.journal.sounding(event)
+                return
+            case PingReport():
+                self.journal.ping(event)
                 return
             case ScanReport():
                 self.journal.scan(event)
@@ -429,17 +459,24 @@ class LiveMission:
     async def build_map(self) -> BuiltMap | None:
         """Make the map of everything accepted so far as thoroughly as for a product, in a worker thread."""
         await self.whole.complete()
+        await self.swath.complete()
         before = self.builder.newest
         built = await self.in_thread(partial(self.builder.build, thorough=True))
         if built is not None and built is not before:
             self.publish_map(built)
+            self.publish_summary()
         return built
+
+    @property
+    def map_is_missing(self) -> bool:
+        """Whether something was measured that is in no map yet."""
+        unmapped = self.builder.newest is None and self.journal.counts.pings > 0
+        return self.builder.stale or self.swath.behind or (unmapped and self.swath.unread)
 
     async def map_what_is_stored(self) -> None:
         """Make the map of a mission that was just taken up, and tell everyone who watches how far it has come."""
-        if self.builder.stale:
+        if self.map_is_missing:
             await self.build_map()
-            self.publish_summary()
             await self.whole.keep(self.header.step, ended=self.header.state in ENDED)
 
     async def in_thread(self, work: Callable[..., Made], *arguments: Any) -> Made:
@@ -483,6 +520,18 @@ class LiveMission:
         self.builder.add(soundings)
         self.telling.of_soundings(len(soundings), self.header.step)
 
+    def _take_pings(self, pings: Mapping[str, Pings]) -> None:
+        """Take in committed pings by their vehicle."""
+        self.swath.add(pings)
+        if not self.running:
+            # No flight makes maps: one is made for who asks.
+            self.telling.of_soundings(sum(some.beams for some in pings.values()), self.header.step)
+        for vehicle, some in pings.items():
+            member, last = self.team.get(vehicle), some.take(slice(-1, None))
+            reached = reach_m(last)
+            if member is not None and np.isfinite(reached).all():
+                member.swath = Swath(float(last.time_s[0]), *reached[0].tolist())
+
     def publish_map(self, built: BuiltMap) -> None:
         """Tell everyone who watches that there is a new map."""
         self.telling.of_map(built, self.header.step)
@@ -500,18 +549,24 @@ class LiveMission:
     def progress(self) -> Progress:
         """Return how far the mission has come."""
         built = self.builder.newest
-        header = self.header
+        header, counts = self.header, self.journal.counts
         loop_time = asyncio.get_running_loop().time()
         running_s = loop_time - self.running_since_s if self.running_since_s is not None else 0.0
         left = remaining(self.spec, self.team)
+        swept = self.builder.ensonified()
         return Progress(
             step=header.step,
             steps=self.spec.steps,
             budget=self.spec.budget,
             minutes_left=left.minutes,
             km_left_per_vehicle=left.km_per_vehicle,
-            soundings=self.journal.counts.accepted,
-            rejected=self.journal.counts.rejected,
+            soundings=counts.accepted,
+            rejected=counts.rejected + counts.rejected_pings,
+            pings=counts.pings,
+            beams=counts.beams,
+            ensonified_pct=None if swept is None else swept.ensonified_pct,
+            dense_pct=None if swept is None else swept.dense_pct,
+            holidays=None if swept is None else len(swept.holidays),
             distance_m=self.journal.travelled_m,
             coverage_pct=self.builder.coverage_pct(),
             remaining_pct=self.builder.remaining_pct(),
@@ -574,6 +629,7 @@ class LiveMission:
         self.telling.stop()
         self.ranges.abandon()
         self.journal.abandon()
+        self.pings.abandon()
         self.broadcaster.end(why)
 
     async def close(self) -> None:
@@ -581,6 +637,7 @@ class LiveMission:
         await self.telling.close()
         await self.ranges.close()
         await self.journal.close()
+        await self.pings.close()
         await self.whole.close(self.header.step)
 
 
@@ -598,4 +655,11 @@ def place_of(place_m: FloatArray) -> tuple[float, float]:
 
 def builder_of(spec: MissionSpec) -> MapBuilder:
     """Return the builder of a mission's map, which knows of no sounding yet."""
-    return MapBuilder(spec.local_area(), spec.cell_m, spec.accuracy_m, live=True)
+    return MapBuilder(
+        spec.local_area(),
+        spec.cell_m,
+        spec.accuracy_m,
+        live=True,
+        cell_of_depth=spec.coverage.cell_of_depth,
+        errors=spec.uncertainty,
+    )

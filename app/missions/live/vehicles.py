@@ -8,11 +8,14 @@ from typing import Any
 from app.mapping.georeference import LocalFrame
 from app.missions.clock import now
 from app.missions.fleet.hub import FleetHub
-from app.missions.fleet.interface import LinkState, Position, VehicleInfo
+from app.missions.fleet.interface import LinkState, Position, VehicleInfo, VehicleReport
 from app.missions.recovery.failsafes import with_reserve_s
 from app.missions.spec.mission import MissionSpec, SurfacePolicy
-from app.missions.team import Member, Team
+from app.missions.team import Member, Swath, Team
 from app.missions.views.mission import FailsafeView, PositionQuality, VehicleView
+
+SWATH_KEPT_S = 5.0
+"""By its vehicle's clock, how long a ping is shown."""
 
 
 class VehicleViews:
@@ -98,6 +101,7 @@ class VehicleViews:
                 "speed_mps": rounded(report.speed_mps, 3),
                 "battery_pct": rounded(report.battery_pct, 2),
                 "position_sd_m": rounded(report.position_sd_m, 3),
+                "swath_m": _swath_m(member.swath, report),
                 "localization": _position_quality(report.position_sd_m, self._spec.surface_policy),
             }
         )
@@ -126,6 +130,13 @@ class VehicleViews:
         if known is None or known[0] is not position:
             known = self._places[name] = position, local_place(self._frame, position)
         return known[1]
+
+
+def _swath_m(swath: Swath | None, report: VehicleReport) -> tuple[float, float] | None:
+    """Return how far a sonar reaches to port and to starboard, as long as it is about what it reached last."""
+    if swath is None or abs(report.time_s - swath.time_s) > SWATH_KEPT_S:
+        return None
+    return round(swath.port_m, 2), round(swath.starboard_m, 2)
 
 
 def _position_quality(sd_m: float | None, policy: SurfacePolicy | None) -> PositionQuality:

@@ -11,13 +11,18 @@ import shapely
 from shapely.geometry import Polygon
 
 from app.arrays import BoolArray, FloatArray
+from app.estimation.uncertainty import SoundingErrors
+from app.exploration.core.coverage import Coverage
 from app.exploration.core.problem import Belief
 from app.mapping.fusion import fuse, prior_map
 from app.mapping.gp import GaussianProcessMap
 from app.mapping.outliers import flag_outliers
+from app.mapping.swath.ensonified import Ensonified, ensonified
+from app.mapping.swath.gridded import is_of_swaths, without_guesses
 from app.mapping.types import BathymetricMap, Grid, SoundingRows, Soundings
 from app.missions.maps.live_grid import LiveGrid
 from app.missions.maps.queue import MapQueue, Replacement
+from app.missions.maps.swath_grid import SwathGrid
 
 MAX_LANDMARKS = 4000
 """More landmarks make planning slower, not better: neighbouring cells are almost the same question."""
@@ -101,11 +106,25 @@ class MapBuilder:
         Corners of a polygon, east and north.
     live
         Also keep the interpolation that takes every sounding in at once.
+    cell_of_depth
+        The share of its depth that each place's cell is judged by in surveys with swath sonars; None: all are judged
+        by ``cell_m``.
+    errors
+        Of swath sonars' soundings; None: the usual ones.
     """
 
-    def __init__(self, area: FloatArray, cell_m: float, accuracy_m: float, *, live: bool = False) -> None:
+    def __init__(
+        self,
+        area: FloatArray,
+        cell_m: float,
+        accuracy_m: float,
+        *,
+        live: bool = False,
+        cell_of_depth: float | None = None,
+        errors: SoundingErrors | None = None,
+    ) -> None:
         self.grid, self.mask = make_grid(area, cell_m)
-        self._accuracy_m = accuracy_m
+        self._accuracy_m, self._cell_of_depth = accuracy_m, cell_of_depth
         stride = int(np.ceil(np.sqrt(max(self.mask.sum(), 1) / MAX_LANDMARKS)))
         self._nodes = np.zeros_like(self.mask)
         self._nodes[stride // 2 :: stride, stride // 2 :: stride] = True
@@ -116,6 +135,11 @@ class MapBuilder:
         self.arrivals = MapQueue()
         self.live = LiveGrid(self.grid, self.mask) if live else None
         """What came since the newest map was made; None: nobody asks for it."""
+        self.swath = SwathGrid(self.grid, self.mask, errors or SoundingErrors(), cell_of_depth)
+        """What swath sonars have ensonified."""
+        self._beams_mapped = 0
+        self._believed: BathymetricMap | None = None
+        """The newest map with depths where it shows none; None: the map as it is."""
         self._soundings = np.zeros((0, 4))
         # Those that an operator restored: they are no outliers whatever their neighbours say.
         self._trusted = np.zeros(0, dtype=bool)
@@ -129,6 +153,7 @@ class MapBuilder:
         self._replaced_mapped = 0
         self._version = 0
         self._shares: tuple[BuiltMap | None, float, float] = (None, 0.0, 100.0)
+        self._ensonified: Ensonified | None = None
         # Counts how often all soundings were replaced: what is learned meanwhile of the old ones is void.
         self._generation = 0
 
@@ -143,7 +168,7 @@ class MapBuilder:
     def show(self, built: BuiltMap, doubted: Doubted) -> None:
         """Begin with a map that was stored, and with what it left out; its soundings stay where they are stored."""
         self._version = built.version
-        self._newest, self._doubted = built, doubted
+        self._newest, self._doubted, self._believed = built, doubted, None
         self.arrivals.rest()
 
     def release(self) -> None:
@@ -173,7 +198,7 @@ class MapBuilder:
     @property
     def stale(self) -> bool:
         """Whether there are soundings that the newest map does not hold."""
-        return bool(self.arrivals)
+        return bool(self.arrivals) or self.swath.beams != self._beams_mapped
 
     def build(self, *, thorough: bool = False) -> BuiltMap | None:
         """Make a map of everything added so far; None without soundings.
@@ -190,13 +215,15 @@ class MapBuilder:
             self._take_in(came[0])
             if self.live is not None and (generation != self._generation or self.live.outgrown(len(self._soundings))):
                 self.live.begin_anew(self._soundings, upto)
-            if not len(self._soundings) and self._prior is None:
+            beams = self.swath.beams
+            if not len(self._soundings) and self._prior is None and not beams:
                 self._newest = None
                 return None
             if thorough:
                 self.learn(always=True)
-            if came[0] or (self._newest is not None and thorough):
+            if came[0] or beams != self._beams_mapped or (self._newest is not None and thorough):
                 self._newest = self._build(thorough=thorough)
+                self._beams_mapped = beams
                 self._replaced_mapped = came[1]
                 if self.live is not None:
                     self.live.settle(upto)
@@ -223,12 +250,18 @@ class MapBuilder:
 
     def _build(self, *, thorough: bool) -> BuiltMap:
         bathymetry = self._prior
-        if len(self._soundings):
+        measured = self.swath.map(self._soundings) if self.swath.beams else None
+        if measured is None and len(self._soundings):
             measured = self._measured()
+        if measured is not None:
             bathymetry = measured if bathymetry is None else fuse(measured, bathymetry)
         if bathymetry is None:
             raise ValueError("there is no sounding to make a map of")
         bathymetry = self._with_margin(bathymetry)
+        # Vehicles rather believe a guess than nothing; people are shown none.
+        self._believed = bathymetry
+        if is_of_swaths(bathymetry) and self._prior is None:
+            bathymetry = without_guesses(bathymetry)
         digest = digest_of(bathymetry)
         self._version += 1
         return BuiltMap(self._version, len(self._soundings), bathymetry, digest, thorough)
@@ -320,8 +353,22 @@ class MapBuilder:
             return None, 0.0, 100.0
         if built is not self._shares[0]:
             known = built.map.known(self._accuracy_m)
-            self._shares = built, float(100.0 * known[self.mask].mean()), float(100.0 * (~known[self._nodes]).mean())
+            shares = float(100.0 * known[self.mask].mean()), float(100.0 * (~known[self._nodes]).mean())
+            self._ensonified = ensonified(built.map, self._cell_of_depth)
+            if self._ensonified is not None:
+                shares = self._ensonified.ensonified_pct, 100.0 - self._ensonified.ensonified_pct
+            self._shares = built, *shares
         return self._shares
+
+    def ensonified(self) -> Ensonified | None:
+        """Return how far a survey with swath sonars has come; None where nothing of one is in the newest map."""
+        self._counted()
+        return self._ensonified
+
+    def coverage(self) -> Coverage:
+        """Return what swath sonars have to ensonify and have, on cells that lines are planned on."""
+        prior = self._prior
+        return self.swath.coverage(None if prior is None else prior.depth_m)
 
     def belief(self) -> Belief:
         """Return what is known at the landmarks (a lattice of the grid's cells)."""
@@ -336,11 +383,12 @@ class MapBuilder:
                 weight=np.ones(n),
                 correlation_length_m=extent / 5,
             )
-        bathymetry = self._newest.map
+        bathymetry = self._believed or self._newest.map
+        sd_m = bathymetry.planning_sd_m[self._nodes]
         return Belief(
             xy_m=self._nodes_xy,
             depth_m=bathymetry.depth_m[self._nodes],
-            sd_m=bathymetry.planning_sd_m[self._nodes],
+            sd_m=np.where(np.isnan(sd_m), np.inf, sd_m),
             # Not latched as in AURO15: more soundings may show that a map was too sure of itself.
             accurate=bathymetry.known(self._accuracy_m)[self._nodes],
             weight=bathymetry.roughness[self._nodes],
@@ -353,6 +401,9 @@ class MapBuilder:
         What came since the newest map was begun counts as sounded.
         """
         places = np.concatenate([self._soundings, *self.arrivals.noted()])[:, :2]
+        if self.swath.beams and self._newest is not None:
+            seen = self._nodes & self._newest.map.sounded
+            return np.concatenate([places, self.grid.centres_m[seen.ravel()]]), np.zeros((0, 2))
         rejected = self._learned.rejected[: len(places)]
         doubtful = np.zeros(len(places), dtype=bool)
         doubtful[: len(rejected)] = rejected

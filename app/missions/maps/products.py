@@ -2,6 +2,7 @@
 
 import csv
 import io
+import zipfile
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from datetime import datetime
@@ -12,20 +13,26 @@ from shapely.geometry import Polygon, mapping
 
 from app import __version__
 from app.csv_cells import text_cell
-from app.mapping.layers import file_layers
+from app.mapping.layers import LayerSource, file_layers
 from app.mapping.products.bag import bag
 from app.mapping.products.contours import Contour, contours_geojson, find_contours
+from app.mapping.products.crossovers import crossovers_csv
 from app.mapping.products.crowdsourced import Provider, RawSounding, crowdsourced_geojson
 from app.mapping.products.geotiff import geotiff
+from app.mapping.products.holidays import holidays_geojson
 from app.mapping.products.kml import contours_kml, tracks_kml
 from app.mapping.products.netcdf import netcdf
 from app.mapping.products.overlay import overlay_png
 from app.mapping.products.picture import picture_png
+from app.mapping.products.s102 import SurveyFacts, file_name, s102
 from app.mapping.products.text import map_xyz, soundings_xyz
 from app.mapping.products.tracks import Track, tracks_geojson, tracks_gpx
-from app.mapping.s44 import Order
+from app.mapping.products.vr_bag import vr_bag
+from app.mapping.quality.survey import SurveyCheck
+from app.mapping.s44 import Order, thu_m
+from app.mapping.tiers import tiers
 from app.mapping.types import Soundings
-from app.missions.errors import InvalidRequestError, MapNotReadyError
+from app.missions.errors import ConflictError, InvalidRequestError, MapNotReadyError
 from app.missions.maps.snapshot import MapSnapshot, MissionFacts
 from app.missions.search.obstacles import obstacles_geojson
 from app.missions.search.state import Search
@@ -35,9 +42,23 @@ from app.storage.models import SoundingRow
 CONTOURS_PER_MAP = 10
 CONTOUR_INTERVALS_M = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0)
 
-MAP, SOUNDINGS, TRACKS, SEARCH = "map", "soundings", "tracks", "search"
+MAP, SOUNDINGS, TRACKS, SEARCH, SWATHS, SURVEY, TIERS, CROSSOVERS = (
+    "map",
+    "soundings",
+    "tracks",
+    "search",
+    "swaths",
+    "survey",
+    "tiers",
+    "crossovers",
+)
 """What files are made of."""
 
+
+NOT_SOUNDED = ("no cell of the map was sounded", "wait for soundings inside of the area")
+
+ZIP_EPOCH = (1980, 1, 1, 0, 0, 0)
+"""The same content is the same archive."""
 
 GEOJSON, KML, TEXT, CSV = (
     "application/geo+json",
@@ -70,6 +91,18 @@ class ProductOptions:
 
 
 @dataclass(frozen=True)
+class Surveyed:
+    """When a mission's soundings were made, and the largest deviation of a position that they state.
+
+    All None without soundings, the last one also where some state none.
+    """
+
+    first_time_s: float | None = None
+    last_time_s: float | None = None
+    position_sd_m: float | None = None
+
+
+@dataclass(frozen=True)
 class Material:
     """What files are made of; only what the kind needs is there."""
 
@@ -80,6 +113,8 @@ class Material:
     soundings: Sequence[SoundingRow] = ()
     tracks: Sequence[Track] = ()
     search: Search | None = None
+    surveyed: Surveyed = Surveyed()
+    crossovers: SurveyCheck | None = None
 
     @property
     def snapshot(self) -> MapSnapshot:
@@ -117,6 +152,8 @@ class ProductKind:
         What has to be loaded to make it.
     of_vehicle
         Whether it holds what one vehicle measured.
+    filename
+        Returns what it is saved as, where a standard says so; None: the mission's name.
     """
 
     resource: str
@@ -126,6 +163,7 @@ class ProductKind:
     make: Callable[[Material, ProductOptions], bytes]
     needs: Collection[str]
     of_vehicle: bool = False
+    filename: Callable[[MissionFacts], str] | None = None
 
     @property
     def name(self) -> str:
@@ -159,6 +197,60 @@ def _netcdf(material: Material, options: ProductOptions) -> bytes:
 def _bag(material: Material, _: ProductOptions) -> bytes:
     facts = material.facts
     return bag(material.snapshot.built.map, facts.frame, vertical_datum=facts.vertical_datum, title=facts.title)
+
+
+def _s102(material: Material, _: ProductOptions) -> bytes:
+    facts, surveyed, bathymetry = material.facts, material.surveyed, material.snapshot.built.map
+    if facts.vertical_datum.s100 is None:
+        raise ConflictError(
+            f"S-102 asks for a chart datum, and depths are below {facts.vertical_datum.statement}",
+            "state the tide with one of its datums, for example datum_epsg 5861 (LAT depth)",
+        )
+    if not (bathymetry.sounded.any() or bathymetry.prior is not None):
+        raise ConflictError(*NOT_SOUNDED)
+    swept = material.snapshot.ensonified()
+    position_sd_m = surveyed.position_sd_m
+    survey = SurveyFacts(
+        source_id=f"{facts.title} ({facts.mission_id})",
+        authority="" if material.provider is None else material.provider.organization,
+        first_time_s=surveyed.first_time_s,
+        last_time_s=surveyed.last_time_s,
+        position_95_m=None if position_sd_m is None else float(thu_m(np.array(position_sd_m))),
+        common_sd_m=facts.common_sd_m,
+        full_coverage=swept is not None and swept.full_coverage,
+    )
+    return s102(bathymetry, facts.frame, survey, vertical_datum=facts.vertical_datum, issued=material.created)
+
+
+def _vr_bag(material: Material, _: ProductOptions) -> bytes:
+    facts, bathymetry = material.facts, material.snapshot.built.map
+    share = _cell_of_depth(material)
+    return vr_bag(bathymetry, share, facts.frame, vertical_datum=facts.vertical_datum, title=facts.title)
+
+
+def _tiers(material: Material, options: ProductOptions) -> bytes:
+    """Return a GeoTIFF of each tier in one archive; they are compressed by themselves."""
+    facts = material.facts
+    archive = io.BytesIO()
+    with zipfile.ZipFile(archive, "w") as file:
+        for tier in tiers(material.snapshot.built.map, _cell_of_depth(material)):
+            layers = file_layers(LayerSource(tier.map, options.order, facts.common_sd_m))
+            content = geotiff(tier.map, layers, facts.frame, vertical_datum=facts.vertical_datum)
+            name = zipfile.ZipInfo(f"{_slug(facts.spec.name)}-{tier.map.grid.cell_m:g}m.tif", ZIP_EPOCH)
+            file.writestr(name, content)
+    return archive.getvalue()
+
+
+def _cell_of_depth(material: Material) -> float:
+    """Return the share of depth that cells are of. Raises ConflictError where there are no tiers."""
+    share = material.facts.spec.coverage.cell_of_depth
+    if share is None:
+        raise ConflictError(
+            "the mission has cells of one size", "create it with coverage.cell_of_depth, for example 0.05"
+        )
+    if not material.snapshot.built.map.sounded.any():
+        raise ConflictError(*NOT_SOUNDED)
+    return share
 
 
 def _map_xyz(material: Material, _: ProductOptions) -> bytes:
@@ -206,6 +298,25 @@ def _obstacles(material: Material, _: ProductOptions) -> bytes:
     if material.search is None:
         raise InvalidRequestError("format", "the mission is no search", "ask for another file")
     return obstacles_geojson(material.search, material.facts.frame)
+
+
+def _crossovers(material: Material, options: ProductOptions) -> bytes:
+    if material.crossovers is None:
+        raise MapNotReadyError("nothing was sounded yet", "start the mission or post measurements")
+    frame = material.facts.frame
+    return crossovers_csv(material.crossovers, frame, options.order, vertical_datum=material.datum)
+
+
+def snapshot_holidays(snapshot: MapSnapshot) -> bytes:
+    """Return the holidays of a map as GeoJSON. Raises ConflictError where it is not one of swaths."""
+    built, frame = snapshot.built, snapshot.facts.frame
+    swept = snapshot.ensonified()
+    if swept is None:
+        raise ConflictError(
+            "no swath sonar has measured in this mission, so nothing is known of holidays",
+            "send pings of a vehicle with sensor multibeam, or start a mission with one",
+        )
+    return holidays_geojson(swept.holidays, built.map.grid.cell_m, frame, version=built.version)
 
 
 def _local_track(facts: MissionFacts, track: Track) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
@@ -303,7 +414,32 @@ PRODUCTS = {
         ),
         ProductKind(MAP, "nc", "application/x-netcdf", "CF-NetCDF with every layer", _netcdf, {MAP}),
         ProductKind(
-            MAP, "bag", "application/x-bag", "Bathymetric Attributed Grid: elevation and uncertainty", _bag, {MAP}
+            MAP,
+            "bag",
+            "application/x-bag",
+            "Bathymetric Attributed Grid: elevation, uncertainty and numbers of soundings",
+            _bag,
+            {MAP},
+        ),
+        ProductKind(
+            MAP,
+            "vr.bag",
+            "application/x-bag",
+            "Bathymetric Attributed Grid of variable resolution: cells by depth",
+            _vr_bag,
+            {MAP, TIERS},
+        ),
+        ProductKind(
+            MAP, "tiers.zip", "application/zip", "a GeoTIFF of each tier of cells by depth", _tiers, {MAP, TIERS}
+        ),
+        ProductKind(
+            MAP,
+            "s102",
+            "application/x-hdf5",
+            "Bathymetric Surface for charts (IHO S-102 3.0): depth, uncertainty and quality",
+            _s102,
+            {MAP, SURVEY},
+            filename=lambda facts: file_name(facts.title, facts.mission_id),
         ),
         ProductKind(MAP, "xyz", TEXT, "longitude, latitude and depth of every cell", _map_xyz, {MAP}),
         ProductKind(MAP, "csv", CSV, EVERY_SOUNDING, _soundings_csv, {SOUNDINGS}),
@@ -342,6 +478,22 @@ PRODUCTS = {
             {TRACKS},
         ),
         ProductKind(
+            "holidays",
+            "geojson",
+            GEOJSON,
+            "what swath sonars missed inside of what was swept",
+            lambda m, _: snapshot_holidays(m.snapshot),
+            {MAP, SWATHS},
+        ),
+        ProductKind(
+            CROSSOVERS,
+            "csv",
+            CSV,
+            "where lines cross, with both depths and their difference",
+            _crossovers,
+            {CROSSOVERS},
+        ),
+        ProductKind(
             f"{SEARCH}/obstacles", "geojson", GEOJSON, "obstacles of the search, known and found", _obstacles, {SEARCH}
         ),
     )
@@ -360,6 +512,8 @@ def make_product(name: str, material: Material, options: ProductOptions) -> Prod
     """Return one file. Raises InvalidRequestError for an unknown format or options that cannot be."""
     kind = product_kind(name)
     content = kind.make(material, options)
+    if kind.filename is not None:
+        return Product(kind.filename(material.facts), kind.media_type, content)
     part = _only_vehicle(material.soundings, options.vehicle) if kind.of_vehicle else kind.part.removeprefix(MAP)
     return Product(f"{_slug(material.facts.spec.name)}{part and f'-{part}'}.{kind.extension}", kind.media_type, content)
 

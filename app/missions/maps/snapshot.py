@@ -12,6 +12,7 @@ from app.mapping.georeference import LocalFrame
 from app.mapping.layers import Layer, LayerSource
 from app.mapping.products.overlay import overlay_corners
 from app.mapping.s44 import Order, conformity
+from app.mapping.swath.ensonified import Ensonified, ensonified
 from app.mapping.vertical import VerticalDatum
 from app.missions.maps.builder import BuiltMap
 from app.missions.maps.live_grid import LiveCells, LiveGrid
@@ -86,7 +87,12 @@ class MapSnapshot:
             self.facts.spec.accuracy_m,
             self.reference_m,
             lambda: None if self.interpolation is None else self.interpolation.map(),
+            self.facts.spec.coverage.cell_of_depth,
         )
+
+    def ensonified(self) -> Ensonified | None:
+        """Return how far the survey has come; None where the map is not one of swaths."""
+        return ensonified(self.built.map, self.facts.spec.coverage.cell_of_depth)
 
     def header(self) -> dict[str, Any]:
         """Return which map it is, where it lies, and what its depths mean and are between."""
@@ -133,7 +139,14 @@ def quality_of(snapshot: MapSnapshot) -> QualityView:
     bathymetry = snapshot.built.map
     common_sd_m = snapshot.facts.common_sd_m
     found = [
-        conformity(bathymetry.depth_m, bathymetry.sd_m, bathymetry.sounded, order, common_sd_m=common_sd_m)
+        conformity(
+            bathymetry.depth_m,
+            bathymetry.sd_m,
+            bathymetry.sounded,
+            order,
+            common_sd_m=common_sd_m,
+            horizontal_sd_m=bathymetry.horizontal_sd_m,
+        )
         for order in Order
     ]
     return QualityView(

@@ -15,8 +15,8 @@ from shapely.geometry import Polygon
 
 from app.missions.clock import now
 from app.missions.errors import InvalidRequestError
-from app.missions.fleet.interface import SoundingReport, VehicleReport
-from app.missions.fleet.links.imc import bridge_settings, sounding_report, vehicle_report
+from app.missions.fleet.interface import PingReport, SoundingReport, VehicleReport
+from app.missions.fleet.links.imc import bridge_settings, ping_report, sounding_report, vehicle_report
 from app.missions.live.journal import TRACK_SPACING_M, position_row, track_length_m
 from app.missions.live.mission import LiveMission
 from app.missions.live.vehicles import local_place
@@ -28,17 +28,19 @@ from app.storage import missions as mission_queries
 from app.storage import soundings as sounding_queries
 from app.storage.models import BatchRow
 from app.storage.soundings import LOG_KEY
-from imc_bridge import Sounding, StateReport
+from imc_bridge import Sounding, StateReport, SwathPing
 from imc_bridge.logs import LogError, VehicleLog
 
 BATCH = 1000
 """Soundings and positions of one transaction. Batches already written are known by their number: never change it."""
+PING_BATCH = 500
+"""Pings of one transaction, which have batches of their own; never change it either."""
 HASH_BLOCK_BYTES = 1 << 20
 """Begin of the batches' keys; counts up when the same log gives other batches than before."""
 
 NAME: TypeAdapter[str] = TypeAdapter(Name)
 
-Report = SoundingReport | VehicleReport
+Report = SoundingReport | VehicleReport | PingReport
 Progress = Callable[[int, int], None]
 """Told how many bytes of the file are done, and how many it has."""
 
@@ -49,7 +51,10 @@ class Tally:
 
     verdicts: Counter[str] = field(default_factory=Counter)
     reasons: Counter[str] = field(default_factory=Counter)
+    pings: Counter[str] = field(default_factory=Counter)
+    """Verdicts on pings."""
     batches: int = 0
+    ping_batches: int = 0
     known: int = 0
     """Batches that an earlier import had written."""
     first_s: float | None = None
@@ -61,6 +66,18 @@ class Tally:
         self.reasons.update(answer["reasons"])
         self.batches += 1
         self.known += known
+
+    def add_pings(self, answer: dict[str, Any], *, known: bool) -> None:
+        """Count a batch of pings by the answer that is stored with it."""
+        self.pings.update(answer["pings"])
+        self.reasons.update(answer["reasons"])
+        self.ping_batches += 1
+        self.known += known
+
+    @property
+    def was_known(self) -> bool:
+        """Whether earlier imports had written all there is."""
+        return self.known == self.batches + self.ping_batches
 
     def span(self, time_s: float) -> None:
         """Note when something was measured."""
@@ -130,17 +147,19 @@ class LogImport:
         """Read the whole log; what is counted accepted is stored for good when this returns."""
         batches = self._batches()
         while batch := await asyncio.to_thread(next, batches, None):
-            await self._write(batch)
+            pings = [report for report in batch if isinstance(report, PingReport)]
+            await (self._write_pings(pings) if pings else self._write(batch))
             if progress is not None:
                 progress(self._log.file.read_bytes, self._log.file.size_bytes)
         if progress is not None:
             progress(self._log.file.size_bytes, self._log.file.size_bytes)
         view = self._view()
-        if self._tally.known < self._tally.batches:
+        if not self._tally.was_known:
+            also = f" and {view.pings} pings" if view.pings else ""
             await self._live.journal.log(
                 Level.INFO,
                 "import",
-                f"{view.soundings} soundings from {view.file}, the log of {view.vehicle}",
+                f"{view.soundings} soundings{also} from {view.file}, the log of {view.vehicle}",
                 actor=actor,
                 sha256=self._digest,
                 **view.model_dump(),
@@ -149,13 +168,14 @@ class LogImport:
 
     def _batches(self) -> Iterator[list[Report]]:
         batch: list[Report] = []
+        pings: list[Report] = []
         for report in self._reports():
-            batch.append(report)
-            if len(batch) == BATCH:
-                yield batch
-                batch = []
-        if batch:
-            yield batch
+            gathered, full = (pings, PING_BATCH) if isinstance(report, PingReport) else (batch, BATCH)
+            gathered.append(report)
+            if len(gathered) == full:
+                yield gathered.copy()
+                gathered.clear()
+        yield from (rest for rest in (batch, pings) if rest)
 
     def _reports(self) -> Iterator[Report]:
         """Yield every sounding, and the track near the area thinned like that of live telemetry."""
@@ -163,6 +183,8 @@ class LogImport:
         for event in self._log.events():
             if isinstance(event, Sounding):
                 yield sounding_report(event)
+            elif isinstance(event, SwathPing):
+                yield ping_report(event)
             elif isinstance(event, StateReport):
                 end = (event.lon_deg, event.lat_deg)
                 if last is None or track_length_m([last, end]) >= TRACK_SPACING_M:
@@ -198,6 +220,26 @@ class LogImport:
         committed()
         tally.add(answer, known=False)
 
+    async def _write_pings(self, pings: list[PingReport]) -> None:
+        live, tally = self._live, self._tally
+        for report in pings:
+            tally.span(report.time_s)
+        key = f"{self._key}-pings-{tally.ping_batches}"
+        judged = await live.pings.judge(pings)
+        async with live.journal.writing, live.database.writing() as session:
+            known = await sounding_queries.answer_to(session, live.id, key)
+            if known is not None:
+                tally.add_pings(known.answer, known=True)
+                return
+            verdicts, committed = await live.journal.take_pings([judged], session)
+            answer: dict[str, Any] = {
+                "pings": Counter(str(item.verdict) for item in verdicts),
+                "reasons": Counter(_general(v.reason) for v in verdicts if v.verdict is Verdict.REJECTED),
+            }
+            session.add(BatchRow(mission_id=live.id, key=key, digest=self._digest, answer=answer, created_at=now()))
+        committed()
+        tally.add_pings(answer, known=False)
+
     def _view(self) -> LogImportView:
         tally, file = self._tally, self._log.file
         return LogImportView(
@@ -206,6 +248,8 @@ class LogImport:
             soundings=tally.verdicts[Verdict.ACCEPTED],
             rejected=tally.verdicts[Verdict.REJECTED],
             duplicate=tally.verdicts[Verdict.DUPLICATE],
+            pings=tally.pings[Verdict.ACCEPTED],
+            pings_rejected=tally.pings[Verdict.REJECTED],
             reasons=dict(tally.reasons),
             refused=dict(self._log.refused),
             first_s=tally.first_s,
@@ -214,7 +258,7 @@ class LogImport:
             unreadable=self._log.faults,
             skipped_bytes=file.skipped_bytes,
             cut_off=file.cut_off,
-            known=tally.known == tally.batches and tally.batches > 0,
+            known=tally.was_known and tally.known > 0,
         )
 
 

@@ -8,16 +8,19 @@ from dataclasses import dataclass
 from datetime import timedelta
 from functools import partial
 
+import numpy as np
 import orjson
 from sqlalchemy.ext.asyncio import AsyncSession
 
 from app.mapping.georeference import LocalFrame
 from app.missions.clock import now
 from app.missions.errors import ConflictError, InvalidRequestError
-from app.missions.fleet.interface import BeamGeometry, Position, RangeReport, SoundingReport, VehicleReport
+from app.missions.fleet.interface import BeamGeometry, PingReport, Position, RangeReport, SoundingReport, VehicleReport
 from app.missions.large_batches import each_of, made_of
 from app.missions.live.mission import LiveMission
+from app.missions.pings.store import BEAMS_PER_ITEM, JudgedBatch
 from app.missions.soundings.measurement import Measurement
+from app.missions.spec.mission import Sensor
 from app.missions.states import MissionState
 from app.missions.targets.filters import Arrived
 from app.missions.views.soundings import BatchVerdict, ItemVerdict, Verdict, batch_verdict
@@ -28,6 +31,7 @@ from app.storage.soundings import LOG_KEY
 from imc_bridge.telemetry.soundings import Beam, StateSample, footprint
 
 MAX_BATCH = 10_000
+MAX_BATCH_BEAMS = 300_000
 
 KEYS_KEPT = timedelta(days=1)
 """For so long the answer to an idempotency key is given again."""
@@ -57,22 +61,30 @@ async def measure(
         raise ConflictError("the mission is a draft and takes no measurements yet", "add a vehicle to it first")
     if len(items) > MAX_BATCH:
         raise InvalidRequestError("items", f"{len(items)} items are too many", f"send at most {MAX_BATCH} at once")
-    digest, strangers, reports = await made_of(items, _looked_through, live, items)
+    beams = sum(len(item.beams.angles_deg) for item in items if item.beams is not None)
+    if beams > MAX_BATCH_BEAMS:
+        raise InvalidRequestError("items", f"{beams} beams are too many", f"send at most {MAX_BATCH_BEAMS} at once")
+    work = range(len(items) + beams // BEAMS_PER_ITEM)
+    digest, strangers, reports, pings = await made_of(work, _looked_through, live, items)
     ranges = _ranges(live, items, strangers)
     key = _Key.of(sender, idempotency_key) if idempotency_key is not None else None
-    batch = _Batch(items, key, digest, strangers, reports, ranges)
+    batch = _Batch(items, key, digest, strangers, reports, pings, ranges)
     return await live.part(_Intake).group(batch)
 
 
 def _looked_through(
     live: LiveMission, items: Sequence[Measurement]
-) -> tuple[str, dict[int, str], dict[int, SoundingReport]]:
-    """Return what a batch is known by, and by item why it is refused and its sounding; changes nothing."""
-    digest = hashlib.sha256(orjson.dumps([item.model_dump() for item in items])).hexdigest()
+) -> tuple[str, dict[int, str], dict[int, SoundingReport], "_Pings"]:
+    """Return what a batch is known by, and by item why it is refused, its sounding, and its pings; changes nothing."""
+    # Batches without beams are known by what they were known by before there were any.
+    dumped = [item.model_dump(exclude={"beams"} if item.beams is None else None) for item in items]
+    digest = hashlib.sha256(orjson.dumps(dumped)).hexdigest()
     near = _all_near(items, live.frame)
     strangers = {i: _stranger(live, item, near=near) for i, item in enumerate(items)}
     reports = {i: report for i, item in enumerate(items) if not strangers[i] and (report := _sounding(item))}
-    return digest, strangers, reports
+    pings = {i: ping for i, item in enumerate(items) if not strangers[i] and (ping := _ping(item))}
+    judged = live.pings.judge_here(list(pings.values()))
+    return digest, strangers, reports, _Pings(list(pings), judged)
 
 
 @dataclass(frozen=True)
@@ -93,14 +105,23 @@ class _Key:
 
 
 @dataclass(frozen=True)
+class _Pings:
+    """The pings of a batch as the gate judges them, and which of its items they are."""
+
+    items: Sequence[int]
+    judged: JudgedBatch
+
+
+@dataclass(frozen=True)
 class _Batch:
-    """A batch that was looked through: by item why it is refused, its sounding, its range to a target."""
+    """A batch that was looked through: by item why it is refused, its sounding, its ping, its range to a target."""
 
     items: Sequence[Measurement]
     key: _Key | None
     digest: str
     strangers: Mapping[int, str]
     reports: Mapping[int, SoundingReport]
+    pings: _Pings
     ranges: Mapping[int, Arrived]
 
     @property
@@ -196,9 +217,10 @@ async def _store(
     """Store batches that are new; returns their answers, and what is done once they are committed."""
     reports = [report for batch in batches for report in batch.reports.values()]
     on_reports, counted = await live.journal.take(reports, session)
-    verdicts, then, answers = iter(on_reports), [counted], []
+    on_pings, pinged = await live.journal.take_pings([b.pings.judged for b in batches if b.pings.items], session)
+    verdicts, ping_verdicts, then, answers = iter(on_reports), iter(on_pings), [counted, pinged], []
     for batch in batches:
-        taken = {i: next(verdicts) for i in batch.reports}
+        taken = {i: next(verdicts) for i in batch.reports} | {i: next(ping_verdicts) for i in batch.pings.items}
         if batch.ranges:
             on_ranges, used = await live.ranges.take(list(batch.ranges.values()), session)
             taken |= dict(zip(batch.ranges, on_ranges, strict=True))
@@ -241,6 +263,9 @@ def _stranger(live: LiveMission, item: Measurement, *, near: bool) -> str:
         polled = " or ".join(live.hub.polled)
         words = f"is of kind {member.spec.kind}; only vehicles of kind {polled} post measurements"
         return f"vehicle: {item.vehicle!r} {words}"
+    if item.beams is not None and member.spec.sensor is not Sensor.MULTIBEAM:
+        words = f"has sensor {member.spec.sensor}; only vehicles with sensor {Sensor.MULTIBEAM} send pings"
+        return f"beams: {item.vehicle!r} {words}"
     return ("" if near else _impossible_place(item, live.frame)) or _useless_range(item, live)
 
 
@@ -311,6 +336,25 @@ def _sounding(item: Measurement) -> SoundingReport | None:
         depth_sd_m=item.range_sd_m,
         position_sd_m=item.position_sd_m,
         beam_geometry=geometry,
+    )
+
+
+def _ping(item: Measurement) -> PingReport | None:
+    if item.beams is None or item.heading_deg is None:
+        return None
+    with np.errstate(over="ignore"):  # a range that is too large is none
+        ranges = np.array(item.beams.ranges_m, dtype=float).astype(np.float32)
+    return PingReport(
+        vehicle=item.vehicle,
+        time_s=item.time_s,
+        position=Position(item.lat_deg, item.lon_deg, item.depth_m),
+        roll_rad=math.radians(item.roll_deg),
+        pitch_rad=math.radians(item.pitch_deg),
+        heading_rad=math.radians(item.heading_deg),
+        angles_rad=np.radians(item.beams.angles_deg).astype(np.float32),
+        ranges_m=ranges,
+        source="rest",
+        position_sd_m=item.position_sd_m,
     )
 
 

@@ -10,22 +10,29 @@ from app.missions.live.mission import LiveMission
 from app.missions.live.sounding_store import accepted
 from app.missions.maps.builder import BuiltMap
 from app.missions.maps.products import (
+    CROSSOVERS,
     MAP,
     SEARCH,
     SOUNDINGS,
+    SURVEY,
     TRACKS,
     Material,
     Product,
     ProductOptions,
+    Surveyed,
     make_product,
     product_kind,
 )
 from app.missions.maps.snapshot import MapSnapshot
+from app.missions.operations.crossovers import check_of
 from app.missions.operations.history import soundings_of
 from app.missions.operations.scans import search_of
 from app.missions.running.final_maps import FinalMaps
 from app.missions.settings import ProviderSettings
+from app.missions.views.soundings import Verdict
 from app.storage import missions as mission_queries
+from app.storage import pings as ping_queries
+from app.storage import soundings as sounding_queries
 
 
 async def newest_map(live: LiveMission, maps: FinalMaps, *, patient: bool = True) -> MapSnapshot:
@@ -39,7 +46,7 @@ async def newest_map(live: LiveMission, maps: FinalMaps, *, patient: bool = True
     await maps.last(live.id)
     await live.notice_imports()
     built = live.builder.newest
-    if built is None or (live.builder.stale and not live.running):
+    if built is None or (live.map_is_missing and not live.running):
         built = await live.build_map()
     if built is None:
         raise MapNotReadyError(
@@ -97,16 +104,31 @@ async def export(
         mission would have to be a search.
     """
     needs = product_kind(name).needs
+    snapshot = await newest_map(live, maps) if {MAP, CROSSOVERS} & set(needs) else None
     material = Material(
         facts=live.facts,
         created=now(),
         provider=provider.named(),
-        map=await newest_map(live, maps) if MAP in needs else None,
+        map=snapshot,
         soundings=await soundings_of(live) if SOUNDINGS in needs else (),
         tracks=await _track_lines(live) if TRACKS in needs else (),
         search=search_of(live) if SEARCH in needs else None,
+        surveyed=await _surveyed(live) if SURVEY in needs else Surveyed(),
+        crossovers=(await check_of(live, snapshot)).check if snapshot and CROSSOVERS in needs else None,
     )
     return await live.in_thread(make_product, name, material, options or ProductOptions())
+
+
+async def _surveyed(live: LiveMission) -> Surveyed:
+    await live.journal.flush()
+    async with live.database.reading() as session:
+        extent = await sounding_queries.extent(session, live.id, Verdict.ACCEPTED)
+        period = await ping_queries.period(session, live.id)
+    if extent is None:
+        return Surveyed() if period is None else Surveyed(*period)
+    if period is None:
+        return Surveyed(extent.first_time_s, extent.last_time_s, extent.position_sd_m)
+    return Surveyed(min(extent.first_time_s, period[0]), max(extent.last_time_s, period[1]))
 
 
 async def _track_lines(live: LiveMission) -> list[Track]:

@@ -11,7 +11,6 @@ from app.mapping.tides import TideTable, TideTableError, parse_tid
 from app.missions.clock import now
 from app.missions.errors import ConflictError, InvalidRequestError
 from app.missions.fleet.interface import BeamGeometry, Position, SoundingReport
-from app.missions.live.journal import Counts
 from app.missions.live.mission import LiveMission
 from app.missions.soundings.corrections import NO_LEVEL, Corrections
 from app.missions.soundings.gate import Gate
@@ -107,7 +106,8 @@ async def _recorrect(live: LiveMission, spec: MissionSpec, table: TideTable | No
             await stored_maps.forget(session, live.id)
             counted = await sounding_queries.counts(session, live.id)
         # Committed: from here on nothing waits until all of it holds.
-        live.recorrect(spec, corrections, Counts(counted.get("accepted", 0), counted.get("rejected", 0)))
+        counts = live.journal.counts.of_soundings(counted.get("accepted", 0), counted.get("rejected", 0))
+        live.recorrect(spec, corrections, counts)
     live.changed.set()
     live.publish_summary()
 

@@ -6,7 +6,6 @@ from sqlalchemy import ColumnElement, and_, func, or_, select
 from sqlalchemy.ext.asyncio import AsyncSession
 
 from app.missions.errors import ConflictError, SoundingNotFoundError
-from app.missions.live.journal import Counts
 from app.missions.live.mission import LiveMission
 from app.missions.operations.recorrection import report_of
 from app.missions.soundings.gate import implausible_value
@@ -97,7 +96,7 @@ async def _store(live: LiveMission, sounding_id: int, ruling: Ruling, note: str,
         await stored_maps.forget(session, live.id)
     # To count all of them again takes seconds where there are millions.
     counts, more = live.journal.counts, int(row.verdict == Verdict.ACCEPTED) - int(was_accepted)
-    live.recount(Counts(counts.accepted + more, counts.rejected - more))
+    live.recount(counts.of_soundings(counts.accepted + more, counts.rejected - more))
     return line
 
 

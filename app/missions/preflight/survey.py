@@ -12,6 +12,7 @@ from app.missions.live.mission import LiveMission
 from app.missions.live.vehicles import local_place
 from app.missions.preflight.recovery import recovery_checks
 from app.missions.preflight.search import search_checks
+from app.missions.preflight.swath import swath_checks
 from app.missions.safety import WAITING_CIRCLE_M
 from app.missions.spec.mission import MissionSpec, VehicleSpec
 from app.missions.team import Member
@@ -36,6 +37,7 @@ def preflight(live: LiveMission) -> PreflightView:
         *_waiting(live),
         *_water_level(live),
         *_known_bottom(live),
+        *swath_checks(live),
         *search_checks(live),
         *([_duration(live)] if live.search is None else []),
     ]

@@ -2,9 +2,9 @@
 
 from collections.abc import Sequence
 
-from app.exploration.planners import ONLY_IN_SIMULATION, PLANNERS, REFUSAL, SEARCHERS
+from app.exploration.planners import COVERERS, ONLY_IN_SIMULATION, PLANNERS, REFUSAL, SEARCHERS
 from app.missions.errors import InvalidRequestError
-from app.missions.spec.mission import MissionKind, MissionSpec, VehicleKind, VehicleSpec
+from app.missions.spec.mission import MissionKind, MissionSpec, Sensor, VehicleKind, VehicleSpec
 
 
 def check_spec(spec: MissionSpec, kinds: Sequence[VehicleKind]) -> None:
@@ -13,15 +13,23 @@ def check_spec(spec: MissionSpec, kinds: Sequence[VehicleKind]) -> None:
     ``kinds`` are the kinds of vehicles that can be reached.
     """
     name = spec.planner.name
-    there = PLANNERS if spec.kind is MissionKind.SURVEY else SEARCHERS
+    there = PLANNERS | COVERERS if spec.kind is MissionKind.SURVEY else SEARCHERS
     use = f"use one of {', '.join(there)}"
     if name in ONLY_IN_SIMULATION:
         raise InvalidRequestError("planner.name", REFUSAL.format(name=name), use)
     if name not in there:
         what = (
-            f"{name!r} plans no missions of kind {spec.kind}" if name in PLANNERS else f"there is no planner {name!r}"
+            f"{name!r} plans no missions of kind {spec.kind}"
+            if name in PLANNERS | COVERERS
+            else f"there is no planner {name!r}"
         )
         raise InvalidRequestError("planner.name", what, use)
+    if name in COVERERS and spec.limits.com_range_m is not None:
+        raise InvalidRequestError(
+            "limits.com_range_m",
+            f"{spec.limits.com_range_m:g} m is given, and planner {name!r} sends vehicles to lines of their own",
+            "leave it out, or use another planner",
+        )
     for index, vehicle in enumerate(spec.vehicles):
         check_vehicle(vehicle, spec, kinds, f"vehicles.{index}.")
 
@@ -45,6 +53,12 @@ def check_vehicle(vehicle: VehicleSpec, spec: MissionSpec, kinds: Sequence[Vehic
             f"{prefix}speed_mps",
             f"{vehicle.speed_mps:g} m/s is given, and in a search all are back in time at the mission's speed_mps",
             "leave it out",
+        )
+    if spec.planner.name in COVERERS and vehicle.sensor is not Sensor.MULTIBEAM:
+        raise InvalidRequestError(
+            f"{prefix}sensor",
+            f"{vehicle.sensor} has no swath, and planner {spec.planner.name!r} plans by swaths",
+            f"give it sensor {Sensor.MULTIBEAM}, or the mission another planner",
         )
     taken = {name for target in spec.targets for name in (target.name, target.called)}
     if vehicle.name in taken:

@@ -26,7 +26,7 @@ class FinalMaps:
 
     def take_up(self, live: LiveMission) -> None:
         """Make the map of what was stored."""
-        if live.builder.stale:
+        if live.map_is_missing:
             self._begin(self._taken_up, live, self._map_stored(live))
 
     def map_last(self, live: LiveMission) -> None:
@@ -70,6 +70,7 @@ class FinalMaps:
 
 async def _map_all(live: LiveMission) -> None:
     await live.journal.flush()
+    await live.pings.move()
     await live.build_map()
     live.publish_summary()
     await live.whole.keep(live.header.step, ended=True)

@@ -5,7 +5,7 @@ from collections.abc import AsyncIterator, Sequence
 from contextlib import asynccontextmanager
 
 from app.exploration.planner.options import PlannerOptions
-from app.exploration.planners import PLANNERS
+from app.exploration.planners import COVERERS, PLANNERS
 from app.missions.fleet.interface import StopReceipt, VehicleInfo
 from app.missions.live.broadcast import Subscription
 from app.missions.live.mission import LiveMission
@@ -87,7 +87,9 @@ def idle_vehicle_view(info: VehicleInfo) -> VehicleView:
 def planner_views() -> list[PlannerView]:
     """Return the planners that a mission may name."""
     options = PlannerOptions.model_json_schema()
-    return [PlannerView(name=name, summary=_summary(kind), options=options) for name, kind in PLANNERS.items()]
+    return [
+        PlannerView(name=name, summary=_summary(kind), options=options) for name, kind in (PLANNERS | COVERERS).items()
+    ]
 
 
 def _summary(kind: type[object]) -> str:

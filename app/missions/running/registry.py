@@ -17,6 +17,7 @@ from app.missions.states import AT_SEA, ENDED
 from app.missions.views.mission import MissionSummary
 from app.storage.database import Database
 from app.storage.models import MissionRow
+from app.storage.ping_files import PingFiles
 
 ENDED_MISSIONS_IN_MEMORY = 8
 
@@ -35,12 +36,14 @@ class MissionRegistry:
         hub: FleetHub,
         executor: Executor,
         maps: FinalMaps,
+        ping_files: PingFiles,
         time_scale: float,
     ) -> None:
         self._database = database
         self._hub = hub
         self._executor = executor
         self._maps = maps
+        self._ping_files = ping_files
         self._time_scale = time_scale
         self._ownership: Ownership | None = None
         self._may_take_up: Callable[[MissionRow], Awaitable[bool]] = _always
@@ -102,7 +105,9 @@ class MissionRegistry:
                 # Its last owner may have written until the moment it was taken.
                 async with database.reading() as session:
                     row = await session.get_one(MissionRow, mission_id)
-            live = await take_up(database, self._hub, self._executor, row, self._time_scale)
+            live = await take_up(database, self._hub, self._executor, row, self._ping_files, self._time_scale)
+            if self._ownership is not None:
+                await live.pings.tidy()
             await self._make_room()
             self._live[mission_id] = live
             self._left.pop(mission_id, None)
@@ -127,10 +132,14 @@ class MissionRegistry:
         """Remove a mission with everything that belongs to it. What was measured is kept: then ConflictError."""
         if live.header.state in AT_SEA:
             raise ConflictError(f"the mission is {live.header.state}", "finish or abort it first")
-        measured = live.journal.counts.accepted + live.journal.counts.rejected
-        if live.header.step or measured:
+        counts = live.journal.counts
+        measured = counts.accepted + counts.rejected
+        pings = counts.pings + counts.rejected_pings
+        if live.header.step or measured or pings:
+            and_pings = f" and {pings} pings" if pings else ""
             raise ConflictError(
-                f"the mission took {live.header.step} steps and has {measured} soundings: what was measured is kept",
+                f"the mission took {live.header.step} steps and has {measured} soundings{and_pings}: "
+                "what was measured is kept",
                 "leave it in the list; only missions in which nothing was measured can be deleted",
             )
         self._maps.forget(live.id)

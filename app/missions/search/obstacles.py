@@ -1,14 +1,10 @@
 """The obstacles of a search as GeoJSON."""
 
-from typing import Any
-
-import numpy as np
 import orjson
-from shapely.geometry import Polygon
 
 from app.estimation.occupancy import Cell
 from app.mapping.georeference import LocalFrame
-from app.mapping.outlines import outlines
+from app.mapping.outlines import geographic_rings, outlines
 from app.missions.search.state import Search
 
 
@@ -22,20 +18,9 @@ def obstacles_geojson(search: Search, frame: LocalFrame) -> bytes:
         {
             "type": "Feature",
             "properties": {"found": cell is Cell.FOUND, "area_m2": round(polygon.area, 3)},
-            "geometry": {"type": "Polygon", "coordinates": _rings(polygon, frame)},
+            "geometry": {"type": "Polygon", "coordinates": geographic_rings(polygon, frame)},
         }
         for cell in (Cell.KNOWN, Cell.FOUND)
         for polygon in outlines(states == cell, grid.west_m, grid.south_m, grid.cell_m)
     ]
     return orjson.dumps({"type": "FeatureCollection", "features": features})
-
-
-def _rings(polygon: Polygon, frame: LocalFrame) -> list[list[Any]]:
-    """Return a polygon's rings of [longitude, latitude], the outer one counter-clockwise, holes clockwise."""
-    turned = polygon if polygon.exterior.is_ccw else polygon.reverse()
-    rings = []
-    for ring in (turned.exterior, *turned.interiors):
-        east, north = np.asarray(ring.coords).T
-        lat, lon = frame.to_geographic(east, north)
-        rings.append(np.round(np.column_stack([lon, lat]), 8).tolist())
-    return rings

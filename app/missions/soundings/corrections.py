@@ -1,13 +1,14 @@
 """From what a sonar reported to a depth below the datum: sound speed, then tide. The report itself stays as it came."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from app.mapping.georeference import LocalFrame
 from app.mapping.sound_speed import SoundSpeedProfile
+from app.mapping.swath.pings import Footprints, Pings, placed
 from app.mapping.tides import TideTable
 from app.mapping.vertical import INSTANTANEOUS_WATER_LEVEL, VerticalDatum
 from app.missions.fleet.interface import Position, SoundingReport
@@ -117,6 +118,18 @@ class Corrections:
             below = float(bottom) - float(level) + self._tide.datum_offset_m
             results.append(PlacedSounding(report, east, north, below, float(level)))
         return results
+
+    def beams(self, pings: Pings) -> Footprints | None:
+        """Return where the beams of pings met the bottom, depths below the datum; None where the frame has no place.
+
+        Footprints of pings for whose time there is no water level have a depth of NaN.
+        """
+        try:
+            found = placed(pings, self._frame, self._profile)
+        except ValueError:
+            return None
+        levels = np.full(len(pings), self._tide.level_m) if self.table is None else self.table.levels_at(pings.time_s)
+        return replace(found, depth_m=found.depth_m - levels[found.ping] + self._tide.datum_offset_m)
 
     def _levels(self, reports: Sequence[SoundingReport]) -> NDArray[np.float64]:
         if self.table is None:

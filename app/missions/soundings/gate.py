@@ -1,7 +1,7 @@
 """The gate every measurement passes: what is plausible enters the map, the rest is kept with the reason."""
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
 import shapely
@@ -104,19 +104,32 @@ def implausible_value(report: SoundingReport) -> str:
         "vehicle_depth_m": report.vehicle_depth_m,
         "range_m": report.range_m,
     }
-    for name, value in values.items():
-        if not math.isfinite(value):
-            return f"{name}: {value} is not a finite number"
-    if not -90 <= place.lat_deg <= 90:
-        return f"lat_deg: {place.lat_deg} is not between -90 and 90"
-    if not -180 <= place.lon_deg <= 180:
-        return f"lon_deg: {place.lon_deg} is not between -180 and 180"
+    reason = not_finite(values) or impossible_place(place.lat_deg, place.lon_deg, report.vehicle_depth_m)
+    if reason:
+        return reason
     if report.range_m <= 0:
         return f"range_m: {report.range_m:g} is not positive"
-    if not -2 <= report.vehicle_depth_m <= MAX_OCEAN_DEPTH_M:
-        return f"vehicle_depth_m: {report.vehicle_depth_m:g} is not between -2 and {MAX_OCEAN_DEPTH_M:g}"
     if not 0 < place.depth_m <= MAX_OCEAN_DEPTH_M:
         return f"depth_m: {place.depth_m:g} is not between 0 and {MAX_OCEAN_DEPTH_M:g}"
     if report.depth_sd_m is not None and not MIN_SD_M <= report.depth_sd_m <= MAX_SD_M:
         return f"depth_sd_m: {report.depth_sd_m} is not between {MIN_SD_M:g} and {MAX_SD_M:g}"
+    return ""
+
+
+def not_finite(values: Mapping[str, float]) -> str:
+    """Return which of the values is not a finite number; empty when all are."""
+    for name, value in values.items():
+        if not math.isfinite(value):
+            return f"{name}: {value} is not a finite number"
+    return ""
+
+
+def impossible_place(lat_deg: float, lon_deg: float, vehicle_depth_m: float) -> str:
+    """Return why no vehicle can be at a place; empty when one can."""
+    if not -90 <= lat_deg <= 90:
+        return f"lat_deg: {lat_deg} is not between -90 and 90"
+    if not -180 <= lon_deg <= 180:
+        return f"lon_deg: {lon_deg} is not between -180 and 180"
+    if not -2 <= vehicle_depth_m <= MAX_OCEAN_DEPTH_M:
+        return f"vehicle_depth_m: {vehicle_depth_m:g} is not between -2 and {MAX_OCEAN_DEPTH_M:g}"
     return ""

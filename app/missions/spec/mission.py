@@ -14,6 +14,7 @@ from pydantic import FailFast, Field, field_validator, model_validator
 from shapely.geometry import Point, Polygon
 from shapely.geometry.polygon import orient
 
+from app.estimation.uncertainty import SoundingErrors
 from app.exploration import DEFAULT_PLANNER
 from app.exploration.planner.options import PlannerOptions
 from app.mapping.georeference import LocalFrame
@@ -24,6 +25,7 @@ from app.missions.spec.failsafes import Failsafe, Response
 from app.missions.spec.recovery import Recovery
 from app.missions.spec.search import DEFAULTS as SEARCH_DEFAULTS
 from app.missions.spec.search import SearchSpec, filled_in
+from app.missions.spec.sonar import SwathSonarSpec
 from app.missions.spec.targets import MOST_TARGETS, TargetSpec, Tracking
 
 Speed = Annotated[float, Field(gt=0, le=5)]
@@ -85,6 +87,9 @@ class VehicleSpec(Model):
         "neptus: of a session of Neptus' ConvCAO panel, which makes its mission itself",
     )
     sensor: Sensor = Sensor.SINGLE_BEAM
+    sonar: SwathSonarSpec | None = Field(
+        default=None, description="With sensor multibeam: what that sonar can do; null: its defaults"
+    )
     depth_m: float | None = Field(
         default=None,
         ge=0,
@@ -122,6 +127,12 @@ class VehicleSpec(Model):
         default=None,
         description="Where a simulated vehicle starts, [longitude, latitude]; default: a corner of the area",
     )
+
+    @model_validator(mode="after")
+    def _has_the_sonar_that_is_described(self) -> Self:
+        if self.sonar is not None and self.sensor is not Sensor.MULTIBEAM:
+            raise ValueError(f"sonar is given but sensor is {self.sensor}: only a multibeam is described by it")
+        return self
 
     @model_validator(mode="after")
     def _is_led_as_its_kind_can_be(self) -> Self:
@@ -313,6 +324,31 @@ class SoundSpeed(Model):
         return profile
 
 
+class CoverageSpec(Model):
+    """What full coverage by swath sonars is asked for, where the planner is `swath`."""
+
+    overlap_pct: float = Field(
+        default=6.0,
+        ge=0,
+        le=80,
+        description="Share of half a swath that the next one sounds again, at least; more where position is uncertain",
+    )
+    crosslines_pct: float = Field(
+        default=5.0,
+        ge=0,
+        le=50,
+        description="Length of lines across all others, flown last, as a share of those; by what both measured where "
+        "they cross a survey is judged. 0: none",
+    )
+    cell_of_depth: float | None = Field(
+        default=None,
+        gt=0,
+        le=1,
+        description="Cells by depth, in files with cells of several sizes: each depth has the smallest of cell_m, "
+        "twice and four times as much, and so on, that is at least this share of it, for example 0.05. null: one size",
+    )
+
+
 class MissionSpec(Model):
     """A mission as an operator describes it."""
 
@@ -353,6 +389,7 @@ class MissionSpec(Model):
     surface_policy: SurfacePolicy | None = Field(
         default=None, description="When vehicles come up for a GPS fix; null: never because of their position"
     )
+    coverage: CoverageSpec = Field(default_factory=CoverageSpec)
     targets: list[TargetSpec] = Field(
         default_factory=list, max_length=MOST_TARGETS, description="Moving targets to keep track of"
     )
@@ -384,6 +421,9 @@ class MissionSpec(Model):
         ge=0,
         le=1,
         description="Standard deviation of a range as a fraction of it, where the vehicle states none",
+    )
+    uncertainty: SoundingErrors = Field(
+        default_factory=SoundingErrors, description="What makes soundings of swath sonars uncertain"
     )
     tide: Tide = Field(default_factory=Tide)
     sound_speed: SoundSpeed | None = Field(

@@ -47,6 +47,9 @@ class LayerView(View):
     range: tuple[float, float] | None = Field(
         description="Values of the first and the last colour; null: they follow the data as `fit` says"
     )
+    classes: tuple[str, ...] = Field(
+        description="Words for the values 0, 1, 2 and so on, where there are no others; else empty"
+    )
     scale: int | None = Field(description="Tiles hold whole numbers, the value times this; null: no tile has it")
     in_every_tile: bool = Field(description="Tiles have it without being asked for it by `layer`")
     in_json: bool = Field(description="The map's JSON has it when asked for it by `layer`")
@@ -57,11 +60,15 @@ class LayerView(View):
 
 
 class ConformityView(View):
-    """How the TVU estimate stands beside one order of IHO S-44; no order is claimed by it."""
+    """How the estimates of TVU and THU stand beside one order of IHO S-44; no order is claimed by it."""
 
     order: Order
     cells_pct: float = Field(description="Share of the cells whose TVU estimate stays within the order's largest")
     sounded_pct: float | None = Field(description="The same among the sounded cells; null: none is")
+    horizontal_pct: float | None = Field(
+        description="Share of the cells whose THU estimate stays within the order's largest, of those that have one; "
+        "null: none has"
+    )
     statement: str = Field(examples=["TVU estimate meets Order 1a in 83.2 % of cells"])
 
 

@@ -92,6 +92,11 @@ class VehicleView(View):
     localization: PositionQuality = Field(
         default=PositionQuality.UNTOLD, description="What that is worth beside the mission's surface_policy"
     )
+    swath_m: tuple[float, float] | None = Field(
+        default=None,
+        description="How far its swath sonar reached with its last ping, level to port and to starboard, metres; null: "
+        "it has none, or did not measure within the last seconds",
+    )
     surfacing: bool = Field(default=False, description="On its way up, or at the surface, for a GPS fix")
     risings: int = Field(default=0, description="How often it was sent up for a fix in this mission")
     pursuing: str | None = Field(default=None, description="The target that it leaves the mapping for")
@@ -161,9 +166,26 @@ class Progress(View):
         default=None, description="What is left to fly for the vehicle with most; null: not known"
     )
     soundings: int = Field(description="Accepted soundings")
-    rejected: int = Field(description="Soundings kept but not used")
+    rejected: int = Field(description="Soundings and pings kept but not used")
+    pings: int = Field(default=0, description="Accepted pings of swath sonars")
+    beams: int = Field(default=0, description="Beams of these that detected something; they are no soundings")
+    ensonified_pct: float | None = Field(
+        default=None,
+        description="Share of the area's cells that beams of swath sonars met; null without any. With "
+        "coverage.cell_of_depth cells are those that the depth of a place asks for, here, in dense_pct and in holidays",
+    )
+    dense_pct: float | None = Field(
+        default=None, description="Share of the area's cells with at least five soundings; null without swath sonars"
+    )
+    holidays: int | None = Field(
+        default=None,
+        description="Holidays: pieces of ground of at least three by three cells that were missed inside of what was "
+        "swept; null without swath sonars",
+    )
     distance_m: float = Field(description="Distance travelled by all vehicles, along their tracks")
-    coverage_pct: float = Field(description="Share of the area's cells known to accuracy_m")
+    coverage_pct: float = Field(
+        description="Share of the area's cells known to accuracy_m; with swath sonars of those that a beam met"
+    )
     remaining_pct: float = Field(default=100.0, description="Share of the landmarks not known to accuracy_m")
     mean_sd_m: float | None = Field(default=None, description="Mean standard deviation of the map")
     objective: float | None = Field(default=None, description="The planner's objective at the last step")

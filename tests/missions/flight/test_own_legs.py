@@ -3,6 +3,7 @@
 import asyncio
 import time
 from collections import defaultdict
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -83,6 +84,35 @@ async def test_no_vehicle_waits_for_a_decision_that_takes_long(
         # Of a vehicle that waits for no decision, the next leg is written down before the one before it is flown.
         ahead = [legs for step, legs in flown.ahead[name] if step < 12]
         assert min(ahead) >= 1, ahead
+
+
+async def test_a_mission_ends_only_when_nothing_is_left_after_all_was_flown(
+    harbour_closed: Harbour, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    looked: list[bool] = []
+    """Of each look after the third leg, whether all legs had been flown."""
+    flown = Flown(monkeypatch)
+
+    def seen_late(number: int, *arguments: Any, **more: Any) -> Decision:
+        decision = decide(number, *arguments, **more)
+        assert flown.live is not None
+        [member] = flown.live.team
+        all_flown = not member.ordered and not member.ahead
+        if number < 4 or (number == 4 and all_flown):
+            return decision
+        # As long as legs are still to be flown nothing seems to be left.
+        looked.append(all_flown)
+        return replace(decision, legs=[], done=frozenset({member.name}))
+
+    monkeypatch.setattr(deciding, "decide", seen_late)
+    service = await harbour_closed.open(time_scale=5.0)
+    mission = (await service.create(sim_spec("a", steps=12, side_m=60.0, planner={"name": "lawnmower"}, **APART))).id
+    flown.live = await service.get(mission)
+    await act(service, mission, "start")
+    await until_state(service, mission, MissionState.FINISHED)
+    assert sorted({step for _, step in flown.ordered["a"]}) == [1, 2, 3, 4]
+    assert not looked[0]
+    assert looked[-1]
 
 
 async def test_everybody_flies_its_own_legs_and_a_step_is_begun_once(

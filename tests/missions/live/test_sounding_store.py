@@ -7,7 +7,7 @@ import pytest
 
 from app.missions.live import sounding_store
 from app.missions.maps.builder import MapBuilder
-from app.missions.maps.codec import pack, unpack
+from app.missions.maps.codec import LAYERS, OPTIONAL, pack, unpack
 from app.missions.maps.queue import MapQueue, Replacement
 from app.missions.operations.measurements import measure
 from app.missions.operations.mission_maps import newest_map
@@ -42,10 +42,10 @@ async def mapped(service: MissionService, count: int = 80) -> str:
 def test_a_map_comes_back_as_it_was_and_no_other() -> None:
     built = built_of(soundings(60)).newest
     assert built is not None
-    for bathymetry in (built.map, replace(built.map, prior=built.map.sounded)):
+    for bathymetry in (built.map, replace(built.map, prior=built.map.sounded, precision=built.map.sd_m**-2)):
         content = pack(bathymetry, [(np.arange(4.0), "a fish")])
         again, doubted = unpack(content, built.digest, 60, thorough=True)
-        for name in ("depth_m", "sd_m", "count", "sounded", "roughness", "prior", "process_sd_m", "bound_sd_m"):
+        for name in (*LAYERS, *OPTIONAL):
             was, now = getattr(bathymetry, name), getattr(again.map, name)
             assert (was is None and now is None) or np.array_equal(was, now, equal_nan=was.dtype.kind == "f")
         assert (again.map.grid, again.map.model) == (bathymetry.grid, bathymetry.model)

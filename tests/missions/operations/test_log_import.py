@@ -104,6 +104,26 @@ async def test_a_log_imported_again_changes_nothing(
     assert (await view_of(service, mission.id)).progress.soundings == first.soundings
 
 
+async def test_pings_of_a_log_count_once_and_are_on_the_map(
+    service: MissionService, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(log_import, "PING_BATCH", 3)
+    times = [writer.START_S + 1.03 + 0.1 * k for k in range(10)]
+    packets = [*writer.survey(20), *(writer.ping(at_s, 8.0) for at_s in times)]
+    log = writer.write(tmp_path / "Data.lsf", packets)
+    mission = await service.create(make_spec(vehicles=[]))
+    view = await take(service, mission.id, log)
+    assert (view.pings, view.pings_rejected, view.soundings, view.known) == (10, 0, 20, False)
+    live = await service.get(mission.id)
+    assert (live.progress().pings, live.progress().beams) == (10, 10 * writer.BEAMS)
+    assert (await take(service, mission.id, log)).known
+    await live.build_map()
+    assert live.progress().ensonified_pct
+    assert live.progress().pings == 10
+    events = await events_after(live)
+    assert "20 soundings and 10 pings" in events[-1].message
+
+
 @pytest.mark.usefixtures("small_batches")
 @pytest.mark.parametrize("fails_after", [0, 1, 5])
 async def test_an_import_that_failed_anywhere_goes_on_where_it_was(

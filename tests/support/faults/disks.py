@@ -2,9 +2,10 @@
 
 import os
 import resource
+import sqlite3
 import subprocess
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
 
 from tests.support.faults.service import Service
@@ -29,7 +30,8 @@ class Disk:
         self._filler = folder / "filler"
 
     def fill(self, _service: Service) -> None:
-        """Leave not a byte on it."""
+        """Leave not a byte on it, and none in the log of the database that could be written over."""
+        self._empty_log()
         with self._filler.open("wb", buffering=0) as file:
             size = len(BLOCK)
             while size:
@@ -42,6 +44,13 @@ class Disk:
         """Give it room again."""
         self._filler.unlink()
 
+    def _empty_log(self) -> None:
+        [database] = self.folder.glob("*.db")
+        with closing(sqlite3.connect(database, timeout=10.0, isolation_level=None)) as connection:
+            busy = True
+            while busy:
+                busy, *_ = connection.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchone()
+
 
 class Ration(Disk):
     """For machines where nothing may be mounted: no file of the service may grow any more."""
@@ -50,6 +59,7 @@ class Ration(Disk):
 
     def fill(self, service: Service) -> None:
         """Let no file grow beyond its present size."""
+        self._empty_log()
         largest = max(path.stat().st_size for path in self.folder.iterdir())
         self._limit(service, min(largest, 1 << 14))
 

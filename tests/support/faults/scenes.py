@@ -258,6 +258,11 @@ async def _aborted(
     await _nothing_is_written(service, api, mission_id, "the disk")
     for vehicle in vehicles:
         vehicle.gives_up = True
+
+    async def asking() -> bool:
+        return all(vehicle.asks for vehicle in vehicles)
+
+    await until(asking, "both vehicles ask where to go")
     answer = await api.post(f"/missions/{mission_id}/abort")
     assert answer.status_code == httpx.codes.OK, answer.text
     said = answer.json()

@@ -31,6 +31,8 @@ class PollingVehicle:
     """Stays where it is and asks for nothing."""
     gives_up: bool = False
     """Asks for its waypoint, too, while its batch is not taken, and forgets the batch."""
+    asks: bool = False
+    """Waits for an answer with its waypoint."""
 
     def depth_here_m(self) -> float:
         return 10.0 + 2.0 * math.sin(self.east_m / 15.0) + 0.05 * self.north_m
@@ -72,6 +74,7 @@ class PollingVehicle:
     async def next_waypoint(self, api: httpx.AsyncClient, mission_id: str) -> dict[str, float] | None:
         """Return a waypoint newer than the last; None when there is none yet, or none ever again."""
         after = {"after_step": self.steps_seen[-1]} if self.steps_seen else {}
+        self.asks = True
         try:
             answer = await api.get(
                 f"/missions/{mission_id}/vehicles/{self.name}/waypoint", params={**after, "timeout_s": 2}
@@ -79,6 +82,8 @@ class PollingVehicle:
         except httpx.TransportError:
             await asyncio.sleep(RETRY_S)
             return None
+        finally:
+            self.asks = False
         if answer.status_code == httpx.codes.CONFLICT:
             self.told_to_stop = True
             return None

@@ -17,6 +17,7 @@ from app.missions.fleet.interface import (
     LinkCapabilities,
     LinkReport,
     LinkState,
+    PingReport,
     Position,
     RangeReport,
     RestartReport,
@@ -45,6 +46,7 @@ from imc_bridge import (
     Restarted,
     Sounding,
     StateReport,
+    SwathPing,
     TargetRange,
     Waypoint,
     WaypointChange,
@@ -219,6 +221,8 @@ def _translate(event: BridgeEvent) -> FleetEvent | None:
             return vehicle_report(event)
         case Sounding():
             return sounding_report(event)
+        case SwathPing():
+            return ping_report(event)
         case TargetRange():
             return range_report(event)
         case WaypointChange():
@@ -241,7 +245,7 @@ def _translate(event: BridgeEvent) -> FleetEvent | None:
         case Fault():
             return fault_report(event)
         case _:
-            # A refused Distance is counted in the vehicle's details.
+            # A refused Distance or ping is counted in the vehicle's details.
             return None
 
 
@@ -278,6 +282,22 @@ def sounding_report(event: Sounding) -> SoundingReport:
         beam=event.beam,
         position_sd_m=event.position_sd_m,
         beam_geometry=_beam_geometry(event),
+    )
+
+
+def ping_report(event: SwathPing) -> PingReport:
+    """What a multibeam measured, as missions know it."""
+    return PingReport(
+        vehicle=event.vehicle,
+        time_s=event.time_s,
+        position=Position(event.lat_deg, event.lon_deg, event.depth_m),
+        roll_rad=event.roll_rad,
+        pitch_rad=event.pitch_rad,
+        heading_rad=event.yaw_rad,
+        angles_rad=event.angles_rad,
+        ranges_m=event.ranges_m,
+        source=event.source,
+        position_sd_m=event.position_sd_m,
     )
 
 
@@ -326,6 +346,8 @@ def _info(node: NodeView) -> VehicleInfo:
         "bottom sensors": ", ".join(node.bottom_sensors) or None,
         "soundings": str(node.soundings),
         "soundings refused": "; ".join(f"{reason}: {count}" for reason, count in node.refused.items()) or None,
+        "pings": str(node.pings) if node.pings else None,
+        "pings refused": "; ".join(f"{reason}: {count}" for reason, count in node.pings_refused.items()) or None,
         "rate limiters": node.rate_limiters,
         "way home": node.way_home or None,
         "conflict": node.conflict,

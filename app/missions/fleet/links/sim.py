@@ -20,6 +20,7 @@ from app.missions.fleet.interface import (
     LinkCapabilities,
     LinkReport,
     LinkState,
+    PingReport,
     Position,
     RangeReport,
     ScanReport,
@@ -34,6 +35,7 @@ from app.missions.fleet.interface import (
 )
 from app.missions.settings import SimulationSettings
 from app.missions.spec.mission import Sensor
+from app.missions.spec.sonar import SwathSonarSpec
 from app.missions.spec.targets import TargetSpec
 from simulator.battery import Battery, BatterySpec
 from simulator.obstacles import ObstacleWorld
@@ -41,12 +43,13 @@ from simulator.raycasting import warm_up
 from simulator.scanning import Scan, Scanning
 from simulator.seafloors import generate
 from simulator.sensors import SensorKind, SonarNoise
+from simulator.swath import SwathSonar, SwathSounder
 from simulator.targets import Ranging, RangingNoise, Target
 from simulator.targets import TargetSpec as SimulatedTarget
 from simulator.terrain import Terrain
 from simulator.terrain_files import load_terrain
 from simulator.vehicle import BOAT, STEP_S
-from simulator.world import BeamReturn, LocalPosition, SimulatedVehicle
+from simulator.world import BeamReturn, LocalPosition, SimulatedVehicle, SwathPing
 
 TICK_S = 0.05
 PIECE_S = 2.0
@@ -64,6 +67,7 @@ REPORT_PERIOD_S = 0.5
 """Time between position reports on the vehicle's clock, as often as DUNE sends EstimatedState."""
 
 LAUNCH_MARGIN_M = 2.0
+LAUNCH_SPACING_M = 6.0
 KEPT_TERRAINS = 32
 AGROUND = "ran into an obstacle and lies there"
 SENSORS = {
@@ -102,7 +106,9 @@ class Launch:
     start
         Latitude and longitude; None: in the south-western corner, beside those already there.
     noise
-        Standard deviation of a range as a fraction of it.
+        Standard deviation of a range as a fraction of it; 0: without any error.
+    swath
+        What its sonar can do when that is a multibeam.
     targets, ranging
         What moves about there, and how well it ranges to that.
     lookout
@@ -118,6 +124,7 @@ class Launch:
     height_m: float
     start: tuple[float, float] | None
     noise: float
+    swath: SwathSonar = SwathSonar()  # noqa: RUF009 - frozen
     targets: tuple[TargetSpec, ...] = ()
     ranging: RangingNoise = RangingNoise()  # noqa: RUF009 - frozen
     lookout: Lookout | None = None
@@ -249,6 +256,7 @@ class SimFleetLink(FleetLink):
             height_m=float(size[1]),
             start=(vehicle.start[1], vehicle.start[0]) if vehicle.start is not None else deployment.berth(),
             noise=mission.sounding_noise,
+            swath=SwathSonar(**(vehicle.sonar or SwathSonarSpec()).model_dump()),
             targets=tuple(mission.targets),
             ranging=RangingNoise(
                 relative_sd=mission.tracking.range_noise,
@@ -297,6 +305,7 @@ class SimFleetLink(FleetLink):
             (*self._start(launch, terrain), 0.0),
             np.random.default_rng(seed),
             noise=SonarNoise(relative_sd=launch.noise),
+            swath=launch.swath,
             start_time_s=started_s,
             drift_m2ps=self._settings.drift_m2ps,
             current=self._settings.current_mps,
@@ -347,7 +356,7 @@ class SimFleetLink(FleetLink):
         if launch.start is not None:
             return terrain.frame.to_local(*launch.start)
         there = sum(1 for s in self._swimmers.values() if s.terrain.frame.definition == terrain.frame.definition)
-        spacing = min(5.0, terrain.width_m / 4)
+        spacing = min(LAUNCH_SPACING_M, terrain.width_m / 4)
         return LAUNCH_MARGIN_M + (there * spacing) % (terrain.width_m - LAUNCH_MARGIN_M), LAUNCH_MARGIN_M
 
     def vehicles(self) -> Sequence[VehicleInfo]:
@@ -420,7 +429,7 @@ class SimFleetLink(FleetLink):
 
     def _advance(self, swimmer: _Swimmer, passed_s: float) -> list[FleetEvent]:
         events: list[FleetEvent] = []
-        measurements, scans = _lived(swimmer, passed_s)
+        soundings, scans = _lived(swimmer, passed_s)
         events += scans
         if swimmer.scanning is not None and swimmer.scanning.collided and not swimmer.aground:
             swimmer.aground = True
@@ -430,7 +439,7 @@ class SimFleetLink(FleetLink):
             events.append(LinkReport(swimmer.body.name, LinkState.HEARD, AGROUND))
         order = swimmer.order
         if order is not None:
-            events += [_sounding(swimmer, m) for m in measurements if m.valid]
+            events += soundings
             self._keep_clear_of_bottom(swimmer, order)
         events += _ranges(swimmer)
         if swimmer.body.time_s - swimmer.reported_s >= REPORT_PERIOD_S:
@@ -476,20 +485,30 @@ def _simulated(target: TargetSpec, terrain: Terrain) -> SimulatedTarget:
     return SimulatedTarget(target.called, place, math.radians(asked.course_deg), asked.speed_mps)
 
 
-def _lived(swimmer: _Swimmer, passed_s: float) -> tuple[list[BeamReturn], list[FleetEvent]]:
-    """Let time pass; one that looks round does so on its way, and not only where it is in the end."""
+def _lived(swimmer: _Swimmer, passed_s: float) -> tuple[list[FleetEvent], list[FleetEvent]]:
+    """Let time pass, and return what was sounded and scanned.
+
+    One that looks round does so on its way, and not only where it is in the end.
+    """
     scanning, body = swimmer.scanning, swimmer.body
     if scanning is None:
-        return body.advance(passed_s), []
-    measurements: list[BeamReturn] = []
+        return _sounded(swimmer, passed_s), []
+    soundings: list[FleetEvent] = []
     scans: list[FleetEvent] = []
     while passed_s > 0.0 and not scanning.collided:
-        measurements += body.advance(min(passed_s, STEP_S))
+        soundings += _sounded(swimmer, min(passed_s, STEP_S))
         passed_s -= STEP_S
         scan = scanning.step(body.time_s, body.true_position)
         if scan is not None:
             scans.append(_scan(swimmer, scan, scanning))
-    return measurements, scans
+    return soundings, scans
+
+
+def _sounded(swimmer: _Swimmer, passed_s: float) -> list[FleetEvent]:
+    body = swimmer.body
+    if isinstance(body.sonar, SwathSounder):
+        return [_ping(swimmer, ping) for ping in body.advance_swath(passed_s)]
+    return [_sounding(swimmer, m) for m in body.advance(passed_s) if m.valid]
 
 
 def _scan(swimmer: _Swimmer, scan: Scan, scanning: Scanning) -> ScanReport:
@@ -535,4 +554,19 @@ def _sounding(swimmer: _Swimmer, measurement: BeamReturn) -> SoundingReport:
         beam=measurement.beam,
         position_sd_m=math.sqrt(swimmer.body.state.position_variance_m2),
         beam_geometry=BeamGeometry(sonar.lat_deg, sonar.lon_deg),
+    )
+
+
+def _ping(swimmer: _Swimmer, ping: SwathPing) -> PingReport:
+    return PingReport(
+        vehicle=ping.vehicle,
+        time_s=ping.time_s,
+        position=swimmer.position(ping.position),
+        roll_rad=ping.roll_rad,
+        pitch_rad=ping.pitch_rad,
+        heading_rad=ping.heading_rad,
+        angles_rad=ping.angles_rad.astype(np.float32),
+        ranges_m=ping.ranges_m.astype(np.float32),
+        source=ping.source,
+        position_sd_m=math.sqrt(swimmer.body.state.position_variance_m2),
     )

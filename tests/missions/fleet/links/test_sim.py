@@ -1,14 +1,19 @@
 """Vehicles in this process: what they tell of their energy and of the current."""
 
+from dataclasses import replace
 from functools import partial
 
+import numpy as np
 import pytest
+from pydantic import ValidationError
 
 from app.missions.fleet.interface import (
     FaultKind,
     FaultReport,
     FleetEvent,
+    PingReport,
     Position,
+    SoundingReport,
     VehicleReport,
     WaypointOrder,
     WaypointReport,
@@ -16,9 +21,11 @@ from app.missions.fleet.interface import (
 )
 from app.missions.fleet.links.sim import Launch, SimFleetLink
 from app.missions.settings import SimulationSettings
-from app.missions.spec.mission import Sensor
+from app.missions.spec.mission import Sensor, VehicleSpec
+from app.missions.spec.sonar import SwathSonarSpec
 from simulator import seafloors
 from simulator.battery import BatterySpec
+from simulator.swath import SwathSonar
 from tests.support.missions.specs import LAT, LON
 from tests.support.waiting import until
 
@@ -103,3 +110,38 @@ async def test_it_arrives_against_and_across_half_its_speed(current: tuple[float
             await until(partial(has_reached, step), f"step {step} is reached")
     finally:
         await link.close()
+
+
+async def test_a_multibeam_tells_of_whole_pings() -> None:
+    events: list[FleetEvent] = []
+    link = SimFleetLink(SimulationSettings(), 20.0)
+    await link.start(events.append)
+    try:
+        sonar = SwathSonar(aperture_deg=90.0, beams=32, rate_hz=2.0)
+        link.launch(replace(launch(BatterySpec()), sensor=Sensor.MULTIBEAM, noise=0.0, swath=sonar))
+        await link.engage(NAME)
+        await link.order(order(1, 50, 40))
+        await until(
+            lambda: any(isinstance(e, WaypointReport) and e.status is WaypointStatus.REACHED for e in events),
+            "it has arrived",
+        )
+    finally:
+        await link.close()
+    pings = [event for event in events if isinstance(event, PingReport)]
+    assert not [event for event in events if isinstance(event, SoundingReport)]
+    times = [ping.time_s for ping in pings]
+    np.testing.assert_allclose(np.diff(times), 0.5, atol=1e-3)
+    assert {(ping.vehicle, ping.source, len(ping.angles_rad)) for ping in pings} == {(NAME, "Multibeam", 32)}
+    assert {ping.ranges_m.dtype for ping in pings} == {np.dtype(np.float32)}
+    below = [float(np.nanmin(ping.ranges_m)) for ping in pings]
+    assert min(below) > 0.5
+
+
+def test_the_sonar_that_a_mission_describes_is_the_one_that_is_simulated() -> None:
+    assert SwathSonar(**SwathSonarSpec().model_dump()) == SwathSonar()
+    vehicle = VehicleSpec(name=NAME, sensor=Sensor.MULTIBEAM, sonar=SwathSonarSpec(beams=64))
+    assert vehicle.sonar is not None
+    with pytest.raises(ValidationError, match="only a multibeam is described by it"):
+        VehicleSpec(name=NAME, sensor=Sensor.DVL, sonar=SwathSonarSpec())
+    with pytest.raises(ValidationError, match="aperture_deg"):
+        SwathSonarSpec(aperture_deg=180.0)

@@ -1,0 +1,104 @@
+"""What the swath sonars of a mission have ensonified: beams placed, counted and averaged in the cells of its map."""
+
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from app.arrays import BoolArray, FloatArray
+from app.estimation.uncertainty import BeamGeometry, SoundingErrors, Uncertainty, uncertainty
+from app.exploration.core.coverage import Coverage
+from app.mapping.swath.density import DensityGrid
+from app.mapping.swath.gridded import gridded_map
+from app.mapping.swath.holidays import open_ground, side_of
+from app.mapping.swath.pings import Footprints, Pings
+from app.mapping.swath.spikes import spikes
+from app.mapping.tiers import asked_of, by_depth
+from app.mapping.types import BathymetricMap, Grid, SoundingRows
+
+Place = Callable[[Pings], Footprints | None]
+"""Returns where beams met the bottom, corrected; None where that is nowhere near."""
+
+
+@dataclass(frozen=True)
+class Beams:
+    """Beams that met the bottom, spikes left out: where, and how uncertain that is."""
+
+    footprints: Footprints
+    uncertainty: Uncertainty
+
+    @property
+    def sd_m(self) -> FloatArray:
+        """Standard deviation of the depth of each, (m,)."""
+        return self.uncertainty.vertical_sd_m
+
+
+def beams_of(pings: Pings, place: Place, errors: SoundingErrors) -> Beams | None:
+    """Return the beams of one vehicle's pings whose depth is known; None where they are nowhere near."""
+    beams = place(pings)
+    if beams is None:
+        return None
+    wrong = spikes(pings)
+    keep = ~wrong[np.isfinite(pings.range_m) & np.isfinite(pings.angle_rad)] & np.isfinite(beams.depth_m)
+    found = beams.take(keep)
+    went = BeamGeometry(
+        angle_rad=found.angle_rad - pings.roll_rad[found.ping],
+        down_m=np.abs(found.depth_m - pings.depth_m[found.ping]),
+        pitch_rad=pings.pitch_rad[found.ping],
+    )
+    return Beams(found, uncertainty(went, errors, pings.position_sd_m[found.ping]))
+
+
+class SwathGrid:
+    """Collects pings; everything here belongs in worker threads, which may do so at the same time."""
+
+    def __init__(self, grid: Grid, mask: BoolArray, errors: SoundingErrors, cell_of_depth: float | None = None) -> None:
+        self._grid, self._mask, self._cell_of_depth = grid, mask, cell_of_depth
+        self.place: Place = lambda pings: None
+        self.errors = errors
+        self._density = DensityGrid(grid, mask)
+        self._lock = threading.Lock()
+        self.beams = 0
+        """How many were taken in, spikes left out."""
+
+    def add(self, pings: Pings) -> None:
+        """Take in the pings of one vehicle."""
+        beams = beams_of(pings, self.place, self.errors)
+        if beams is None:
+            return
+        at = beams.footprints
+        with self._lock:
+            self._density.add(
+                at.east_m,
+                at.north_m,
+                at.depth_m,
+                beams.uncertainty.scattered_sd_m,
+                beams.uncertainty.shared_sd_m,
+                beams.uncertainty.horizontal_sd_m,
+            )
+            self.beams += len(at)
+
+    def begin_anew(self) -> None:
+        """Forget all pings: they are read again."""
+        with self._lock:
+            self._density, self.beams = DensityGrid(self._grid, self._mask), 0
+
+    def map(self, soundings: SoundingRows) -> BathymetricMap | None:
+        """Return the map of all beams and of single soundings (n, 4); None without any."""
+        with self._lock:
+            density = self._density.copy()
+        if len(soundings):
+            density.add(*soundings.T)
+        return gridded_map(density)
+
+    def coverage(self, prior_m: FloatArray | None) -> Coverage:
+        """Return what is left to ensonify; ``prior_m`` (rows, cols): depths that were known before."""
+        with self._lock:
+            count, depth = np.where(self._mask, self._density.count, 0), self._density.depth_m
+        if prior_m is not None:
+            depth = np.where(np.isfinite(depth), depth, prior_m)
+        grid = self._grid
+        side, asked = side_of(grid.cell_m, grid.cell_m), asked_of(depth, grid.cell_m, self._cell_of_depth)
+        left = by_depth(count, self._mask, asked, lambda count, mask: open_ground(count > 0, mask, side)) > 0
+        return Coverage(grid.west_m, grid.south_m, grid.cell_m, self._mask, self._mask & ~left, depth).planned_on()

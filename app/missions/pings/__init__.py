@@ -1,0 +1,1 @@
+"""Pings of swath sonars: ``gate`` judges, ``store`` keeps them, as ``codec`` and ``chunk_file`` say."""

@@ -1,0 +1,174 @@
+"""Vehicles with swath sonars over REST: pings in, and files of them out."""
+
+import asyncio
+import io
+from collections.abc import AsyncIterator, Callable
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pyarrow.parquet as pq
+import pytest
+
+from app.main import Server
+from app.missions.operations import measurements
+from app.missions.pings import store
+from app.settings import Settings
+from app.storage.ping_files import PingFiles
+from tests.support.missions.pings import posted_ping
+from tests.support.rest import make_client, mission_spec, running, soundings
+
+VEHICLES = [{"name": "rover", "kind": "rest", "sensor": "multibeam"}, {"name": "plain", "kind": "rest"}]
+
+
+@pytest.fixture
+def settings(make_settings: Callable[..., Settings], tmp_path: Path) -> Settings:
+    return make_settings(pings_url=str(tmp_path / "pings"))
+
+
+@pytest.fixture
+async def server(settings: Settings) -> AsyncIterator[Server]:
+    async with running(settings) as server:
+        yield server
+
+
+@pytest.fixture
+async def path(client: httpx.AsyncClient) -> str:
+    answer = await client.post("/missions", json=mission_spec(vehicles=VEHICLES))
+    assert answer.status_code == 201, answer.text
+    return f"/missions/{answer.json()['id']}"
+
+
+async def post(client: httpx.AsyncClient, path: str, items: list[Any], **headers: str) -> Any:
+    answer = await client.post(f"{path}/measurements", json={"items": items}, headers=headers)
+    assert answer.status_code == 200, answer.text
+    return answer.json()
+
+
+async def test_pings_are_accepted_beside_soundings_and_stored_once(client: httpx.AsyncClient, path: str) -> None:
+    items = [posted_ping(0), soundings(1, "plain")[0], posted_ping(1, position_sd_m=0.5, roll_deg=2.0), posted_ping(0)]
+    batch = await post(client, path, items)
+    assert [item["verdict"] for item in batch["items"]] == ["accepted", "accepted", "accepted", "duplicate"]
+    progress = (await client.get(path)).json()["progress"]
+    assert (progress["pings"], progress["beams"], progress["soundings"]) == (2, 16, 1)
+    again = await post(client, path, items)
+    assert (again["accepted"], again["duplicate"], again["replayed"]) == (0, 4, False)
+    metrics = (await client.get(str(client.base_url).replace("api/v1/", "metrics"))).text
+    assert 'bathyfleet_pings_total{verdict="accepted"}' in metrics
+    assert "bathyfleet_beams_total" in metrics
+
+
+async def test_a_batch_whose_answer_was_lost_is_answered_again(client: httpx.AsyncClient, path: str) -> None:
+    items = [posted_ping(number) for number in range(20)]
+    key = {"Idempotency-Key": "line-1"}
+    first = await post(client, path, items, **key)
+    assert (first["accepted"], first["replayed"]) == (20, False)
+    assert (await post(client, path, items, **key)) == first | {"replayed": True}
+    items[3]["beams"]["ranges_m"][2] = 1.0
+    other = await client.post(f"{path}/measurements", json={"items": items}, headers=key)
+    assert other.status_code == 409
+    assert (await client.get(path)).json()["progress"]["pings"] == 20
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"beams": {"angles_deg": [0.0, 1.0], "ranges_m": [5.0]}}, "angles_deg has 2 entries and ranges_m 1"),
+        ({"beams": {"angles_deg": [], "ranges_m": []}}, "beams.angles_deg: List should have at least 1 item"),
+        ({"beams": {"angles_deg": [0.0] * 1025, "ranges_m": [1.0] * 1025}}, "at most 1024"),
+        (
+            {"beams": {"angles_deg": [0.0, 90.0], "ranges_m": [1.0, 1.0]}},
+            "beams.angles_deg.1: Input should be less th",
+        ),
+        ({"beams": {"angles_deg": [0.0], "ranges_m": ["far"]}}, "beams.ranges_m.0"),
+        ({"beams": {"angles_deg": [0.0], "range_m": [1.0]}}, "did you mean ranges_m?"),
+        ({"beams": [1.0, 2.0]}, "beams: "),
+        ({"heading_deg": None}, "beams is given but heading_deg is not; expected both"),
+        ({"range_m": 8.0}, "beams and range_m are given; expected beams without range_m"),
+        ({"beam_off_nadir_deg": 8.0}, "beams and beam_off_nadir_deg are given"),
+        ({"target": "tag", "target_range_m": 8.0}, "beams and target_range_m are given"),
+        ({"vehicle": "plain"}, "beams: 'plain' has sensor single_beam; only vehicles with sensor multibeam send pings"),
+        ({"vehicle": "stranger"}, "vehicle: 'stranger' takes no part in this mission"),
+        ({"lat_deg": 41.2}, "outside the area"),
+        ({"depth_m": -40.0}, "vehicle_depth_m: -40 is not between -2 and 11100"),
+    ],
+)
+async def test_what_is_wrong_with_a_ping_is_said_and_spoils_no_other(
+    client: httpx.AsyncClient, path: str, changes: dict[str, Any], said: str
+) -> None:
+    batch = await post(client, path, [posted_ping(0), posted_ping(1) | changes, posted_ping(2)])
+    assert [item["verdict"] for item in batch["items"]] == ["accepted", "rejected", "accepted"]
+    assert said in batch["items"][1]["reason"]
+    assert (await client.get(path)).json()["progress"]["pings"] == 2
+
+
+async def test_beams_without_a_range_are_no_beams(client: httpx.AsyncClient, path: str) -> None:
+    beams = {"angles_deg": [-30.0, 0.0, 30.0, 45.0, 60.0], "ranges_m": [None, 0.0, 9.5, -1.0, 1e300]}
+    batch = await post(client, path, [posted_ping() | {"beams": beams}])
+    assert batch["accepted"] == 1
+    progress = (await client.get(path)).json()["progress"]
+    assert (progress["pings"], progress["beams"]) == (1, 1)
+
+
+async def test_a_batch_of_many_beams_is_taken_and_of_too_many_refused_whole(
+    client: httpx.AsyncClient, path: str
+) -> None:
+    many = [posted_ping(number, beams=1000) for number in range(300)]
+    assert (await post(client, path, many))["accepted"] == 300
+    answer = await client.post(f"{path}/measurements", json={"items": [*many, posted_ping(300)]})
+    assert answer.status_code == 422
+    problem = answer.json()["errors"][0]
+    assert (problem["field"], problem["message"]) == ("items", "300008 beams are too many")
+    assert str(measurements.MAX_BATCH_BEAMS) in problem["expected"]
+    assert (await client.get(path)).json()["progress"]["beams"] == 300_000
+
+
+async def test_files_of_pings_are_listed_and_sent(
+    client: httpx.AsyncClient, path: str, settings: Settings, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    empty = {"pings": 0, "beams": 0, "rejected": 0, "parts": []}
+    assert (await client.get(f"{path}/pings")).json() == empty
+    await post(client, path, [posted_ping(number) for number in range(6)])
+    (part,) = (await client.get(f"{path}/pings")).json()["parts"]
+    assert (part["number"], part["vehicle"], part["pings"], part["sha256"]) == (None, "rover", 6, None)
+    monkeypatch.setattr(store, "CHUNK_PINGS", 8)
+    far = posted_ping(7) | {"lat_deg": 41.2}
+    await post(client, path, [posted_ping(6), far])
+    for _ in range(200):
+        listed = (await client.get(f"{path}/pings")).json()
+        if listed["parts"][0]["number"] is not None:
+            break
+        await asyncio.sleep(0.02)
+    (part,) = listed["parts"]
+    assert (part["pings"], part["beams"], part["rejected"]) == (7, 56, 1)
+    answer = await client.get(f"{path}/pings/{part['number']}")
+    assert answer.headers["content-type"] == "application/vnd.apache.parquet"
+    assert len(answer.content) == part["size_bytes"]
+    table = pq.read_table(io.BytesIO(answer.content))
+    assert table.num_rows == 8
+    assert [bool(reason) for reason in table["reason"].to_pylist()] == [False] * 7 + [True]
+    tag = {"If-None-Match": answer.headers["etag"]}
+    assert (await client.get(f"{path}/pings/{part['number']}", headers=tag)).status_code == 304
+
+    absent = await client.get(f"{path}/pings/99")
+    assert (absent.status_code, absent.json()["type"]) == (404, "urn:bathyfleet:problem:pings-not-found")
+    files = PingFiles(settings.pings_url)
+    (name,) = files.names()
+    files.write(name, answer.content[:-1])
+    damaged = await client.get(f"{path}/pings/{part['number']}")
+    assert (damaged.status_code, damaged.json()["type"]) == (500, "urn:bathyfleet:problem:pings-unreadable")
+    assert name in damaged.json()["detail"]
+
+
+async def test_pings_are_there_after_a_restart(settings: Settings) -> None:
+    async with running(settings) as server, make_client(server) as client:
+        mission = (await client.post("/missions", json=mission_spec(vehicles=VEHICLES))).json()
+        path = f"/missions/{mission['id']}"
+        await post(client, path, [posted_ping(number) for number in range(10)])
+    async with running(settings) as server, make_client(server) as client:
+        progress = (await client.get(path)).json()["progress"]
+        assert (progress["pings"], progress["beams"]) == (10, 80)
+        batch = await post(client, path, [posted_ping(number) for number in range(12)])
+        assert (batch["duplicate"], batch["accepted"]) == (10, 2)
+        parts = (await client.get(f"{path}/pings")).json()["parts"]
+        assert [(part["pings"], part["number"] is None) for part in parts] == [(10, False), (2, True)]
