@@ -664,6 +664,91 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/missions/{mission_id}/uncertainty-budget": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * See where uncertainty comes from
+         * @description Return what each source of error adds to soundings of swath sonars, straight down and at 45 and 60 degrees.
+         *
+         *     It is computed for level ground at the mean depth of the newest map, from the mission's `uncertainty`.
+         */
+        get: operations["getUncertaintyBudget"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/missions/{mission_id}/holidays": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * See what swath sonars missed
+         * @description Return the outline of each holiday of the newest map with its `number`, largest first, area and middle.
+         */
+        get: operations["getHolidays"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/missions/{mission_id}/crosslines": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * See how well the survey agrees with itself
+         * @description Return what the depths of lines differ where they cross, and crosslines' beams from the grid of the main lines.
+         *
+         *     Tide and sound speed are applied. Lines are found in the vehicles' ways: one ends at a gap or a turn. The worst
+         *     crossings are listed as GeoJSON. While the mission runs, the answer may be of an earlier map than the newest.
+         */
+        get: operations["getCrosslines"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/missions/{mission_id}/crossovers.csv": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Download the crossings
+         * @description Return where lines cross as a file, all crossings.
+         */
+        get: operations["getCrossoversFile"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/missions/{mission_id}/products": {
         parameters: {
             query?: never;
@@ -676,6 +761,26 @@ export interface paths {
          * @description Return every file that can be downloaded, with its path.
          */
         get: operations["listProducts"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/missions/{mission_id}/holidays.geojson": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Download the holidays
+         * @description Return what swath sonars missed as a file.
+         */
+        get: operations["getHolidaysFile"];
         put?: never;
         post?: never;
         delete?: never;
@@ -818,6 +923,50 @@ export interface paths {
          * @description Take a sounding out of the map; its values stay, the log keeps who did so, and it can be restored.
          */
         post: operations["rejectSounding"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/missions/{mission_id}/pings": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * See which pings there are
+         * @description Return the files of pings, and what is in none yet: some thousand of a vehicle fill one, the rest comes last.
+         */
+        get: operations["listPings"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/missions/{mission_id}/pings/{number}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Fetch a file of pings
+         * @description Return a Parquet file with a row for each ping, also for refused ones, which have a reason.
+         *
+         *     Columns: `block`, `step`, `received_at`, `source`, `reason`, `time_s`, `lat_deg`, `lon_deg`, `depth_m`, `roll_rad`,
+         *     `pitch_rad`, `heading_rad`, `position_sd_m`, and the lists `angle_rad` (across the track from straight down,
+         *     positive to starboard) and `range_m`. NaN: not known, or nothing was detected.
+         */
+        get: operations["getPings"];
+        put?: never;
+        post?: never;
         delete?: never;
         options?: never;
         head?: never;
@@ -1172,6 +1321,72 @@ export interface components {
             stops: components["schemas"]["StopView"][];
         };
         /**
+         * AgreementView
+         * @description Differences of depths that should be the same, metres.
+         */
+        AgreementView: {
+            /** Count */
+            count: number;
+            /** Mean M */
+            mean_m: number;
+            /** Median M */
+            median_m: number;
+            /**
+             * Sd M
+             * @description Standard deviation of a sample; null: there is one difference
+             */
+            sd_m: number | null;
+            /** Rms M */
+            rms_m: number;
+            /**
+             * P95 M
+             * @description 95 % quantile of the absolute differences
+             */
+            p95_m: number;
+            /**
+             * Max M
+             * @description Largest absolute difference
+             */
+            max_m: number;
+            /**
+             * Within Pct
+             * @description Share that is not larger than the order's largest TVU
+             */
+            within_pct: number;
+        };
+        /**
+         * AllowedView
+         * @description What an order of IHO S-44 allows at the depth, 95 %.
+         */
+        AllowedView: {
+            order: components["schemas"]["Order"];
+            /** Tvu M */
+            tvu_m: number;
+            /** Thu M */
+            thu_m: number;
+        };
+        /**
+         * AngleAgreementView
+         * @description Beams of crosslines minus the grid of the main lines, for one bin of beam angles.
+         */
+        AngleAgreementView: {
+            /**
+             * From Deg
+             * @description From straight down in the vehicle, positive to starboard
+             */
+            from_deg: number;
+            /** To Deg */
+            to_deg: number;
+            /** Count */
+            count: number;
+            /** Mean M */
+            mean_m: number;
+            /** Sd M */
+            sd_m: number | null;
+            /** Within Pct */
+            within_pct: number;
+        };
+        /**
          * AuditEntry
          * @description A command and what came of it.
          */
@@ -1354,10 +1569,37 @@ export interface components {
             components: {
                 [key: string]: string;
             };
+            /**
+             * Compiling
+             * @description Whether what decisions and maps are computed with is still being compiled, as after the first start on a machine: decisions are slow until then
+             */
+            compiling: boolean;
+        };
+        /**
+         * ComponentView
+         * @description A source of error.
+         */
+        ComponentView: {
+            /**
+             * Name
+             * @description Of its field in the mission's `uncertainty`; tide: `tide.sd_m`
+             */
+            name: string;
+            /** Title */
+            title: string;
+            /** Unit */
+            unit: string;
+            /**
+             * Sd
+             * @description Its standard deviation, in its unit
+             */
+            sd: number;
+            /** Shares */
+            shares: components["schemas"]["ShareView"][];
         };
         /**
          * ConformityView
-         * @description How the TVU estimate stands beside one order of IHO S-44; no order is claimed by it.
+         * @description How the estimates of TVU and THU stand beside one order of IHO S-44; no order is claimed by it.
          */
         ConformityView: {
             order: components["schemas"]["Order"];
@@ -1371,6 +1613,11 @@ export interface components {
              * @description The same among the sounded cells; null: none is
              */
             sounded_pct: number | null;
+            /**
+             * Horizontal Pct
+             * @description Share of the cells whose THU estimate stays within the order's largest, of those that have one; null: none has
+             */
+            horizontal_pct: number | null;
             /**
              * Statement
              * @example TVU estimate meets Order 1a in 83.2 % of cells
@@ -1398,6 +1645,195 @@ export interface components {
             accepted: number;
             /** Rejected */
             rejected: number;
+        };
+        /**
+         * CoverageSpec
+         * @description What full coverage by swath sonars is asked for, where the planner is `swath`.
+         */
+        CoverageSpec: {
+            /**
+             * Overlap Pct
+             * @description Share of half a swath that the next one sounds again, at least; more where position is uncertain
+             * @default 6
+             */
+            overlap_pct: number;
+            /**
+             * Crosslines Pct
+             * @description Length of lines across all others, flown last, as a share of those; by what both measured where they cross a survey is judged. 0: none
+             * @default 5
+             */
+            crosslines_pct: number;
+            /**
+             * Cell Of Depth
+             * @description Cells by depth, in files with cells of several sizes: each depth has the smallest of cell_m, twice and four times as much, and so on, that is at least this share of it, for example 0.05. null: one size
+             */
+            cell_of_depth?: number | null;
+        };
+        /**
+         * CrossingFeatureView
+         * @description A crossing as GeoJSON.
+         */
+        CrossingFeatureView: {
+            /**
+             * Type
+             * @constant
+             */
+            type: "Feature";
+            properties: components["schemas"]["CrossingView"];
+            geometry: components["schemas"]["PointView"];
+        };
+        /**
+         * CrossingFeaturesView
+         * @description Crossings as GeoJSON, worst first.
+         */
+        CrossingFeaturesView: {
+            /**
+             * Type
+             * @constant
+             */
+            type: "FeatureCollection";
+            /** Features */
+            features: components["schemas"]["CrossingFeatureView"][];
+        };
+        /**
+         * CrossingView
+         * @description A place where two lines cross.
+         */
+        CrossingView: {
+            /**
+             * Number
+             * @description 1 is the worst beside what the order allows
+             */
+            number: number;
+            /** Vehicles */
+            vehicles: [
+                string,
+                string
+            ];
+            /** Lines */
+            lines: [
+                number,
+                number
+            ];
+            /**
+             * Times S
+             * @description The vehicles' clocks, Unix seconds
+             */
+            times_s: [
+                number,
+                number
+            ];
+            /** Depths M */
+            depths_m: [
+                number,
+                number
+            ];
+            /**
+             * Difference M
+             * @description First minus second
+             */
+            difference_m: number;
+            /**
+             * Predicted Sd M
+             * @description As the soundings' standard deviations predict it
+             */
+            predicted_sd_m: number;
+            /**
+             * Angle Deg
+             * @description Between the lines, 0 to 90
+             */
+            angle_deg: number;
+            /**
+             * Within
+             * @description Whether it is not larger than the order's largest TVU
+             */
+            within: boolean;
+            /**
+             * Outlier
+             * @description Whether it is larger than that, or than three robust standard deviations
+             */
+            outlier: boolean;
+            /**
+             * Lat Deg
+             * @description Latitude, WGS84 degrees
+             */
+            lat_deg: number;
+            /**
+             * Lon Deg
+             * @description Longitude, WGS84 degrees
+             */
+            lon_deg: number;
+        };
+        /**
+         * CrossoversView
+         * @description How well a survey agrees with itself where its lines cross.
+         */
+        CrossoversView: {
+            /**
+             * Version
+             * @description Of the map that was newest when this was computed
+             */
+            version: number;
+            order: components["schemas"]["Order"];
+            /** Lines */
+            lines: number;
+            /**
+             * Length Km
+             * @description Of all lines
+             */
+            length_km: number;
+            /**
+             * Crosslines
+             * @description Lines across the dominant direction that cross others, flown as such or not
+             */
+            crosslines: number;
+            /** Crosslines Km */
+            crosslines_km: number;
+            /**
+             * Crosslines Pct
+             * @description Share of the length of all lines
+             */
+            crosslines_pct: number;
+            /** @description Of all crossings; null: there is none */
+            statistics: components["schemas"]["AgreementView"] | null;
+            /** @description Of those where a crossline crosses a main line */
+            at_crosslines: components["schemas"]["AgreementView"] | null;
+            /**
+             * Normalised Rms
+             * @description RMS of the differences over what the soundings' standard deviations predict: 1 is as predicted; null: there is no crossing
+             */
+            normalised_rms: number | null;
+            /** By Vehicles */
+            by_vehicles: components["schemas"]["VehiclesAgreementView"][];
+            /**
+             * By Line
+             * @description Lines that cross others, largest RMS first
+             */
+            by_line: components["schemas"]["LineAgreementView"][];
+            /**
+             * Lines Left Off
+             * @description Lines that `by_line` has no place for
+             */
+            lines_left_off: number;
+            /** @description Crosslines' beams of all angles minus the grid of the main lines; null: swath sonars have none */
+            beams: components["schemas"]["AngleAgreementView"] | null;
+            /**
+             * By Angle
+             * @description The same for each bin of beam angles
+             */
+            by_angle: components["schemas"]["AngleAgreementView"][];
+            histogram: components["schemas"]["HistogramView"];
+            /**
+             * Outliers
+             * @description Crossings beyond the order's largest TVU, or far from the others
+             */
+            outliers: number;
+            /**
+             * Left Off
+             * @description Crossings that `features` has no place for; `crossovers.csv` has all
+             */
+            left_off: number;
+            features: components["schemas"]["CrossingFeaturesView"];
         };
         /**
          * DifferenceView
@@ -1664,13 +2100,26 @@ export interface components {
          * @description A layer that the tiles hold on request.
          * @enum {string}
          */
-        FurtherLayer: "slope" | "tvu_fraction" | "difference";
+        FurtherLayer: "density" | "slope" | "tvu_fraction" | "difference" | "tvu" | "thu";
         /**
          * Guidance
          * @description How a vehicle of kind ``imc`` is led.
          * @enum {string}
          */
         Guidance: "follow" | "legs" | "acoustic";
+        /**
+         * HistogramView
+         * @description Counts of differences; the outer bins hold those beyond the ends, too.
+         */
+        HistogramView: {
+            /**
+             * Edges M
+             * @description One more than there are counts
+             */
+            edges_m: number[];
+            /** Counts */
+            counts: number[];
+        };
         /**
          * Homecoming
          * @description What becomes of a vehicle that goes on no further.
@@ -1745,7 +2194,7 @@ export interface components {
          * @description A layer of the map beside those that its JSON always has.
          * @enum {string}
          */
-        LayerName: "uncertainty" | "count" | "sounded" | "slope" | "tvu_fraction" | "difference" | "live";
+        LayerName: "uncertainty" | "count" | "sounded" | "density" | "slope" | "tvu_fraction" | "difference" | "tvu" | "thu" | "live";
         /**
          * LayerView
          * @description A layer of the map: what its values say and how it is shown.
@@ -1775,6 +2224,11 @@ export interface components {
                 number,
                 number
             ] | null;
+            /**
+             * Classes
+             * @description Words for the values 0, 1, 2 and so on, where there are no others; else empty
+             */
+            classes: string[];
             /**
              * Scale
              * @description Tiles hold whole numbers, the value times this; null: no tile has it
@@ -1872,6 +2326,58 @@ export interface components {
              * @default 1
              */
             min_vertical_separation_m: number;
+        };
+        /**
+         * LineAgreementView
+         * @description Differences of a line to all that cross it: its depths minus theirs.
+         */
+        LineAgreementView: {
+            /** Count */
+            count: number;
+            /** Mean M */
+            mean_m: number;
+            /** Median M */
+            median_m: number;
+            /**
+             * Sd M
+             * @description Standard deviation of a sample; null: there is one difference
+             */
+            sd_m: number | null;
+            /** Rms M */
+            rms_m: number;
+            /**
+             * P95 M
+             * @description 95 % quantile of the absolute differences
+             */
+            p95_m: number;
+            /**
+             * Max M
+             * @description Largest absolute difference
+             */
+            max_m: number;
+            /**
+             * Within Pct
+             * @description Share that is not larger than the order's largest TVU
+             */
+            within_pct: number;
+            /** Vehicle */
+            vehicle: string;
+            /**
+             * Line
+             * @description Among the vehicle's lines, from 1
+             */
+            line: number;
+            /** Crossline */
+            crossline: boolean;
+            /**
+             * Start S
+             * @description The vehicle's clock at its begin, Unix seconds
+             */
+            start_s: number;
+            /** Length M */
+            length_m: number;
+            /** Heading Deg */
+            heading_deg: number;
         };
         /**
          * LinkRecord
@@ -2001,7 +2507,7 @@ export interface components {
         };
         /**
          * Measurement
-         * @description One measurement posted by a vehicle: its position, and a sounding or a range to a target where it has one.
+         * @description One measurement posted by a vehicle: its position, and a sounding, a ping or a range to a target, if any.
          */
         Measurement: {
             /** Vehicle */
@@ -2064,6 +2570,8 @@ export interface components {
             range_sd_m?: number | null;
             /** Position Sd M */
             position_sd_m?: number | null;
+            /** @description One ping of a swath sonar, of vehicles with sensor multibeam; it needs heading_deg and comes without range_m */
+            beams?: components["schemas"]["PostedBeams"] | null;
             /**
              * Target
              * @description The moving target that target_range_m was measured to
@@ -2167,6 +2675,7 @@ export interface components {
             };
             /** @description When vehicles come up for a GPS fix; null: never because of their position */
             surface_policy?: components["schemas"]["SurfacePolicy"] | null;
+            coverage?: components["schemas"]["CoverageSpec"];
             /**
              * Targets
              * @description Moving targets to keep track of
@@ -2205,6 +2714,8 @@ export interface components {
              * @default 0.01
              */
             sounding_noise: number;
+            /** @description What makes soundings of swath sonars uncertain */
+            uncertainty?: components["schemas"]["SoundingErrors"];
             tide?: components["schemas"]["Tide"];
             /** @description Sound speed correction; null: the sonars' own ranges are taken */
             sound_speed?: components["schemas"]["SoundSpeed"] | null;
@@ -2345,6 +2856,7 @@ export interface components {
                 };
                 /** @description When vehicles come up for a GPS fix; null: never because of their position */
                 surface_policy?: components["schemas"]["SurfacePolicy"] | null;
+                coverage?: components["schemas"]["CoverageSpec"];
                 /**
                  * Targets
                  * @description Moving targets to keep track of
@@ -2383,6 +2895,8 @@ export interface components {
                  * @default 0.01
                  */
                 sounding_noise: number;
+                /** @description What makes soundings of swath sonars uncertain */
+                uncertainty?: components["schemas"]["SoundingErrors"];
                 tide?: components["schemas"]["Tide"];
                 /** @description Sound speed correction; null: the sonars' own ranges are taken */
                 sound_speed?: components["schemas"]["SoundSpeed"] | null;
@@ -2455,13 +2969,13 @@ export interface components {
          * @description A layer that can be seen as a picture.
          * @enum {string}
          */
-        OverlayLayer: "depth" | "uncertainty" | "count" | "slope" | "tvu_fraction" | "difference" | "live";
+        OverlayLayer: "depth" | "uncertainty" | "count" | "density" | "slope" | "tvu_fraction" | "difference" | "tvu" | "thu" | "live";
         /**
          * Palette
          * @description Colours of the dashboard's map.
          * @enum {string}
          */
-        Palette: "deep" | "violet" | "matter" | "balance" | "landmarks";
+        Palette: "deep" | "violet" | "matter" | "balance" | "landmarks" | "classes";
         /**
          * PcaoModel
          * @description A controller that ``bathyfleet train`` wrote.
@@ -2537,6 +3051,71 @@ export interface components {
          * @enum {string}
          */
         Phase: "transit" | "survey" | "surfacing" | "returning" | "home" | "stopped";
+        /**
+         * PingPartView
+         * @description Some of a vehicle's pings: a file of them, or those that are in none yet.
+         */
+        PingPartView: {
+            /**
+             * Number
+             * @description Of the file, for `GET /missions/{mission_id}/pings/{number}`; null: in no file yet
+             */
+            number: number | null;
+            /** Vehicle */
+            vehicle: string;
+            /**
+             * First Time S
+             * @description The vehicle's clock at the first ping, Unix seconds
+             */
+            first_time_s: number;
+            /**
+             * Last Time S
+             * @description The vehicle's clock at the last ping, Unix seconds
+             */
+            last_time_s: number;
+            /**
+             * Pings
+             * @description Accepted ones
+             */
+            pings: number;
+            /**
+             * Beams
+             * @description Their beams that detected something
+             */
+            beams: number;
+            /**
+             * Rejected
+             * @description Pings that are kept but not used; the file says why
+             */
+            rejected: number;
+            /**
+             * Size Bytes
+             * @description Of the file
+             */
+            size_bytes: number | null;
+            /**
+             * Sha256
+             * @description Of the file
+             */
+            sha256: string | null;
+        };
+        /**
+         * PingsView
+         * @description All pings of a mission, in the order in which they came.
+         */
+        PingsView: {
+            /**
+             * Pings
+             * @description Accepted ones of all parts
+             */
+            pings: number;
+            /** Beams */
+            beams: number;
+            /** Rejected */
+            rejected: number;
+            /** Parts */
+            parts: components["schemas"]["PingPartView"][];
+        };
         /**
          * PlannerOptions
          * @description Settings of the planners. Every planner reads those that concern it.
@@ -2668,6 +3247,22 @@ export interface components {
             };
         };
         /**
+         * PointView
+         * @description A GeoJSON point.
+         */
+        PointView: {
+            /**
+             * Type
+             * @constant
+             */
+            type: "Point";
+            /** Coordinates */
+            coordinates: [
+                number,
+                number
+            ];
+        };
+        /**
          * PolygonGeometry
          * @description A GeoJSON polygon: one closed outer ring of [longitude, latitude] positions, no holes.
          */
@@ -2717,6 +3312,36 @@ export interface components {
          * @enum {string}
          */
         PositionQuality: "untold" | "stated" | "good" | "fading" | "poor";
+        /**
+         * PostedBeams
+         * @description What a swath sonar measured with one ping: angle and range of each beam, in the same order.
+         */
+        PostedBeams: {
+            /**
+             * Angles Deg
+             * @description Across the track, from straight down in the vehicle; positive to starboard
+             * @example [
+             *       -60,
+             *       -30,
+             *       0,
+             *       30,
+             *       60
+             *     ]
+             */
+            angles_deg: number[];
+            /**
+             * Ranges M
+             * @description Slant ranges, metres; null, 0 or less: nothing was detected
+             * @example [
+             *       19.8,
+             *       11.6,
+             *       10.1,
+             *       11.7,
+             *       null
+             *     ]
+             */
+            ranges_m: (number | null)[];
+        };
         /**
          * PreflightView
          * @description What stands before a start.
@@ -2829,9 +3454,36 @@ export interface components {
             soundings: number;
             /**
              * Rejected
-             * @description Soundings kept but not used
+             * @description Soundings and pings kept but not used
              */
             rejected: number;
+            /**
+             * Pings
+             * @description Accepted pings of swath sonars
+             * @default 0
+             */
+            pings: number;
+            /**
+             * Beams
+             * @description Beams of these that detected something; they are no soundings
+             * @default 0
+             */
+            beams: number;
+            /**
+             * Ensonified Pct
+             * @description Share of the area's cells that beams of swath sonars met; null without any. With coverage.cell_of_depth cells are those that the depth of a place asks for, here, in dense_pct and in holidays
+             */
+            ensonified_pct: number | null;
+            /**
+             * Dense Pct
+             * @description Share of the area's cells with at least five soundings; null without swath sonars
+             */
+            dense_pct: number | null;
+            /**
+             * Holidays
+             * @description Holidays: pieces of ground of at least three by three cells that were missed inside of what was swept; null without swath sonars
+             */
+            holidays: number | null;
             /**
              * Distance M
              * @description Distance travelled by all vehicles, along their tracks
@@ -2839,7 +3491,7 @@ export interface components {
             distance_m: number;
             /**
              * Coverage Pct
-             * @description Share of the area's cells known to accuracy_m
+             * @description Share of the area's cells known to accuracy_m; with swath sonars of those that a beam met
              */
             coverage_pct: number;
             /**
@@ -3281,6 +3933,27 @@ export interface components {
          */
         Severity: "ok" | "note" | "problem";
         /**
+         * ShareView
+         * @description What something adds to the uncertainty of a beam, standard deviations in metres.
+         */
+        ShareView: {
+            /**
+             * Angle Deg
+             * @description Of the beam from straight down
+             */
+            angle_deg: number;
+            /**
+             * Vertical M
+             * @description Of the depth
+             */
+            vertical_m: number;
+            /**
+             * Horizontal M
+             * @description Of the place, east and north together
+             */
+            horizontal_m: number;
+        };
+        /**
          * SimulatedTarget
          * @description A target that moves about in the service's own simulation; vehicles of kind ``sim`` range to it.
          */
@@ -3377,6 +4050,84 @@ export interface components {
              * @default
              */
             source: string;
+        };
+        /**
+         * SoundingErrors
+         * @description Standard deviations (1 sigma) of what makes soundings of swath sonars uncertain.
+         */
+        SoundingErrors: {
+            /**
+             * Range M
+             * @description Range: the part that is the same at all ranges, m
+             * @default 0.03
+             */
+            range_m: number;
+            /**
+             * Range Pct
+             * @description Range: the part that grows with it, %
+             * @default 0.5
+             */
+            range_pct: number;
+            /**
+             * Beam Angle Deg
+             * @description Direction of a beam in the sonar, degrees
+             * @default 0.1
+             */
+            beam_angle_deg: number;
+            /**
+             * Roll Deg
+             * @description Roll as it is measured, degrees
+             * @default 0.05
+             */
+            roll_deg: number;
+            /**
+             * Pitch Deg
+             * @description Pitch as it is measured, degrees
+             * @default 0.05
+             */
+            pitch_deg: number;
+            /**
+             * Heading Deg
+             * @description Heading as it is measured, degrees
+             * @default 0.5
+             */
+            heading_deg: number;
+            /**
+             * Roll Patch Deg
+             * @description Roll of the sonar in the vehicle, as a patch test leaves it, degrees
+             * @default 0.1
+             */
+            roll_patch_deg: number;
+            /**
+             * Heave M
+             * @description Depth of the vehicle from moment to moment: heave, waves, m
+             * @default 0.05
+             */
+            heave_m: number;
+            /**
+             * Waterline M
+             * @description Depth of the sonar below the water level as a whole: draught, m
+             * @default 0.02
+             */
+            waterline_m: number;
+            /**
+             * Surface Sound Speed Mps
+             * @description Sound speed at the sonar, by which it steers its beams, m/s
+             * @default 0.5
+             */
+            surface_sound_speed_mps: number;
+            /**
+             * Sound Speed Profile Mps
+             * @description Sound speed between the sonar and the bottom, m/s
+             * @default 0.5
+             */
+            sound_speed_profile_mps: number;
+            /**
+             * Position M
+             * @description East and north of a vehicle that does not say how well it knows its place, m each
+             * @default 1.5
+             */
+            position_m: number;
         };
         /**
          * SoundingPage
@@ -3564,6 +4315,36 @@ export interface components {
              * @description It stays at the surface until its position is known this well; null: a third of the limit
              */
             good_position_sd_m?: number | null;
+        };
+        /**
+         * SwathSonarSpec
+         * @description A multibeam sonar, looking down, across the vehicle's heading.
+         */
+        SwathSonarSpec: {
+            /**
+             * Aperture Deg
+             * @description Angle between its outermost beams, half of it to each side, degrees
+             * @default 120
+             */
+            aperture_deg: number;
+            /**
+             * Beams
+             * @description How many beams a ping has, at equal angles
+             * @default 256
+             */
+            beams: number;
+            /**
+             * Rate Hz
+             * @description Pings a second, Hz
+             * @default 5
+             */
+            rate_hz: number;
+            /**
+             * Range M
+             * @description Longest slant range, metres
+             * @default 100
+             */
+            range_m: number;
         };
         /**
          * TargetRangePage
@@ -3889,6 +4670,21 @@ export interface components {
             sha256: string;
         };
         /**
+         * TotalView
+         * @description A beam's total propagated uncertainty, 95 %.
+         */
+        TotalView: {
+            /**
+             * Angle Deg
+             * @description Of the beam from straight down
+             */
+            angle_deg: number;
+            /** Tvu M */
+            tvu_m: number;
+            /** Thu M */
+            thu_m: number;
+        };
+        /**
          * Tracking
          * @description How well targets are to be known, and how well vehicles range to them.
          */
@@ -3997,6 +4793,28 @@ export interface components {
             score?: number | null;
         };
         /**
+         * UncertaintyBudgetView
+         * @description Where the uncertainty of a swath sonar's soundings comes from, over level ground, for single beams.
+         */
+        UncertaintyBudgetView: {
+            /**
+             * Depth M
+             * @description Mean depth of the map
+             */
+            depth_m: number;
+            /**
+             * Below Sonar M
+             * @description That minus the depth at which the highest vehicle travels
+             */
+            below_sonar_m: number;
+            /** Components */
+            components: components["schemas"]["ComponentView"][];
+            /** Totals */
+            totals: components["schemas"]["TotalView"][];
+            /** Allowed */
+            allowed: components["schemas"]["AllowedView"][];
+        };
+        /**
          * VehicleDiagnosis
          * @description What was found of one vehicle.
          */
@@ -4059,6 +4877,8 @@ export interface components {
             kind: components["schemas"]["VehicleKind"];
             /** @default single_beam */
             sensor: components["schemas"]["Sensor"];
+            /** @description With sensor multibeam: what that sonar can do; null: its defaults */
+            sonar?: components["schemas"]["SwathSonarSpec"] | null;
             /**
              * Depth M
              * @description Depth it travels at where the bottom leaves room; null: the first vehicle of a mission at limits.min_depth_m, each further one limits.min_vertical_separation_m deeper
@@ -4201,6 +5021,14 @@ export interface components {
              */
             localization: components["schemas"]["PositionQuality"];
             /**
+             * Swath M
+             * @description How far its swath sonar reached with its last ping, level to port and to starboard, metres; null: it has none, or did not measure within the last seconds
+             */
+            swath_m: [
+                number,
+                number
+            ] | null;
+            /**
              * Surfacing
              * @description On its way up, or at the surface, for a GPS fix
              * @default false
@@ -4278,6 +5106,48 @@ export interface components {
             failsafes: components["schemas"]["FailsafeView"][];
             /** @description What its battery's level is worth; null while it has not said. */
             readonly battery: components["schemas"]["BatteryState"] | null;
+        };
+        /**
+         * VehiclesAgreementView
+         * @description Differences where two vehicles cross, or one crosses its own way.
+         */
+        VehiclesAgreementView: {
+            /** Count */
+            count: number;
+            /** Mean M */
+            mean_m: number;
+            /** Median M */
+            median_m: number;
+            /**
+             * Sd M
+             * @description Standard deviation of a sample; null: there is one difference
+             */
+            sd_m: number | null;
+            /** Rms M */
+            rms_m: number;
+            /**
+             * P95 M
+             * @description 95 % quantile of the absolute differences
+             */
+            p95_m: number;
+            /**
+             * Max M
+             * @description Largest absolute difference
+             */
+            max_m: number;
+            /**
+             * Within Pct
+             * @description Share that is not larger than the order's largest TVU
+             */
+            within_pct: number;
+            /**
+             * Vehicles
+             * @description Depths of the first minus those of the second; twice the same: the later minus the earlier
+             */
+            vehicles: [
+                string,
+                string
+            ];
         };
         /**
          * VehiclesMessage
@@ -7831,6 +8701,331 @@ export interface operations {
             };
         };
     };
+    getUncertaintyBudget: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description The mission's id */
+                mission_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["UncertaintyBudgetView"];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such mission; there is no map yet */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too many requests */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    getHolidays: {
+        parameters: {
+            query?: never;
+            header?: {
+                /** @description ETag of the map that the client has */
+                "if-none-match"?: string;
+            };
+            path: {
+                /** @description The mission's id */
+                mission_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description A FeatureCollection with the map's `version` */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/geo+json": unknown;
+                };
+            };
+            /** @description The map is still the one that `If-None-Match` names */
+            304: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such mission; there is no map yet */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description It contradicts the present state */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too many requests */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    getCrosslines: {
+        parameters: {
+            query?: {
+                /** @description Order of IHO S-44 that the TVU is compared with */
+                order?: components["schemas"]["Order"];
+            };
+            header?: {
+                /** @description ETag of the map that the client has */
+                "if-none-match"?: string;
+            };
+            path: {
+                /** @description The mission's id */
+                mission_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["CrossoversView"];
+                };
+            };
+            /** @description The map is still the one that `If-None-Match` names */
+            304: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such mission; there is no map yet */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too many requests */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description A file of pings is missing or damaged */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    getCrossoversFile: {
+        parameters: {
+            query?: {
+                /** @description Order of IHO S-44 that the TVU is compared with */
+                order?: components["schemas"]["Order"];
+            };
+            header?: never;
+            path: {
+                /** @description The mission's id */
+                mission_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description A row for each crossing, the worst beside what the order allows first */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "text/csv": string;
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such mission; there is no map yet */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too many requests */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description A file of pings is missing or damaged */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
     listProducts: {
         parameters: {
             query?: never;
@@ -7899,6 +9094,83 @@ export interface operations {
             };
         };
     };
+    getHolidaysFile: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description The mission's id */
+                mission_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description A FeatureCollection */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/geo+json": unknown;
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such mission; there is no map yet */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description It contradicts the present state */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too many requests */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
     getMapFile: {
         parameters: {
             query?: {
@@ -7915,7 +9187,7 @@ export interface operations {
             };
             header?: never;
             path: {
-                /** @description One of tif, nc, bag, xyz, csv, geojson, kml, png */
+                /** @description One of tif, nc, bag, vr.bag, tiers.zip, s102, xyz, csv, geojson, kml, png */
                 format: string;
                 /** @description The mission's id */
                 mission_id: string;
@@ -7924,7 +9196,7 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description `.tif`: Cloud-Optimized GeoTIFF with every layer; `.nc`: CF-NetCDF with every layer; `.bag`: Bathymetric Attributed Grid: elevation and uncertainty; `.xyz`: longitude, latitude and depth of every cell; `.csv`: every sounding, raw and corrected, with its verdict; `.geojson`: depth contours, area and tracks; `.kml`: depth contours; `.png`: a picture with axes, colour bar and scale */
+            /** @description `.tif`: Cloud-Optimized GeoTIFF with every layer; `.nc`: CF-NetCDF with every layer; `.bag`: Bathymetric Attributed Grid: elevation, uncertainty and numbers of soundings; `.vr.bag`: Bathymetric Attributed Grid of variable resolution: cells by depth; `.tiers.zip`: a GeoTIFF of each tier of cells by depth; `.s102`: Bathymetric Surface for charts (IHO S-102 3.0): depth, uncertainty and quality; `.xyz`: longitude, latitude and depth of every cell; `.csv`: every sounding, raw and corrected, with its verdict; `.geojson`: depth contours, area and tracks; `.kml`: depth contours; `.png`: a picture with axes, colour bar and scale */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -7933,7 +9205,9 @@ export interface operations {
                     "application/geo+json": Record<string, never>;
                     "application/vnd.google-earth.kml+xml": string;
                     "application/x-bag": string;
+                    "application/x-hdf5": string;
                     "application/x-netcdf": string;
+                    "application/zip": string;
                     "image/png": string;
                     "image/tiff": string;
                     "text/csv": string;
@@ -7960,6 +9234,15 @@ export interface operations {
             };
             /** @description There is no such mission; there is no map yet; there is no such format */
             404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description It contradicts the present state */
+            409: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -8050,6 +9333,15 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            /** @description It contradicts the present state */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description Some values cannot be taken */
             422: {
                 headers: {
@@ -8126,6 +9418,15 @@ export interface operations {
             };
             /** @description There is no such mission; there is no map yet; there is no such format */
             404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description It contradicts the present state */
+            409: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -8524,6 +9825,163 @@ export interface operations {
             };
             /** @description Too much is under way */
             503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    listPings: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description The mission's id */
+                mission_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["PingsView"];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such mission */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too many requests */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    getPings: {
+        parameters: {
+            query?: never;
+            header?: {
+                /** @description ETag of the file that the client has */
+                "if-none-match"?: string;
+            };
+            path: {
+                /** @description The file's number */
+                number: number;
+                /** @description The mission's id */
+                mission_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description The file */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/vnd.apache.parquet": string;
+                };
+            };
+            /** @description It is the file that `If-None-Match` names: files never change */
+            304: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such file of pings */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too many requests */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description A file of pings is missing or damaged */
+            500: {
                 headers: {
                     [name: string]: unknown;
                 };

@@ -45,6 +45,10 @@ export type SoundingState = Schemas["SoundingState"];
 export type LayerView = Complete<Schemas["LayerView"]>;
 export type ProductView = Complete<Schemas["ProductView"]>;
 export type QualityView = Complete<Schemas["QualityView"]>;
+export type CrossoversView = Complete<Schemas["CrossoversView"]>;
+export type CrossingView = Complete<Schemas["CrossingView"]>;
+export type AgreementView = Complete<Schemas["AgreementView"]>;
+export type AngleAgreementView = Complete<Schemas["AngleAgreementView"]>;
 export type PlannerView = Complete<Schemas["PlannerView"]>;
 export type ActionView = Complete<Schemas["ActionView"]>;
 export type DoctorView = Complete<Schemas["DoctorView"]>;
@@ -62,7 +66,9 @@ export type VehicleSpec = Pick<Schemas["VehicleSpec"], "name" | "kind" | "sensor
   speed_mps?: number;
   endurance_min?: number;
   recovery_point?: LngLat;
+  sonar?: Partial<Schemas["SwathSonarSpec"]> | null;
 };
+export type Sensor = Schemas["Sensor"];
 export type PlannerOptions = Partial<Schemas["PlannerOptions"]>;
 
 /** What the form sends. */
@@ -81,6 +87,15 @@ export type NewMission = Pick<Schemas["MissionSpec"], "name" | "area" | "keep_ou
   tide?: { level_m: number; source: string };
   recovery?: { point: LngLat } & Partial<Schemas["Recovery"]>;
 };
+
+/** What a swath survey missed, as its GeoJSON says, largest first; `version` is the map's. */
+export interface Holidays {
+  version: number;
+  features: {
+    properties: { number: number; area_m2: number; lat_deg: number; lon_deg: number };
+    geometry: { coordinates: LngLat[][][] };
+  }[];
+}
 
 /** Where a vehicle was and when, as the tracks' GeoJSON says. */
 export interface TimedTracks {

@@ -15,6 +15,7 @@ import type { PictureResult } from "./picture.worker";
 import { Sheets } from "./sheets";
 import { type Site, sitePicture } from "./site";
 import { imageOf, paintStill, type StillContent } from "./still";
+import type { SwathLine } from "./swath";
 import type { TargetMark } from "./targets";
 
 setWorkerUrl(workerUrl);
@@ -58,7 +59,15 @@ export class Chart {
   readonly #sheets: Sheets;
   readonly #pins = new Map<string, Marker>();
   #look: Look;
-  #still: StillContent = { floor: null, area: null, keepOut: [], tracks: [], site: null };
+  #still: StillContent = {
+    floor: null,
+    area: null,
+    keepOut: [],
+    tracks: [],
+    holidays: [],
+    crossings: [],
+    site: null,
+  };
   #lively: LivelyContent = NOTHING;
   #areaBounds: Bounds | null = null;
   #draftBounds: Bounds | null = null;
@@ -166,6 +175,11 @@ export class Chart {
     this.#map.fitBounds(bounds, { padding: padding(), animate: false, maxZoom: 19 });
   }
 
+  goTo(bounds: Bounds, padding: Padding): void {
+    this.#fitting = null;
+    this.#map.fitBounds(bounds, { padding, animate: false, maxZoom: 21 });
+  }
+
   /** Whether the middle of something lies in the free part of the map, and neither tiny nor larger than that. */
   #isInSight([west, south, east, north]: Bounds, { left, right, top, bottom }: Padding): boolean {
     const at = this.#sheets.projection;
@@ -230,6 +244,21 @@ export class Chart {
   /** The newest part of the vehicles' ways. */
   setTails(tails: readonly Track[]): void {
     this.#show({ tails });
+  }
+
+  /** What the sonars of vehicles see now. */
+  setSwaths(swaths: readonly SwathLine[]): void {
+    this.#show({ swaths });
+  }
+
+  /** What swath sonars missed. */
+  setHolidays(holidays: StillContent["holidays"]): void {
+    if (holidays.length > 0 || this.#still.holidays.length > 0) this.#lay({ holidays });
+  }
+
+  /** Where lines cross and disagree. */
+  setCrossings(crossings: StillContent["crossings"]): void {
+    if (crossings.length > 0 || this.#still.crossings.length > 0) this.#lay({ crossings });
   }
 
   setRoutes(routes: readonly Route[]): void {

@@ -23,7 +23,9 @@ export function paletteOf(layer: LayerView, depth: DepthPalette): Palette | null
 /** A pleasant range that holds all of a layer's values; null while there are none. */
 export function fittingRange(map: SeaFloor, layer: LayerView): Range | null {
   const values = map.layers[layer.name];
-  if (values && layer.range) return { low: layer.range[0], high: layer.range[1] };
+  if (layer.range && values?.some((value) => value !== UNKNOWN)) {
+    return { low: layer.range[0], high: layer.range[1] };
+  }
   const scale = map.scales[layer.name] ?? 1;
   let low = Number.POSITIVE_INFINITY;
   let high = Number.NEGATIVE_INFINITY;
@@ -39,6 +41,18 @@ export function fittingRange(map: SeaFloor, layer: LayerView): Range | null {
   }
   const [from, to] = roundRange(layer.fit === "data" ? low / scale : 0, high / scale);
   return { low: from, high: to > from ? to : from + 1 };
+}
+
+/** Share of the cells with each of the values 0, 1, 2 and so on. */
+export function classShares(map: SeaFloor, { name, classes }: LayerView): number[] {
+  const counts = classes.map(() => 0);
+  let all = 0;
+  for (const value of map.layers[name] ?? []) {
+    if (value === UNKNOWN) continue;
+    counts[value] = (counts[value] ?? 0) + 1;
+    all += 1;
+  }
+  return counts.map((one) => one / Math.max(all, 1));
 }
 
 export function shareOutside(map: SeaFloor, { name }: LayerView, { low, high }: Range): number {

@@ -6,6 +6,7 @@ import type { PlaceMark, Route, Spot, Track } from "./marks";
 import type { Paper } from "./paper";
 import { dot, line, stroke, trace, way } from "./pen";
 import type { Projection } from "./projection";
+import type { SwathLine } from "./swath";
 import type { TargetMark } from "./targets";
 
 const SKETCH = "#1d5c94";
@@ -20,6 +21,7 @@ export interface LivelyContent {
   draft: { area: PolygonGeometry | null; keepOut: readonly PolygonGeometry[] };
   ranges: readonly { at: LngLat; radius_m: number; colour: string }[];
   tails: readonly Track[];
+  swaths: readonly SwathLine[];
   routes: readonly Route[];
   targets: readonly TargetMark[];
   marks: readonly PlaceMark[];
@@ -32,6 +34,7 @@ export const NOTHING: LivelyContent = {
   draft: { area: null, keepOut: [] },
   ranges: [],
   tails: [],
+  swaths: [],
   routes: [],
   targets: [],
   marks: [],
@@ -48,7 +51,7 @@ export function paintLively(
   content: LivelyContent,
   paper: Paper,
 ): void {
-  const { draft, ranges, tails, routes, targets, marks, spots, measure, sketch } = content;
+  const { draft, ranges, tails, swaths, routes, targets, marks, spots, measure, sketch } = content;
   context.lineJoin = context.lineCap = "round";
   for (const ring of draft.area?.coordinates ?? []) {
     line(context, at, ring as LngLat[], { colour: paper.area, width: 2.5, dash: [5, 5] });
@@ -63,6 +66,10 @@ export function paintLively(
   }
   for (const mark of marks) paintMark(context, at, mark, paper);
   for (const tail of tails) way(context, at, tail, paper.casing);
+  for (const { ends, colour, opacity } of swaths) {
+    line(context, at, ends, { colour: paper.casing, width: 7, opacity: 0.65 * opacity });
+    line(context, at, ends, { colour, width: 3.5, opacity });
+  }
   for (const { points, colour, acknowledged, arrivalRadius_m } of routes) {
     const to = points.at(-1);
     if (to) line(context, at, circle(to, arrivalRadius_m), { colour, width: 1.5, opacity: 0.8 });

@@ -62,11 +62,15 @@ const BALANCE = palette(
   "181c43 263276 2548b0 0f6abd 3888ba 65a2bc 98bac5 c7d2d7 f1eceb e2c7be d7a290 cc7d63 bf573a ae2e24 8d1029 630e23 3c0912",
 );
 
+/** Of layers by classes: missed, too few, enough; as landmarks are drawn. */
+const CLASSES = palette("b03a2e f4c450 2e7d6e");
+
 /** The palettes that layers name beside that of depths; null: the layer is drawn by classes. */
 export const PALETTES: Readonly<Record<Exclude<LayerView["palette"], "deep">, Palette | null>> = {
   violet: VIOLET,
   matter: MATTER,
   balance: BALANCE,
+  classes: CLASSES,
   landmarks: null,
 };
 

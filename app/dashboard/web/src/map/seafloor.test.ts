@@ -132,6 +132,7 @@ const layer = (name: string, changes: Partial<LayerView> = {}): LayerView => ({
   palette: "deep",
   fit: "data",
   range: null,
+  classes: [],
   scale: 100,
   in_every_tile: true,
   in_json: true,

@@ -35,6 +35,10 @@ export interface StillContent {
   area: PolygonGeometry | null;
   keepOut: readonly PolygonGeometry[];
   tracks: readonly Track[];
+  /** Outlines of what swath sonars missed. */
+  holidays: readonly (readonly (readonly LngLat[])[])[];
+  /** Where lines cross and disagree. */
+  crossings: readonly LngLat[];
   /** What a search knows of its site. */
   site: { corners: readonly LngLat[]; image: HTMLCanvasElement } | null;
 }
@@ -57,25 +61,39 @@ export function paintStill(
   context: CanvasRenderingContext2D,
   at: Projection,
   window: Projection,
-  { floor, area, keepOut, tracks, site }: StillContent,
+  { floor, area, keepOut, tracks, holidays, crossings, site }: StillContent,
   paper: Paper,
 ): void {
   context.lineCap = context.lineJoin = "round";
   if (floor) paintFloor(context, at, floor);
   if (site) paintGridded(context, at, site.corners, site.image);
   paintGrid(context, at, window, paper);
-  for (const zone of keepOut) {
-    const pattern = context.createPattern(striped(paper.keepOut), "repeat");
-    context.beginPath();
-    for (const ring of zone.coordinates) trace(context, at, ring as LngLat[], true);
-    if (pattern) context.fillStyle = pattern;
-    context.fill("evenodd");
-    stroke(context, { colour: paper.keepOut, width: 2 });
-  }
+  for (const zone of keepOut) paintStriped(context, at, zone.coordinates as LngLat[][], paper.keepOut);
+  for (const rings of holidays) paintStriped(context, at, rings, paper.holiday, paper.casing);
   for (const ring of area?.coordinates ?? []) {
     line(context, at, ring as LngLat[], { colour: paper.area, width: 2 }, true);
   }
   for (const track of tracks) way(context, at, track, paper.casing);
+  for (const place of crossings) paintCrossing(context, at, place, paper);
+}
+
+/** Half the width of the sign of a crossing, pixels. */
+const ARM = 6;
+
+function paintCrossing(
+  context: CanvasRenderingContext2D,
+  at: Projection,
+  [lng, lat]: LngLat,
+  paper: Paper,
+): void {
+  const [x, y] = [at.x(lng), at.y(lat)];
+  context.beginPath();
+  for (const side of [-ARM, ARM]) {
+    context.moveTo(x - ARM, y - side);
+    context.lineTo(x + ARM, y + side);
+  }
+  stroke(context, { colour: paper.casing, width: 6 });
+  stroke(context, { colour: paper.crossing, width: 3 });
 }
 
 /** Draws a picture over the grid with these corners; returns where three of them are on the sheet. */
@@ -166,6 +184,24 @@ function paintContours(
       context.restore();
     }
   }
+}
+
+/** An area with its holes, striped; on a casing and in the other direction where it lies on a map's own stripes. */
+function paintStriped(
+  context: CanvasRenderingContext2D,
+  at: Projection,
+  rings: readonly (readonly LngLat[])[],
+  colour: string,
+  casing?: string,
+): void {
+  const pattern = context.createPattern(striped(colour), "repeat");
+  if (casing) pattern?.setTransform(new DOMMatrix([-1, 0, 0, 1, 0, 0]));
+  context.beginPath();
+  for (const ring of rings) trace(context, at, ring, true);
+  if (pattern) context.fillStyle = pattern;
+  context.fill("evenodd");
+  if (casing) stroke(context, { colour: casing, width: 5.5 });
+  stroke(context, { colour, width: casing ? 3 : 2 });
 }
 
 /** The lines lie where the window's labels say, and reach over the whole sheet. */

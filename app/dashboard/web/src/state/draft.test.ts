@@ -1,7 +1,17 @@
 import { describe, expect, it } from "vitest";
 import type { MissionView } from "../api/types";
 import { boundsOf } from "../map/geo";
-import { areaOf, centred, copyOf, emptyDraft, estimate, faultsOf, fieldOf, toMission } from "./draft";
+import {
+  areaOf,
+  canPlan,
+  centred,
+  copyOf,
+  emptyDraft,
+  estimate,
+  faultsOf,
+  fieldOf,
+  toMission,
+} from "./draft";
 
 const draft = { ...emptyDraft([-8.705, 41.185]), name: "Quay" };
 
@@ -23,6 +33,43 @@ describe("a wrong value is named with what would be right", () => {
     const faults = faultsOf({ ...draft, ...change });
     expect(Object.keys(faults)).toEqual([field]);
     expect(faults[field]).toContain(words);
+  });
+});
+
+describe("swath sonars", () => {
+  const swath = { ...draft, sensor: "multibeam" as const, planner: "swath" };
+
+  it("are described where they are no usual ones, and are copied", () => {
+    const mission = toMission({ ...swath, own: { "sim-2": { aperture_deg: "90", speed_mps: "1.5" } } });
+    expect(mission.vehicles).toEqual([
+      { name: "sim-1", kind: "sim", sensor: "multibeam" },
+      { name: "sim-2", kind: "sim", sensor: "multibeam", speed_mps: 1.5, sonar: { aperture_deg: 90 } },
+    ]);
+    expect(mission).toMatchObject({ planner: { name: "swath" }, coverage: { overlap_pct: 6 } });
+    const copy = copyOf({ name: "Quay", spec: { tide: {}, ...mission } as unknown as MissionView["spec"] });
+    expect(toMission(copy).vehicles).toEqual(mission.vehicles);
+    expect(
+      toMission({ ...copy, own: { "sim-2": { ...copy.own["sim-2"], sensor: "dvl" } } }).vehicles[1],
+    ).toEqual({
+      name: "sim-2",
+      kind: "sim",
+      sensor: "dvl",
+      speed_mps: 1.5,
+    });
+  });
+
+  it("are held to the service's bounds", () => {
+    expect(faultsOf(swath)).toEqual({});
+    expect(faultsOf({ ...swath, own: { "sim-1": { beams: "1" } } }).own).toContain("Beams of sim-1 must be");
+    expect(fieldOf("vehicles.1.sonar.rate_hz")).toBe("own");
+    expect(fieldOf("coverage.overlap_pct")).toBe("overlap_pct");
+  });
+
+  it("are needed on every vehicle for full coverage", () => {
+    const one = { ...swath, own: { "sim-1": { sensor: "dvl" as const } } };
+    expect(canPlan("swath", swath)).toBe(true);
+    expect(canPlan("swath", one)).toBe(false);
+    expect(faultsOf(one).planner).toContain("multibeam");
   });
 });
 

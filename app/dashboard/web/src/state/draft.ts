@@ -1,7 +1,7 @@
 /** A mission being described: the form's fields, checked and turned into what the service takes. Pure. */
 
 import SPEC from "../api/mission.json";
-import type { LngLat, MissionView, NewMission, PlannerOptions, VehicleSpec } from "../api/types";
+import type { LngLat, MissionView, NewMission, PlannerOptions, Sensor, VehicleSpec } from "../api/types";
 import { areaFault, polygonOf, ringOf } from "../map/area";
 import { rectangle } from "../map/geo";
 import {
@@ -13,13 +13,17 @@ import {
   type LengthUnit,
   type MissionKind,
   numberFault,
+  ownPath,
+  put,
   type Schema,
   startOf,
   startTexts,
   type Texts,
+  type Tree,
   textsOf,
   VEHICLE_FIELDS,
   type VehicleField,
+  valueAt,
   vehicleFieldsOf,
   withTexts,
 } from "./fields";
@@ -28,7 +32,7 @@ import {
 export type AreaSource = "typed" | "drawn";
 
 /** What one vehicle has of its own, as typed; `recovery_point` as "latitude, longitude". */
-export type Own = Partial<Record<VehicleField | "recovery_point", string>>;
+export type Own = Partial<Record<VehicleField | "recovery_point", string>> & { sensor?: Sensor };
 
 /** As typed. */
 export interface Draft extends Texts {
@@ -53,6 +57,8 @@ export interface Draft extends Texts {
   planner: string;
   options: PlannerOptions;
   simulated: string;
+  /** Of the simulated vehicles that have no other of their own. */
+  sensor: Sensor;
   /** Of the simulated vehicles, separated by commas; empty: sim-1, sim-2 and so on. */
   names: string;
   chosen: readonly VehicleSpec[];
@@ -75,11 +81,16 @@ export const PLANNER_PRESETS: Readonly<Record<string, { title: string; words: st
     words:
       "Parallel lines over the whole area, shared among the vehicles. Predictable; finds no more where it is rough.",
   },
+  swath: {
+    title: "Full coverage",
+    words:
+      "Lines as far apart as the measured depth lets swath sonars see, then what was missed. Needs a multibeam on every vehicle.",
+  },
   random: { title: "Random", words: "Wanders about. Only to compare the others with." },
 };
 
 /** What the service has no default for. */
-const SUGGESTED = { east_m: "100", north_m: "100", simulated: "2" };
+const SUGGESTED = { east_m: "100", north_m: "100", simulated: "2", sensor: "dvl" } as const;
 
 /** A draft whose area lies in the middle of what the map shows. */
 export function emptyDraft(middle: LngLat): Draft {
@@ -137,7 +148,8 @@ export function copyOf({ spec, name }: Pick<MissionView, "spec" | "name">): Draf
     recovery: spec.recovery ? typedPlace(spec.recovery.point as LngLat) : "",
     simulated: "0",
     chosen: spec.vehicles.map(
-      ({ speed_mps: _s, endurance_min: _e, recovery_point: _p, ...vehicle }) => vehicle as VehicleSpec,
+      ({ speed_mps: _s, endurance_min: _e, recovery_point: _p, sonar: _, ...vehicle }) =>
+        vehicle as VehicleSpec,
     ),
     own: Object.fromEntries(spec.vehicles.map((vehicle) => [vehicle.name, ownOf(vehicle as VehicleSpec)])),
     base: base as Partial<NewMission>,
@@ -146,9 +158,10 @@ export function copyOf({ spec, name }: Pick<MissionView, "spec" | "name">): Draf
 
 /** What a vehicle that is described has of its own. */
 function ownOf({ recovery_point, ...vehicle }: VehicleSpec): Own {
-  const numbers = (Object.keys(VEHICLE_FIELDS) as VehicleField[]).flatMap((name) =>
-    vehicle[name] == null ? [] : [[name, String(vehicle[name])]],
-  );
+  const numbers = Object.entries(VEHICLE_FIELDS).flatMap(([name, field]) => {
+    const value = valueAt(vehicle, ownPath(field));
+    return value == null ? [] : [[name, String(value)]];
+  });
   return {
     ...Object.fromEntries(numbers),
     ...(recovery_point ? { recovery_point: typedPlace(recovery_point) } : {}),
@@ -180,6 +193,14 @@ export const vehicleNames = (draft: Draft): string[] => [
   ...draft.chosen.map((vehicle) => vehicle.name),
   ...simulatedNames(draft),
 ];
+
+/** How a vehicle of this name sounds the bottom. */
+export const sensorOf = (draft: Draft, name: string): Sensor =>
+  draft.own[name]?.sensor ?? draft.chosen.find((vehicle) => vehicle.name === name)?.sensor ?? draft.sensor;
+
+/** Whether a planner can lead these vehicles. */
+export const canPlan = (planner: string, draft: Draft): boolean =>
+  planner !== "swath" || vehicleNames(draft).every((name) => sensorOf(draft, name) === "multibeam");
 
 /** Where a typed area begins when a place is to be its middle; nothing while its size is no size. */
 export function centred(draft: Draft, [lng, lat]: LngLat): Partial<Draft> {
@@ -256,15 +277,19 @@ export function faultsOf(draft: Draft): Faults {
   if (!faults.simulated && Number(draft.simulated) + draft.chosen.length === 0) {
     faults.simulated = "Choose at least one vehicle, or simulate some";
   }
-  for (const name of vehicleNames(draft)) note("own", ownFault(name, draft.own[name] ?? {}, draft.kind));
+  for (const name of vehicleNames(draft)) note("own", ownFault(name, draft));
+  if (draft.kind === "survey" && !canPlan(draft.planner, draft)) {
+    faults.planner = "Full coverage needs vehicles with a multibeam: choose their sensor, or another planner";
+  }
   return faults;
 }
 
 const PLACE_SAMPLE = '"41.1852, -8.7046"';
 
 /** What is wrong with what a vehicle has of its own. */
-function ownFault(name: string, own: Own, kind: MissionKind): string {
-  const fault = vehicleFieldsOf(kind)
+function ownFault(name: string, draft: Draft): string {
+  const own = draft.own[name] ?? {};
+  const fault = vehicleFieldsOf(draft.kind, sensorOf(draft, name))
     .map(([field, declared]) =>
       fieldFault({ ...declared, label: `${declared.label} of ${name}`, optional: true }, own[field] ?? ""),
     )
@@ -309,7 +334,9 @@ export function toMission(draft: Draft): NewMission {
   if (!area) throw new Error("the draft has faults");
   const { search, budget: _, recovery: before, ...base } = draft.base;
   const point = placeOf(draft.recovery);
-  const simulated = simulatedNames(draft).map((name): VehicleSpec => ({ name, kind: "sim", sensor: "dvl" }));
+  const simulated = simulatedNames(draft).map(
+    (name): VehicleSpec => ({ name, kind: "sim", sensor: draft.sensor }),
+  );
   const all = [...draft.chosen, ...simulated];
   const vehicles = all.map((vehicle) => withOwn(vehicle, draft));
   const mission = {
@@ -331,14 +358,18 @@ export function toMission(draft: Draft): NewMission {
   return { ...made, ...homing } as unknown as NewMission;
 }
 
-function withOwn(vehicle: VehicleSpec, { own: all, kind }: Draft): VehicleSpec {
-  const own = all[vehicle.name] ?? {};
-  const numbers = vehicleFieldsOf(kind).flatMap(([name]) => {
-    const text = own[name]?.trim();
-    return text ? [[name, Number(text)]] : [];
-  });
+function withOwn(vehicle: VehicleSpec, draft: Draft): VehicleSpec {
+  const own = draft.own[vehicle.name] ?? {};
+  const sensor = sensorOf(draft, vehicle.name);
+  const made = vehicleFieldsOf(draft.kind, sensor).reduce<Tree>(
+    (described, [name, field]) => {
+      const text = own[name]?.trim();
+      return text ? put(described, ownPath(field), Number(text)) : described;
+    },
+    { ...vehicle, sensor },
+  );
   const point = placeOf(own.recovery_point ?? "");
-  return { ...vehicle, ...Object.fromEntries(numbers), ...(point ? { recovery_point: point } : {}) };
+  return { ...made, ...(point ? { recovery_point: point } : {}) } as VehicleSpec;
 }
 
 /** What only a search has: its places, and vehicles at the surface. Planner and length are left to the service. */

@@ -1,7 +1,7 @@
 /** The form's fields for plain values of a mission, declared once; type, bounds, default and help are the service's. Pure. */
 
 import SPEC from "../api/mission.json";
-import type { NewMission } from "../api/types";
+import type { NewMission, Sensor } from "../api/types";
 
 export type MissionKind = NonNullable<NewMission["kind"]>;
 
@@ -24,7 +24,7 @@ export interface Field {
   /** Where the value stands in a mission. */
   path: keyof typeof SPEC;
   /** Where it stands in the form. */
-  part: "length" | "limits" | "search" | "tide" | "recovery";
+  part: "length" | "limits" | "search" | "tide" | "recovery" | "coverage" | "uncertainty";
   label: string;
   unit?: string;
   placeholder?: string;
@@ -83,7 +83,29 @@ export const FIELDS = {
     optional: true,
   },
   cell_m: { path: "cell_m", part: "limits", label: "Cell", unit: "m" },
+  cell_of_depth: {
+    path: "coverage.cell_of_depth",
+    part: "limits",
+    label: "Cell by depth",
+    kind: "survey",
+    placeholder: "one size",
+    optional: true,
+  },
   accuracy_m: { path: "accuracy_m", part: "limits", label: "Accuracy", unit: "m" },
+  overlap_pct: {
+    path: "coverage.overlap_pct",
+    part: "coverage",
+    label: "Overlap of swaths",
+    unit: "%",
+    kind: "survey",
+  },
+  crosslines_pct: {
+    path: "coverage.crosslines_pct",
+    part: "coverage",
+    label: "Crosslines",
+    unit: "%",
+    kind: "survey",
+  },
   tide_m: {
     path: "tide.level_m",
     part: "tide",
@@ -91,6 +113,78 @@ export const FIELDS = {
     unit: "m",
     placeholder: "none",
     optional: true,
+  },
+  sd_range_m: { path: "uncertainty.range_m", part: "uncertainty", label: "Range", unit: "m", kind: "survey" },
+  sd_range_pct: {
+    path: "uncertainty.range_pct",
+    part: "uncertainty",
+    label: "Range, by length",
+    unit: "%",
+    kind: "survey",
+  },
+  sd_beam_angle_deg: {
+    path: "uncertainty.beam_angle_deg",
+    part: "uncertainty",
+    label: "Beam angle",
+    unit: "°",
+    kind: "survey",
+  },
+  sd_roll_deg: {
+    path: "uncertainty.roll_deg",
+    part: "uncertainty",
+    label: "Roll",
+    unit: "°",
+    kind: "survey",
+  },
+  sd_pitch_deg: {
+    path: "uncertainty.pitch_deg",
+    part: "uncertainty",
+    label: "Pitch",
+    unit: "°",
+    kind: "survey",
+  },
+  sd_heading_deg: {
+    path: "uncertainty.heading_deg",
+    part: "uncertainty",
+    label: "Heading",
+    unit: "°",
+    kind: "survey",
+  },
+  sd_roll_patch_deg: {
+    path: "uncertainty.roll_patch_deg",
+    part: "uncertainty",
+    label: "Roll of the mounting",
+    unit: "°",
+    kind: "survey",
+  },
+  sd_heave_m: { path: "uncertainty.heave_m", part: "uncertainty", label: "Heave", unit: "m", kind: "survey" },
+  sd_waterline_m: {
+    path: "uncertainty.waterline_m",
+    part: "uncertainty",
+    label: "Waterline",
+    unit: "m",
+    kind: "survey",
+  },
+  sd_surface_sound_speed_mps: {
+    path: "uncertainty.surface_sound_speed_mps",
+    part: "uncertainty",
+    label: "Sound speed at the sonar",
+    unit: "m/s",
+    kind: "survey",
+  },
+  sd_sound_speed_profile_mps: {
+    path: "uncertainty.sound_speed_profile_mps",
+    part: "uncertainty",
+    label: "Sound speed profile",
+    unit: "m/s",
+    kind: "survey",
+  },
+  sd_position_m: {
+    path: "uncertainty.position_m",
+    part: "uncertainty",
+    label: "Position",
+    unit: "m",
+    kind: "survey",
   },
   recovery_radius_m: { path: "recovery.radius_m", part: "recovery", label: "Radius", unit: "m" },
   on_finish: { path: "recovery.on_finish", part: "recovery", label: "On finish" },
@@ -102,15 +196,27 @@ export const FIELDS = {
 export const VEHICLE_FIELDS = {
   speed_mps: { path: "vehicles.speed_mps", label: "Speed", unit: "m/s", kind: "survey" },
   endurance_min: { path: "vehicles.endurance_min", label: "Endurance", unit: "min" },
-} as const satisfies Record<string, Omit<Field, "part">>;
+  aperture_deg: { path: "vehicles.sonar.aperture_deg", label: "Aperture", unit: "°", sensor: "multibeam" },
+  beams: { path: "vehicles.sonar.beams", label: "Beams", sensor: "multibeam" },
+  rate_hz: { path: "vehicles.sonar.rate_hz", label: "Pings a second", unit: "Hz", sensor: "multibeam" },
+  range_m: { path: "vehicles.sonar.range_m", label: "Range", unit: "m", sensor: "multibeam" },
+} as const satisfies Record<string, OwnField>;
+
+/** A number of a single vehicle; with a `sensor` it describes that one. */
+export type OwnField = Omit<Field, "part"> & { sensor?: Sensor };
+
+export const SENSORS: readonly Sensor[] = SPEC["vehicles.sensor"].enum as Sensor[];
 
 export type VehicleField = keyof typeof VEHICLE_FIELDS;
 
-/** Those that vehicles have in this kind of mission. */
-export function vehicleFieldsOf(kind: MissionKind): [VehicleField, Omit<Field, "part">][] {
-  const all = Object.entries(VEHICLE_FIELDS) as [VehicleField, Omit<Field, "part">][];
-  return all.filter(([, field]) => (field.kind ?? kind) === kind);
+/** Those that a vehicle with this sensor has in this kind of mission. */
+export function vehicleFieldsOf(kind: MissionKind, sensor: Sensor): [VehicleField, OwnField][] {
+  const all = Object.entries(VEHICLE_FIELDS) as [VehicleField, OwnField][];
+  return all.filter(([, field]) => (field.kind ?? kind) === kind && (field.sensor ?? sensor) === sensor);
 }
+
+/** Where a vehicle's number stands in its description. */
+export const ownPath = ({ path }: Pick<Field, "path">): string[] => path.split(".").slice(1);
 
 export type FieldName = keyof typeof FIELDS;
 /** Units of a mission's length; one of these fields is sent. */
@@ -151,9 +257,7 @@ export function textOf(field: Field, value: unknown): string {
 /** The texts of a mission that there is; what it lacks begins as in a new one. */
 export function textsOf(mission: unknown, kind: MissionKind): Texts {
   return textsWith((field) => {
-    const value = field.path
-      .split(".")
-      .reduce((part, key) => (part as Tree | null | undefined)?.[key], mission);
+    const value = valueAt(mission, field.path.split("."));
     return value === undefined ? startOf(field, kind) : textOf(field, value);
   });
 }
@@ -170,7 +274,11 @@ export function typedValue(field: Field, text: string): unknown {
   return type === "string" ? text : Number(text) * (field.factor ?? 1);
 }
 
-type Tree = { [key: string]: unknown };
+export type Tree = { [key: string]: unknown };
+
+/** What stands at a path; undefined where nothing does. */
+export const valueAt = (tree: unknown, path: readonly string[]): unknown =>
+  path.reduce((part, key) => (part as Tree | null | undefined)?.[key], tree);
 
 /** A mission with the values that were typed. */
 export function withTexts(mission: Tree, texts: Texts, kind: MissionKind, length: LengthUnit): Tree {
@@ -180,7 +288,7 @@ export function withTexts(mission: Tree, texts: Texts, kind: MissionKind, length
   }, mission);
 }
 
-function put(tree: Tree, [key = "", ...rest]: string[], value: unknown): Tree {
+export function put(tree: Tree, [key = "", ...rest]: string[], value: unknown): Tree {
   return { ...tree, [key]: rest.length > 0 ? put((tree[key] ?? {}) as Tree, rest, value) : value };
 }
 

@@ -14,6 +14,10 @@ export function distance(value_m: number, digits = 0): string {
   return value_m < 1000 ? `${value_m.toFixed(digits)} m` : `${(value_m / 1000).toFixed(2)} km`;
 }
 
+export function area(value_m2: number): string {
+  return value_m2 < 1e6 ? `${count(Math.round(value_m2))} m²` : `${(value_m2 / 1e6).toFixed(2)} km²`;
+}
+
 export function count(value: number): string {
   return value.toLocaleString("en", { useGrouping: true }).replaceAll(",", " ");
 }

@@ -11,6 +11,7 @@ const vehicle = (
   name,
   kind: "sim",
   sensor: "dvl",
+  swath_m: null,
   mission_id: "m",
   active: true,
   left_at: null,

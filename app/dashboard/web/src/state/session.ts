@@ -1,6 +1,6 @@
 /** What goes on while the page is open: asking for lists, following one mission, sending commands. */
 
-import { effect, signal, untracked } from "@preact/signals";
+import { effect, type Signal, signal, untracked } from "@preact/signals";
 import { api, liveUrl, ServiceError } from "../api/client";
 import { LiveSocket } from "../api/socket";
 import type { ActionView, MissionAction, NewMission } from "../api/types";
@@ -9,8 +9,11 @@ import { siteOf } from "../map/site";
 import { identify, me, signedOut } from "./access";
 import { EMPTY_VIEW, reduce, withEvents, withMission } from "./live";
 import {
+  crossovers,
+  crossoversWanted,
   fleet,
   furtherLayers,
+  holidays,
   layers,
   missions,
   now,
@@ -104,6 +107,8 @@ function clear(): void {
   view.value = EMPTY_VIEW;
   seaFloor.value = null;
   site.value = null;
+  holidays.value = null;
+  crossovers.value = null;
   socketStatus.value = null;
 }
 
@@ -140,11 +145,15 @@ function followMission(id: string): () => void {
   });
   const stopMap = followMap(id, () => connections.value);
   const stopSite = followSite(id);
+  const stopHolidays = followHolidays(id);
+  const stopCrossovers = followCrossovers(id);
   return () => {
     closed = true;
     socket.close();
     stopMap();
     stopSite();
+    stopHolidays();
+    stopCrossovers();
   };
 }
 
@@ -198,25 +207,59 @@ function followMap(id: string, connections: () => number): () => void {
   };
 }
 
-/** Fetches a search's site whenever scans changed it, one request at a time. */
-function followSite(id: string): () => void {
+/** Fetches a search's site whenever scans changed it. */
+const followSite = (id: string) =>
+  followVersions(
+    () => view.value.mission?.progress.search?.version ?? null,
+    async () => siteOf(await api.site(id)),
+    site,
+  );
+
+/** Fetches what swath sonars missed whenever there is a new map. */
+const followHolidays = (id: string) =>
+  followVersions(
+    () => (view.value.mission?.progress.holidays == null ? null : view.value.mapVersion || null),
+    () => api.holidays(id),
+    holidays,
+  );
+
+/** The service reads all soundings to compare lines where they cross. */
+const LEAST_COMPARING_PERIOD_MS = 10_000;
+
+/** Compares lines where they cross when there is a new map, unless there is so much that someone has to ask for it. */
+const followCrossovers = (id: string) =>
+  followVersions(
+    () => (crossoversWanted.value === id ? view.value.mapVersion || null : null),
+    () => api.crossovers(id),
+    crossovers,
+    LEAST_COMPARING_PERIOD_MS,
+  );
+
+/** Fetches something whenever there is a version of it that is not known, one request at a time. */
+function followVersions<T>(
+  wanted: () => number | null,
+  fetched: () => Promise<T>,
+  found: Signal<T | null>,
+  period_ms = LEAST_MAP_PERIOD_MS,
+): () => void {
   let stopped = false;
   let fetching = false;
-  const wanted = () => view.value.mission?.progress.search?.version ?? null;
+  let known: number | null = null;
   const stop = effect(() => {
     const version = wanted();
-    if (version !== null && version !== site.peek()?.version && !fetching) void fetchSite();
+    if (version !== null && version !== known && !fetching) void fetchAll();
   });
-  async function fetchSite(): Promise<void> {
+  async function fetchAll(): Promise<void> {
     fetching = true;
-    while (!stopped && untracked(wanted) !== (site.peek()?.version ?? null)) {
+    for (let want = untracked(wanted); !stopped && want !== known; want = untracked(wanted)) {
       try {
-        const answer = siteOf(await api.site(id));
-        if (!stopped) site.value = answer;
+        const answer = await fetched();
+        if (!stopped) found.value = answer;
+        known = want;
       } catch {
         // The service is gone, which the live socket tells of.
       }
-      await new Promise((resolve) => setTimeout(resolve, LEAST_MAP_PERIOD_MS));
+      await new Promise((resolve) => setTimeout(resolve, period_ms));
     }
     fetching = false;
   }

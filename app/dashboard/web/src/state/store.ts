@@ -4,6 +4,8 @@ import { computed, effect, signal } from "@preact/signals";
 import type { ServiceError } from "../api/client";
 import type { SocketStatus } from "../api/socket";
 import type {
+  CrossoversView,
+  Holidays,
   LayerView,
   LngLat,
   MissionSummary,
@@ -16,6 +18,7 @@ import type {
   WaypointView,
 } from "../api/types";
 import { kept } from "../kept";
+import type { Bounds } from "../map/geo";
 import { fittingRange, type Range } from "../map/layers";
 import type { PlaceMark } from "../map/marks";
 import { type DepthPalette, vehicleColour } from "../map/palette";
@@ -35,11 +38,30 @@ export const view = signal<LiveView>(EMPTY_VIEW);
 export const seaFloor = signal<SeaFloor | null>(null);
 /** What a search knows of its site. */
 export const site = signal<Site | null>(null);
+/** What swath sonars missed; null while nothing is known of that. */
+export const holidays = signal<Holidays | null>(null);
+/** How well the survey agrees with itself where its lines cross; null while that is not known. */
+export const crossovers = signal<CrossoversView | null>(null);
 export const socketStatus = signal<SocketStatus | null>(null);
 /** Page clock, milliseconds, ticking. */
 export const now = signal(Date.now());
 
 export const mission = computed(() => view.value.mission);
+
+/** Reading more soundings and pings takes long enough to be asked for. */
+const COMPARED_UNASKED = 200_000;
+/** The mission whose crossings are to be compared because someone asked. */
+const crossoversAsked = signal("");
+/** The mission whose crossings are compared; null where someone has to ask for it. */
+export const crossoversWanted = computed(() => {
+  const { id = "", progress } = mission.value ?? {};
+  if (!progress) return "";
+  const few = progress.soundings + progress.pings <= COMPARED_UNASKED;
+  return few || crossoversAsked.value === id ? id : null;
+});
+export const askForCrossovers = () => {
+  crossoversAsked.value = mission.peek()?.id ?? "";
+};
 export const waypointOf = computed(
   () => new Map<string, WaypointView>((mission.value?.waypoints ?? []).map((w) => [w.vehicle, w])),
 );
@@ -136,6 +158,8 @@ export const showContours = kept("contours", true);
 export const showTracks = kept("tracks", true);
 export const showRanges = kept("com-range", false);
 export const showSite = kept("site", true);
+export const showHolidays = kept("holidays", true);
+export const showCrossings = kept("crossings", true);
 export const showTargets = kept("targets", true);
 /** Ranges that the operator fixed, for each layer; a layer without one takes a fitting range. */
 export const fixedRanges = kept<Partial<Record<string, Range>>>("ranges", {});
@@ -154,6 +178,8 @@ export const furtherLayers = computed<readonly string[]>(() =>
 export const coordinateFormat = kept<CoordinateFormat>("coordinates", "decimal");
 export const cursor = signal<LngLat | null>(null);
 export const mapCentre = signal<LngLat>([-8.7044, 41.1854]);
+/** What the map is to go to next; taken back when it has. */
+export const destination = signal<Bounds | null>(null);
 export const in3d = signal(false);
 
 /** Corners of the line being measured; null while nothing is measured. */

@@ -1,5 +1,5 @@
 import { describe, expect, it } from "vitest";
-import type { VehicleView, WaypointView } from "../api/types";
+import type { MissionView, VehicleView, WaypointView } from "../api/types";
 import { age, clock, count, distance, duration, latitude, longitude, metres } from "./format";
 import {
   batteryWords,
@@ -10,8 +10,10 @@ import {
   isAllowed,
   isSaid,
   lengthWords,
+  measuredWords,
   missionWords,
   rangeWords,
+  sonarWords,
   vehicleState,
 } from "./words";
 
@@ -186,4 +188,21 @@ describe("how far a vehicle still goes", () => {
 it("a mission that is ending says what it becomes", () => {
   expect(missionWords({ state: "running", ending: "aborted" })).toBe("Returning home; then aborted");
   expect(missionWords({ state: "running", ending: null })).toBe("Running");
+});
+
+describe("swath sonars", () => {
+  it("are described with what the service takes where nothing is said", () => {
+    const carrier = { name: "a", sensor: "multibeam" } as VehicleView;
+    const described = [{ name: "a", sonar: { aperture_deg: 90, beams: 128, rate_hz: 5, range_m: 40 } }];
+    const spec = described as unknown as MissionView["spec"]["vehicles"];
+    expect(sonarWords(carrier, spec)).toEqual(["multibeam 90°", "128 beams", "5 Hz", "reaches 40 m"]);
+    expect(sonarWords({ ...carrier, name: "b" }, spec)[0]).toBe("multibeam 120°");
+    expect(sonarWords({ ...carrier, sensor: "dvl" }, spec)).toEqual([]);
+  });
+
+  it("count beams, not soundings", () => {
+    expect(measuredWords({ soundings: 12, beams: 0 })).toBe("12 soundings");
+    expect(measuredWords({ soundings: 0, beams: 1200 })).toContain("beams");
+    expect(measuredWords({ soundings: 3, beams: 9 })).toBe("3 soundings, 9 beams");
+  });
 });

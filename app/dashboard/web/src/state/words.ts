@@ -1,5 +1,6 @@
 /** States in the words an operator uses. */
 
+import SPEC from "../api/mission.json";
 import type {
   BatteryState,
   FailsafeView,
@@ -13,7 +14,7 @@ import type {
   WaypointStatus,
   WaypointView,
 } from "../api/types";
-import { clock, minutes, percent } from "./format";
+import { clock, count, minutes, percent } from "./format";
 
 export const MISSION_WORDS: Record<MissionState, string> = {
   draft: "Draft, needs a vehicle",
@@ -174,6 +175,33 @@ const BATTERY_SIGNS: Record<BatteryState, string> = { ok: "", low: "▲ ", criti
 /** A battery's level, with a sign where the service calls it low. */
 export const batteryWords = ({ battery, battery_pct }: VehicleView): string =>
   `${BATTERY_SIGNS[battery ?? "ok"]}${percent(battery_pct)}`;
+
+type Carrier = Pick<VehicleView, "name" | "sensor">;
+
+/** What a vehicle's swath sonar can do; nothing where it has none. */
+export function sonarWords(
+  { name, sensor }: Carrier,
+  described: MissionView["spec"]["vehicles"] = [],
+): string[] {
+  if (sensor !== "multibeam") return [];
+  const sonar = described.find((one) => one.name === name)?.sonar;
+  const {
+    aperture_deg = SPEC["vehicles.sonar.aperture_deg"].default,
+    beams = SPEC["vehicles.sonar.beams"].default,
+    rate_hz = SPEC["vehicles.sonar.rate_hz"].default,
+    range_m = SPEC["vehicles.sonar.range_m"].default,
+  } = sonar ?? {};
+  return [`multibeam ${aperture_deg}°`, `${beams} beams`, `${rate_hz} Hz`, `reaches ${range_m} m`];
+}
+
+/** What was measured: soundings, and beams where there are any. */
+export const measuredWords = ({
+  soundings,
+  beams,
+}: Pick<MissionView["progress"], "soundings" | "beams">): string =>
+  beams === 0
+    ? `${count(soundings)} soundings`
+    : `${soundings === 0 ? "" : `${count(soundings)} soundings, `}${count(beams)} beams`;
 
 type Range = Withdrawn & Pick<VehicleView, "energy_left_s" | "turn_back_at" | "return_needs_s">;
 

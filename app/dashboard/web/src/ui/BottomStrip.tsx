@@ -50,17 +50,26 @@ export function BottomStrip() {
               <Figure label="Goal area seen" value={percent(p.search.goal_pct, 1)} id="strip-goal" />
               <Figure label="Site seen" value={percent(p.search.explored_pct, 1)} id="strip-site" />
             </>
-          ) : p.search ? null : (
+          ) : p.search ? null : p.ensonified_pct !== null && !past ? (
+            <>
+              <Figure label="Ensonified" value={percent(p.ensonified_pct, 1)} id="coverage" />
+              <Figure label="Dense (5 and more)" value={percent(p.dense_pct, 1)} id="dense" />
+              <Figure label="Holidays" value={count(p.holidays ?? 0)} id="holidays" />
+              <Figure label="Beams" value={count(p.beams)} id="beams" />
+            </>
+          ) : (
             <>
               <Figure
-                label={`Known to ${present.spec.accuracy_m} m`}
+                label={p.ensonified_pct === null ? `Known to ${present.spec.accuracy_m} m` : "Ensonified"}
                 value={percent(coverage_pct, 1)}
                 id="coverage"
               />
               <Figure label="Mean deviation" value={metres(mean_sd_m, 2)} id="mean-sd" />
             </>
           )}
-          <Figure label="Soundings" value={soundings === null ? "–" : count(soundings)} id="soundings" />
+          {soundings === 0 && p.beams > 0 && !past ? null : (
+            <Figure label="Soundings" value={soundings === null ? "–" : count(soundings)} id="soundings" />
+          )}
           <Figure label="Travelled" value={distance_m === null ? "–" : distance(distance_m)} id="distance" />
         </dl>
         <nav class="tabs" aria-label="More about this mission">

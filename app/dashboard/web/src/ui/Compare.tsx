@@ -86,15 +86,32 @@ async function fetchOther(id: string): Promise<Other> {
   return { mission, steps, map };
 }
 
+type Row = [string, (m: MissionView) => string];
+
+/** How much each covers: what is ensonified is another thing than what is known to an accuracy. */
+function coverageRows(missions: readonly MissionView[]): Row[] {
+  const swept = ({ progress }: MissionView) => progress.ensonified_pct !== null;
+  const known: Row = [
+    "Known to the asked accuracy",
+    (m) => percent(swept(m) ? null : m.progress.coverage_pct, 1),
+  ];
+  const ensonified: Row[] = [
+    ["Ensonified", (m) => percent(m.progress.ensonified_pct, 1)],
+    ["Dense", (m) => percent(m.progress.dense_pct, 1)],
+    ["Holidays", (m) => (m.progress.holidays === null ? "–" : count(m.progress.holidays))],
+  ];
+  return [...(missions.every(swept) ? [] : [known]), ...(missions.some(swept) ? ensonified : [])];
+}
+
 function Both({ one, other }: { one: MissionView; other: Other }) {
   const two = other.mission;
   const difference = seaFloor.value && other.map ? differenceOf(seaFloor.value, other.map) : null;
-  const rows: [string, (m: MissionView) => string][] = [
+  const rows: Row[] = [
     ["State", (m) => MISSION_WORDS[m.state]],
     ["Planner", (m) => m.spec.planner.name],
     ["Vehicles", (m) => String(m.vehicles.length)],
     ["Length", (m) => lengthWords(m.progress)],
-    ["Known to the asked accuracy", (m) => percent(m.progress.coverage_pct, 1)],
+    ...coverageRows([one, two]),
     ["Remaining landmarks", (m) => percent(m.progress.remaining_pct, 1)],
     ["Mean deviation", (m) => metres(m.progress.mean_sd_m, 3)],
     ["Soundings", (m) => count(m.progress.soundings)],

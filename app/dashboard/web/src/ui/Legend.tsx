@@ -4,8 +4,8 @@ import type { ComponentChildren } from "preact";
 import { useEffect, useRef } from "preact/hooks";
 import type { LayerView } from "../api/types";
 import { LANDMARK_COLOURS, LANDMARK_WORDS, landmarkShares } from "../map/landmarks";
-import { paletteOf, type Range, rangeFault, shareOutside, symbolOf } from "../map/layers";
-import { DEPTH_PALETTES, type Palette } from "../map/palette";
+import { classShares, paletteOf, type Range, rangeFault, shareOutside, symbolOf } from "../map/layers";
+import { colourAt, DEPTH_PALETTES, type Palette, type Rgb } from "../map/palette";
 import type { SeaFloor } from "../map/seafloor";
 import { SITE_COLOURS, SITE_WORDS } from "../map/site";
 import {
@@ -45,10 +45,22 @@ export function Legend() {
         />
       </label>
       {map && range ? (
-        palette ? (
+        palette && shown.classes.length > 0 ? (
+          <Classes
+            words={shown.classes}
+            colours={shown.classes.map((_, i) => colourAt(palette, i, range.low, range.high))}
+            shares={classShares(map, shown)}
+            id={shown.name}
+          />
+        ) : palette ? (
           <Scale shown={shown} palette={palette} range={range} />
         ) : (
-          <Landmarks />
+          <Classes
+            words={LANDMARK_WORDS}
+            colours={LANDMARK_COLOURS}
+            shares={landmarkShares(map) ?? []}
+            id="landmarks"
+          />
         )
       ) : (
         <p class="empty">{map ? missing(map, shown) : "The sea floor appears with the first soundings"}</p>
@@ -110,14 +122,22 @@ function Scale({ shown, palette, range }: { shown: LayerView; palette: Palette; 
   );
 }
 
-function Landmarks() {
-  const shares = seaFloor.value ? landmarkShares(seaFloor.value) : null;
+interface ClassesProps {
+  words: readonly string[];
+  colours: readonly Rgb[];
+  /** Of the cells; empty while they are not known. */
+  shares: readonly number[];
+  id: string;
+}
+
+/** A layer whose values are classes, with each one's share of the cells. */
+function Classes({ words, colours, shares, id }: ClassesProps) {
   return (
-    <ul class="landmarks" data-testid="landmarks">
-      {LANDMARK_WORDS.map((words, i) => (
-        <li key={words}>
-          <span class="swatch" style={{ background: `rgb(${LANDMARK_COLOURS[i]?.join(" ")})` }} /> {words}
-          {shares ? ` ${((shares[i] ?? 0) * 100).toFixed(0)} %` : ""}
+    <ul class="landmarks" data-testid={id}>
+      {words.map((one, i) => (
+        <li key={one}>
+          <span class="swatch" style={{ background: `rgb(${colours[i]?.join(" ")})` }} /> {one}
+          {shares.length > 0 ? ` ${((shares[i] ?? 0) * 100).toFixed(0)} %` : ""}
         </li>
       ))}
     </ul>

@@ -5,10 +5,13 @@ import { wayBetween } from "../map/geo";
 import { distance } from "../state/format";
 import {
   coordinateFormat,
+  crossovers,
   in3d,
   measured,
   mission,
   seaFloor,
+  showCrossings,
+  showHolidays,
   showRanges,
   showSite,
   showTargets,
@@ -46,6 +49,16 @@ export function MapTools({ onFit }: { onFit: () => void }) {
         {mission.value?.targets.length ? (
           <Shown what="Targets" signal={showTargets} id="show-targets">
             <path d="M10,2 v4 M10,14 v4 M2,10 h4 M14,10 h4 M10,6 a4,4 0 1 1 -0.01,0" />
+          </Shown>
+        ) : null}
+        {mission.value?.progress.holidays != null ? (
+          <Shown what="Holidays" signal={showHolidays} id="show-holidays">
+            <path d="M4,4 H16 V16 H4 Z M4,10 L10,4 M4,16 L16,4 M10,16 L16,10" />
+          </Shown>
+        ) : null}
+        {crossovers.value?.outliers ? (
+          <Shown what="Crossings that disagree" signal={showCrossings} id="show-crossings">
+            <path d="M5,5 L15,15 M15,5 L5,15" />
           </Shown>
         ) : null}
         {mission.value?.spec.limits.com_range_m ? (

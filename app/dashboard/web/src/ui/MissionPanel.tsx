@@ -2,10 +2,9 @@ import "./MissionPanel.css";
 import { useSignal } from "@preact/signals";
 import type { MissionSummary } from "../api/types";
 import { whyNotCommand } from "../state/access";
-import { count } from "../state/format";
 import { deleteMission, selectMission } from "../state/session";
 import { copied, describing, fleetOpen, mission, missions, selectedId, serviceFault } from "../state/store";
-import { capital, lengthWords, missionSign, missionWords } from "../state/words";
+import { capital, lengthWords, measuredWords, missionSign, missionWords } from "../state/words";
 import { Button, sets } from "./Controls";
 import { NewMissionForm } from "./NewMissionForm";
 
@@ -51,7 +50,7 @@ function MissionList() {
                 <span aria-hidden="true">{missionSign(m)}</span> {missionWords(m)}
               </span>
               <small>
-                {capital(lengthWords(m.progress))} · {count(m.progress.soundings)} soundings
+                {capital(lengthWords(m.progress))} · {measuredWords(m.progress)}
               </small>
               <small>
                 {new Date(m.created_at).toLocaleString("en-GB", { dateStyle: "medium", timeStyle: "short" })}
@@ -68,7 +67,7 @@ function MissionList() {
 /** What can be done with the mission that is shown: begin another one like it, or delete it while it holds nothing. */
 function Actions({ of: { id, state, progress } }: { of: MissionSummary }) {
   const asked = useSignal(false);
-  const empty = progress.step === 0 && progress.soundings + progress.rejected === 0;
+  const empty = progress.step === 0 && progress.soundings + progress.pings + progress.rejected === 0;
   const atSea = state === "running" || state === "paused";
   const forbidden = whyNotCommand.value;
   return (

@@ -8,6 +8,7 @@ import type { PlaceMark } from "../map/marks";
 import { recoveryMarks } from "../map/recovery";
 import {
   areaOf,
+  canPlan,
   copyOf,
   cornersOf,
   type Draft,
@@ -129,6 +130,14 @@ export function NewMissionForm() {
             <Part of="limits" />
           </div>
         </details>
+        {draft.value.kind === "survey" ? (
+          <details>
+            <summary>Uncertainty of swath sonars</summary>
+            <div class="pair">
+              <Part of="uncertainty" />
+            </div>
+          </details>
+        ) : null}
         <details>
           <summary>Tide</summary>
           <div class="pair">
@@ -288,12 +297,15 @@ function Planner() {
       },
     );
   }, []);
+  const presets = Object.entries(PLANNER_PRESETS).filter(
+    ([name]) => name === draft.planner || canPlan(name, draft),
+  );
   const others = planners.value.filter((p) => !(p.name in PLANNER_PRESETS));
   const other = others.find((p) => p.name === draft.planner);
   return (
     <fieldset class="planner">
       <legend>Planner</legend>
-      {Object.entries(PLANNER_PRESETS).map(([name, { title, words }]) => (
+      {presets.map(([name, { title, words }]) => (
         <label key={name} class="preset">
           <input
             type="radio"
@@ -307,6 +319,11 @@ function Planner() {
           </span>
         </label>
       ))}
+      {draft.planner === "swath" ? (
+        <div class="pair">
+          <Part of="coverage" />
+        </div>
+      ) : null}
       <details>
         <summary>More planners and their settings</summary>
         <label class="field">

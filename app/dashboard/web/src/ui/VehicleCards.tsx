@@ -25,21 +25,30 @@ import {
   isThere,
   PHASE_WORDS,
   rangeWords,
+  sonarWords,
   type Tone,
   vehicleState,
   WAYPOINT_WORDS,
 } from "../state/words";
 import { Button } from "./Controls";
+import { CrosslinesCard } from "./CrosslinesCard";
 import { WaypointShape } from "./marks";
 import { SearchCard } from "./SearchCard";
+import { SwathCard } from "./SwathCard";
 import { TargetCards } from "./TargetCards";
 
 export function VehicleCards() {
   const present = mission.value;
   if (!present) return null;
   return (
-    <section class={`cards${socketStatus.value?.kind === "open" ? "" : " stale"}`} aria-label="Vehicles">
+    <section
+      class={`cards${socketStatus.value?.kind === "open" ? "" : " stale"}`}
+      aria-label="Vehicles"
+      // biome-ignore lint/a11y/noNoninteractiveTabindex: cards higher than the window are scrolled with the keyboard
+      tabIndex={0}
+    >
       <SearchCard />
+      <SwathCard />
       {vehicles.value.length === 0 ? (
         <p class="empty">
           No vehicle takes part yet. Switch one on within reach of this network, or create a mission with
@@ -49,6 +58,7 @@ export function VehicleCards() {
         vehicles.value.map((vehicle) => <Card key={vehicle.view.name} vehicle={vehicle} />)
       )}
       <TargetCards />
+      <CrosslinesCard />
     </section>
   );
 }
@@ -105,6 +115,7 @@ function Card({ vehicle }: { vehicle: Vehicle }) {
             : v.kind,
           v.address,
           v.speed_mps === null ? null : `${v.speed_mps.toFixed(1)} m/s`,
+          ...sonarWords(v, mission.value?.spec.vehicles),
           ...localizationWords(v),
           v.pursuing === null ? null : `goes for ${v.pursuing}`,
         ]

@@ -1,13 +1,15 @@
-import type { VehicleSpec, VehicleView } from "../api/types";
-import { type Own, simulatedNames, vehicleNames } from "../state/draft";
-import { schemaOf, vehicleFieldsOf } from "../state/fields";
+import type { Sensor, VehicleSpec, VehicleView } from "../api/types";
+import { type Own, sensorOf, simulatedNames, vehicleNames } from "../state/draft";
+import { SENSORS, schemaOf, vehicleFieldsOf } from "../state/fields";
 import { fleet } from "../state/store";
-import { Button } from "./Controls";
+import { Button, Choice } from "./Controls";
 import { Fault, Place, Text, useForm } from "./Fields";
+
+const SENSOR_WORDS = SENSORS.map((sensor) => [sensor, sensor.replaceAll("_", " ")] as const);
 
 /** Who takes part: real vehicles that are free, simulated ones, and what each has of its own. */
 export function VehicleFields() {
-  const { draft } = useForm();
+  const { draft, set } = useForm();
   return (
     <fieldset>
       <legend>Vehicles</legend>
@@ -20,35 +22,57 @@ export function VehicleFields() {
           placeholder={simulatedNames({ ...draft, names: "" }).join(", ")}
           hint="Separated by commas; empty: sim-1, sim-2 and so on"
         />
+        <label class="field">
+          Their sensor
+          <Choice
+            value={draft.sensor}
+            options={SENSOR_WORDS}
+            id="field-sensor"
+            onChoose={(sensor) => set({ sensor })}
+          />
+        </label>
       </div>
       <Singles />
     </fieldset>
   );
 }
 
-/** What single vehicles have of their own: another speed, how long their energy lasts, where they come home to. */
+/** What single vehicles have of their own: another speed or sensor, how long their energy lasts, where they come home to. */
 function Singles() {
   const { draft, set } = useForm();
   const names = vehicleNames(draft);
   if (names.length === 0) return null;
-  const change = (name: string, field: keyof Own, text: string) =>
+  const change = (name: string, field: keyof Own, text: string | Sensor) =>
     set(({ own }) => ({ own: { ...own, [name]: { ...own[name], [field]: text } } }));
   return (
     <details>
-      <summary>Single vehicles: speed, endurance, recovery point</summary>
+      <summary>Single vehicles: speed, endurance, sensor, recovery point</summary>
       {names.map((name) => (
         <fieldset key={name} class="single-vehicle">
           <legend>{name}</legend>
           <div class="pair">
-            {vehicleFieldsOf(draft.kind).map(([field, { path, label, unit }]) => (
+            <label class="field">
+              Sensor
+              <Choice
+                value={sensorOf(draft, name)}
+                options={SENSOR_WORDS}
+                id={`sensor-${name}`}
+                onChoose={(sensor) => change(name, "sensor", sensor)}
+              />
+            </label>
+            {vehicleFieldsOf(draft.kind, sensorOf(draft, name)).map(([field, { path, label, unit }]) => (
               <label key={field} class="field" title={schemaOf({ path }).description}>
-                {label}, {unit}
+                {unit ? `${label}, ${unit}` : label}
                 <input
                   type="text"
                   inputMode="decimal"
                   autocomplete="off"
                   value={draft.own[name]?.[field] ?? ""}
-                  placeholder={field === "speed_mps" ? draft.speed_mps : "not known"}
+                  placeholder={
+                    field === "speed_mps"
+                      ? draft.speed_mps
+                      : String(schemaOf({ path }).default ?? "not known")
+                  }
                   data-testid={`${field}-${name}`}
                   onInput={(event) => change(name, field, event.currentTarget.value)}
                 />

@@ -6,6 +6,7 @@ import SPEC from "../api/mission.json";
 import type { LngLat, MissionView, Place, WaypointView } from "../api/types";
 import type { Chart, Padding, Pin } from "../map/chart";
 import { contourInterval } from "../map/contours";
+import { outliersOf, placeOf } from "../map/crossings";
 import { paletteOf } from "../map/layers";
 import type { Route, Track } from "../map/marks";
 import { Painter } from "../map/painter";
@@ -14,17 +15,21 @@ import type { Look } from "../map/paper";
 import { recoveryMarks } from "../map/recovery";
 import type { SeaFloor } from "../map/seafloor";
 import { searchMarks } from "../map/site";
+import { ringsOf, type SwathLine, swathEnds, swathOpacity } from "../map/swath";
 import { targetMarks } from "../map/targets";
 import { replayed } from "../state/replay";
 import {
   chosenSounding,
   colourOf,
+  crossovers,
   depthPalette,
+  destination,
   draftShapes,
   drawing,
   drawingReady,
   editing,
   editingReady,
+  holidays,
   isDark,
   measured,
   mission,
@@ -32,7 +37,9 @@ import {
   reviewed,
   seaFloor,
   showContours,
+  showCrossings,
   showHatching,
+  showHolidays,
   shownLayer,
   shownRange,
   showRanges,
@@ -99,6 +106,21 @@ export function follow(chart: Chart): () => void {
         showTargets.value && replayStep.value === null ? targetMarks(mission.value?.targets ?? []) : [],
       ),
     ),
+    effect(() => chart.setSwaths(replayStep.value === null ? swaths() : [])),
+    effect(() => {
+      const shown = showHolidays.value && replayStep.value === null ? holidays.value : null;
+      chart.setHolidays((shown?.features ?? []).map(ringsOf));
+    }),
+    effect(() => {
+      const shown = showCrossings.value && replayStep.value === null ? crossovers.value : null;
+      chart.setCrossings(shown ? outliersOf(shown).map(placeOf) : []);
+    }),
+    effect(() => {
+      const bounds = destination.value;
+      if (!bounds) return;
+      chart.goTo(bounds, overlaid());
+      destination.value = null;
+    }),
     effect(() => chart.setSite(showSite.value && replayStep.value === null ? site.value : null)),
     effect(() => {
       const spec = mission.value?.spec;
@@ -256,6 +278,15 @@ function places(): { at: LngLat; colour: string }[] {
   return vehicles.value.flatMap(({ view: { active, lon_deg, lat_deg }, colour }) =>
     !active || lon_deg === null || lat_deg === null ? [] : [{ at: [lon_deg, lat_deg] as LngLat, colour }],
   );
+}
+
+function swaths(): SwathLine[] {
+  return vehicles.value.flatMap(({ view: v, colour, age_s }) => {
+    const opacity = age_s === null ? 0 : swathOpacity(age_s);
+    if (!v.active || !v.swath_m || opacity === 0) return [];
+    if (v.lon_deg === null || v.lat_deg === null || v.heading_deg === null) return [];
+    return [{ ends: swathEnds([v.lon_deg, v.lat_deg], v.heading_deg, v.swath_m), colour, opacity }];
+  });
 }
 
 function routes(): Route[] {

@@ -1,0 +1,255 @@
+import "./CrosslinesCard.css";
+import type { AgreementView, AngleAgreementView, CrossingView, CrossoversView } from "../api/types";
+import { aboutCrossing, barsOf, outliersOf, placeOf } from "../map/crossings";
+import { count, distance, metres, percent, place } from "../state/format";
+import {
+  askForCrossovers,
+  coordinateFormat,
+  crossovers,
+  crossoversWanted,
+  destination,
+} from "../state/store";
+import { Button } from "./Controls";
+
+/** More are on the map and in the file. */
+const MOST_LISTED = 100;
+
+/** Pixels of the card's pictures. */
+const [WIDTH, HEIGHT] = [260, 56];
+
+/** How well a survey agrees with itself where its lines cross. */
+export function CrosslinesCard() {
+  const found = crossovers.value;
+  if (crossoversWanted.value === null) {
+    return (
+      <article class="card target crosslines" data-testid="crosslines-card" aria-label="Crosslines">
+        <header>
+          <h2>Crosslines</h2>
+        </header>
+        <Button id="check-crosslines" onClick={askForCrossovers}>
+          Compare lines where they cross
+        </Button>
+      </article>
+    );
+  }
+  if (!found?.statistics) return null;
+  return (
+    <article class="card target crosslines" data-testid="crosslines-card" aria-label="Crosslines">
+      <header>
+        <h2>Crosslines</h2>
+      </header>
+      <Figures found={found} all={found.statistics} />
+      <Differences found={found} />
+      <ByAngle bins={found.by_angle} />
+      <Agreements
+        title="Vehicles"
+        rows={found.by_vehicles.map((one) => [
+          one.vehicles[0] === one.vehicles[1] ? one.vehicles[0] : one.vehicles.join(" – "),
+          one,
+        ])}
+      />
+      <details>
+        <summary>By line, worst first</summary>
+        <Agreements
+          title="Line"
+          rows={found.by_line
+            .slice(0, MOST_LISTED)
+            .map((one) => [`${one.vehicle} ${one.line}${one.crossline ? " (crossline)" : ""}`, one])}
+        />
+      </details>
+      <Outliers found={found} />
+    </article>
+  );
+}
+
+const ORDER = "Order 1a";
+
+function Figures({ found, all }: { found: CrossoversView; all: AgreementView }) {
+  return (
+    <>
+      <dl class="big">
+        <div title="Places where two lines cross">
+          <dt>Crossings</dt>
+          <dd data-testid="crossings">{count(all.count)}</dd>
+        </div>
+        <div title={`Share of differences that are not larger than the largest TVU of S-44 ${ORDER}`}>
+          <dt>{ORDER}</dt>
+          <dd data-testid="crossings-within">{percent(all.within_pct, 1)}</dd>
+        </div>
+        <div title="Mean difference; between vehicles the first minus the second, else the later minus the earlier">
+          <dt>Mean</dt>
+          <dd data-testid="crossings-mean">{metres(all.mean_m, 2)}</dd>
+        </div>
+        <div title="Standard deviation of the differences">
+          <dt>Deviation</dt>
+          <dd>{metres(all.sd_m, 2)}</dd>
+        </div>
+      </dl>
+      <p class="small" data-testid="crosslines-length">
+        {count(found.crosslines)} {found.crosslines === 1 ? "crossline" : "crosslines"},{" "}
+        {distance(1000 * found.crosslines_km)}: {percent(found.crosslines_pct, 1)} of the way
+      </p>
+      {found.at_crosslines ? (
+        <p class="small" data-testid="at-crosslines">
+          With main lines: {count(found.at_crosslines.count)} crossings, mean{" "}
+          {metres(found.at_crosslines.mean_m, 2)}, deviation {metres(found.at_crosslines.sd_m, 2)},{" "}
+          {percent(found.at_crosslines.within_pct, 1)} within {ORDER}
+        </p>
+      ) : null}
+    </>
+  );
+}
+
+function Differences({ found: { histogram } }: { found: CrossoversView }) {
+  const [low = 0, high = 0] = [histogram.edges_m[0], histogram.edges_m.at(-1)];
+  return (
+    <figure>
+      <figcaption>Differences, m</figcaption>
+      <svg
+        viewBox={`0 0 ${WIDTH} ${HEIGHT + 14}`}
+        role="img"
+        aria-label={`Histogram of differences from ${low.toFixed(2)} to ${high.toFixed(2)} metres`}
+        data-testid="crossings-histogram"
+      >
+        {barsOf(histogram.counts, WIDTH, HEIGHT).map((bar) => (
+          <rect key={bar.x} class="bar" {...bar} width={bar.width - 0.5} />
+        ))}
+        <path class="axis" d={`M0,${HEIGHT} H${WIDTH}`} />
+        <Ends low={low.toFixed(2)} middle="0" high={high.toFixed(2)} />
+      </svg>
+    </figure>
+  );
+}
+
+function ByAngle({ bins }: { bins: readonly AngleAgreementView[] }) {
+  if (bins.length === 0) return null;
+  const reach_m = Math.max(0.01, ...bins.map((one) => Math.abs(one.mean_m) + (one.sd_m ?? 0)));
+  const widest = Math.max(...bins.map((one) => Math.max(Math.abs(one.from_deg), one.to_deg)));
+  const x = (angle: number) => (WIDTH * (angle + widest)) / (2 * widest);
+  const y = (off_m: number) => (HEIGHT / 2) * (1 + off_m / reach_m);
+  return (
+    <figure>
+      <figcaption>Beams minus main lines by angle, ± {reach_m.toFixed(2)} m</figcaption>
+      <svg
+        viewBox={`0 0 ${WIDTH} ${HEIGHT + 14}`}
+        role="img"
+        aria-label="Mean and standard deviation of crosslines' beams by their angle, deeper is lower"
+        data-testid="crossings-by-angle"
+      >
+        <path class="axis" d={`M0,${HEIGHT / 2} H${WIDTH}`} />
+        {bins.map(({ from_deg, to_deg, mean_m, sd_m, count: beams, within_pct }) => {
+          const middle = (from_deg + to_deg) / 2;
+          return (
+            <g key={from_deg}>
+              <title>
+                {`${middle}°: ${mean_m.toFixed(3)} m, deviation ${metres(sd_m, 3)}, ${count(beams)} beams, ` +
+                  `${percent(within_pct, 1)} within ${ORDER}`}
+              </title>
+              <path
+                class="spread"
+                d={`M${x(middle)},${y(mean_m - (sd_m ?? 0))} V${y(mean_m + (sd_m ?? 0))}`}
+              />
+              <circle class="bar" cx={x(middle)} cy={y(mean_m)} r={2.5} />
+            </g>
+          );
+        })}
+        <Ends low={`${-widest}° port`} middle="0°" high={`${widest}° starboard`} />
+      </svg>
+    </figure>
+  );
+}
+
+function Ends({ low, middle, high }: { low: string; middle: string; high: string }) {
+  return (
+    <>
+      <text x={0} y={HEIGHT + 12}>
+        {low}
+      </text>
+      <text x={WIDTH / 2} y={HEIGHT + 12} text-anchor="middle">
+        {middle}
+      </text>
+      <text x={WIDTH} y={HEIGHT + 12} text-anchor="end">
+        {high}
+      </text>
+    </>
+  );
+}
+
+function Agreements({
+  title,
+  rows,
+}: {
+  title: string;
+  rows: readonly (readonly [name: string, AgreementView])[];
+}) {
+  return (
+    <section
+      class="rows"
+      aria-label={`Differences by ${title.toLowerCase()}`}
+      // biome-ignore lint/a11y/noNoninteractiveTabindex: what does not fit is scrolled with the keyboard
+      tabIndex={0}
+    >
+      <table>
+        <thead>
+          <tr>
+            <th scope="col">{title}</th>
+            <th scope="col">Number</th>
+            <th scope="col">Mean</th>
+            <th scope="col">Dev.</th>
+            <th scope="col">In order</th>
+          </tr>
+        </thead>
+        <tbody>
+          {rows.map(([name, one]) => (
+            <tr key={name}>
+              <th scope="row">{name}</th>
+              <td>{count(one.count)}</td>
+              <td>{one.mean_m.toFixed(2)}</td>
+              <td>{one.sd_m?.toFixed(2) ?? "–"}</td>
+              <td>{percent(one.within_pct)}</td>
+            </tr>
+          ))}
+        </tbody>
+      </table>
+    </section>
+  );
+}
+
+function Outliers({ found }: { found: CrossoversView }) {
+  const shown = outliersOf(found).slice(0, MOST_LISTED);
+  if (shown.length === 0) return null;
+  return (
+    <>
+      <ol class="holidays" aria-label="Crossings that disagree, worst first">
+        {shown.map((crossing) => (
+          <li key={crossing.number}>
+            <Outlier crossing={crossing} />
+          </li>
+        ))}
+      </ol>
+      {found.outliers > shown.length ? (
+        <p class="small">and {count(found.outliers - shown.length)} more</p>
+      ) : null}
+    </>
+  );
+}
+
+function Outlier({ crossing }: { crossing: CrossingView }) {
+  const { number, vehicles, lines, difference_m } = crossing;
+  const [one, other] = vehicles.map((name, i) => `${name} ${lines[i]}`);
+  return (
+    <Button
+      id={`crossing-${number}`}
+      kind="link-button"
+      title={`Show it: ${place(placeOf(crossing), coordinateFormat.value)}`}
+      onClick={() => {
+        destination.value = aboutCrossing(crossing);
+      }}
+    >
+      <span>
+        {one} × {other}
+      </span>{" "}
+      <span>{metres(difference_m, 2)}</span>
+    </Button>
+  );
+}

@@ -1,0 +1,60 @@
+import "./SwathCard.css";
+import { aboutHoliday } from "../map/swath";
+import { area, count, percent, place } from "../state/format";
+import { coordinateFormat, destination, holidays, mission } from "../state/store";
+import { Button } from "./Controls";
+
+/** More are on the map and in the file. */
+const MOST_LISTED = 100;
+
+/** How far a swath survey has come, and where it missed something. */
+export function SwathCard() {
+  const progress = mission.value?.progress;
+  if (!progress || progress.holidays === null) return null;
+  const found = holidays.value?.features ?? [];
+  return (
+    <article class="card target" data-testid="swath-card" aria-label="Swath coverage">
+      <header>
+        <h2>Swath coverage</h2>
+      </header>
+      <dl class="big">
+        <div title="Share of the area's cells that a beam met">
+          <dt>Ensonified</dt>
+          <dd>{percent(progress.ensonified_pct, 1)}</dd>
+        </div>
+        <div title="Share of the area's cells with at least five soundings">
+          <dt>Dense</dt>
+          <dd>{percent(progress.dense_pct, 1)}</dd>
+        </div>
+        <div title="Ground of at least three by three cells that was missed inside of what was swept">
+          <dt>Holidays</dt>
+          <dd data-testid="holiday-count">{count(progress.holidays)}</dd>
+        </div>
+      </dl>
+      {found.length > 0 ? (
+        <ol class="holidays" aria-label="Holidays, largest first">
+          {found.slice(0, MOST_LISTED).map((holiday) => {
+            const { number, area_m2, lon_deg, lat_deg } = holiday.properties;
+            return (
+              <li key={number}>
+                <Button
+                  id={`holiday-${number}`}
+                  kind="link-button"
+                  title={`Show it: ${place([lon_deg, lat_deg], coordinateFormat.value)}`}
+                  onClick={() => {
+                    destination.value = aboutHoliday(holiday);
+                  }}
+                >
+                  <span>Holiday {number}</span> <span>{area(area_m2)}</span>
+                </Button>
+              </li>
+            );
+          })}
+        </ol>
+      ) : null}
+      {found.length > MOST_LISTED ? (
+        <p class="small">and {count(found.length - MOST_LISTED)} smaller ones</p>
+      ) : null}
+    </article>
+  );
+}
