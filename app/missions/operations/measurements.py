@@ -138,7 +138,10 @@ class _Intake:
         self.group: Grouped[_Batch, BatchVerdict] = Grouped(self._take, lambda batch: bool(batch.ranges))
 
     async def _take(self, batches: Sequence[_Batch]) -> list[BatchVerdict | Exception]:
-        """Store batches in one transaction: many vehicles that post at the same time wait for the disk once."""
+        """Store batches in one transaction: many vehicles that post at the same time wait for the disk once.
+
+        It raises only where nothing was stored.
+        """
         live = self._live
         keys = {name for batch in batches if batch.key for name in (batch.key.stored, batch.key.before) if name}
         async with live.journal.writing, live.ranges.writing, live.database.writing() as session:
@@ -154,12 +157,16 @@ class _Intake:
         results: list[BatchVerdict | Exception] = [
             answers.get(i) or _again(batch, known) for i, batch in enumerate(batches)
         ]
-        for batch, result in zip(batches, results, strict=True):
-            if isinstance(result, BatchVerdict):
-                # The first answer may have got lost together with the process that knew where the vehicle is.
-                await _hear(live, batch.known, only_unknown=result.replayed)
-        # Where the vehicle is, and whether it arrived, is on disk as well before it is answered.
-        await live.journal.flush()
+        try:
+            for batch, result in zip(batches, results, strict=True):
+                if isinstance(result, BatchVerdict):
+                    # The first answer may have got lost together with the process that knew where the vehicle is.
+                    await _hear(live, batch.known, only_unknown=result.replayed)
+            # Where the vehicle is, and whether it arrived, is on disk as well before it is answered.
+            await live.journal.flush()
+        except Exception as error:
+            # The batches are stored: each sender hears of it and asks again; done alone they would be duplicates.
+            return [error for _ in batches]
         return results
 
     async def _forget_old_keys(self, session: AsyncSession) -> None:

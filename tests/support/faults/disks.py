@@ -31,8 +31,7 @@ class Disk:
 
     def fill(self, _service: Service) -> None:
         """Leave not a byte on it, and none in the log of the database that could be written over."""
-        self._empty_log()
-        with self._filler.open("wb", buffering=0) as file:
+        with self._empty_log(), self._filler.open("wb", buffering=0) as file:
             size = len(BLOCK)
             while size:
                 try:
@@ -44,12 +43,20 @@ class Disk:
         """Give it room again."""
         self._filler.unlink()
 
-    def _empty_log(self) -> None:
+    @contextmanager
+    def _empty_log(self) -> Iterator[None]:
+        """Empty the log of the database and keep it empty: nobody else writes meanwhile."""
         [database] = self.folder.glob("*.db")
+        log = database.with_name(f"{database.name}-wal")
         with closing(sqlite3.connect(database, timeout=10.0, isolation_level=None)) as connection:
-            busy = True
-            while busy:
-                busy, *_ = connection.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchone()
+            while True:
+                connection.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchone()
+                connection.execute("BEGIN IMMEDIATE")
+                if log.stat().st_size == 0:
+                    break
+                connection.execute("ROLLBACK")
+            yield
+            connection.execute("ROLLBACK")
 
 
 class Ration(Disk):
@@ -59,9 +66,9 @@ class Ration(Disk):
 
     def fill(self, service: Service) -> None:
         """Let no file grow beyond its present size."""
-        self._empty_log()
-        largest = max(path.stat().st_size for path in self.folder.iterdir())
-        self._limit(service, min(largest, 1 << 14))
+        with self._empty_log():
+            largest = max(path.stat().st_size for path in self.folder.iterdir())
+            self._limit(service, min(largest, 1 << 14))
 
     def free(self, service: Service) -> None:
         """Let files grow."""

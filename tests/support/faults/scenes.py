@@ -260,6 +260,9 @@ async def _aborted(
         vehicle.gives_up = True
 
     async def asking() -> bool:
+        for task in tasks:
+            if task.done():
+                task.result()  # the error of a vehicle that failed, not that it was waited for
         return all(vehicle.asks for vehicle in vehicles)
 
     await until(asking, "both vehicles ask where to go")
