@@ -15,9 +15,9 @@ MOST = 64
 class Grouped(Generic[T, R]):
     """Does what came while the last orders were done, in the order it came, all of it at once.
 
-    ``work`` returns a result or an exception for each order, and raises only where nothing was done. When it raises with
-    several, each is done alone: one that cannot be done is not the others' trouble. ``alone`` says which orders are never
-    done with others.
+    ``work`` returns a result or an exception for each order, and raises only where nothing was done. When it raises
+    with several, each is done alone: one that cannot be done is not the others' trouble. ``alone`` says which orders
+    are never done with others.
     """
 
     def __init__(
