@@ -32,7 +32,7 @@ async def test_batches_that_were_stored_are_not_stored_again_when_what_follows_f
     )
     for answer in answers:
         # Who is told that they were not taken sends them again; who is told that they were must not hear "duplicate".
-        assert isinstance(answer, OSError) or {item.verdict for item in answer.items} == {Verdict.ACCEPTED}  # type: ignore[union-attr]
+        assert isinstance(answer, OSError) or {item.verdict for item in answer.items} == {Verdict.ACCEPTED}
     assert any(isinstance(answer, OSError) for answer in answers)
     async with database.reading() as session:
         assert (await counts(session, live.id))[Verdict.ACCEPTED] == 9
