@@ -72,6 +72,35 @@ def travel_depth_m(
     return float(min(wanted_m, max(known.min() - min_altitude_m, 0.0)))
 
 
+def depth_above_bottom_m(
+    origin: FloatArray,
+    target: FloatArray,
+    altitude_m: float,
+    otherwise_m: float,
+    bottom: Bottom,
+    constraints: Constraints,
+) -> float:
+    """Return the depth for a leg of a vehicle that keeps a height above the bottom; 0 is the surface.
+
+    Where part of the leg is over ground that nobody knows, it travels as deep as if it kept a depth, if that is less.
+
+    Parameters
+    ----------
+    origin, target : (2,)
+        Ends of the leg, east and north.
+    altitude_m
+        Height above the shallowest ground on the leg, if it is not less than the least.
+    otherwise_m
+        Depth of travel over unknown ground.
+    bottom : Bottom
+        Pessimistic sea floor: estimate minus its uncertainty. NaN where nothing is known.
+    """
+    along = np.linspace(0.0, 1.0, LEG_SAMPLES)[:, None]
+    known = bool(np.isfinite(bottom.at(origin + along * (target - origin))).all())
+    wanted_m = constraints.max_depth_m if known else otherwise_m
+    return travel_depth_m(origin, target, wanted_m, bottom, max(altitude_m, constraints.min_altitude_m))
+
+
 def too_deep(layer_m: float, safe_m: float) -> str:
     """Return why a vehicle whose console sends it at its layer's depth, whatever it is told, has to stay; '' if not."""
     if safe_m >= layer_m - DEPTH_TOLERANCE_M:

@@ -1,5 +1,6 @@
 """The vehicles of one mission as its flight sees them."""
 
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from datetime import datetime
@@ -211,6 +212,12 @@ class Member:
         if self.spec.depth_m is not None:
             return self.spec.depth_m
         return min(limits.min_depth_m + self.slot * limits.min_vertical_separation_m, limits.max_depth_m)
+
+    @property
+    def altitude_m(self) -> float:
+        """Height above the bottom that it is to keep; NaN where it keeps a depth."""
+        asked = self.spec.altitude_m
+        return math.nan if asked is None or self.capabilities.keeps_depth else asked
 
     def place_m(self, frame: LocalFrame) -> NDArray[np.float64]:
         """Return its last reported place, (2,): east and north in the mission's frame."""

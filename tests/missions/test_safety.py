@@ -1,6 +1,7 @@
 """Nothing that breaks a limit is sent to a vehicle."""
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -131,8 +132,42 @@ def test_depth_of_travel_is_as_wanted_or_leaves_the_clearance(
     assert depth == pytest.approx(min(wanted_m, max(0.0, shallowest - clearance_m)))
 
 
+@settings(deadline=None)
+@given(
+    st.tuples(st.floats(-20, 78), st.floats(1, 58)),
+    st.tuples(st.floats(-20, 78), st.floats(1, 58)),
+    st.floats(0.5, 15),
+    st.floats(0, 5),
+)
+def test_a_height_above_the_bottom_is_kept_or_more(
+    start: tuple[float, float], end: tuple[float, float], altitude_m: float, clearance_m: float
+) -> None:
+    limits = replace(LIMITS, min_altitude_m=clearance_m, max_depth_m=7.0)
+    depth = safety.depth_above_bottom_m(np.array(start), np.array(end), altitude_m, 2.0, BOTTOM, limits)
+    along = np.linspace(0, 1, safety.LEG_SAMPLES)[:, None] * (np.array(end) - start) + start
+    below = BOTTOM.at(along)
+    deepest = 7.0 if np.isfinite(below).all() else 2.0
+    known = below[np.isfinite(below)]
+    room = max(float(known.min()) - max(altitude_m, clearance_m), 0.0) if len(known) else math.inf
+    assert depth == pytest.approx(min(deepest, room))
+
+
 def test_over_an_unknown_bottom_the_wanted_depth_counts() -> None:
     assert safety.travel_depth_m(np.zeros(2), np.ones(2), 4.0, Bottom.unknown(), 2.0) == 4.0
+
+
+def test_a_vehicle_goes_as_deep_as_its_height_above_the_bottom_asks_where_the_bottom_is_known() -> None:
+    # 9 m deep, give or take 0.5 m: 8 m are sure.
+    low = replace(place("low", 10.0, 10.0), altitude_m=3.0)
+    lowest = replace(place("lowest", 30.0, 30.0), altitude_m=0.2)
+    decision, *_ = decide_for([low, lowest], [[20.0, 10.0, 2.0], [40.0, 30.0, 2.0]])
+    assert {leg.vehicle: leg.target_m[2] for leg in decision.legs} == {
+        "low": pytest.approx(5.0),
+        "lowest": pytest.approx(7.0),  # limits.min_altitude_m
+    }
+    unknown = belief_of(depth_m=math.nan)
+    decision, *_ = decide_for([low], [[20.0, 10.0, 2.0]], unknown)
+    assert [leg.target_m[2] for leg in decision.legs] == [2.0]
 
 
 # Decisions

@@ -1,7 +1,7 @@
 """What a swath survey has to ensonify, and what it has."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -87,9 +87,12 @@ class SwathTask:
         Share of half a swath that is sounded twice at least.
     crosslines
         Length of lines across all others, as a share of those.
+    altitudes_m
+        Height above the bottom of the vehicles that keep one, by name; the others keep a depth.
     """
 
     coverage: Coverage
     sonars: Mapping[str, SwathSonar]
     overlap: float
     crosslines: float = 0.0
+    altitudes_m: Mapping[str, float] = field(default_factory=dict)

@@ -88,7 +88,10 @@ class SwathPlanner(PlannerBase):
     def _flying(self, team: Situation, name: str, task: SwathTask) -> Flying:
         sonar: SwathSonar = task.sonars[name]
         radius_m = max(self.options.turn_radius_m, 0.5)
-        return Flying(sonar, self._cruise[name], team.constraints.min_altitude_m, radius_m, task.overlap)
+        depth_m, altitude_m = self._cruise[name], team.constraints.min_altitude_m
+        if name in task.altitudes_m:
+            depth_m, altitude_m = team.constraints.max_depth_m, max(task.altitudes_m[name], altitude_m)
+        return Flying(sonar, depth_m, altitude_m, radius_m, task.overlap)
 
     def _leg_m(self, team: Situation, row: int, bottom: Bottom, flying: Flying) -> float:
         below_m: FloatArray = bottom.at(team.positions[row : row + 1, :2])

@@ -158,6 +158,7 @@ def place_of(member: Member, live: LiveMission) -> Place:
         report.position.depth_m if member.surfacing and report is not None else math.nan,
         member.capabilities.keeps_depth,
         submerged_s=member.submerged_s,
+        altitude_m=member.altitude_m,
     )
 
 

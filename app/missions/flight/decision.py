@@ -65,11 +65,24 @@ class Place:
     """How far it may still fly; NaN: as many steps as the mission has left."""
     submerged_s: float = 0.0
     """How long it has been under water since its last fix at the surface, by its clock."""
+    altitude_m: float = math.nan
+    """Height above the bottom that it is to keep; NaN: it keeps its depth."""
 
     @property
     def surfacing(self) -> bool:
         """Whether its last waypoint brought it up for a fix."""
         return math.isfinite(self.surfacing_depth_m)
+
+    def travel_depth_m(
+        self, origin_m: FloatArray, target_m: FloatArray, bottom: Bottom, constraints: Constraints
+    ) -> float:
+        """Return how deep it travels from one place (2,) to another over a pessimistic sea floor."""
+        if math.isnan(self.altitude_m):
+            least_m = constraints.min_altitude_m
+            return safety.travel_depth_m(origin_m, target_m, self.cruise_depth_m, bottom, least_m)
+        return safety.depth_above_bottom_m(
+            origin_m, target_m, self.altitude_m, self.cruise_depth_m, bottom, constraints
+        )
 
 
 @dataclass(frozen=True)
@@ -142,9 +155,11 @@ def make_planner(spec: MissionSpec, sensor: Sensor | None = None) -> PlannerBase
 
 def swath_task(spec: MissionSpec, vehicles: Iterable[VehicleSpec], coverage: Coverage) -> SwathTask:
     """Return what the swath sonars of a mission's vehicles have to ensonify."""
-    sonars = {vehicle.name: sonar for vehicle in vehicles if (sonar := swath_sonar(vehicle)) is not None}
+    team = list(vehicles)
+    sonars = {vehicle.name: sonar for vehicle in team if (sonar := swath_sonar(vehicle)) is not None}
+    altitudes_m = {vehicle.name: vehicle.altitude_m for vehicle in team if vehicle.altitude_m is not None}
     asked = spec.coverage
-    return SwathTask(coverage, sonars, asked.overlap_pct / 100.0, asked.crosslines_pct / 100.0)
+    return SwathTask(coverage, sonars, asked.overlap_pct / 100.0, asked.crosslines_pct / 100.0, altitudes_m)
 
 
 def swath_sonar(vehicle: VehicleSpec) -> SwathSonar | None:
@@ -226,12 +241,7 @@ def decide(
         belief.xy_m,
         np.where(np.isfinite(belief.sd_m), below_level_m - safety.UNCERTAINTY_FACTOR * belief.sd_m, np.nan),
     )
-    origin = np.array(
-        [
-            [*p.en_m, safety.travel_depth_m(p.en_m, p.en_m, p.cruise_depth_m, cautious, constraints.min_altitude_m)]
-            for p in team
-        ]
-    )
+    origin = np.array([[*p.en_m, p.travel_depth_m(p.en_m, p.en_m, cautious, constraints)] for p in team])
     moving = np.array([p.moving for p in team])
     left_m = np.array([p.left_m for p in team])
     up, fixes = surfacing(team, spec.surface_policy)
@@ -259,9 +269,7 @@ def decide(
     for i, place in enumerate(team):
         if not place.moving or not np.isfinite(proposed[i]).all():
             continue  # the check makes the vehicle hold
-        proposed[i, 2] = safety.travel_depth_m(
-            place.en_m, proposed[i, :2], place.cruise_depth_m, cautious, constraints.min_altitude_m
-        )
+        proposed[i, 2] = place.travel_depth_m(place.en_m, proposed[i, :2], cautious, constraints)
         clear_m = bottom.deepest_end_m(origin[i], proposed[i, :2] - origin[i, :2], constraints.min_altitude_m)
         proposed[i, 2] = min(proposed[i, 2], max(float(clear_m), 0.0))
         if up[i]:
@@ -281,9 +289,7 @@ def decide(
         # It was planned for from the border, and comes from beyond it: no farther than there where both is too far.
         if np.linalg.norm(proposed[i, :2] - start) > constraints.max_step_m:
             proposed[i] = origin[i]
-        depth_m = safety.travel_depth_m(
-            start, proposed[i, :2], place.cruise_depth_m, cautious, constraints.min_altitude_m
-        )
+        depth_m = place.travel_depth_m(start, proposed[i, :2], cautious, constraints)
         proposed[i, 2] = min(proposed[i, 2], depth_m)
     checked = safety.check_step(names, origin, proposed, constraints, bottom)
     resting = {place.vehicle for place in team if not place.moving or place.vehicle in proposal.done}

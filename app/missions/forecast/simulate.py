@@ -246,6 +246,7 @@ class _Swarm:
                 keeps_depth=member.capabilities.keeps_depth,
                 moving=bool(due[i]),
                 left_m=planned_way_m(self._spec, float(self.left_m[i])),
+                altitude_m=member.altitude_m,
             )
             for i, member in enumerate(self._members)
         ]

@@ -1,5 +1,6 @@
 """The checklist before a start: what would be refused, what would go wrong, and what is only good to know."""
 
+import math
 from collections.abc import Iterator
 
 import numpy as np
@@ -160,10 +161,23 @@ def _depths(live: LiveMission) -> Iterator[CheckView]:
     depths = {member.name: member.cruise_depth_m(limits) for member in live.team}
     if not depths:
         return
-    ordered = sorted(depths.values())
+    above = {member.name: member.altitude_m for member in live.team if not math.isnan(member.altitude_m)}
+    ordered = sorted(depth for name, depth in depths.items() if name not in above)
     close = len(ordered) > 1 and min(np.diff(ordered)) < limits.min_vertical_separation_m - 1e-9
-    said = ", ".join(f"{name} at {depth:g} m" for name, depth in depths.items())
-    if close:
+    said = ", ".join(
+        f"{name} {max(above[name], limits.min_altitude_m):g} m above the bottom, {depth:g} m deep where it is not known"
+        if name in above
+        else f"{name} at {depth:g} m"
+        for name, depth in depths.items()
+    )
+    if above and len(depths) > 1:
+        yield CheckView(
+            id="depths",
+            title="Depths of travel",
+            status=NOTE,
+            message=f"{said}: some may travel at the same depth, {limits.min_separation_m:g} m apart sideways",
+        )
+    elif close:
         yield CheckView(
             id="depths",
             title="Depths of travel",

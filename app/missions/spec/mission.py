@@ -97,6 +97,13 @@ class VehicleSpec(Model):
         description="Depth it travels at where the bottom leaves room; null: the first vehicle of a mission at "
         "limits.min_depth_m, each further one limits.min_vertical_separation_m deeper",
     )
+    altitude_m: float | None = Field(
+        default=None,
+        gt=0,
+        le=1000,
+        description="Height above the bottom that it keeps where the bottom is known, down to limits.max_depth_m and "
+        "never less than limits.min_altitude_m; elsewhere it travels at depth_m. null: it keeps its depth",
+    )
     speed_mps: Speed | None = Field(default=None, description="Speed asked of it; null: the mission's speed_mps")
     turn_radius_m: float | None = Field(
         default=None,

@@ -4885,6 +4885,11 @@ export interface components {
              */
             depth_m?: number | null;
             /**
+             * Altitude M
+             * @description Height above the bottom that it keeps where the bottom is known, down to limits.max_depth_m and never less than limits.min_altitude_m; elsewhere it travels at depth_m. null: it keeps its depth
+             */
+            altitude_m?: number | null;
+            /**
              * Speed Mps
              * @description Speed asked of it; null: the mission's speed_mps
              */

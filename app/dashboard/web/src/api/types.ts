@@ -64,6 +64,7 @@ export type FieldProblem = Complete<Schemas["FieldProblem"]>;
 export type VehicleSpec = Pick<Schemas["VehicleSpec"], "name" | "kind" | "sensor"> & {
   depth_m?: number;
   speed_mps?: number;
+  altitude_m?: number;
   endurance_min?: number;
   recovery_point?: LngLat;
   sonar?: Partial<Schemas["SwathSonarSpec"]> | null;

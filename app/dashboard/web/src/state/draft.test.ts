@@ -278,7 +278,7 @@ describe("recovery", () => {
     recovery: "41.184, -8.705",
     recovery_radius_m: "40",
     on_lost_link: "stop",
-    own: { "sim-2": { endurance_min: "90", recovery_point: "41.1845, -8.706" } },
+    own: { "sim-2": { altitude_m: "4", endurance_min: "90", recovery_point: "41.1845, -8.706" } },
   };
 
   it("is sent with its point as [longitude, latitude], and copied with what vehicles have of their own", () => {
@@ -290,7 +290,11 @@ describe("recovery", () => {
       on_low_energy: "return",
       on_lost_link: "stop",
     });
-    expect(mission.vehicles[1]).toMatchObject({ endurance_min: 90, recovery_point: [-8.706, 41.1845] });
+    expect(mission.vehicles[1]).toMatchObject({
+      altitude_m: 4,
+      endurance_min: 90,
+      recovery_point: [-8.706, 41.1845],
+    });
     const spec = { tide: {}, search: null, ...mission } as unknown as MissionView["spec"];
     const copy = copyOf({ name: "Quay", spec });
     expect([copy.recovery, copy.recovery_radius_m]).toEqual(["41.184000, -8.705000", "40"]);

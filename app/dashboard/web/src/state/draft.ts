@@ -148,7 +148,7 @@ export function copyOf({ spec, name }: Pick<MissionView, "spec" | "name">): Draf
     recovery: spec.recovery ? typedPlace(spec.recovery.point as LngLat) : "",
     simulated: "0",
     chosen: spec.vehicles.map(
-      ({ speed_mps: _s, endurance_min: _e, recovery_point: _p, sonar: _, ...vehicle }) =>
+      ({ speed_mps: _s, altitude_m: _a, endurance_min: _e, recovery_point: _p, sonar: _, ...vehicle }) =>
         vehicle as VehicleSpec,
     ),
     own: Object.fromEntries(spec.vehicles.map((vehicle) => [vehicle.name, ownOf(vehicle as VehicleSpec)])),

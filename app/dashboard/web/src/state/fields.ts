@@ -195,6 +195,7 @@ export const FIELDS = {
 /** The numbers that a single vehicle may have of its own. */
 export const VEHICLE_FIELDS = {
   speed_mps: { path: "vehicles.speed_mps", label: "Speed", unit: "m/s", kind: "survey" },
+  altitude_m: { path: "vehicles.altitude_m", label: "Height above bottom", unit: "m", kind: "survey" },
   endurance_min: { path: "vehicles.endurance_min", label: "Endurance", unit: "min" },
   aperture_deg: { path: "vehicles.sonar.aperture_deg", label: "Aperture", unit: "°", sensor: "multibeam" },
   beams: { path: "vehicles.sonar.beams", label: "Beams", sensor: "multibeam" },

@@ -46,7 +46,7 @@ function Singles() {
     set(({ own }) => ({ own: { ...own, [name]: { ...own[name], [field]: text } } }));
   return (
     <details>
-      <summary>Single vehicles: speed, endurance, sensor, recovery point</summary>
+      <summary>Single vehicles: speed, endurance, height above the bottom, sensor, recovery point</summary>
       {names.map((name) => (
         <fieldset key={name} class="single-vehicle">
           <legend>{name}</legend>
@@ -71,7 +71,10 @@ function Singles() {
                   placeholder={
                     field === "speed_mps"
                       ? draft.speed_mps
-                      : String(schemaOf({ path }).default ?? "not known")
+                      : String(
+                          schemaOf({ path }).default ??
+                            (field === "altitude_m" ? "keeps its depth" : "not known"),
+                        )
                   }
                   data-testid={`${field}-${name}`}
                   onInput={(event) => change(name, field, event.currentTarget.value)}
