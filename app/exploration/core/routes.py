@@ -71,7 +71,7 @@ def next_waypoint(
         for k in range(i, j + 1):
             kx, ky = route[k, 0] - x, route[k, 1] - y
             along = (kx * tx + ky * ty) / length
-            if along > length + 1e-12 or abs(kx * ty - ky * tx) / length > cut * step + 1e-12:
+            if not -1e-12 <= along <= length + 1e-12 or abs(kx * ty - ky * tx) / length > cut * step + 1e-12:
                 close = False
                 break
         if not close:

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
@@ -63,6 +63,7 @@ class WithZone(SurveyScenario):
 
 @settings(max_examples=50, deadline=None)
 @given(st.integers(0, 10**6), st.integers(1, 6))
+@example(16163, 3)  # the route turns back through where a leg begins
 def test_a_route_is_flown_leg_by_leg_to_its_end_and_no_farther_than_it_is_long(seed: int, corners: Any) -> None:
     rng = np.random.default_rng(seed)
     route, step = rng.uniform(0.0, 100.0, (corners, 2)), rng.uniform(0.5, 12.0)
@@ -74,7 +75,7 @@ def test_a_route_is_flown_leg_by_leg_to_its_end_and_no_farther_than_it_is_long(s
         assert np.hypot(nx - x, ny - y) <= step * (1 + 1e-9)
         x, y = nx, ny
     np.testing.assert_allclose([x, y], route[-1], atol=1e-6)
-    assert length - corners * step <= flown <= length + 1e-6
+    assert length - 0.5 * corners * step <= flown <= length + 1e-6
 
 
 @pytest.mark.parametrize(
