@@ -16,7 +16,7 @@ from app.exploration.planner.options import PlannerOptions
 from simulator.seafloors import generate
 from simulator.terrain_files import save_npz
 
-MINUTES = 4.0
+MINUTES = 2.5
 QUICK = PlannerOptions(search=50, candidates=16)
 
 
@@ -40,7 +40,7 @@ def test_everybody_flies_for_the_same_minutes(scenario: SurveyScenario, planner:
 
 
 def test_the_same_seed_flies_the_same_survey(scenario: SurveyScenario) -> None:
-    first, again = (fly_planner_at_sea(scenario, "cao", QUICK, 2.0) for _ in range(2))
+    first, again = (fly_planner_at_sea(scenario, "cao", QUICK, 1.0) for _ in range(2))
     np.testing.assert_array_equal(first.soundings.depth_m, again.soundings.depth_m)
     np.testing.assert_array_equal(first.flown_m, again.flown_m)
 
@@ -56,12 +56,12 @@ def test_a_pattern_has_the_lines_that_can_be_finished(scenario: SurveyScenario) 
 def test_the_command_tells_minutes_and_metres(tmp_path: Path) -> None:
     floor = tmp_path / "floor.npz"
     save_npz(generate("smooth", 5, width_m=40.0, height_m=40.0), floor)
-    words = ["survey", "--terrain", str(floor), "--dynamics", "--minutes", "2", "--steps", "20", "--json"]
+    words = ["survey", "--terrain", str(floor), "--dynamics", "--minutes", "1", "--steps", "10", "--json"]
     result = CliRunner().invoke(evaluate_app, words)
     assert result.exit_code == 0, result.output
     run = json.loads(result.stdout)
-    assert run["minutes"] == 2.0
-    assert 0.0 < run["on_plan_m"] <= run["flown_m"] <= 1.15 * 2 * 120.0 * SPEED_MPS
+    assert run["minutes"] == 1.0
+    assert 0.0 < run["on_plan_m"] <= run["flown_m"] <= 1.15 * 2 * 60.0 * SPEED_MPS
     assert run["ratio"] > 0.0
     refused = CliRunner().invoke(evaluate_app, [*words[:3], "--minutes", "2"])
     assert refused.exit_code == 2
