@@ -61,7 +61,7 @@ Every section is written by the command that stands in it (`--write`). Simulated
 the team's kilometres count from its start in the south-western corner. Each leg is decided 2.5 s before the last one
 ends. It is kinder than the sea: vehicles fly exactly where they are sent, nothing drifts, and every beam within range
 and aperture detects the bottom. Beams are evenly spaced on a flat bottom, and the speed lets two pings meet each cell.
-The floors called *own*, and seed 0 of the *unseen* ones, were looked at while the planner was made.
+The floors called *own*, and seeds 0 and 1 of the *unseen* ones, were looked at while the planner was made.
 """,
 )
 PLANNING = Page(
