@@ -4,10 +4,10 @@
         [--seeds 0] [--jobs 2] [--write]
 
 *own* are the floors of a folder and generated slopes of 5 to 40 m; *unseen* generated floors, one of each family and
-seed: those of seeds 0 and 1 were looked at while the planner was made, no others. Every row is one floor and team: what is
-ensonified, holidays, nodes that are dense enough, kilometres over those of fixed lines (``fixed``, spaced for the
-shoalest depth, known beforehand) and of the same survey with every depth known (``known``). ``varies`` is the deepest
-over the shoalest depth of the middle 98 % of the area.
+seed: those of seeds 0 and 1 were looked at while the planner was made, no others. Every row is one floor and team:
+what is ensonified, holidays, nodes that are dense enough, kilometres over those of fixed lines (``fixed``, spaced for
+the shoalest depth, known beforehand) and of the same survey with every depth known (``known``). ``varies`` is the
+deepest over the shoalest depth of the middle 98 % of the area.
 """
 
 import argparse
