@@ -16,6 +16,7 @@ from app.commands.backup import backup, prune, restore
 from app.commands.common import CommandError, Database, command_settings, noted
 from app.commands.data import export, import_file, tide
 from app.commands.failsafes import failsafes
+from app.commands.home import home
 from app.commands.logs import import_logs
 from app.commands.train import train
 
@@ -419,6 +420,15 @@ def _search_demo(
         raise CommandError(str(error)) from None
 
 
+def evaluations() -> typer.Typer:
+    """Return what ``evaluate`` offers: planners against each other, and missions of the whole service."""
+    from app.evaluation.cli import evaluate_app
+
+    if all(command.callback is not home for command in evaluate_app.registered_commands):
+        evaluate_app.command()(home)
+    return evaluate_app
+
+
 @app.command(
     "evaluate",
     context_settings={"allow_extra_args": True, "ignore_unknown_options": True, "allow_interspersed_args": False},
@@ -427,9 +437,7 @@ def _search_demo(
 def evaluate(context: typer.Context) -> None:
     """Compare planners in closed loop, without a network. See bathyfleet evaluate --help."""
     # Mounted by hand: its options are made from the planners, which take a second to load.
-    from app.evaluation.cli import evaluate_app
-
-    evaluate_app(args=context.args, prog_name="bathyfleet evaluate")
+    evaluations()(args=context.args, prog_name="bathyfleet evaluate")
 
 
 def _with_tokens(database: str | None, run: Any, changing: str = "", target: str = "") -> Any:

@@ -23,8 +23,8 @@ from pydantic import BaseModel
 from app.api.problems import TITLES
 from app.api.schemas import API, MeasurementBatch, ScanBatch
 from app.cli import app as command_line
+from app.cli import evaluations
 from app.estimation import SingleBeam
-from app.evaluation.cli import evaluate_app
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.constraints import Constraints
 from app.exploration.core.problem import Belief, Situation
@@ -90,7 +90,7 @@ def check_words(command: Any, words: list[str]) -> None:
     while words and words[0] in getattr(command, "commands", {}):
         command, words = command.commands[words[0]], words[1:]
         if command.name == "evaluate":
-            command = typer.main.get_command(evaluate_app)
+            command = typer.main.get_command(evaluations())
     assert not (getattr(command, "commands", {}) and words and not words[0].startswith("-")), (
         f"{command.name} has no subcommand {words[0]!r}, only {sorted(command.commands)}"
     )
