@@ -39,7 +39,9 @@ from app.api import (
     soundings,
     streams,
     targets,
+    tiles,
 )
+from app.api.address_key import AddressKeyMiddleware
 from app.api.audit_log import AuditLog, AuditMiddleware
 from app.api.auth import console_log_in
 from app.api.bodies import BodyMiddleware
@@ -165,6 +167,7 @@ def create_app(settings: Settings | None = None, *, port: int | None = None) -> 
         imports.router,
         maps.router,
         maps.layers_router,
+        tiles.router,
         soundings.router,
         pings.router,
         targets.router,
@@ -202,6 +205,7 @@ def create_app(settings: Settings | None = None, *, port: int | None = None) -> 
     app.add_middleware(PeerMiddleware)
     app.add_middleware(RequestMiddleware)
     app.add_middleware(UnreadBodyMiddleware)
+    app.add_middleware(AddressKeyMiddleware)
     return app
 
 
