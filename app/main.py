@@ -52,6 +52,7 @@ from app.api.health import health_router
 from app.api.intake import Intakes
 from app.api.limits import LimitMiddleware, RequestLimits
 from app.api.middleware import RequestMiddleware
+from app.api.ogc import routes as features
 from app.api.peers import is_own_user
 from app.api.quotas import Shares
 from app.api.schemas import API
@@ -168,6 +169,7 @@ def create_app(settings: Settings | None = None, *, port: int | None = None) -> 
         maps.router,
         maps.layers_router,
         tiles.router,
+        features.router,
         soundings.router,
         pings.router,
         targets.router,

@@ -7,7 +7,7 @@ returns.
 import asyncio
 import socket
 import uuid
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 
 from app.missions import states
@@ -208,6 +208,16 @@ class MissionService:
     async def get(self, mission_id: str) -> LiveMission:
         """Return a mission. Raises MissionNotFoundError, MissionElsewhereError."""
         return await self._registry.get(mission_id)
+
+    @property
+    def database(self) -> Database:
+        """What is stored, to be read."""
+        return self._database
+
+    async def rows(self, mission_id: str | None = None) -> Sequence[MissionRow]:
+        """Return all missions as they are stored, oldest first, whoever has them; or the one of an id, if there is."""
+        async with self._database.reading() as session:
+            return await mission_queries.oldest_first(session, mission_id)
 
     async def spec(self, mission_id: str) -> MissionSpec:
         """Return what a mission is to do, whoever has it. Raises MissionNotFoundError."""
