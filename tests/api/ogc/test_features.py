@@ -26,6 +26,10 @@ def utc(time_s: float) -> str:
     return datetime.fromtimestamp(time_s, UTC).isoformat().replace("+00:00", "Z")
 
 
+def joined(*numbers: float) -> str:
+    return ",".join(repr(float(number)) for number in numbers)
+
+
 # Part 1, Core
 
 
@@ -170,11 +174,11 @@ def test_a_box_selects_what_touches_it(gis: Gis, collection: str) -> None:
         lat, lon = FRAME.to_geographic([west_m, east_m], [south_m, north_m])
         box = shapely.box(lon[0], lat[0], lon[1], lat[1])
         wanted = [one["id"] for one in features if shapely.geometry.shape(one["geometry"]).intersects(box)]
-        text = ",".join(map(repr, box.bounds))
+        text = joined(*box.bounds)
         body = gis.items(collection, bbox=text)
         assert [feature["id"] for feature in body["features"]] == wanted
         assert body["numberMatched"] == len(wanted)
-        high = ",".join(map(repr, (lon[0], lat[0], -100.0, lon[1], lat[1], 100.0)))
+        high = joined(lon[0], lat[0], -100.0, lon[1], lat[1], 100.0)
         assert [one["id"] for one in gis.everything(collection, bbox=high, limit=3)] == wanted
     over_the_antimeridian = gis.items(collection, bbox="170,-90,-8,90")
     assert over_the_antimeridian["numberReturned"] == len(features)
@@ -267,7 +271,7 @@ def test_boxes_are_taken_in_every_system(gis: Gis, code: int) -> None:
     lat, lon = FRAME.to_geographic([0.0, 25.0], [0.0, 25.0])
     wanted = gis.items("soundings", bbox=f"{lon[0]},{lat[0]},{lon[1]},{lat[1]}")
     first, second = pyproj.Transformer.from_crs("OGC:CRS84", f"EPSG:{code}").transform(lon, lat)
-    box = f"{first[0]!r},{second[0]!r},{first[1]!r},{second[1]!r}"
+    box = joined(first[0], second[0], first[1], second[1])
     found = gis.items("soundings", **{"bbox": box, "bbox-crs": f"{EPSG}{code}"})
     assert 5 < found["numberMatched"] < SOUNDINGS
     assert abs(found["numberMatched"] - wanted["numberMatched"]) <= (0 if code != 32629 else 3), "UTM is turned"
