@@ -169,6 +169,7 @@ def create_app(settings: Settings | None = None, *, port: int | None = None) -> 
         maps.router,
         maps.layers_router,
         tiles.router,
+        tiles.tile_router,
         features.router,
         soundings.router,
         pings.router,

@@ -1,20 +1,25 @@
 """A mission's map as tiles for web maps and GIS, and the TileJSON that tells of them."""
 
-from typing import Annotated
+import re
+from collections.abc import Callable, Coroutine
+from typing import Annotated, Any
 
 from fastapi import APIRouter, Header, Path, Query, Request, Response
+from fastapi.routing import APIRoute
 from pydantic import BaseModel, Field
 
-from app.api.auth import Reader
+from app.api.auth import READERS, Reader, RoleCheck
 from app.api.links import link_root
 from app.api.maps import End
 from app.api.mission import Mission
 from app.api.problems import ProblemError, problems
 from app.api.schemas import API, MissionId
-from app.api.state import Service
+from app.api.state import Service, edge_state
 from app.mapping.web_tiles import MAX_ZOOM, WebTile, finest_zoom
+from app.missions.live.mission import LiveMission
 from app.missions.maps.web_layers import WEB_LAYERS, Range, WebLayer
 from app.missions.operations.web_tiles import TileRequest
+from app.missions.service import MissionService
 from app.missions.spec.mission import MissionSpec
 from app.missions.states import ENDED
 
@@ -87,7 +92,44 @@ async def get_tile_json(
     )
 
 
-@router.get(
+class _TileRoute(APIRoute):
+    """Answers plain requests itself: programs ask for hundreds of tiles a second, and checking each field costs most."""
+
+    def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
+        """Return what answers a request."""
+        handle = super().get_route_handler()
+
+        async def answer(request: Request) -> Response:
+            path = request.path_params
+            found = _PLAIN.match(f"{path['layer']}/{path['z']}/{path['x']}/{path['y']}")
+            kind = WEB_LAYERS.get(path["layer"])
+            if found is None or kind is None or request.url.query or not _ID.match(path["mission_id"]):
+                return await handle(request)
+            edge = edge_state(request)
+            await _READERS.admit(request, edge)
+            mission = await edge.service.get(path["mission_id"])
+            z, x, y = (int(number) for number in found.groups()[:3])
+            return await _answer(
+                edge.service,
+                mission,
+                kind,
+                _tile(z, x, y),
+                double=found[4] is not None,
+                range_=kind.default_range(mission.spec),
+                if_none_match=request.headers.get("if-none-match"),
+            )
+
+        return answer
+
+
+_PLAIN = re.compile(r"^[a-z]+/([0-9]{1,2})/([0-9]{1,8})/([0-9]{1,8})(@2x)?$")
+_ID = re.compile(r"^[A-Za-z0-9_-]{1,64}$")
+_READERS = RoleCheck(READERS, "look")
+
+tile_router = APIRouter(prefix=router.prefix, tags=["maps"], responses=router.responses, route_class=_TileRoute)
+
+
+@tile_router.get(
     "/{layer}/{z}/{x}/{y}.png",
     operation_id="getTile",
     summary="See the map as tiles",
@@ -114,12 +156,23 @@ async def get_tile(
 ) -> Response:
     """Return a tile of a layer of the newest map. Its colours stay the same while the map grows."""
     kind = _kind(layer)
-    row, double = y.removesuffix(DOUBLE), y.endswith(DOUBLE)
-    try:
-        tile = WebTile(z, x, int(row))
-    except ValueError as error:
-        raise ProblemError("invalid-request", str(error), remedy="Ask for a tile that there is") from None
-    wanted = TileRequest(mission.id, layer, tile, double, _range(kind, mission.spec, min, max))
+    tile = _tile(z, x, int(y.removesuffix(DOUBLE)))
+    range_ = _range(kind, mission.spec, min, max)
+    double = y.endswith(DOUBLE)
+    return await _answer(service, mission, kind, tile, double=double, range_=range_, if_none_match=if_none_match)
+
+
+async def _answer(
+    service: MissionService,
+    mission: LiveMission,
+    kind: WebLayer,
+    tile: WebTile,
+    *,
+    double: bool,
+    range_: Range,
+    if_none_match: str | None,
+) -> Response:
+    wanted = TileRequest(mission.id, kind.name, tile, double, range_)
     picture = await service.web_tiles.tile(mission, service.maps, wanted)
     tag = f'"{picture.tag}"'
     fresh_s = FRESH_ENDED_S if mission.header.state in ENDED else FRESH_S
@@ -127,6 +180,14 @@ async def get_tile(
     if if_none_match is not None and (tag in if_none_match or if_none_match.strip() == "*"):
         return Response(status_code=304, headers=headers)
     return Response(picture.content, media_type="image/png", headers=headers)
+
+
+def _tile(z: int, x: int, y: int) -> WebTile:
+    """Return a tile. Raises ProblemError where there is none."""
+    try:
+        return WebTile(z, x, y)
+    except ValueError as error:
+        raise ProblemError("invalid-request", str(error), remedy="Ask for a tile that there is") from None
 
 
 def _kind(layer: str) -> WebLayer:

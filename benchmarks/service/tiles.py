@@ -43,11 +43,12 @@ def addresses(url: str, mission: str) -> list[str]:
 
 async def look(url: str, mission: str, clients: int, rate: float, seconds: float) -> dict[str, Any]:
     """Fetch tiles, and tell how long that took."""
-    tiles, took_s, counts = addresses(url, mission), [], {"same": 0, "new": 0, "bytes": 0}
+    tiles, counts = addresses(url, mission), {"same": 0, "new": 0, "bytes": 0}
+    took_s: list[float] = []
     until = time.monotonic() + seconds
 
     async def client(number: int) -> None:
-        rng, tags = random.Random(number), {}
+        rng, tags = random.Random(number), dict[str, str]()  # noqa: S311 - no secret
         async with httpx.AsyncClient(timeout=60, verify=False, trust_env=False) as http:  # noqa: S501
             due = time.monotonic() + rng.random() / rate
             while due < until:
