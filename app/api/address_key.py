@@ -36,10 +36,10 @@ def _without_key(scope: Scope) -> Scope:
     found = _KEYED.match(scope["path"])
     reads = scope["type"] == "http" and scope["method"] in ("GET", "HEAD")
     if found is None or not reads or not _READ_BY_GIS.match(found[2]):
-        return scope | {"path": UNNAMED, "raw_path": UNNAMED.encode()}
+        return dict(scope) | {"path": UNNAMED, "raw_path": UNNAMED.encode()}
     prefix = f"/key/{found[1]}"
     raw = (scope.get("raw_path") or scope["path"].encode()).removeprefix(prefix.encode())
     headers = [(name, value) for name, value in Headers(scope=scope).raw if name not in (b"authorization", b"cookie")]
     headers.append((b"authorization", f"Bearer {found[1]}".encode()))
     state = dict(scope.get("state", {})) | {KEY_PREFIX: prefix}
-    return scope | {"path": found[2], "raw_path": raw, "headers": headers, "state": state}
+    return dict(scope) | {"path": found[2], "raw_path": raw, "headers": headers, "state": state}

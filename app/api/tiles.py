@@ -93,7 +93,7 @@ async def get_tile_json(
 
 
 class _TileRoute(APIRoute):
-    """Answers plain requests itself: programs ask for hundreds of tiles a second, and checking each field costs most."""
+    """Answers plain requests itself: hundreds of tiles a second are asked for, and checking each field costs most."""
 
     def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
         """Return what answers a request."""

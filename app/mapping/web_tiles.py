@@ -126,7 +126,7 @@ def geographic(x_m: FloatArray, y_m: FloatArray) -> tuple[FloatArray, FloatArray
 
 def pixel_cells(tile: WebTile, side_px: int, cell_m: float, lat_deg: float) -> float:
     """Return how many cells a pixel is wide."""
-    return WORLD_M / 2**tile.zoom / side_px * math.cos(math.radians(lat_deg)) / cell_m
+    return WORLD_M / float(2**tile.zoom) / side_px * math.cos(math.radians(lat_deg)) / cell_m
 
 
 def finest_zoom(cell_m: float, lat_deg: float) -> int:

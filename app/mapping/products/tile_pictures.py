@@ -34,8 +34,8 @@ def shade(depth_m: FloatArray, cell_m: float) -> FloatArray:
     """Return how light each cell is under :data:`SUN`, 1 for level ground and where no slope is known, (rows, cols)."""
     east, north = (EXAGGERATION * np.nan_to_num(part) for part in gradient(depth_m, cell_m))
     # Depth grows downwards: the surface's normal leans to where it gets deeper.
-    light = (SUN[0] * east + SUN[1] * north + SUN[2]) / np.sqrt(east**2 + north**2 + 1.0)
-    return np.clip(light / SUN[2], DARKEST, LIGHTEST)
+    light: FloatArray = (SUN[0] * east + SUN[1] * north + SUN[2]) / np.sqrt(east**2 + north**2 + 1.0)
+    return np.asarray(np.clip(light / SUN[2], DARKEST, LIGHTEST))
 
 
 def paint(

@@ -82,7 +82,7 @@ def along_lines() -> list[dict[str, Any]]:
 
 def pings() -> list[dict[str, Any]]:
     """A ping over every cell but those of a hole of four by four."""
-    items = []
+    items: list[dict[str, Any]] = []
     for north in np.arange(1.0, 60.0, 2.0).tolist():
         for east in np.arange(1.0, 60.0, 2.0).tolist():
             if 20 < east < 28 and 20 < north < 28:
