@@ -53,11 +53,11 @@ class TileJson(BaseModel):
     tiles: list[str] = Field(description="Address of each tile, with {z}, {x} and {y}")
     minzoom: int
     maxzoom: int = Field(description="A cell of the map is at least four pixels wide there; there are tiles beyond")
-    bounds: tuple[float, float, float, float] = Field(description="West, south, east and north, degrees")
-    center: tuple[float, float, int]
+    bounds: list[float] = Field(min_length=4, max_length=4, description="West, south, east and north, degrees")
+    center: list[float] = Field(min_length=3, max_length=3, description="Longitude, latitude and zoom to begin with")
     layer: str
     unit: str = Field(description="Of `range`; empty for layers by classes")
-    range: tuple[float, float] = Field(description="Values of the first and the last colour")
+    range: list[float] = Field(min_length=2, max_length=2, description="Values of the first and the last colour")
 
 
 @router.get("/{layer}.json", operation_id="getTileJson", summary="See where a layer's tiles are")
@@ -84,11 +84,11 @@ async def get_tile_json(
         tiles=[f"{link_root(request)}{API}/missions/{mission_id}/tiles/{layer}/{{z}}/{{x}}/{{y}}.png{query}"],
         minzoom=0,
         maxzoom=maxzoom,
-        bounds=(west, south, east, north),
-        center=((west + east) / 2, (south + north) / 2, _most((maxzoom - 3, 0))),
+        bounds=[west, south, east, north],
+        center=[(west + east) / 2, (south + north) / 2, _most((maxzoom - 3, 0))],
         layer=layer,
         unit=kind.unit,
-        range=range_,
+        range=list(range_),
     )
 
 
