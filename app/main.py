@@ -39,7 +39,9 @@ from app.api import (
     soundings,
     streams,
     targets,
+    tiles,
 )
+from app.api.address_key import AddressKeyMiddleware
 from app.api.audit_log import AuditLog, AuditMiddleware
 from app.api.auth import console_log_in
 from app.api.bodies import BodyMiddleware
@@ -50,6 +52,7 @@ from app.api.health import health_router
 from app.api.intake import Intakes
 from app.api.limits import LimitMiddleware, RequestLimits
 from app.api.middleware import RequestMiddleware
+from app.api.ogc import routes as features
 from app.api.peers import is_own_user
 from app.api.quotas import Shares
 from app.api.schemas import API
@@ -165,6 +168,9 @@ def create_app(settings: Settings | None = None, *, port: int | None = None) -> 
         imports.router,
         maps.router,
         maps.layers_router,
+        tiles.router,
+        tiles.tile_router,
+        features.router,
         soundings.router,
         pings.router,
         targets.router,
@@ -202,6 +208,7 @@ def create_app(settings: Settings | None = None, *, port: int | None = None) -> 
     app.add_middleware(PeerMiddleware)
     app.add_middleware(RequestMiddleware)
     app.add_middleware(UnreadBodyMiddleware)
+    app.add_middleware(AddressKeyMiddleware)
     return app
 
 

@@ -11,6 +11,7 @@ from fastapi.security import HTTPBearer
 from starlette.requests import HTTPConnection
 
 from app.api.limits import RequestLimits, host_of
+from app.api.links import key_prefix
 from app.api.peers import OWN_USER
 from app.api.problems import ProblemError
 from app.api.processes import vouched_for
@@ -69,6 +70,12 @@ async def authenticate(connection: HTTPConnection, state: EdgeState) -> Principa
         state.limits.log_in(token.strip(), host_of(connection.scope), good=principal is not None)
         if principal is None:
             raise _unauthenticated("the access token is unknown, revoked or has run out")
+        if key_prefix(connection.scope) and principal.role is not Role.VIEWER:
+            raise ProblemError(
+                "forbidden",
+                f"the token {principal.name!r} has role {principal.role}, which is too much for an address",
+                remedy="Make one for this: bathyfleet token create NAME --role viewer",
+            )
         return _remember(connection, principal)
     signed_in = await _signed_in(connection, state)
     if signed_in is not None:

@@ -24,7 +24,8 @@ from app.api.spool import Spool, spool_folder
 from app.api.state import EdgeState
 from app.missions.running.ownership import Peer
 
-_OF_A_MISSION = re.compile(rf"^{API}/missions/([0-9a-f]{{8}}-[0-9a-f-]{{27}})(?:/|$)")
+_OF_A_MISSION = re.compile(rf"^{API}/missions/([0-9a-f]{{8}}-[0-9a-f-]{{27}})(?:/(?!tiles/[a-z]+\.json$)|$)")
+"""A layer's TileJSON is answered by whoever is asked: it holds that process's address, and the key."""
 
 TAKEOVER_S = 10.0
 """How long a request waits for a mission whose process ended to be taken up by another one."""

@@ -77,8 +77,9 @@ def configure(level: str = "info", form: Literal["console", "json"] = "console",
     root = logging.getLogger()
     root.handlers[:] = [*(other for other in root.handlers if not isinstance(other, _Handler)), handler]
     root.setLevel(level.upper())
-    # At its info level uvicorn writes out the addresses of WebSockets, access tokens included.
-    logging.getLogger("uvicorn.error").setLevel(logging.WARNING)
+    # At their info level uvicorn's loggers write out addresses, with the keys and tokens in them.
+    for name in ("uvicorn.error", "uvicorn.access"):
+        logging.getLogger(name).setLevel(logging.WARNING)
     for name in ("uvicorn", "uvicorn.error", "uvicorn.access"):
         logger = logging.getLogger(name)
         logger.handlers.clear()

@@ -55,7 +55,7 @@ OVERLAY = "overlay.png"
 MAX_VALUE_M = 20_000.0
 """No sea is deeper."""
 
-_End = Annotated[float | None, Field(ge=-MAX_VALUE_M, le=MAX_VALUE_M, allow_inf_nan=False)]
+End = Annotated[float | None, Field(ge=-MAX_VALUE_M, le=MAX_VALUE_M, allow_inf_nan=False)]
 """Of a range of colours; ``min`` and ``max`` are the query parameters' names."""
 _Order = Annotated[Order, Query(description="Order of IHO S-44 that the TVU is compared with")]
 
@@ -70,8 +70,8 @@ async def _file_options(
     interval_m: Annotated[
         float | None, Query(gt=0, le=1000, allow_inf_nan=False, description="Between contours; default: about ten")
     ] = None,
-    min: Annotated[_End, Query(description="A picture's least depth")] = None,  # noqa: A002
-    max: Annotated[_End, Query(description="Its largest depth")] = None,  # noqa: A002
+    min: Annotated[End, Query(description="A picture's least depth")] = None,  # noqa: A002
+    max: Annotated[End, Query(description="Its largest depth")] = None,  # noqa: A002
     vehicle: Annotated[
         Name | None, Query(description="Whose soundings, in crowdsourced bathymetry; default: the only vehicle's")
     ] = None,
@@ -180,8 +180,8 @@ async def get_overlay(
     mission: Mission,
     layer: Annotated[str, _OneOf(PICTURES), Query(description="What is shown")] = "depth",
     order: _Order = Order.ORDER_1A,
-    min: Annotated[_End, Query(description="Value at the palette's begin, m; default: the map's least")] = None,  # noqa: A002
-    max: Annotated[_End, Query(description="Value at the palette's end, m; default: the map's largest")] = None,  # noqa: A002
+    min: Annotated[End, Query(description="Value at the palette's begin, m; default: the map's least")] = None,  # noqa: A002
+    max: Annotated[End, Query(description="Value at the palette's end, m; default: the map's largest")] = None,  # noqa: A002
     if_none_match: _IfNoneMatch = None,
 ) -> Response:
     """Return a picture to lay between the `corners` of the map's JSON; cells without a value are transparent.

@@ -78,6 +78,7 @@ class Problem(BaseModel):
 
 TITLES: dict[str, tuple[int, str]] = {
     "malformed-body": (400, "The body cannot be read"),
+    "invalid-parameter": (400, "A parameter of the address cannot be taken"),
     "unauthenticated": (401, "An access token is needed"),
     "forbidden": (403, "Not allowed"),
     "not-found": (404, "There is no such resource"),
@@ -87,6 +88,7 @@ TITLES: dict[str, tuple[int, str]] = {
     "sounding-not-found": (404, "There is no such sounding"),
     "target-not-found": (404, "The mission has no such target"),
     "import-not-found": (404, "There is no such import"),
+    "feature-not-found": (404, "There is no such feature"),
     "pings-not-found": (404, "There is no such file of pings"),
     "map-not-ready": (404, "There is no map yet"),
     "method-not-allowed": (405, "The method is not allowed here"),

@@ -137,7 +137,12 @@ def slope_deg(depth_m: FloatArray, cell_m: float) -> FloatArray:
     Central differences of the neighbours, one-sided ones where a neighbour is unknown; NaN where the cell is unknown
     or has no known neighbour along one of the axes.
     """
-    return np.degrees(np.arctan(np.hypot(_along(depth_m, cell_m), _along(depth_m.T, cell_m).T)))
+    return np.degrees(np.arctan(np.hypot(*gradient(depth_m, cell_m))))
+
+
+def gradient(depth_m: FloatArray, cell_m: float) -> tuple[FloatArray, FloatArray]:
+    """Return by how much the depth grows per metre to the east and to the north, as :func:`slope_deg` takes it."""
+    return _along(depth_m, cell_m), _along(depth_m.T, cell_m).T
 
 
 def _along(depth_m: FloatArray, cell_m: float) -> FloatArray:

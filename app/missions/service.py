@@ -7,7 +7,7 @@ returns.
 import asyncio
 import socket
 import uuid
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 
 from app.missions import states
@@ -24,6 +24,7 @@ from app.missions.operations.imports import Imports
 from app.missions.operations.reading import Reader
 from app.missions.operations.recorrection import check_level_is_known
 from app.missions.operations.uploads import Uploads
+from app.missions.operations.web_tiles import WebTiles
 from app.missions.running.admission import check_spec
 from app.missions.running.claims import Claims, free_elsewhere
 from app.missions.running.failover import Failover
@@ -97,6 +98,8 @@ class MissionService:
         self._claims = Claims(self.hub)
         self.maps = FinalMaps()
         """Maps that are made while nobody waits for them."""
+        self.web_tiles = WebTiles()
+        """Tiles of maps for web maps and GIS."""
         self._compilation = Compilation(self._executor)
         self.forecaster = Forecaster(self.hub, self._compilation)
         """Flies missions ahead."""
@@ -145,6 +148,7 @@ class MissionService:
         await self.process.leave()
         self._executor.shutdown(wait=True, cancel_futures=True)
         self.forecaster.close()
+        self.web_tiles.close()
         self._at_once.close()
 
     @property
@@ -204,6 +208,20 @@ class MissionService:
     async def get(self, mission_id: str) -> LiveMission:
         """Return a mission. Raises MissionNotFoundError, MissionElsewhereError."""
         return await self._registry.get(mission_id)
+
+    @property
+    def database(self) -> Database:
+        """What is stored, to be read."""
+        return self._database
+
+    async def rows(self, mission_id: str | None = None) -> Sequence[MissionRow]:
+        """Return all missions as they are stored, oldest first, whoever has them; or the one of an id, if there is."""
+        async with self._database.reading() as session:
+            return await mission_queries.oldest_first(session, mission_id)
+
+    async def spec(self, mission_id: str) -> MissionSpec:
+        """Return what a mission is to do, whoever has it. Raises MissionNotFoundError."""
+        return await self._registry.spec(mission_id)
 
     async def check_exists(self, mission_id: str) -> None:
         """Raise MissionNotFoundError where there is no such mission; costs little, whoever has it."""

@@ -15,6 +15,12 @@ ALL = select(MissionRow.id).order_by(MissionRow.created_at.desc(), MissionRow.id
 """The ids of all missions, newest first."""
 
 
+async def oldest_first(session: AsyncSession, mission_id: str | None = None) -> Sequence[MissionRow]:
+    """Return all missions in the order in which they were created, or only the one of an id."""
+    query = select(MissionRow).order_by(MissionRow.created_at, MissionRow.id)
+    return (await session.scalars(query if mission_id is None else query.where(MissionRow.id == mission_id))).all()
+
+
 async def newest_named(session: AsyncSession, name: str) -> MissionRow | None:
     """Return the newest mission of this name."""
     query = select(MissionRow).where(MissionRow.name == name).order_by(MissionRow.created_at.desc()).limit(1)

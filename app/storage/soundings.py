@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from sqlalchemy import Select, delete, func, select, tuple_
+from sqlalchemy import Select, and_, delete, func, or_, select, tuple_
 from sqlalchemy.dialects import postgresql, sqlite
 from sqlalchemy.ext.asyncio import AsyncSession
 
@@ -130,6 +130,57 @@ async def all_soundings(session: AsyncSession, mission_id: str) -> Sequence[Soun
     """Return every sounding, rejected ones included, in the order they came."""
     query = select(SoundingRow).where(SoundingRow.mission_id == mission_id).order_by(SoundingRow.id)
     return (await session.scalars(query)).all()
+
+
+def accepted_after(
+    mission_ids: Sequence[str] | None,
+    after: int,
+    most: int,
+    *,
+    boxes: Sequence[tuple[float, float, float, float]] | None = None,
+    from_s: float | None = None,
+    until_s: float | None = None,
+    vehicle: str | None = None,
+) -> tuple[Select[*tuple[Any, ...]], Select[*tuple[Any, ...]]]:
+    """Return two queries of soundings with an id above ``after``, of all missions where ``mission_ids`` is None.
+
+    The first tells the largest id among the next ``most`` of them and how many these are, the second has those among
+    them that are accepted, lie in one of the ``boxes`` (west, south, east and north, degrees) and were made between the
+    two times, in their order. So what one query costs has a bound, however few of them are asked for.
+    """
+    row = SoundingRow
+    of_missions = () if mission_ids is None else (row.mission_id.in_(mission_ids),)
+    ids = select(row.id).where(row.id > after, *of_missions).order_by(row.id).limit(most).subquery()
+    last = select(func.max(ids.c.id), func.count())
+    conditions = [row.id > after, *of_missions, row.verdict == "accepted"]
+    if boxes is not None:
+        conditions.append(
+            or_(
+                *(
+                    and_(row.lon_deg.between(west, east), row.lat_deg.between(south, north))
+                    for west, south, east, north in boxes
+                )
+            )
+        )
+    conditions += [] if from_s is None else [row.time_s >= from_s]
+    conditions += [] if until_s is None else [row.time_s <= until_s]
+    conditions += [] if vehicle is None else [row.vehicle == vehicle]
+    columns = (row.mission_id, row.vehicle, row.time_s, row.depth_m, row.sd_m, row.position_sd_m, row.beam, row.step)
+    return last.select_from(ids), select(row.id, row.lon_deg, row.lat_deg, *columns).where(*conditions)
+
+
+async def window(
+    session: AsyncSession, queries: tuple[Select[*tuple[Any, ...]], Select[*tuple[Any, ...]]], most: int, limit: int
+) -> tuple[int | None, Sequence[Any]]:
+    """Return what the queries of :func:`accepted_after` find: up to ``limit`` rows, and the id that was looked up to.
+
+    That id is None where there is nothing beyond.
+    """
+    last_id, number = (await session.execute(queries[0])).one()
+    if not number:
+        return None, ()
+    query = queries[1].where(SoundingRow.id <= last_id).order_by(SoundingRow.id).limit(limit)
+    return last_id if number >= most else None, (await session.execute(query)).all()
 
 
 async def answer_to(session: AsyncSession, mission_id: str, key: str) -> BatchRow | None:

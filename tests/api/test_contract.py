@@ -44,6 +44,8 @@ BEYOND_THE_SCHEMA = {
     "getMapFile",
     "getSoundingsFile",
     "getTracksFile",
+    "getTile",
+    "getTileJson",
     "importSoundings",
     "setReference",
     "setTide",

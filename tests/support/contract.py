@@ -31,6 +31,8 @@ CONTRACT = {
     "DELETE /missions/{mission_id}/vehicles/{name}": "removeVehicle",
     "POST /missions/{mission_id}/measurements": "postMeasurements",
     "GET /missions/{mission_id}/vehicles/{name}/waypoint": "getWaypoint",
+    "GET /missions/{mission_id}/tiles/{layer}.json": "getTileJson",
+    "GET /missions/{mission_id}/tiles/{layer}/{z}/{x}/{y}.png": "getTile",
     "GET /missions/{mission_id}/map": "getMap",
     "GET /missions/{mission_id}/map.{format}": "getMapFile",
     "GET /missions/{mission_id}/map.overlay.png": "getMapOverlay",

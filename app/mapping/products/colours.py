@@ -1,6 +1,6 @@
 """One colour scale for pictures and overlays."""
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -49,3 +49,7 @@ def scaled(values: FloatArray, range_m: tuple[float, float]) -> FloatArray:
     if not (np.isfinite(low) and np.isfinite(high) and low < high):
         raise ValueError(f"range_m is ({low}, {high}); the first number must be the smaller one, both finite")
     return np.clip((values - low) / (high - low), 0.0, 1.0)
+
+
+CLASS_COLOURS: Final = ((176, 58, 46), (244, 196, 80), (46, 125, 110))
+"""Of layers by classes: missed, too few, enough; as the page has them."""

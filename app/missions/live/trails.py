@@ -66,6 +66,10 @@ class Trails:
         """How far all vehicles went, as of the last time that someone asked for the trails."""
         return sum(_length_m(points) for points in self._points.values())
 
+    def periods_s(self) -> dict[str, tuple[float, float]]:
+        """Return the first and the last time of each trail, as of the last time that someone asked for them."""
+        return {name: (float(at[:, 0].min()), float(at[:, 0].max())) for name, at in self._points.items()}
+
     def _add(self, found: dict[str, list[FloatArray]]) -> None:
         for vehicle, more in found.items():
             came = np.concatenate(more)

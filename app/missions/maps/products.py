@@ -31,7 +31,7 @@ from app.mapping.products.vr_bag import vr_bag
 from app.mapping.quality.survey import SurveyCheck
 from app.mapping.s44 import Order, thu_m
 from app.mapping.tiers import tiers
-from app.mapping.types import Soundings
+from app.mapping.types import BathymetricMap, Soundings
 from app.missions.errors import ConflictError, InvalidRequestError, MapNotReadyError
 from app.missions.maps.snapshot import MapSnapshot, MissionFacts
 from app.missions.search.obstacles import obstacles_geojson
@@ -324,12 +324,16 @@ def _local_track(facts: MissionFacts, track: Track) -> np.ndarray[tuple[int, int
     return np.column_stack(facts.frame.to_local(lat, lon))
 
 
+def nice_interval_m(bathymetry: BathymetricMap) -> float:
+    """Return the distance of about ten contours of a map, metres."""
+    span = float(np.nanmax(bathymetry.depth_m) - np.nanmin(bathymetry.depth_m))
+    return next((i for i in CONTOUR_INTERVALS_M if span / i <= CONTOURS_PER_MAP), CONTOUR_INTERVALS_M[-1])
+
+
 def _contours(material: Material, options: ProductOptions) -> list[Contour]:
     snapshot, interval_m = material.snapshot, options.interval_m
     if interval_m is None:
-        depths = snapshot.built.map.depth_m
-        span = float(np.nanmax(depths) - np.nanmin(depths))
-        interval_m = next((i for i in CONTOUR_INTERVALS_M if span / i <= CONTOURS_PER_MAP), CONTOUR_INTERVALS_M[-1])
+        interval_m = nice_interval_m(snapshot.built.map)
     try:
         return find_contours(snapshot.built.map, snapshot.facts.frame, interval_m)
     except ValueError as error:

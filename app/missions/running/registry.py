@@ -13,6 +13,7 @@ from app.missions.live.load import take_up
 from app.missions.live.mission import LiveMission
 from app.missions.running.final_maps import FinalMaps
 from app.missions.running.ownership import Ownership
+from app.missions.spec.mission import MissionSpec
 from app.missions.states import AT_SEA, ENDED
 from app.missions.views.mission import MissionSummary
 from app.storage.database import Database
@@ -84,6 +85,16 @@ class MissionRegistry:
             if await session.scalar(select(MissionRow.id).where(MissionRow.id == mission_id)) is None:
                 raise _not_found(mission_id)
         self._seen.add(mission_id)
+
+    async def spec(self, mission_id: str) -> MissionSpec:
+        """Return what a mission is to do; it is not taken up. Raises MissionNotFoundError."""
+        if mission_id in self._live:
+            return self._live[mission_id].spec
+        async with self._database.reading() as session:
+            row = await session.get(MissionRow, mission_id)
+        if row is None:
+            raise _not_found(mission_id)
+        return await asyncio.to_thread(MissionSpec.model_validate, row.spec)
 
     async def get(self, mission_id: str) -> LiveMission:
         """Return a mission, taken up if need be. Raises MissionNotFoundError, MissionElsewhereError."""

@@ -1,0 +1,1 @@
+"""OGC API – Features: missions for programs that read geographic features. ``routes`` has the router."""

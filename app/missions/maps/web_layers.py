@@ -1,0 +1,150 @@
+"""What web maps and GIS are shown of a mission's map: layers with colours that stay the same while the map grows."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from app.arrays import FloatArray
+from app.mapping.layers import ACCURATE, LAYERS, SOUNDED, VISIBLE
+from app.mapping.products.tile_pictures import Pixels, coarser, coarser_grid, paint, paint_classes, shade
+from app.mapping.swath.density import LEAST_SOUNDINGS
+from app.mapping.types import Grid
+from app.missions.maps.snapshot import MapSnapshot
+from app.missions.spec.mission import MissionSpec
+
+Range = tuple[float, float]
+"""Values of the first and of the last colour."""
+
+SURE_TIMES = 4.0
+"""Uncertainty is coloured up to so many times the accuracy that a mission asks for."""
+
+
+@dataclass(frozen=True)
+class WebLayer:
+    """A layer in tiles.
+
+    Attributes
+    ----------
+    meaning
+        What is to be seen.
+    unit
+        Of ``min`` and ``max``; empty for layers by classes, which have neither.
+    default_range
+        Returns the range of a mission's colours, from what it is to do: it never changes while the map grows.
+    """
+
+    name: str
+    title: str
+    meaning: str
+    unit: str
+    default_range: Callable[[MissionSpec], Range]
+    paint: Callable[[MapSnapshot, Range], Pixels]
+
+
+def _depth_range(spec: MissionSpec) -> Range:
+    """Return from the surface to the deepest bottom that vehicles may follow."""
+    return 0.0, spec.limits.max_depth_m + spec.limits.min_altitude_m
+
+
+def _depth(snapshot: MapSnapshot, range_: Range) -> Pixels:
+    depth_m, bathymetry = _with_live(snapshot)[0], snapshot.built.map
+    light = shade(depth_m, bathymetry.grid.cell_m)
+    return paint(depth_m, range_, LAYERS["depth"].fit, sounded=_count(snapshot) > 0, light=light)
+
+
+def _uncertainty(snapshot: MapSnapshot, range_: Range) -> Pixels:
+    return paint(_with_live(snapshot)[1], range_, LAYERS["uncertainty"].fit)
+
+
+def _density(snapshot: MapSnapshot, _: Range) -> Pixels:
+    classes = LAYERS["density"].compute(snapshot.source())
+    if classes is None:  # no swath sonar: by the cells themselves
+        classes = np.digitize(_count(snapshot), (1, LEAST_SOUNDINGS)).astype(np.float64)
+    return paint_classes(classes)
+
+
+def _coverage(snapshot: MapSnapshot, _: Range) -> Pixels:
+    flags = LAYERS["flags"].compute(snapshot.source())
+    bits = np.nan_to_num(np.zeros_like(snapshot.built.map.depth_m) if flags is None else flags).astype(np.int64)
+    if snapshot.live is not None:
+        bits[snapshot.live.cells] |= np.where(snapshot.live.count > 0, SOUNDED | VISIBLE, VISIBLE)
+    return paint_classes(np.where(bits & ACCURATE, 2.0, np.where(bits & VISIBLE, 1.0, 0.0)))
+
+
+def _with_live(snapshot: MapSnapshot) -> tuple[FloatArray, FloatArray]:
+    """Return depth and deviation of the cells, with what was sounded since the map was made."""
+    depth_m, sd_m, live = snapshot.built.map.depth_m, snapshot.built.map.sd_m, snapshot.live
+    if live is not None:
+        depth_m, sd_m = depth_m.copy(), sd_m.copy()
+        depth_m[live.cells], sd_m[live.cells] = live.depth_m, live.sd_m
+    return depth_m, sd_m
+
+
+def _count(snapshot: MapSnapshot) -> FloatArray:
+    count = snapshot.built.map.count.astype(np.float64)
+    if snapshot.live is not None:
+        count[snapshot.live.cells] = np.maximum(count[snapshot.live.cells], snapshot.live.count)
+    return count
+
+
+def _two_classes(_: MissionSpec) -> Range:
+    return 0.0, 2.0
+
+
+WEB_LAYERS = {
+    layer.name: layer
+    for layer in (
+        WebLayer(
+            "depth",
+            "Depth",
+            "depth below the vertical datum in colours, lit from the north-west; paler between soundings",
+            LAYERS["depth"].unit,
+            _depth_range,
+            _depth,
+        ),
+        WebLayer(
+            "uncertainty",
+            "Uncertainty",
+            LAYERS["uncertainty"].meaning,
+            LAYERS["uncertainty"].unit,
+            lambda spec: (0.0, SURE_TIMES * spec.accuracy_m),
+            _uncertainty,
+        ),
+        WebLayer(
+            "density",
+            "Density",
+            f"yellow: 1 to {LEAST_SOUNDINGS - 1} soundings in the cell, green: {LEAST_SOUNDINGS} and more",
+            "",
+            _two_classes,
+            _density,
+        ),
+        WebLayer(
+            "coverage",
+            "Coverage",
+            "yellow: near a sounding, green: known to the accuracy that the mission asks for",
+            "",
+            _two_classes,
+            _coverage,
+        ),
+    )
+}
+"""Every layer in tiles by its name."""
+
+
+@dataclass(frozen=True)
+class Painted:
+    """A painted layer and the grid that its cells lie on."""
+
+    grid: Grid
+    pixels: Pixels
+
+
+def painted(snapshot: MapSnapshot, layer: WebLayer, range_: Range) -> Painted:
+    """Return a layer of the map in colours."""
+    return Painted(snapshot.source().map.grid, layer.paint(snapshot, range_))
+
+
+def halved(finer: Painted) -> Painted:
+    """Return the same of half as many cells along each side."""
+    return Painted(coarser_grid(finer.grid), coarser(finer.pixels))
