@@ -137,11 +137,11 @@ def slope_deg(depth_m: FloatArray, cell_m: float) -> FloatArray:
     Central differences of the neighbours, one-sided ones where a neighbour is unknown; NaN where the cell is unknown
     or has no known neighbour along one of the axes.
     """
-    return np.degrees(np.arctan(np.hypot(_along(depth_m, cell_m), _along(depth_m.T, cell_m).T)))
+    return np.degrees(np.arctan(np.hypot(along(depth_m, cell_m), along(depth_m.T, cell_m).T)))
 
 
-def _along(depth_m: FloatArray, cell_m: float) -> FloatArray:
-    """Return the derivative over the second axis."""
+def along(depth_m: FloatArray, cell_m: float) -> FloatArray:
+    """Return the derivative over the second axis, one-sided where a neighbour is unknown; NaN where both are."""
     gap = np.full((len(depth_m), 1), np.nan)
     ahead = np.hstack([depth_m[:, 1:] - depth_m[:, :-1], gap])
     behind = np.hstack([gap, depth_m[:, 1:] - depth_m[:, :-1]])

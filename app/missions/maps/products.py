@@ -15,7 +15,7 @@ from app import __version__
 from app.csv_cells import text_cell
 from app.mapping.layers import LayerSource, file_layers
 from app.mapping.products.bag import bag
-from app.mapping.products.contours import Contour, contours_geojson, find_contours
+from app.mapping.products.contours import Contour, contours_geojson, find_contours, usual_interval_m
 from app.mapping.products.crossovers import crossovers_csv
 from app.mapping.products.crowdsourced import Provider, RawSounding, crowdsourced_geojson
 from app.mapping.products.geotiff import geotiff
@@ -38,9 +38,6 @@ from app.missions.search.obstacles import obstacles_geojson
 from app.missions.search.state import Search
 from app.missions.views.soundings import Verdict
 from app.storage.models import SoundingRow
-
-CONTOURS_PER_MAP = 10
-CONTOUR_INTERVALS_M = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0)
 
 MAP, SOUNDINGS, TRACKS, SEARCH, SWATHS, SURVEY, TIERS, CROSSOVERS = (
     "map",
@@ -327,9 +324,7 @@ def _local_track(facts: MissionFacts, track: Track) -> np.ndarray[tuple[int, int
 def _contours(material: Material, options: ProductOptions) -> list[Contour]:
     snapshot, interval_m = material.snapshot, options.interval_m
     if interval_m is None:
-        depths = snapshot.built.map.depth_m
-        span = float(np.nanmax(depths) - np.nanmin(depths))
-        interval_m = next((i for i in CONTOUR_INTERVALS_M if span / i <= CONTOURS_PER_MAP), CONTOUR_INTERVALS_M[-1])
+        interval_m = usual_interval_m(snapshot.built.map.depth_m)
     try:
         return find_contours(snapshot.built.map, snapshot.facts.frame, interval_m)
     except ValueError as error:
