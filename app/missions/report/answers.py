@@ -11,16 +11,6 @@ from app.missions.maps.snapshot import MapSnapshot
 
 
 @dataclass(frozen=True)
-class DeliveredFile:
-    """A file that the report vouches for."""
-
-    name: str
-    title: str
-    size_bytes: int
-    sha256: str
-
-
-@dataclass(frozen=True)
 class Incident:
     """An alarm or a failsafe of the mission's log."""
 
@@ -41,9 +31,9 @@ class Answers:
     rest
         What REST answers, by name: ``mission``, ``map``, ``quality``, ``corrections``, ``crosslines``, ``pings``,
         ``imports`` and, where the mission has them, ``holidays``, ``uncertainty_budget`` and ``reference``.
-        ``period`` holds the times of the first and last sounding, ``rejected`` how many soundings were refused.
-    refusals
-        How many soundings each reason refused, most first; numbers in reasons are left out.
+        ``period`` holds the times of the first and last sounding, ``rejected`` how many soundings are in each state that
+        is not used, ``refusals`` why, and how many each (numbers in reasons are left out), ``files`` name, title,
+        size and SHA-256 of files.
     tracks_m
         By vehicle its track, (n, 2) east and north.
     """
@@ -53,10 +43,8 @@ class Answers:
     snapshot: MapSnapshot
     made_s: int
     authority: str = ""
-    refusals: Sequence[tuple[str, int]] = ()
     incidents: Sequence[Incident] = ()
     tracks_m: Mapping[str, FloatArray] = field(default_factory=dict)
-    files: Sequence[DeliveredFile] = ()
     files_left_off: Sequence[str] = ()
     versions: Mapping[str, str] = field(default_factory=dict)
 

@@ -1,0 +1,67 @@
+"""A document as a PDF: pages with numbers, embedded fonts, and text that can be searched and copied."""
+
+import io
+import re
+from functools import cache
+from importlib.resources import files
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import orjson
+
+from app.missions.report.document import Document, Figure, as_json
+
+if TYPE_CHECKING:
+    import typst
+
+PAGE_WIDTH_CM, MOST_HEIGHT_CM = 17.0, 15.5
+"""Of the page's text, and of a figure in it."""
+
+SUFFIXES = {"image/png": "png", "image/svg+xml": "svg"}
+
+
+def pdf(document: Document) -> bytes:
+    """Return the PDF. It is the same for the same document."""
+    import typst
+
+    sources: dict[str, bytes] = {"main.typ": files(__package__).joinpath("report.typ").read_bytes()}
+    sections = []
+    for section in document.sections:
+        blocks = []
+        for block in section.blocks:
+            plain = as_json(block)
+            if isinstance(block, Figure):
+                name = f"figure-{len(sources)}.{SUFFIXES[block.media_type]}"
+                sources[name] = block.content
+                plain |= {"file": name} | _size(block)
+            blocks.append(plain)
+        sections.append({"title": section.title, "blocks": blocks})
+    values: dict[str, Any] = {
+        name: getattr(document, name) for name in ("language", "title", "subtitle", "author", "footer", "words")
+    }
+    sources["data.json"] = orjson.dumps(values | {"sections": sections})
+    made = typst.compile(sources, format="pdf", font_paths=_fonts(), timestamp=document.made_s)  # type: ignore[call-overload]
+    return bytes(made)
+
+
+def _size(figure: Figure) -> dict[str, float]:
+    """Return the size at which a picture keeps its shape and is neither wider nor higher than a page allows."""
+    if figure.media_type == "image/png":
+        from PIL import Image
+
+        with Image.open(io.BytesIO(figure.content)) as picture:
+            shape = picture.height / picture.width
+    else:
+        width, height = re.findall(rb'(?:width|height)="([\d.]+)"', figure.content[:400])[:2]
+        shape = float(height) / float(width)
+    width_cm = min(figure.width * PAGE_WIDTH_CM, MOST_HEIGHT_CM / shape)
+    return {"width": width_cm / PAGE_WIDTH_CM, "height": width_cm * shape}
+
+
+@cache
+def _fonts() -> "typst.Fonts":
+    """Return the fonts that come with Matplotlib, for other writings those of the machine."""
+    import matplotlib
+    import typst
+
+    return typst.Fonts(include_system_fonts=True, font_paths=[str(Path(matplotlib.get_data_path(), "fonts", "ttf"))])
