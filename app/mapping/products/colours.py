@@ -27,7 +27,7 @@ CLASSES = "b03a2e f4c450 2e7d6e"
 
 
 def page_colours(name: Palette) -> "Colormap":
-    """Return the colours that the page shows a layer in."""
+    """Return the colours that the page shows a layer in. Raises KeyError for layers that are drawn otherwise."""
     import cmocean
     from matplotlib.colors import LinearSegmentedColormap, ListedColormap
 
@@ -37,8 +37,9 @@ def page_colours(name: Palette) -> "Colormap":
         Palette.CLASSES: ListedColormap(classes),
         Palette.MATTER: cmocean.cm.matter,
         Palette.BALANCE: cmocean.cm.balance,
+        Palette.DEEP: cmocean.cm.deep,
     }
-    return found.get(name, cmocean.cm.deep)
+    return found[name]
 
 
 def depth_range(bathymetry: BathymetricMap) -> tuple[float, float]:

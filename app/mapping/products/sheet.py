@@ -9,7 +9,6 @@ import numpy as np
 from app.arrays import BoolArray, FloatArray
 from app.mapping.layers import Palette
 from app.mapping.products.colours import page_colours
-from app.mapping.products.hillshade import hillshade
 from app.mapping.products.picture import north_arrow, scale_bar
 from app.mapping.swath.holidays import Holiday
 from app.mapping.types import Grid

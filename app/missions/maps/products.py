@@ -510,7 +510,12 @@ def make_product(name: str, material: Material, options: ProductOptions) -> Prod
     if kind.filename is not None:
         return Product(kind.filename(material.facts), kind.media_type, content)
     part = _only_vehicle(material.soundings, options.vehicle) if kind.of_vehicle else kind.part.removeprefix(MAP)
-    return Product(f"{_slug(material.facts.spec.name)}{part and f'-{part}'}.{kind.extension}", kind.media_type, content)
+    return Product(product_name(material.facts, part, kind.extension), kind.media_type, content)
+
+
+def product_name(facts: MissionFacts, part: str, extension: str) -> str:
+    """Return what a file is saved as; ``part`` says what it shows of the mission, empty for the map."""
+    return f"{_slug(facts.spec.name)}{part and f'-{part}'}.{extension}"
 
 
 def _slug(name: str) -> str:

@@ -19,9 +19,8 @@ TRACK_DETAIL = 1.0 / 1500.0
 
 
 def _text(x: float, y: float, text: str, *, size: float = 9, anchor: str = "middle", colour: str = INK) -> str:
-    return (
-        f'<text x="{x:.1f}" y="{y:.1f}" font-size="{size:g}" text-anchor="{anchor}" fill="{colour}">{escape(text)}</text>'
-    )
+    place = f'x="{x:.1f}" y="{y:.1f}" font-size="{size:g}" text-anchor="{anchor}"'
+    return f'<text {place} fill="{colour}">{escape(text)}</text>'
 
 
 def _line(x1: float, y1: float, x2: float, y2: float, colour: str = INK, width: float = 0.8, more: str = "") -> str:
@@ -68,7 +67,10 @@ def histogram(edges_m: Sequence[float], counts: Sequence[int], t: Texts) -> byte
     for count in ticks(0, most, 5).tolist():
         if count == int(count):
             y = base - count * up
-            parts += [_line(left, y, width - 12.0, y, FAINT, 0.5), _text(left - 4, y + 3, t.number(count), anchor="end")]
+            parts += [
+                _line(left, y, width - 12.0, y, FAINT, 0.5),
+                _text(left - 4, y + 3, t.number(count), anchor="end"),
+            ]
     for first, last, count in zip(edges_m[:-1], edges_m[1:], counts, strict=True):
         x, bar = x_of(first), (last - first) * across
         parts.append(

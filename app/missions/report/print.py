@@ -2,6 +2,7 @@
 
 import io
 import re
+from base64 import b64encode
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
@@ -17,8 +18,6 @@ if TYPE_CHECKING:
 PAGE_WIDTH_CM, MOST_HEIGHT_CM = 17.0, 15.5
 """Of the page's text, and of a figure in it."""
 
-SUFFIXES = {"image/png": "png", "image/svg+xml": "svg"}
-
 
 def pdf(document: Document) -> bytes:
     """Return the PDF. It is the same for the same document."""
@@ -31,9 +30,10 @@ def pdf(document: Document) -> bytes:
         for block in section.blocks:
             plain = as_json(block)
             if isinstance(block, Figure):
-                name = f"figure-{len(sources)}.{SUFFIXES[block.media_type]}"
-                sources[name] = block.content
-                plain |= {"file": name} | _size(block)
+                name = f"figure-{len(sources)}.svg"
+                drawing = _drawing(block)
+                sources[name] = drawing
+                plain |= {"file": name} | _size(drawing, block.width)
             blocks.append(plain)
         sections.append({"title": section.title, "blocks": blocks})
     values: dict[str, Any] = {
@@ -44,24 +44,31 @@ def pdf(document: Document) -> bytes:
     return bytes(made)
 
 
-def _size(figure: Figure) -> dict[str, float]:
-    """Return the size at which a picture keeps its shape and is neither wider nor higher than a page allows."""
-    if figure.media_type == "image/png":
-        from PIL import Image
+def _drawing(figure: Figure) -> bytes:
+    """Return a figure as SVG: files in memory have to be text."""
+    if figure.media_type == "image/svg+xml":
+        return figure.content
+    from PIL import Image
 
-        with Image.open(io.BytesIO(figure.content)) as picture:
-            shape = picture.height / picture.width
-    else:
-        width, height = re.findall(rb'(?:width|height)="([\d.]+)"', figure.content[:400])[:2]
-        shape = float(height) / float(width)
-    width_cm = min(figure.width * PAGE_WIDTH_CM, MOST_HEIGHT_CM / shape)
+    with Image.open(io.BytesIO(figure.content)) as picture:
+        size = f'width="{picture.width}" height="{picture.height}"'
+    head = f'<svg xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink" {size}>'
+    link = f"data:{figure.media_type};base64,{b64encode(figure.content).decode()}"
+    return f'{head}<image {size} xlink:href="{link}"/></svg>'.encode()
+
+
+def _size(drawing: bytes, part: float) -> dict[str, float]:
+    """Return the size at which a drawing keeps its shape and is neither wider nor higher than a page allows."""
+    width, height = re.findall(rb' (?:width|height)="([\d.]+)"', drawing[:400])[:2]
+    shape = float(height) / float(width)
+    width_cm = min(part * PAGE_WIDTH_CM, MOST_HEIGHT_CM / shape)
     return {"width": width_cm / PAGE_WIDTH_CM, "height": width_cm * shape}
 
 
 @cache
 def _fonts() -> "typst.Fonts":
     """Return the fonts that come with Matplotlib, for other writings those of the machine."""
-    import matplotlib
+    import matplotlib as mpl
     import typst
 
-    return typst.Fonts(include_system_fonts=True, font_paths=[str(Path(matplotlib.get_data_path(), "fonts", "ttf"))])
+    return typst.Fonts(include_system_fonts=True, font_paths=[str(Path(mpl.get_data_path(), "fonts", "ttf"))])

@@ -146,7 +146,9 @@ def _place(w: Writer) -> list[Block]:
     corners = [
         (t(name), f"{_angle(w, lat, t('north'), t('south'))}, {_angle(w, lon, t('east'), t('west'))}")
         for name, (lon, lat) in zip(
-            ("fact_north_west", "fact_south_east"), (answers.at("map.corners.0"), answers.at("map.corners.2")), strict=True
+            ("fact_north_west", "fact_south_east"),
+            (answers.at("map.corners.0"), answers.at("map.corners.2")),
+            strict=True,
         )
     ]
     homes = [point for point in (None if spec.recovery is None else spec.recovery.point,) if point is not None]
@@ -166,13 +168,15 @@ def _place(w: Writer) -> list[Block]:
         Facts(
             [
                 *corners,
-                (t("fact_origin"), f"{_angle(w, origin[1], t('north'), t('south'))}, "
-                                   f"{_angle(w, origin[0], t('east'), t('west'))}"),
+                (
+                    t("fact_origin"),
+                    f"{_angle(w, origin[1], t('north'), t('south'))}, {_angle(w, origin[0], t('east'), t('west'))}",
+                ),
                 (t("fact_frame"), t("frame")),
                 (t("fact_zones"), t.number(len(answers.at("mission.spec.keep_out")))),
             ]
         ),
-        Figure(chart, SVG, t("caption_overview"), 0.95),
+        Figure(chart, SVG, t("caption_overview"), 0.7),
     ]
 
 
@@ -229,12 +233,16 @@ def _vehicles(w: Writer) -> list[Block]:
             known = sonar is not None and answers.at(sonar) is not None
             columns = (("aperture_deg", 0, "°"), ("beams", 0, ""), ("rate_hz", 1, "Hz"), ("range_m", 0, "m"))
             cells: list[Text] = [
-                w.number(f"{sonar}.{field}", decimals, unit) if known else t("usual") for field, decimals, unit in columns
+                w.number(f"{sonar}.{field}", decimals, unit) if known else t("usual")
+                for field, decimals, unit in columns
             ]
             sonars.append([w.string(f"{own}.name"), *cells])
     blocks: list[Block] = [
         Table(
-            [t(f"column_{name}") for name in ("vehicle", "kind", "sensor", "flown", "on_plan", "risings", "position_sd")],
+            [
+                t(f"column_{name}")
+                for name in ("vehicle", "kind", "sensor", "flown", "on_plan", "risings", "position_sd")
+            ],
             rows,
             numbers=(3, 4, 5, 6),
             caption=t("caption_vehicles"),
@@ -496,7 +504,9 @@ def _crosslines(w: Writer) -> list[Block]:
         names = " − ".join(printable(name) for name in pair["vehicles"])
         rows.append([names, *_agreement(w, f"{own}.by_vehicles.{index}")])
     blocks.append(Paragraph(t("crossings_words", order=order)))
-    blocks.append(Table([t("column_crossings"), *columns], rows, numbers, widths=(2.0,), caption=t("caption_crossings")))
+    blocks.append(
+        Table([t("column_crossings"), *columns], rows, numbers, widths=(2.0,), caption=t("caption_crossings"))
+    )
     counts = answers.at(f"{own}.histogram")
     blocks.append(Figure(histogram(counts["edges_m"], counts["counts"], t), SVG, t("caption_histogram"), 0.85))
     lines = answers.at(f"{own}.by_line")
@@ -598,7 +608,8 @@ def _not_said(w: Writer) -> list[Text]:
 def _rejected(w: Writer) -> list[Block]:
     t, refusals = w.t, w.answers.at("refusals")
     facts: list[tuple[str, Text]] = [
-        (t(f"fact_{state}"), w.number(f"rejected.{state}")) for state in ("rejected", "doubted", "withdrawn", "restored")
+        (t(f"fact_{state}"), w.number(f"rejected.{state}"))
+        for state in ("rejected", "doubted", "withdrawn", "restored")
     ]
     if w.answers.at("mission.progress.pings") or w.answers.at("pings.rejected"):
         facts.append((t("fact_rejected_pings"), w.number("pings.rejected")))
@@ -666,9 +677,7 @@ def _files(w: Writer) -> list[Block]:
         ]
         columns = [t(f"column_{name}") for name in ("number", "vehicle", "pings", "sha256")]
         left_off = w.left_off(len(rows), len(parts))
-        blocks.append(
-            Table(columns, rows, (0, 2), (0.0, 1.0, 0.0, 0.0), caption=t("caption_pings"), left_off=left_off)
-        )
+        blocks.append(Table(columns, rows, (0, 2), (0.0, 1.0, 0.0, 0.0), caption=t("caption_pings"), left_off=left_off))
     return blocks
 
 
@@ -686,14 +695,20 @@ def listing(value: Any, indent: str = "") -> str:
     """Return JSON with a line for each field; lists of numbers flow."""
     deeper = indent + "  "
     if isinstance(value, Mapping) and value:
-        fields = (f"{deeper}{json.dumps(name)}: {listing(inner, deeper)}" for name, inner in value.items())
+        fields = (f"{deeper}{_flat(name)}: {listing(inner, deeper)}" for name, inner in value.items())
         return "{\n" + ",\n".join(fields) + f"\n{indent}}}"
     if isinstance(value, Sequence) and not isinstance(value, str) and value:
         if any(isinstance(entry, Mapping) for entry in value):
             return "[\n" + ",\n".join(deeper + listing(entry, deeper) for entry in value) + f"\n{indent}]"
-        flat = json.dumps(value)
+        flat = _flat(value)
         return flat if '"' in flat else _wrapped(flat, deeper)
-    return json.dumps(value)
+    return _flat(value)
+
+
+def _flat(value: Any) -> str:
+    """Return JSON in one line; letters of other languages stay unless some character is not fit to be shown."""
+    text = json.dumps(value, ensure_ascii=False)
+    return text if printable(text) == text else json.dumps(value)
 
 
 def _wrapped(text: str, indent: str) -> str:
@@ -744,5 +759,3 @@ def document_of(answers: Answers, texts: Texts) -> Document:
         words={word: texts(f"word_{word}") for word in ("page", "contents", "figure", "table")},
         sections=[Section(section, texts(f"section_{section}"), blocks) for section, blocks in found if blocks],
     )
-
-

@@ -24,6 +24,8 @@ class Language(StrEnum):
 DECIMAL_POINTS = {Language.EN: ".", Language.PT: ","}
 GROUPED_FROM = 10_000
 NARROW_SPACE = "\u202f"
+DEGREES = "°"
+"""The unit that no space is before."""
 
 
 @cache
@@ -62,7 +64,7 @@ class Texts:
         grouping = "," if abs(rounded) >= GROUPED_FROM else ""
         text = f"{rounded:{sign}{grouping}.{decimals}f}".replace("-", "−").replace(",", NARROW_SPACE)
         text = text.replace(".", DECIMAL_POINTS[self.language])
-        return f"{text}\u00a0{unit}" if unit else text
+        return f"{text}\u00a0{unit}" if unit and unit != DEGREES else f"{text}{unit}"
 
     def moment(self, value: str | float | None) -> str:
         """Return a time, given as ISO 8601 or in Unix seconds, to the second, UTC."""
