@@ -46,6 +46,7 @@ from app.missions.report.texts import Language, Texts
 from app.missions.running.final_maps import FinalMaps
 from app.missions.running.mission_views import mission_view
 from app.missions.settings import ProviderSettings
+from app.missions.states import AT_SEA
 from app.missions.views.base import View
 from app.missions.views.mission import Level
 from app.missions.views.soundings import SoundingState
@@ -92,12 +93,17 @@ class Reports:
             shared[options] = Shared(partial(self._made, live, options))
         return await shared[options]()
 
+    async def answers(self, live: LiveMission, order: Order = Order.ORDER_1A) -> Answers:
+        """Return what a mission's report is made of. Raises MapNotReadyError, PingsUnreadableError."""
+        gathered = await self._gathered(live, order)
+        # Not with the planning threads: vehicles may wait for a decision.
+        return await asyncio.to_thread(_answers, gathered, order)
+
     async def _made(self, live: LiveMission, options: ReportOptions) -> Product:
-        async with self._turn:
-            gathered = await self._gathered(live, options.order)
-            # Not with the planning threads: vehicles may wait for a decision.
-            content = await asyncio.to_thread(_content, gathered, options)
         kind = options.kind
+        async with self._turn:
+            answers = await self.answers(live, options.order)
+            content = await asyncio.to_thread(lambda: kind.make(document_of(answers, Texts(options.language))))
         return Product(product_name(live.facts, "report", kind.extension), kind.media_type, content)
 
     async def _gathered(self, live: LiveMission, order: Order) -> "_Gathered":
@@ -176,10 +182,6 @@ class _Gathered:
     authority: str
 
 
-def _content(gathered: _Gathered, options: ReportOptions) -> bytes:
-    return options.kind.make(document_of(_answers(gathered, options.order), Texts(options.language)))
-
-
 def _answers(gathered: _Gathered, order: Order) -> Answers:
     material = gathered.material
     snapshot, live = material.snapshot, gathered.live
@@ -195,6 +197,8 @@ def _answers(gathered: _Gathered, order: Order) -> Answers:
     summed = [
         name for name in SUMMED if name not in gathered.left_off and (is_swath or SWATHS not in PRODUCTS[name].needs)
     ]
+    if live.header.state in AT_SEA:
+        summed = []  # they are others as soon as a vehicle has measured again
     rest["files"] = [_summed(make_product(name, material, ProductOptions(order)), name) for name in summed]
     return Answers(
         rest,

@@ -47,6 +47,9 @@ MOST_HOLIDAYS, MOST_INCIDENTS, MOST_LINES, MOST_OUTLIERS, MOST_PAIRS, MOST_REASO
 )
 """Rows that tables have place for."""
 
+LEAST_COUNTED = 5.0
+"""Colours of numbers of soundings reach at least so far."""
+
 LISTED_WIDTH = 100
 """Characters of a line of the listing."""
 
@@ -353,6 +356,8 @@ def _map(w: Writer) -> list[Block]:
 def _layer_sheet(w: Writer, kind: LayerKind, layer: Layer, words: str, holidays: Any = ()) -> bytes:
     known = layer.values[np.isfinite(layer.values)]
     low, high = kind.range or (float(known.min()) if kind.fit is Fit.DATA else 0.0, float(np.percentile(known, 99)))
+    if kind.name == "count":
+        low, high = 0.0, max(high, LEAST_COUNTED)
     classes = [w.t(f"class_density_{number}") for number in range(len(kind.classes))]
     return sheet_png(
         Sheet(
@@ -658,10 +663,12 @@ def _files(w: Writer) -> list[Block]:
         for index in range(len(files))
     ]
     columns = [t("column_file"), t("column_bytes"), t("column_sha256")]
-    blocks: list[Block] = [
-        Paragraph(t("files_words", order=w.order(w.answers.order))),
-        Table(columns, rows, (1,), (1.0, 0.0, 0.0), caption=t("caption_files")),
-    ]
+    blocks: list[Block] = [Paragraph(t("files_at_sea"))]
+    if rows:
+        blocks = [
+            Paragraph(t("files_words", order=w.order(w.answers.order))),
+            Table(columns, rows, (1,), (1.0, 0.0, 0.0), caption=t("caption_files")),
+        ]
     if w.answers.files_left_off:
         blocks.append(Paragraph(t("files_left_off", names=", ".join(w.answers.files_left_off))))
     parts = w.answers.at("pings.parts")
@@ -754,7 +761,7 @@ def document_of(answers: Answers, texts: Texts) -> Document:
         title=f"{texts('title')}: {name}",
         subtitle=texts("subtitle", made=made, version=answers.versions.get("bathyfleet", "")),
         author=answers.authority or "bathyfleet",
-        footer=f"{name} · {made}",
+        footer=f"{made} · {name}",
         made_s=answers.made_s,
         words={word: texts(f"word_{word}") for word in ("page", "contents", "figure", "table")},
         sections=[Section(section, texts(f"section_{section}"), blocks) for section, blocks in found if blocks],
