@@ -2,27 +2,27 @@
 
 import io
 import re
+import subprocess
+import sys
 from base64 import b64encode
-from functools import cache
 from importlib.resources import files
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import orjson
 
 from app.missions.report.document import Document, Figure, as_json
 
-if TYPE_CHECKING:
-    import typst
-
 PAGE_WIDTH_CM, MOST_HEIGHT_CM = 17.0, 15.5
 """Of the page's text, and of a figure in it."""
+
+PROGRAM = str(Path(__file__).with_name("typesetting.py"))
+LONGEST_S = 120.0
+"""Nothing takes so long."""
 
 
 def pdf(document: Document) -> bytes:
     """Return the PDF. It is the same for the same document."""
-    import typst
-
     sources: dict[str, bytes] = {"main.typ": files(__package__).joinpath("report.typ").read_bytes()}
     sections = []
     for section in document.sections:
@@ -40,8 +40,23 @@ def pdf(document: Document) -> bytes:
         name: getattr(document, name) for name in ("language", "title", "subtitle", "author", "footer", "words")
     }
     sources["data.json"] = orjson.dumps(values | {"sections": sections})
-    made = typst.compile(sources, format="pdf", font_paths=_fonts(), timestamp=document.made_s)  # type: ignore[call-overload]
-    return bytes(made)
+    return _typeset(sources, document.made_s)
+
+
+def _typeset(sources: dict[str, bytes], timestamp: int) -> bytes:
+    """Return the PDF that a process of its own makes. Raises RuntimeError with what it said where it fails."""
+    import matplotlib as mpl
+
+    # The fonts that come with Matplotlib; for other writings those of the machine.
+    fonts = str(Path(mpl.get_data_path(), "fonts", "ttf"))
+    texts = {name: content.decode() for name, content in sources.items()}
+    asked = orjson.dumps({"sources": texts, "fonts": fonts, "timestamp": timestamp})
+    run = subprocess.run(  # noqa: S603 - this program's own file
+        [sys.executable, "-P", PROGRAM], input=asked, capture_output=True, timeout=LONGEST_S, check=False
+    )
+    if run.returncode:
+        raise RuntimeError(f"the report cannot be typeset: {run.stderr.decode(errors='replace')[-2000:]}")
+    return run.stdout
 
 
 def _drawing(figure: Figure) -> bytes:
@@ -63,12 +78,3 @@ def _size(drawing: bytes, part: float) -> dict[str, float]:
     shape = float(height) / float(width)
     width_cm = min(part * PAGE_WIDTH_CM, MOST_HEIGHT_CM / shape)
     return {"width": width_cm / PAGE_WIDTH_CM, "height": width_cm * shape}
-
-
-@cache
-def _fonts() -> "typst.Fonts":
-    """Return the fonts that come with Matplotlib, for other writings those of the machine."""
-    import matplotlib as mpl
-    import typst
-
-    return typst.Fonts(include_system_fonts=True, font_paths=[str(Path(mpl.get_data_path(), "fonts", "ttf"))])
