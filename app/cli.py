@@ -14,7 +14,7 @@ from app import __version__
 from app.commands.audit import audit
 from app.commands.backup import backup, prune, restore
 from app.commands.common import CommandError, Database, command_settings, noted
-from app.commands.data import export, import_file, tide
+from app.commands.data import export, import_file, report, tide
 from app.commands.failsafes import failsafes
 from app.commands.home import home
 from app.commands.logs import import_logs
@@ -33,6 +33,7 @@ app = typer.Typer(
 token_app = typer.Typer(help="Make, list and revoke access tokens.", no_args_is_help=True)
 app.add_typer(token_app, name="token")
 app.command()(export)
+app.command()(report)
 app.command("import")(import_file)
 app.command("import-log")(import_logs)
 app.command()(tide)

@@ -71,6 +71,7 @@ def test_help_lists_every_command_without_loading_the_service(bathyfleet: Run) -
         "demo",
         "evaluate",
         "export",
+        "report",
         "import",
         "import-log",
         "tide",
@@ -102,6 +103,7 @@ def test_help_lists_every_command_without_loading_the_service(bathyfleet: Run) -
         "evaluate",
         "evaluate explore",
         "export",
+        "report",
         "import",
         "import-log",
         "tide",
@@ -138,6 +140,8 @@ def test_every_command_explains_its_options(bathyfleet: Run, command: str) -> No
         (["serve", "--host", "192.0.2.77", "--insecure"], {}, 1, "cannot listen on 192.0.2.77:8080"),
         (["export", "nowhere"], {}, 1, "0 missions have ids that begin with 'nowhere'. There are: none"),
         (["export", "nowhere", "--format", "doc"], {}, 2, "'doc' is not one of tif, nc, bag"),
+        (["report", "nowhere", "--out", "x.doc"], {}, 2, "x.doc ends in none of .pdf, .html"),
+        (["report", "nowhere", "--lang", "xx"], {}, 2, "'xx' is not one of en, pt"),
         (["import-log", "nowhere", "Data.lsf"], {}, 1, "0 missions have ids that begin with 'nowhere'"),
         (["token", "create", "x", "--role", "king"], {}, 2, "king"),
         (["token", "create", "x", "--role", "viewer", "--vehicle", "a"], {}, 2, "only a token of role vehicle"),
@@ -234,6 +238,10 @@ def test_a_mission_is_served_exported_and_found_again(
     assert "nowhere.lsf cannot be read: No such file" in imported.stderr
     bathyfleet("export", mission["id"], "--format", "png")
     assert (tmp_path / "output" / "harbour-basin.png").stat().st_size > 1000
+    bathyfleet("report", mission["id"][:8])
+    assert (tmp_path / "output" / "harbour-basin-report.pdf").read_bytes().startswith(b"%PDF-")
+    bathyfleet("report", mission["id"], "--out", "basin.html", "--lang", "pt")
+    assert "Relatório do levantamento: Harbour basin" in (tmp_path / "basin.html").read_text()
 
     (tmp_path / "old.csv").write_text("lon,lat,depth\n-8.7048,41.1852,9.5\n")
     refused = bathyfleet("import", mission["id"], "old.csv")

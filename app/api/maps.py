@@ -37,7 +37,10 @@ from app.missions.maps.products import (
 from app.missions.maps.snapshot import MapSnapshot, quality_of
 from app.missions.operations.crossovers import check_of, crossovers_view
 from app.missions.operations.mission_maps import export, map_tiles, newest_map
+from app.missions.operations.reports import ReportOptions
 from app.missions.operations.uncertainty_budget import uncertainty_budget
+from app.missions.report.kinds import REPORTS, ReportKind
+from app.missions.report.texts import Language
 from app.missions.spec.base import Name
 from app.missions.views.crossovers import CrossoversView
 from app.missions.views.map import LayerView, MapView, ProductView, QualityView
@@ -329,11 +332,52 @@ async def get_crossovers_file(
     return file_answer(await export(mission, service.maps, service.settings.provider, "crossovers.csv", options))
 
 
+def _add_report(kind: ReportKind) -> None:
+    async def get_report(
+        service: Service,
+        reader: Reader,
+        mission: Mission,
+        lang: Annotated[Language, Query(description="Language that it is written in")] = Language.EN,
+        order: _Order = Order.ORDER_1A,
+    ) -> Response:
+        return file_answer(await service.reports.report(mission, ReportOptions(kind, lang, order)))
+
+    name = kind.extension
+    router.add_api_route(
+        f"/report.{name}",
+        get_report,
+        methods=["GET"],
+        operation_id=f"get{name.capitalize()}Report",
+        summary=f"Download the survey's report as {name.upper()}",
+        description="Return the survey in one document: place, times, vehicles, corrections, map, uncertainty, "
+        "crosslines, what can be said by IHO S-44 and what cannot, rejected soundings, alarms, checksums of files and "
+        "the settings to repeat it. Every number is the one that the other answers have.",
+        response_class=Response,
+        responses=problems("pings-unreadable")
+        | {
+            200: {
+                "description": kind.title,
+                "content": {kind.media_type.partition(";")[0]: {"schema": _schema_of(kind.media_type)}},
+            }
+        },
+    )
+
+
 @router.get("/products", operation_id="listProducts", summary="List the files", responses=problems("mission-not-found"))
 async def list_products(reader: Reader, mission: Mission) -> list[ProductView]:
     """Return every file that can be downloaded, with its path."""
     base = f"{API}/missions/{mission.id}"
-    return [
+    reports = [
+        ProductView(
+            name=f"report.{name}",
+            title=kind.title,
+            media_type=kind.media_type,
+            href=f"{base}/report.{name}",
+            needs_map=True,
+        )
+        for name, kind in REPORTS.items()
+    ]
+    return reports + [
         ProductView(
             name=name,
             title=kind.title,
@@ -417,6 +461,9 @@ def _add_files(resource: str, operation_id: str, summary: str, description: str)
 def _schema_of(media_type: str) -> dict[str, str]:
     return {"type": "object"} if media_type.endswith("json") else {"type": "string", "format": "binary"}
 
+
+for _kind in REPORTS.values():
+    _add_report(_kind)
 
 _add_files(MAP, "getMapFile", "Download the map", "Return the map as a file.")
 _add_files(SOUNDINGS, "getSoundingsFile", "Download the soundings", "Return the soundings as a file.")

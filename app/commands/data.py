@@ -1,4 +1,4 @@
-"""``bathyfleet export``, ``import`` and ``tide``: what goes into a mission and what comes out of it."""
+"""``bathyfleet export``, ``report``, ``import`` and ``tide``: what goes into a mission and what comes out of it."""
 
 import asyncio
 import sys
@@ -19,6 +19,7 @@ from app.commands.common import (
 )
 
 if TYPE_CHECKING:
+    from app.missions.maps.products import Product
     from app.missions.service import MissionService
 
 
@@ -59,7 +60,6 @@ def export(
     from app.missions.maps.products import PRODUCTS, Product, ProductOptions
     from app.missions.operations import mission_maps
     from app.missions.service import MissionService
-    from app.storage import private
 
     if format not in PRODUCTS:
         raise typer.BadParameter(f"{format!r} is not one of {', '.join(PRODUCTS)}", param_hint="--format")
@@ -75,7 +75,48 @@ def export(
     if out == Path("-"):
         sys.stdout.buffer.write(product.content)
         return
-    path = out or settings.output_dir / product.filename
+    _write(product, out, settings.output_dir)
+
+
+def report(
+    mission: Annotated[str, typer.Argument(metavar="MISSION", help="Its id, or the begin of it.")],
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", "-o", help="File to write, .pdf or .html [default: a .pdf in output_dir]"),
+    ] = None,
+    lang: Annotated[str, typer.Option(help="Language that it is written in: en or pt.")] = "en",
+    order: Annotated[
+        str, typer.Option(help="IHO S-44 order that crossings are compared with: exclusive, special, 1a, 1b or 2.")
+    ] = "1a",
+    database: Database = None,
+) -> None:
+    """Write a survey's report, from the database; no service has to run."""
+    settings = command_settings(database_url=database)
+    from app.mapping.s44 import Order
+    from app.missions.maps.products import Product
+    from app.missions.operations.reports import ReportOptions
+    from app.missions.report.kinds import REPORTS
+    from app.missions.report.texts import Language
+    from app.missions.service import MissionService
+
+    extension = "pdf" if out is None else out.suffix.lower().removeprefix(".")
+    if extension not in REPORTS:
+        raise typer.BadParameter(f"{out} ends in none of .{', .'.join(REPORTS)}", param_hint="--out")
+    for value, known, option in ((order, Order, "--order"), (lang, Language, "--lang")):
+        if value not in list(known):
+            raise typer.BadParameter(f"{value!r} is not one of {', '.join(known)}", param_hint=option)
+    options = ReportOptions(REPORTS[extension], Language(lang), Order(order))
+
+    async def run(service: MissionService) -> Product:
+        return await service.reports.report(await meant_mission(service, mission), options)
+
+    _write(with_missions(settings, run), out, settings.output_dir)
+
+
+def _write(product: "Product", out: Path | None, folder: Path) -> None:
+    from app.storage import private
+
+    path = out or folder / product.filename
     try:
         private.make_folder(path.parent)
         private.write(path, product.content)

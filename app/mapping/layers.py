@@ -146,7 +146,7 @@ def gradient(depth_m: FloatArray, cell_m: float) -> tuple[FloatArray, FloatArray
 
 
 def _along(depth_m: FloatArray, cell_m: float) -> FloatArray:
-    """Return the derivative over the second axis."""
+    """Return the derivative over the second axis, one-sided where a neighbour is unknown; NaN where both are."""
     gap = np.full((len(depth_m), 1), np.nan)
     ahead = np.hstack([depth_m[:, 1:] - depth_m[:, :-1], gap])
     behind = np.hstack([gap, depth_m[:, 1:] - depth_m[:, :-1]])

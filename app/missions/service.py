@@ -23,6 +23,7 @@ from app.missions.live.mission import Ending, LiveMission
 from app.missions.operations.imports import Imports
 from app.missions.operations.reading import Reader
 from app.missions.operations.recorrection import check_level_is_known
+from app.missions.operations.reports import Reports
 from app.missions.operations.uploads import Uploads
 from app.missions.operations.web_tiles import WebTiles
 from app.missions.running.admission import check_spec
@@ -120,6 +121,8 @@ class MissionService:
         """Files on their way in."""
         self.imports = Imports(Reader(unconfined=settings.unconfined_imports), self.maps)
         """Files that missions begin with or are compared with."""
+        self.reports = Reports(self.maps, settings.provider)
+        """Reports of surveys."""
         self._started = False
 
     # Life of the service

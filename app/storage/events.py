@@ -1,7 +1,7 @@
 """Queries on the missions' logs."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 from sqlalchemy import func, select
 from sqlalchemy.ext.asyncio import AsyncSession
@@ -17,6 +17,12 @@ async def events_after(session: AsyncSession, mission_id: str, after: int, limit
         .order_by(EventRow.id)
         .limit(limit)
     )
+    return (await session.scalars(query)).all()
+
+
+async def events_of_levels(session: AsyncSession, mission_id: str, levels: Collection[str]) -> Sequence[EventRow]:
+    """Return the events of some levels, oldest first."""
+    query = select(EventRow).where(EventRow.mission_id == mission_id, EventRow.level.in_(levels)).order_by(EventRow.id)
     return (await session.scalars(query)).all()
 
 

@@ -100,6 +100,16 @@ async def counts(session: AsyncSession, mission_id: str) -> dict[str, int]:
     return {row.verdict: row.n for row in await session.execute(query)}
 
 
+async def refusals(session: AsyncSession, mission_id: str) -> dict[str, int]:
+    """Return why soundings were rejected, and how many each."""
+    query = (
+        select(SoundingRow.reason, func.count().label("n"))
+        .where(SoundingRow.mission_id == mission_id, SoundingRow.verdict == "rejected")
+        .group_by(SoundingRow.reason)
+    )
+    return {row.reason: row.n for row in await session.execute(query)}
+
+
 @dataclass(frozen=True)
 class Extent:
     """When the soundings of one verdict were made, and the largest deviation that their positions state.

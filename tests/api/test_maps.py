@@ -104,6 +104,8 @@ async def test_an_empty_colour_range_is_refused(client: httpx.AsyncClient, measu
 
 
 FILES = {
+    "report.pdf": ("application/pdf", b"%PDF-"),
+    "report.html": ("text/html; charset=utf-8", b"<!doctype html>"),
     "map.tif": ("image/tiff", b"II*\0"),
     "map.nc": ("application/x-netcdf", b"\x89HDF"),
     "map.bag": ("application/x-bag", b"\x89HDF"),

@@ -103,7 +103,13 @@ def test_the_files_of_a_mission_are_downloaded_from_a_list(page: Page, service: 
     service.get(f"/missions/{mission}/map")
     expect(by_id(page, "file-tif")).to_be_enabled()
     expect(by_id(page, "quality")).to_contain_text("TVU estimate meets Order 1a in")
-    for name, begin in (("tif", b"II*\0"), ("soundings.csv", b"#"), ("bag", b"\x89HDF")):
+    for name, begin in (
+        ("report.pdf", b"%PDF-"),
+        ("report.html", b"<!doctype html>"),
+        ("tif", b"II*\0"),
+        ("soundings.csv", b"#"),
+        ("bag", b"\x89HDF"),
+    ):
         with page.expect_download() as waited:
             by_id(page, f"file-{name}").click()
         assert waited.value.suggested_filename.endswith(name.rpartition(".")[2])

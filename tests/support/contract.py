@@ -43,6 +43,8 @@ CONTRACT = {
     "GET /missions/{mission_id}/crosslines": "getCrosslines",
     "GET /missions/{mission_id}/uncertainty-budget": "getUncertaintyBudget",
     "GET /missions/{mission_id}/crossovers.csv": "getCrossoversFile",
+    "GET /missions/{mission_id}/report.pdf": "getPdfReport",
+    "GET /missions/{mission_id}/report.html": "getHtmlReport",
     "GET /missions/{mission_id}/products": "listProducts",
     "GET /missions/{mission_id}/quality": "getQuality",
     "GET /missions/{mission_id}/corrections": "getCorrections",

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from app.arrays import FloatArray
-from app.mapping.layers import Fit
+from app.mapping.layers import Fit, Palette
 from app.mapping.types import BathymetricMap
 
 if TYPE_CHECKING:
@@ -19,6 +19,27 @@ def palette(fit: Fit) -> "Colormap":
 
     colours: Colormap = {Fit.DATA: cmocean.cm.deep, Fit.ABOUT_ZERO: cmocean.cm.balance}.get(fit, cmocean.cm.amp)
     return colours
+
+
+VIOLET = "fbf7fd f1e6f7 e3cef0 d1b1e6 bc90da a56fcb 8c50b8 72369f 582183 3f1064"
+CLASSES = "b03a2e f4c450 2e7d6e"
+"""The page's own palettes, low values first."""
+
+
+def page_colours(name: Palette) -> "Colormap":
+    """Return the colours that the page shows a layer in. Raises KeyError for layers that are drawn otherwise."""
+    import cmocean
+    from matplotlib.colors import LinearSegmentedColormap, ListedColormap
+
+    violet, classes = ([f"#{colour}" for colour in own.split()] for own in (VIOLET, CLASSES))
+    found: dict[Palette, Colormap] = {
+        Palette.VIOLET: LinearSegmentedColormap.from_list("violet", violet),
+        Palette.CLASSES: ListedColormap(classes),
+        Palette.MATTER: cmocean.cm.matter,
+        Palette.BALANCE: cmocean.cm.balance,
+        Palette.DEEP: cmocean.cm.deep,
+    }
+    return found[name]
 
 
 def depth_range(bathymetry: BathymetricMap) -> tuple[float, float]:

@@ -13,6 +13,8 @@ from app.mapping.georeference import LocalFrame
 from app.mapping.types import BathymetricMap
 
 MAX_LEVELS = 500
+USUAL_LEVELS = 10
+INTERVALS_M = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0)
 
 
 @dataclass(frozen=True)
@@ -21,6 +23,12 @@ class Contour:
 
     depth_m: float
     lines: list[list[tuple[float, float]]]
+
+
+def usual_interval_m(depth_m: FloatArray) -> float:
+    """Return the interval that makes about ten contours of a map's depths, of which one at least is known."""
+    span = float(np.nanmax(depth_m) - np.nanmin(depth_m))
+    return next((interval for interval in INTERVALS_M if span / interval <= USUAL_LEVELS), INTERVALS_M[-1])
 
 
 def find_contours(bathymetry: BathymetricMap, frame: LocalFrame, interval_m: float) -> list[Contour]:

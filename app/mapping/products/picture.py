@@ -72,16 +72,8 @@ def picture_png(
         axes.plot(positions[:, 0], positions[:, 1], linewidth=0.8, label=name)
     if tracks:
         axes.legend(loc="upper left", fontsize=7, framealpha=0.8)
-    _scale_bar(axes, extent)
-    axes.annotate(
-        "N",
-        xy=(0.965, 0.97),
-        xytext=(0.965, 0.89),
-        xycoords="axes fraction",
-        ha="center",
-        fontsize=9,
-        arrowprops={"arrowstyle": "-|>", "color": "black"},
-    )
+    scale_bar(axes, extent)
+    north_arrow(axes)
     axes.set(xlim=extent[:2], ylim=extent[2:], xlabel="east (m)", ylabel="north (m)", title=title)
     bar = figure.colorbar(image, ax=axes, extend="both", fraction=0.046, pad=0.03)
     bar.set_label(f"depth (m below {vertical_datum})")
@@ -93,7 +85,21 @@ def picture_png(
     return stream.getvalue()
 
 
-def _scale_bar(axes: "Axes", extent: tuple[float, float, float, float]) -> None:
+def north_arrow(axes: "Axes") -> None:
+    """Draw where north is into the corner."""
+    axes.annotate(
+        "N",
+        xy=(0.965, 0.97),
+        xytext=(0.965, 0.89),
+        xycoords="axes fraction",
+        ha="center",
+        fontsize=9,
+        arrowprops={"arrowstyle": "-|>", "color": "black"},
+    )
+
+
+def scale_bar(axes: "Axes", extent: tuple[float, float, float, float]) -> None:
+    """Draw how long some round number of metres is; ``extent`` is west, east, south, north."""
     span = extent[1] - extent[0]
     length = max(step for step in _round_lengths(span) if step <= 0.25 * span)
     x = extent[0] + 0.04 * span

@@ -8,8 +8,9 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from app.arrays import BoolArray, FloatArray
-from app.mapping.layers import Fit, gradient
+from app.mapping.layers import Fit
 from app.mapping.products.colours import CLASS_COLOURS, palette, scaled
+from app.mapping.products.hillshade import hillshade
 from app.mapping.products.overlay import INTERPOLATED_ALPHA
 from app.mapping.types import Grid
 from app.mapping.web_tiles import TileCells
@@ -20,9 +21,6 @@ Pixels = NDArray[np.uint8]
 Words = NDArray[np.uint32]
 """The four bytes of each pixel as one number."""
 
-SUN = np.array([-0.5, 0.5, np.sqrt(0.5)])
-"""Where light comes from, as in charts: from the north-west, 45 degrees high; east, north, up."""
-
 EXAGGERATION = 3.0
 """Slopes of the sea floor are shown so many times as steep."""
 
@@ -31,11 +29,8 @@ DARKEST, LIGHTEST = 0.45, 1.2
 
 
 def shade(depth_m: FloatArray, cell_m: float) -> FloatArray:
-    """Return how light each cell is under :data:`SUN`, 1 for level ground and where no slope is known, (rows, cols)."""
-    east, north = (EXAGGERATION * np.nan_to_num(part) for part in gradient(depth_m, cell_m))
-    # Depth grows downwards: the surface's normal leans to where it gets deeper.
-    light: FloatArray = (SUN[0] * east + SUN[1] * north + SUN[2]) / np.sqrt(east**2 + north**2 + 1.0)
-    return np.asarray(np.clip(light / SUN[2], DARKEST, LIGHTEST))
+    """Return how light each cell is on a tile, 1 for level ground and where no slope is known, (rows, cols)."""
+    return np.asarray(np.clip(hillshade(depth_m, cell_m, EXAGGERATION), DARKEST, LIGHTEST))
 
 
 def paint(

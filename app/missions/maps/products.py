@@ -15,7 +15,7 @@ from app import __version__
 from app.csv_cells import text_cell
 from app.mapping.layers import LayerSource, file_layers
 from app.mapping.products.bag import bag
-from app.mapping.products.contours import Contour, contours_geojson, find_contours
+from app.mapping.products.contours import Contour, contours_geojson, find_contours, usual_interval_m
 from app.mapping.products.crossovers import crossovers_csv
 from app.mapping.products.crowdsourced import Provider, RawSounding, crowdsourced_geojson
 from app.mapping.products.geotiff import geotiff
@@ -31,16 +31,13 @@ from app.mapping.products.vr_bag import vr_bag
 from app.mapping.quality.survey import SurveyCheck
 from app.mapping.s44 import Order, thu_m
 from app.mapping.tiers import tiers
-from app.mapping.types import BathymetricMap, Soundings
+from app.mapping.types import Soundings
 from app.missions.errors import ConflictError, InvalidRequestError, MapNotReadyError
 from app.missions.maps.snapshot import MapSnapshot, MissionFacts
 from app.missions.search.obstacles import obstacles_geojson
 from app.missions.search.state import Search
 from app.missions.views.soundings import Verdict
 from app.storage.models import SoundingRow
-
-CONTOURS_PER_MAP = 10
-CONTOUR_INTERVALS_M = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0)
 
 MAP, SOUNDINGS, TRACKS, SEARCH, SWATHS, SURVEY, TIERS, CROSSOVERS = (
     "map",
@@ -324,16 +321,10 @@ def _local_track(facts: MissionFacts, track: Track) -> np.ndarray[tuple[int, int
     return np.column_stack(facts.frame.to_local(lat, lon))
 
 
-def nice_interval_m(bathymetry: BathymetricMap) -> float:
-    """Return the distance of about ten contours of a map, metres."""
-    span = float(np.nanmax(bathymetry.depth_m) - np.nanmin(bathymetry.depth_m))
-    return next((i for i in CONTOUR_INTERVALS_M if span / i <= CONTOURS_PER_MAP), CONTOUR_INTERVALS_M[-1])
-
-
 def _contours(material: Material, options: ProductOptions) -> list[Contour]:
     snapshot, interval_m = material.snapshot, options.interval_m
     if interval_m is None:
-        interval_m = nice_interval_m(snapshot.built.map)
+        interval_m = usual_interval_m(snapshot.built.map.depth_m)
     try:
         return find_contours(snapshot.built.map, snapshot.facts.frame, interval_m)
     except ValueError as error:
@@ -519,7 +510,12 @@ def make_product(name: str, material: Material, options: ProductOptions) -> Prod
     if kind.filename is not None:
         return Product(kind.filename(material.facts), kind.media_type, content)
     part = _only_vehicle(material.soundings, options.vehicle) if kind.of_vehicle else kind.part.removeprefix(MAP)
-    return Product(f"{_slug(material.facts.spec.name)}{part and f'-{part}'}.{kind.extension}", kind.media_type, content)
+    return Product(product_name(material.facts, part, kind.extension), kind.media_type, content)
+
+
+def product_name(facts: MissionFacts, part: str, extension: str) -> str:
+    """Return what a file is saved as; ``part`` says what it shows of the mission, empty for the map."""
+    return f"{_slug(facts.spec.name)}{part and f'-{part}'}.{extension}"
 
 
 def _slug(name: str) -> str:

@@ -10,11 +10,11 @@ import orjson
 from shapely.geometry import box, shape
 from shapely.geometry.base import BaseGeometry
 
-from app.mapping.products.contours import find_contours
+from app.mapping.products.contours import find_contours, usual_interval_m
 from app.mapping.products.tracks import utc_text
 from app.missions.errors import ConflictError, MapNotReadyError
 from app.missions.live.mission import LiveMission
-from app.missions.maps.products import nice_interval_m, snapshot_holidays
+from app.missions.maps.products import snapshot_holidays
 from app.missions.maps.snapshot import MapSnapshot
 from app.missions.operations.mission_maps import newest_map
 from app.missions.running.final_maps import FinalMaps
@@ -210,7 +210,7 @@ class _MapFeatures:
 
 def _contours(mission_id: str, snapshot: MapSnapshot, period_s: tuple[float, float | None]) -> list[Feature]:
     bathymetry = snapshot.built.map
-    found = find_contours(bathymetry, snapshot.facts.frame, nice_interval_m(bathymetry))
+    found = find_contours(bathymetry, snapshot.facts.frame, usual_interval_m(bathymetry.depth_m))
     datum = snapshot.facts.vertical_datum.statement
     return [
         Feature(

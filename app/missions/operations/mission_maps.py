@@ -111,15 +111,16 @@ async def export(
         provider=provider.named(),
         map=snapshot,
         soundings=await soundings_of(live) if SOUNDINGS in needs else (),
-        tracks=await _track_lines(live) if TRACKS in needs else (),
+        tracks=await track_lines(live) if TRACKS in needs else (),
         search=search_of(live) if SEARCH in needs else None,
-        surveyed=await _surveyed(live) if SURVEY in needs else Surveyed(),
+        surveyed=await surveyed(live) if SURVEY in needs else Surveyed(),
         crossovers=(await check_of(live, snapshot)).check if snapshot and CROSSOVERS in needs else None,
     )
     return await live.in_thread(make_product, name, material, options or ProductOptions())
 
 
-async def _surveyed(live: LiveMission) -> Surveyed:
+async def surveyed(live: LiveMission) -> Surveyed:
+    """Return when a mission's soundings and pings were made."""
     await live.journal.flush()
     async with live.database.reading() as session:
         extent = await sounding_queries.extent(session, live.id, Verdict.ACCEPTED)
@@ -131,7 +132,8 @@ async def _surveyed(live: LiveMission) -> Surveyed:
     return Surveyed(min(extent.first_time_s, period[0]), max(extent.last_time_s, period[1]))
 
 
-async def _track_lines(live: LiveMission) -> list[Track]:
+async def track_lines(live: LiveMission) -> list[Track]:
+    """Return where the vehicles were."""
     await live.journal.flush()
     async with live.database.reading() as session:
         found = await mission_queries.track_points(session, live.id)

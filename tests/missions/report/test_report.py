@@ -1,0 +1,141 @@
+"""Reports of missions as they come: flown, under way, with more than there is room for, in many at the same time."""
+
+import asyncio
+import copy
+import json
+from collections.abc import AsyncIterator, Callable
+from dataclasses import replace
+from html import unescape
+
+import numpy as np
+import pypdfium2
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from app.missions.errors import MapNotReadyError
+from app.missions.live.mission import LiveMission
+from app.missions.operations.measurements import measure
+from app.missions.operations.reports import ReportOptions
+from app.missions.report import sections
+from app.missions.report.answers import Incident
+from app.missions.report.charts import ticks
+from app.missions.report.kinds import REPORTS
+from app.missions.report.page import html
+from app.missions.report.print import pdf
+from app.missions.report.texts import Language, Texts
+from app.missions.settings import ServiceSettings
+from app.missions.soundings.measurement import Measurement
+from tests.support.missions.harbour import Harbour, act, sim_spec
+from tests.support.missions.specs import make_spec
+from tests.support.tracks import flown, lawnmower, measured
+from tests.support.waiting import until
+
+JAPANESE = "港湾測量 — порт \u202egnp.exe"
+
+
+@pytest.fixture
+async def harbour(make_settings: Callable[..., ServiceSettings]) -> AsyncIterator[Harbour]:
+    harbour = Harbour(lambda **changes: make_settings(**({"time_scale": 20.0} | changes)))
+    await harbour.open()
+    yield harbour
+    await harbour.close()
+
+
+@pytest.fixture
+async def live(harbour: Harbour) -> LiveMission:
+    """Some lines of one vehicle."""
+    mission = await harbour.service.create(make_spec(name=JAPANESE))
+    live = await harbour.service.get(mission.id)
+    way = flown([(east + 3, north + 3) for east, north in lawnmower(24, 24, 8)], start_s=1_795_225_140.0, spacing_m=2.0)
+    await measure(live, [Measurement.model_validate(item) for item in measured("a", way)])
+    return live
+
+
+def text_of(content: bytes) -> str:
+    document = pypdfium2.PdfDocument(content)
+    return "".join(document[number].get_textpage().get_text_bounded() for number in range(len(document)))
+
+
+async def test_what_there_is_no_room_for_is_counted(harbour: Harbour, live: LiveMission) -> None:
+    answers = await harbour.service.reports.answers(live)
+    place = {"number": 1, "area_m2": 9.0, "lat_deg": 41.0, "lon_deg": -8.0}
+    rest = copy.deepcopy(dict(answers.rest))
+    rest["holidays"] = {"features": [{"properties": place | {"number": n + 1}} for n in range(500)]}
+    rest["refusals"] = [{"reason": "why " * 200, "count": 3}] * 60
+    storm = Incident(
+        "2026-11-21T03:39:00+00:00", "alarm", "failsafe", "leak", "surface", "a: it reports: " + "w" * 2000
+    )
+    many = replace(answers, rest=rest, incidents=[storm] * 400)
+    document = sections.document_of(many, Texts(Language.EN))
+    page = html(document).decode()
+    assert page.count('data-of="holidays.features.') == 4 * sections.MOST_HOLIDAYS
+    assert "400 more are in holidays.geojson." in page
+    assert "250 more are not listed." in page
+    printed = text_of(pdf(document))
+    assert "400 more are in holidays.geojson." in printed.replace("\r\n", " ")
+
+
+async def test_letters_of_other_languages_stay_and_marks_that_turn_the_writing_are_shown(
+    harbour: Harbour, live: LiveMission
+) -> None:
+    for kind in REPORTS.values():
+        product = await harbour.service.reports.report(live, ReportOptions(kind, Language.PT))
+        text = text_of(product.content) if kind.extension == "pdf" else unescape(product.content.decode())
+        assert "港湾測量 — порт \\u202egnp.exe" in text
+        assert "\u202e" not in text
+
+
+async def test_a_report_is_made_once_for_all_who_ask_and_is_the_same_for_the_same_answers(
+    harbour: Harbour, live: LiveMission
+) -> None:
+    made: list[int] = []
+    kind = replace(REPORTS["pdf"], make=lambda document: _counted(made, pdf(document)))
+    options = ReportOptions(kind)
+    found = await asyncio.gather(*(harbour.service.reports.report(live, options) for _ in range(5)))
+    assert len(made) == 1
+    assert len({product.content for product in found}) == 1
+    answers = await harbour.service.reports.answers(live)
+    one, other = (pdf(sections.document_of(answers, Texts(Language.EN))) for _ in range(2))
+    assert one == other
+
+
+async def test_a_mission_under_way_has_a_report_of_what_is_known(harbour: Harbour) -> None:
+    mission = await harbour.service.create(sim_spec("a", steps=40))
+    live = await harbour.service.get(mission.id)
+    with pytest.raises(MapNotReadyError):
+        await harbour.service.reports.report(live, ReportOptions(REPORTS["html"]))
+    await act(harbour.service, mission.id, "start")
+
+    async def sounded() -> bool:
+        return live.journal.counts.accepted > 20
+
+    await until(sounded, "something was sounded")
+    page = (await harbour.service.reports.report(live, ReportOptions(REPORTS["html"]))).content.decode()
+    assert "The mission has not ended" in page
+    assert "Files are not summed" in page
+    assert "data:image/svg+xml" in page
+    await act(harbour.service, mission.id, "abort")
+
+
+@given(
+    st.recursive(
+        st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False, allow_infinity=False) | st.text(),
+        lambda inner: st.lists(inner, max_size=30) | st.dictionaries(st.text(), inner, max_size=5),
+        max_leaves=60,
+    )
+)
+def test_a_listing_is_the_json_that_it_lists(value: object) -> None:
+    assert json.loads(sections.listing(value)) == value
+
+
+@given(st.floats(-1e5, 1e5), st.floats(1e-3, 1e5), st.integers(2, 9))
+def test_ticks_are_few_round_and_within(low: float, span: float, most: int) -> None:
+    found = ticks(low, low + span, most)
+    assert len(found) <= most + 1
+    assert np.all((found >= low - 1e-6 * span) & (found <= low + span + 1e-6 * span))
+
+
+def _counted(made: list[int], content: bytes) -> bytes:
+    made.append(1)
+    return content
