@@ -909,6 +909,46 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/missions/{mission_id}/tiles/{layer}.json": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * See where a layer's tiles are
+         * @description Return the TileJSON of a layer; the addresses in it hold the key that it was asked for with, if any.
+         */
+        get: operations["getTileJson"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/missions/{mission_id}/tiles/{layer}/{z}/{x}/{y}.png": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * See the map as tiles
+         * @description Return a tile of a layer of the newest map. Its colours stay the same while the map grows.
+         */
+        get: operations["getTile"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/missions/{mission_id}/soundings": {
         parameters: {
             query?: never;
@@ -4714,6 +4754,75 @@ export interface components {
              * @description Of the table as it was sent
              */
             sha256: string;
+        };
+        /**
+         * TileJson
+         * @description Where a layer's tiles are (TileJSON 3.0).
+         */
+        TileJson: {
+            /**
+             * Tilejson
+             * @default 3.0.0
+             */
+            tilejson: string;
+            /** Name */
+            name: string;
+            /** Description */
+            description: string;
+            /**
+             * Version
+             * @default 1.0.0
+             */
+            version: string;
+            /**
+             * Attribution
+             * @default
+             */
+            attribution: string;
+            /**
+             * Scheme
+             * @default xyz
+             */
+            scheme: string;
+            /**
+             * Format
+             * @default png
+             */
+            format: string;
+            /**
+             * Tiles
+             * @description Address of each tile, with {z}, {x} and {y}
+             */
+            tiles: string[];
+            /** Minzoom */
+            minzoom: number;
+            /**
+             * Maxzoom
+             * @description A cell of the map is at least four pixels wide there; there are tiles beyond
+             */
+            maxzoom: number;
+            /**
+             * Bounds
+             * @description West, south, east and north, degrees
+             */
+            bounds: number[];
+            /**
+             * Center
+             * @description Longitude, latitude and zoom to begin with
+             */
+            center: number[];
+            /** Layer */
+            layer: string;
+            /**
+             * Unit
+             * @description Of `range`; empty for layers by classes
+             */
+            unit: string;
+            /**
+             * Range
+             * @description Values of the first and the last colour
+             */
+            range: number[];
         };
         /**
          * TotalView
@@ -9698,6 +9807,172 @@ export interface operations {
             };
             /** @description Not allowed */
             403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too many requests */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    getTileJson: {
+        parameters: {
+            query?: {
+                /** @description Value of the first colour; default: what the layer's TileJSON says */
+                min?: number;
+                /** @description Value of the last colour; default: what the layer's TileJSON says */
+                max?: number;
+            };
+            header?: never;
+            path: {
+                /** @description The mission's id */
+                mission_id: string;
+                /** @description One of depth, uncertainty, density, coverage */
+                layer: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["TileJson"];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such mission */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too many requests */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    getTile: {
+        parameters: {
+            query?: {
+                /** @description Value of the first colour; default: what the layer's TileJSON says */
+                min?: number;
+                /** @description Value of the last colour; default: what the layer's TileJSON says */
+                max?: number;
+            };
+            header?: {
+                /** @description ETag of the tile that the client has */
+                "if-none-match"?: string;
+            };
+            path: {
+                /** @description One of depth, uncertainty, density, coverage */
+                layer: string;
+                /** @description Zoom: the Earth is 2^z tiles wide */
+                z: number;
+                /** @description Column, from the west */
+                x: number;
+                /** @description Row, from the north; then perhaps `@2x` */
+                y: string;
+                /** @description The mission's id */
+                mission_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description 256 by 256 pixels of EPSG:3857, transparent where nothing is known; `@2x`: twice as many */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "image/png": string;
+                };
+            };
+            /** @description The tile still shows what the one of `If-None-Match` does */
+            304: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such mission */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
                 headers: {
                     [name: string]: unknown;
                 };
