@@ -12,7 +12,7 @@ from app.estimation.adjustment.drift import DriftModel, Nodes, prior_rows
 from app.estimation.adjustment.ties import Known, Matcher, Outcome, Relief, Sections, Tie, rms
 from app.estimation.adjustment.tracks import Fixes, TrackSoundings
 
-ROUNDS, LAST_ROUNDS = 6, 3
+ROUNDS, LAST_ROUNDS = 4, 2
 HELD_OUT_EACH = 4
 """Of so many sections one is left out of the first adjustment, which has to make it fit better all the same."""
 

@@ -20,7 +20,10 @@ LEAST_GAIN = 0.05
 WORST_FIT = 5.0
 """A tie is none where the mean square of its residuals, over their variances, is larger than this."""
 
-GRID = 21
+GRID = 15
+MOST_COMPARED = 120
+"""Of a section that has more soundings so many are compared, evenly chosen."""
+
 DEVIATIONS = 3.5
 LEAST_WINDOW_CELLS = 1.5
 MOST_ZOOMS = 3
@@ -276,14 +279,16 @@ class Matcher:
         precision = np.linalg.inv(known.covariance)
         mean, covariance, fit, overlap = known.mean_m, known.covariance, 0.0, 0.0
         centre = known.mean_m
+        every = slice(None, None, max(1, len(x) // MOST_COMPARED))
+        grain_m = self.cell_m * float(np.sqrt(every.step))
         for _ in range(MOST_ZOOMS):
             at = np.linspace(-1.0, 1.0, GRID)
             shift = np.stack(np.meshgrid(centre[0] + at * window[0], centre[1] + at * window[1]), axis=-1).reshape(-1, 2)
             cost, seen, square = misfit.misfit(
-                x,
-                y,
-                depth,
-                variance,
+                x[every],
+                y[every],
+                depth[every],
+                variance[every],
                 around.value,
                 around.doubt,
                 around.nearest,
@@ -292,7 +297,7 @@ class Matcher:
                 float(depth.mean()),
                 background,
                 self.offset_sd_m**2,
-                self.cell_m,
+                grain_m,
             )
             best = int(np.argmin(cost))
             fit, overlap = float(square[best]), float(seen[best])
