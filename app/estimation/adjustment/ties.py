@@ -283,7 +283,9 @@ class Matcher:
         grain_m = self.cell_m * float(np.sqrt(every.step))
         for _ in range(MOST_ZOOMS):
             at = np.linspace(-1.0, 1.0, GRID)
-            shift = np.stack(np.meshgrid(centre[0] + at * window[0], centre[1] + at * window[1]), axis=-1).reshape(-1, 2)
+            shift = np.stack(np.meshgrid(centre[0] + at * window[0], centre[1] + at * window[1]), axis=-1).reshape(
+                -1, 2
+            )
             cost, seen, square = misfit.misfit(
                 x[every],
                 y[every],

@@ -59,7 +59,9 @@ class DriftScenario:
     @property
     def spacing_m(self) -> float:
         """Between lines."""
-        return 2.0 * ALTITUDE_M * float(np.tan(0.5 * APERTURE_RAD)) * (1.0 - OVERLAP) if self.swath else SINGLE_SPACING_M
+        return (
+            2.0 * ALTITUDE_M * float(np.tan(0.5 * APERTURE_RAD)) * (1.0 - OVERLAP) if self.swath else SINGLE_SPACING_M
+        )
 
     @property
     def rectangle_m(self) -> tuple[float, float, float, float]:
