@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from app.arrays import FloatArray
+from app.estimation.adjustment import warm_up
 from app.settings import Settings
 from tests.support.missions.specs import lon_lat, rectangle
 from tests.support.rest import mission_spec
@@ -21,6 +22,12 @@ START_S = 1_795_225_140.0
 OFF_M = 4.0
 """How far the second vehicle has drifted when its dive ends."""
 ANGLES = np.radians(np.arange(-60.0, 61.0, 8.0))
+
+
+@pytest.fixture(autouse=True, scope="module")
+def compiled() -> None:
+    """Compile before requests wait for it."""
+    warm_up()
 
 
 @pytest.fixture
@@ -73,7 +80,7 @@ async def depths(client: httpx.AsyncClient, path: str) -> FloatArray:
     answer = await client.get(f"{path}/map")
     assert answer.status_code == 200, answer.text
     found = answer.json()
-    return np.array([[np.nan if depth is None else depth for depth in row] for row in found["values"]], dtype=float)
+    return np.array([[np.nan if depth is None else depth for depth in row] for row in found["depth_m"]], dtype=float)
 
 
 def rmse(found: FloatArray) -> float:
@@ -109,7 +116,7 @@ async def test_a_map_bent_by_drift_is_straightened_and_bent_again(client: httpx.
     straight = await depths(client, path)
     assert rmse(straight) < 0.5 * rmse(bent)
     assert (await client.get(f"{path}/adjustment")).json() == found
-    events = (await client.get(f"{path}/log")).json()
+    events = (await client.get(f"{path}/events", headers={"Accept": "application/json"})).json()
     assert any("tracks adjusted by" in event["message"] for event in events)
 
     again = (await client.post(f"{path}/adjustment", json={"fixes": fixes})).json()

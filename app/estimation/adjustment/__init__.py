@@ -3,8 +3,8 @@
 :func:`adjusted` takes soundings and fixes, and returns by how much each vehicle's positions were off. The rest is how.
 """
 
-from app.estimation.adjustment.adjustment import AdjustedTracks, adjusted
+from app.estimation.adjustment.adjustment import AdjustedTracks, adjusted, warm_up
 from app.estimation.adjustment.drift import DriftModel
 from app.estimation.adjustment.tracks import Fixes, TrackSoundings, thinned
 
-__all__ = ["AdjustedTracks", "DriftModel", "Fixes", "TrackSoundings", "adjusted", "thinned"]
+__all__ = ["AdjustedTracks", "DriftModel", "Fixes", "TrackSoundings", "adjusted", "thinned", "warm_up"]

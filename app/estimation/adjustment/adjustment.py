@@ -7,7 +7,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import SuperLU, splu
 
-from app.arrays import BoolArray, FloatArray
+from app.arrays import BoolArray, FloatArray, IntArray
 from app.estimation.adjustment.drift import DriftModel, Nodes, prior_rows
 from app.estimation.adjustment.ties import Known, Matcher, Outcome, Relief, Sections, Tie, rms
 from app.estimation.adjustment.tracks import Fixes, TrackSoundings
@@ -138,8 +138,8 @@ class _Problem:
     def solve(self, ties: list[Tie], targets: FloatArray, weights: FloatArray) -> _State:
         """Return the solution under ties with targets (k, 2) for what they compare, and weights (k,)."""
         normal, right = self._normal, self._right.copy()
-        rows: list[FloatArray] = []
-        cols: list[FloatArray] = []
+        rows: list[IntArray] = []
+        cols: list[IntArray] = []
         values: list[FloatArray] = []
         for tie, target, weight in zip(ties, targets, weights, strict=True):
             if tie.outcome != Outcome.USED or weight <= 0.0:
@@ -359,7 +359,7 @@ _NONE = Tie(np.zeros(2), np.zeros((2, 2)), np.zeros(0, np.int64), np.zeros(0), O
 
 def _deviations(problem: _Problem, state: _State, every_node: sparse.csr_array) -> FloatArray:
     covariances = problem.covariances(state, every_node)
-    return np.sqrt(np.maximum(np.einsum("kii->ki", covariances), 0.0))
+    return np.asarray(np.sqrt(np.maximum(np.einsum("kii->ki", covariances), 0.0)))
 
 
 def _scaled(model: DriftModel, nodes: Nodes, fixes: Fixes) -> DriftModel:
@@ -372,3 +372,14 @@ def _scaled(model: DriftModel, nodes: Nodes, fixes: Fixes) -> DriftModel:
             ends.append(fixes.time_s[k] - nodes.time_s[nodes.dive == dive][0])
             off.append((fixes.east_m[k], fixes.north_m[k]))
     return model.scaled_to(np.array(ends), np.array(off).reshape(-1, 2))
+
+
+def warm_up() -> None:
+    """Compile what compares sections (or load it from the cache), so that no request waits for it."""
+    time_s = np.arange(0.0, 240.0, 0.5)
+    across = np.where(time_s < 120.0, 0.0, 1.0)
+    along = np.where(time_s < 120.0, time_s, 240.0 - time_s)
+    depth = 10.0 + np.sin(along)
+    sd = np.full(len(time_s), 0.1)
+    soundings = TrackSoundings(np.zeros(len(time_s), dtype=np.int64), time_s, along, across, depth, sd)
+    adjusted(soundings, Fixes.none())

@@ -17,12 +17,10 @@ def _at(raster: FloatArray, x: float, y: float) -> float:
         return np.nan
     j, i = min(int(x), cols - 2), min(int(y), rows - 2)
     u, v = x - j, y - i
-    return (
-        raster[i, j] * (1.0 - u) * (1.0 - v)
-        + raster[i, j + 1] * u * (1.0 - v)
-        + raster[i + 1, j] * (1.0 - u) * v
-        + raster[i + 1, j + 1] * u * v
-    )
+    south = raster[i, j] * (1.0 - u) + raster[i, j + 1] * u
+    north = raster[i + 1, j] * (1.0 - u) + raster[i + 1, j + 1] * u
+    found: float = south * (1.0 - v) + north * v
+    return found
 
 
 @njit(cache=True, nogil=True)

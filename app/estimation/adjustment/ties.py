@@ -27,8 +27,9 @@ MOST_COMPARED = 120
 DEVIATIONS = 3.5
 LEAST_WINDOW_CELLS = 1.5
 MOST_ZOOMS = 3
-SHARED_TWICE = 0.5
-"""Two sections that overlap make two ties of the same soundings."""
+SHARED = 0.05
+"""Information of a tie as a share of what its misfit says: neighbouring sections share errors, and every overlap is
+seen from both sides."""
 
 LEAST_SD_CELLS = 0.1
 """No tie is better than this share of the raster's cell."""
@@ -103,9 +104,8 @@ class Relief:
         middle = np.concatenate([[0.25], 0.5 * (surface.LAGS_M[1:] + surface.LAGS_M[:-1])])
         for k in range(len(sections)):
             rows = slice(sections.first[k], sections.first[k + 1])
-            total, count = surface.half_squares(
-                sections.of[rows], *(column[rows] for column in columns), surface.LAGS_M
-            )
+            east, north, depth, sd = (column[rows] for column in columns)
+            total, count = surface.half_squares(sections.of[rows], east, north, depth, sd, surface.LAGS_M)
             near = slice(1, 6)
             if count[near].sum() >= 20:
                 usual = float((count[near] * factor * middle[near] ** exponent).sum())
@@ -287,10 +287,10 @@ class Matcher:
                 -1, 2
             )
             cost, seen, square = misfit.misfit(
-                x[every],
-                y[every],
-                depth[every],
-                variance[every],
+                np.ascontiguousarray(x[every]),
+                np.ascontiguousarray(y[every]),
+                np.ascontiguousarray(depth[every]),
+                np.ascontiguousarray(variance[every]),
                 around.value,
                 around.doubt,
                 around.nearest,
@@ -325,7 +325,7 @@ class Matcher:
         nodes, weights = self._compared(section, around, x - mean[0] / self.cell_m, y - mean[1] / self.cell_m, variance)
         if not len(nodes):
             return unknown
-        return Tie(shift_m, SHARED_TWICE * information, nodes, weights, Outcome.USED, residual)
+        return Tie(shift_m, SHARED * information, nodes, weights, Outcome.USED, residual)
 
     def _compared(
         self, section: int, around: Around, x: FloatArray, y: FloatArray, variance: FloatArray

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from app.arrays import FloatArray
+from app.arrays import FloatArray, IntArray
 from app.estimation.adjustment import Fixes, TrackSoundings
 from app.evaluation.coverage.world import sounded
 from simulator.terrain import Terrain
@@ -90,7 +90,7 @@ class DriftingSurvey:
 
     soundings: TrackSoundings
     fixes: Fixes
-    vehicle: FloatArray
+    vehicle: IntArray
     time_s: FloatArray
     error_m: FloatArray
     minutes: float

@@ -35,6 +35,9 @@ from app.storage import soundings as sounding_queries
 from app.storage.bulk import read_in_pieces
 from app.storage.models import AdjustmentRow
 
+Places = dict[str, list[FloatArray]]
+"""By vehicle positions (n, 4) by its own reckoning: time, east, north, depth (NaN: unknown)."""
+
 FINEST_M = 0.5
 PERIOD_S = 5.0
 """What a vehicle sounds in a square within this time is taken as one."""
@@ -87,12 +90,12 @@ async def adjust(live: LiveMission, request: AdjustmentRequest, actor: str) -> A
     """
     await live.journal.flush()
     async with live.correcting:
-        names, soundings = await _soundings(live)
+        names, soundings, places = await _soundings(live)
         if len(soundings) < FEWEST:
             raise ConflictError(
                 f"there are {len(soundings)} places with accepted soundings", f"tracks are adjusted from {FEWEST} on"
             )
-        tracks = await _positions(live)
+        tracks = await _positions(live, places)
         fixes = await asyncio.to_thread(_fixes, request.fixes, tracks, names, live.frame)
         model = DriftModel(walk_m=request.walk_m, rate_mph=request.rate_mph)
         found = await asyncio.to_thread(
@@ -136,12 +139,13 @@ async def _remove(session: AsyncSession, mission_id: str) -> None:
         await session.flush()
 
 
-async def _soundings(live: LiveMission) -> tuple[list[str], TrackSoundings]:
-    """Return the vehicles, and what they sounded by their own positions, thinned."""
+async def _soundings(live: LiveMission) -> tuple[list[str], TrackSoundings, Places]:
+    """Return the vehicles, what they sounded by their own positions, thinned, and where they took themselves to be."""
     before = live.gate.corrections
     cell_m = max(FINEST_M, live.spec.cell_m)
     names: list[str] = []
     parts: list[TrackSoundings] = []
+    places: Places = {}
 
     def number_of(name: str) -> int:
         if name not in names:
@@ -155,6 +159,8 @@ async def _soundings(live: LiveMission) -> tuple[list[str], TrackSoundings]:
             own = values[of == name]
             off = np.zeros((len(own), 2)) if before.adjustment is None else before.adjustment.offsets(name, own[:, 0])
             parts.append(_thinned(number_of(name), own, off, cell_m))
+            below = own[:, 1:3] + off
+            places.setdefault(name, []).append(np.column_stack([own[:, 0], below, np.full(len(own), np.nan)]))
 
     await read_in_pieces(live.database, sounding_queries.track_query(live.id), take)
     # As they would be placed without an adjustment.
@@ -163,8 +169,11 @@ async def _soundings(live: LiveMission) -> tuple[list[str], TrackSoundings]:
         found = await asyncio.to_thread(_of_pings, live, vehicle, number_of(vehicle), pings, place, cell_m)
         if found is not None:
             parts.append(found)
+            east, north = live.frame.to_local(pings.lat_deg, pings.lon_deg)
+            places.setdefault(vehicle, []).append(np.column_stack([pings.time_s, east, north, pings.depth_m]))
     # Pieces were cut anywhere: what one vehicle sounded in one place is joined once more.
-    return names, await asyncio.to_thread(lambda: thinned(TrackSoundings.joined(parts), cell_m, PERIOD_S))
+    joined = await asyncio.to_thread(lambda: thinned(TrackSoundings.joined(parts), cell_m, PERIOD_S))
+    return names, joined, places
 
 
 def _of_pings(
@@ -188,18 +197,23 @@ def _thinned(number: int, table: FloatArray, off: FloatArray, cell_m: float) -> 
     return thinned(raw, cell_m, PERIOD_S)
 
 
-async def _positions(live: LiveMission) -> dict[str, FloatArray]:
-    """Return by vehicle its stored positions (n, 4) in the order of its clock: time, longitude, latitude, depth."""
-    found: dict[str, list[FloatArray]] = {}
+async def _positions(live: LiveMission, places: Places) -> dict[str, FloatArray]:
+    """Return by vehicle its positions (n, 4) in the order of its clock: time, east, north, depth.
+
+    Those stored of its track; of vehicles without one the places of its pings, or below which it sounded.
+    """
+    found: Places = {}
 
     def take(rows: Sequence[Any]) -> None:
         of = np.array([row[1] for row in rows])
         values = np.array([tuple(row)[3:7] for row in rows], dtype=float)
         for name in np.unique(of).tolist():
-            found.setdefault(name, []).append(values[of == name])
+            own = values[of == name]
+            east, north = live.frame.to_local(own[:, 2], own[:, 1])
+            found.setdefault(name, []).append(np.column_stack([own[:, 0], east, north, own[:, 3]]))
 
     await read_in_pieces(live.database, mission_queries.positions_after(live.id, 0), take)
-    tables = {name: np.concatenate(parts) for name, parts in found.items()}
+    tables = {name: np.concatenate(parts) for name, parts in (places | found).items()}
     return {name: table[np.argsort(table[:, 0], kind="stable")] for name, table in tables.items()}
 
 
@@ -214,20 +228,20 @@ def _fixes(asked: Sequence[FixRequest], tracks: dict[str, FloatArray], names: li
                 f"{fix.vehicle!r} sounded nothing",
                 f"it must be one of {', '.join(sorted(names))}",
             )
-        before = int(np.searchsorted(track[:, 0], fix.time_s - 1e-3, side="right")) - 1
+        before = int(np.searchsorted(track[:, 0], fix.time_s, side="right")) - 1
         if before < 0 or fix.time_s - track[before, 0] > JUMP_WITHIN_S:
             raise InvalidRequestError(
                 f"fixes.{k}.time_s",
                 f"{fix.time_s:.1f} is not within {JUMP_WITHIN_S:g} s after a position of {fix.vehicle}",
                 "send a time of its own clock at which its reckoned position is known",
             )
-        reckoned = frame.to_local(track[before, 2], track[before, 1])
+        reckoned = track[before, 1:3]
         east, north = frame.to_local(fix.lat_deg, fix.lon_deg)
         off = float(reckoned[0] - east), float(reckoned[1] - north)
         rows.append((names.index(fix.vehicle), fix.time_s, *off, fix.sd_m, fix.resets))
     for name in names:
         if name in tracks and not any(fix.vehicle == name for fix in asked):
-            rows += [(names.index(name), *jump, FIX_SD_M, True) for jump in jumps(tracks[name], frame)]
+            rows += [(names.index(name), *jump, FIX_SD_M, True) for jump in jumps(tracks[name])]
     if not rows:
         return Fixes.none()
     rows.sort(key=lambda row: row[:2])
@@ -242,15 +256,15 @@ def _fixes(asked: Sequence[FixRequest], tracks: dict[str, FloatArray], names: li
     )
 
 
-def jumps(track: FloatArray, frame: LocalFrame) -> list[tuple[float, float, float]]:
+def jumps(track: FloatArray) -> list[tuple[float, float, float]]:
     """Return when a vehicle's position jumped at the surface, and from where to where it did not move, east and north.
 
-    Positions (n, 4): time, longitude, latitude, depth. At a jump it is told where it is; what it had reckoned until
+    Positions (n, 4): time, east, north, depth. At a jump it is told where it is; what it had reckoned until
     then, less that, is its error.
     """
     if len(track) < 2:
         return []
-    east, north = frame.to_local(track[:, 2], track[:, 1])
+    east, north = track[:, 1], track[:, 2]
     step_s = np.diff(track[:, 0])
     away = np.hypot(np.diff(east), np.diff(north))
     found = (away > JUMP_M + FASTEST_MPS * step_s) & (step_s <= JUMP_WITHIN_S) & (track[1:, 3] < SURFACE_M)

@@ -98,7 +98,7 @@ async def recorrect(
     adjustment: TrackAdjustment | None,
     store: Callable[[AsyncSession], Awaitable[None]],
 ) -> None:
-    """Correct every stored sounding anew; ``store`` writes what else changes with it. The caller holds ``correcting``."""
+    """Correct every stored sounding anew; ``store`` writes what else changes. The caller holds ``correcting``."""
     corrections = Corrections(live.frame, spec.tide, table=table, sound_speed=spec.sound_speed, adjustment=adjustment)
     async with live.journal.writing:
         # Nothing else changes soundings meanwhile. Computing may have to wait for a thread, and the database's turn is

@@ -135,9 +135,9 @@ class Corrections:
         return results
 
     def beams(self, vehicle: str, pings: Pings) -> Footprints | None:
-        """Return where the beams of a vehicle's pings met the bottom, depths below the datum; None where the frame has no place.
+        """Return where the beams of a vehicle's pings met the bottom, depths below the datum.
 
-        Footprints of pings for whose time there is no water level have a depth of NaN.
+        None where the frame has no place for them. Depths for whose time there is no water level are NaN.
         """
         try:
             found = placed(pings, self._frame, self._profile)

@@ -47,7 +47,7 @@ class TrackOffsetView(View):
     mean_m: float = Field(description="Mean length of the change")
     max_m: float
     before_sd_m: float = Field(
-        description="How uncertain its reckoned positions are by the drift that was assumed, east or north, at the worst"
+        description="How uncertain its reckoned positions are by the assumed drift, east or north, at the worst"
     )
     sd_m: float = Field(description="The same of its adjusted ones")
 
@@ -60,7 +60,7 @@ class TieView(View):
     time_s: float = Field(description="The vehicle's clock in its middle, Unix seconds")
     other: str | None = Field(description="The vehicle that it was compared with most; null: it was not used")
     outcome: Literal["used", "no-overlap", "flat", "misfit", "outlier", "not-significant"] = Field(
-        description="Why it was rejected, or used: others' soundings are too far, the terrain says nothing, depths differ "
+        description="Used, or why not: others' soundings are too far, the terrain says nothing, depths differ "
         "wherever it is moved to, it contradicts the others, or no tie at all made held-out ones fit better"
     )
     before_m: float | None = Field(description="RMS of its depths less the others', unadjusted")
