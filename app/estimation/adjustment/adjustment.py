@@ -209,7 +209,14 @@ def adjusted(
         No section is moved farther against the others than this, beyond what fixes say.
     offset_sd_m
         Of a depth that a section as a whole may be off by.
+
+    Raises
+    ------
+    ValueError
+        Without a sounding.
     """
+    if not len(soundings):
+        raise ValueError("there is no sounding along which a track could be adjusted")
     nodes = Nodes.along(soundings, fixes, node_s)
     model = _scaled(model or DriftModel(), nodes, fixes)
     problem = _Problem(nodes, fixes, model)
@@ -219,7 +226,7 @@ def adjusted(
     raw_sd = _Problem(nodes, Fixes.none(), model)
     before_sd = _deviations(raw_sd, raw_sd.solve([], *no_ties), every_node)
     weights = nodes.interpolation(soundings.vehicle, soundings.time_s)
-    dive = nodes.dive[nodes.weights(soundings.vehicle, soundings.time_s)[0][:, 1]] if len(soundings) else nodes.dive[:0]
+    dive = nodes.dive[nodes.weights(soundings.vehicle, soundings.time_s)[0][:, 1]]
     sections = Sections.of_tracks(soundings, dive, section_s)
     relief = Relief.of_sections(soundings, sections)
     matcher = Matcher(soundings, sections, nodes, relief, cell_m, reach_m, apart_s, offset_sd_m)
