@@ -268,10 +268,12 @@ def jumps(track: FloatArray) -> list[tuple[float, float, float]]:
     step_s = np.diff(track[:, 0])
     away = np.hypot(np.diff(east), np.diff(north))
     found = (away > JUMP_M + FASTEST_MPS * step_s) & (step_s <= JUMP_WITHIN_S) & (track[1:, 3] < SURFACE_M)
-    return [
-        (float(track[k, 0]), float(east[k] - east[k + 1]), float(north[k] - north[k + 1]))
-        for k in np.flatnonzero(found).tolist()
-    ]
+    # It went on meanwhile as it went before.
+    speed = np.column_stack([np.diff(east), np.diff(north)]) / np.maximum(step_s, 1e-3)[:, None]
+    steady = np.vstack([np.zeros(2), np.where((away <= JUMP_M + FASTEST_MPS * step_s)[:, None], speed, 0.0)[:-1]])
+    reckoned = track[:-1, 1:3] + steady * step_s[:, None]
+    off = reckoned - track[1:, 1:3]
+    return [(float(track[k, 0]), float(off[k, 0]), float(off[k, 1])) for k in np.flatnonzero(found).tolist()]
 
 
 def _nodes(found: AdjustedTracks, number: int) -> FloatArray:
