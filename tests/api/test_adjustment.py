@@ -1,7 +1,5 @@
 """Tracks adjusted for drift over REST: what overlaps is compared, raw positions stay, one call undoes it."""
 
-import csv
-import io
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -106,7 +104,9 @@ async def test_a_map_bent_by_drift_is_straightened_and_bent_again(client: httpx.
     answer = await client.post(f"{path}/adjustment", json={"fixes": fixes})
     assert answer.status_code == 200, answer.text
     found = answer.json()
-    assert found["applied"] and found["by_ties"] and found["actor"]
+    assert found["applied"]
+    assert found["by_ties"]
+    assert found["actor"]
     assert found["held_out"]["after_m"] < 0.6 * found["held_out"]["before_m"]
     scout = next(track for track in found["tracks"] if track["vehicle"] == "scout")
     assert scout["max_m"] == pytest.approx(np.hypot(OFF_M, 0.5 * OFF_M), abs=1.0)

@@ -316,7 +316,7 @@ class _Adjustment:
         # Logarithms: one steep place is not to decide alone.
         better = 0.5 * np.log((squares[:, 1] + 1e-6) / (squares[:, 2] + 1e-6))
         error = float(np.std(better, ddof=1)) / np.sqrt(len(better))
-        return HeldOut(len(both), float(raw), float(fixed), float(after), float(np.mean(better)) / max(error, 1e-9))
+        return HeldOut(len(both), float(raw), float(fixed), float(after), float(np.mean(better) / max(error, 1e-9)))
 
     def _residuals(self, which: list[int], offset_m: FloatArray) -> list[FloatArray]:
         east, north = self.places(offset_m)

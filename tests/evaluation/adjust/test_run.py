@@ -1,10 +1,12 @@
 """``bathyfleet evaluate adjust`` on a small sea floor."""
 
 import numpy as np
+import orjson
 import pytest
 
 from app.evaluation.adjust.run import AdjustJob
 from app.evaluation.adjust.world import DriftScenario, fly
+from app.evaluation.runs.summary import summarise
 from simulator.seafloors import generate
 
 FLOOR = generate("rugged", 8, width_m=60.0, height_m=60.0)
@@ -12,6 +14,8 @@ FLOOR = generate("rugged", 8, width_m=60.0, height_m=60.0)
 
 def test_a_rugged_floor_is_mapped_better_after_the_adjustment() -> None:
     found = AdjustJob(DriftScenario(FLOOR, 6.0, seed=2)).run(lambda step: None)
+    assert orjson.loads(orjson.dumps(found)) == found
+    assert summarise([found])["all"]["rmse_ratio"]["mean"] == found["rmse_ratio"]
     assert found["by_ties"]
     assert found["position_error_ratio"] < 0.4
     assert found["rmse_ratio"] < 0.7
