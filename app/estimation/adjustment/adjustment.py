@@ -19,6 +19,9 @@ HELD_OUT_EACH = 4
 SIGNIFICANT = 2.0
 """So many standard errors the held-out sections have to fit better on the mean."""
 
+WORTHWHILE = 0.92
+"""So much of their RMS by fixes alone they may have left at most."""
+
 LEAST_HELD_OUT = 4
 CAUCHY = 2.4
 """Ties that are off by so many deviations count half."""
@@ -78,6 +81,11 @@ class HeldOut:
     after_m: float
     significance: float
     """How much better they fit than by fixes alone, in standard errors."""
+
+    @property
+    def speaks_for_ties(self) -> bool:
+        """Whether ties made them fit better, by more than chance and by enough to matter."""
+        return self.significance >= SIGNIFICANT and self.after_m <= WORTHWHILE * self.by_fixes_m
 
 
 @dataclass(frozen=True)
@@ -236,7 +244,7 @@ def adjusted(
         found.pool = pool
         tried = found.run(by_fixes, ~held, ROUNDS)
         held_out = found.compare(held, by_fixes, tried)
-        by_ties = bool(held_out is not None and held_out.significance >= SIGNIFICANT)
+        by_ties = held_out is not None and held_out.speaks_for_ties
         state = found.run(tried, np.ones(len(sections), dtype=bool), LAST_ROUNDS) if by_ties else by_fixes
         shown = found.shown(state if by_ties else replace(by_fixes, ties=tried.ties), state.offset_m, held, by_ties)
     sd = _deviations(problem, state, every_node)
