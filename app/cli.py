@@ -14,7 +14,7 @@ from app import __version__
 from app.commands.audit import audit
 from app.commands.backup import backup, prune, restore
 from app.commands.common import CommandError, Database, command_settings, noted
-from app.commands.data import export, import_file, report, tide
+from app.commands.data import adjust, export, import_file, report, tide
 from app.commands.failsafes import failsafes
 from app.commands.home import home
 from app.commands.logs import import_logs
@@ -37,6 +37,7 @@ app.command()(report)
 app.command("import")(import_file)
 app.command("import-log")(import_logs)
 app.command()(tide)
+app.command()(adjust)
 app.command()(train)
 app.command()(failsafes)
 app.command()(audit)

@@ -1,4 +1,4 @@
-"""How soundings are corrected: tide and sound speed."""
+"""How soundings are corrected: tide, sound speed, and the drift of vehicles."""
 
 from fastapi import APIRouter
 
@@ -7,9 +7,10 @@ from app.api.json_route import JsonRoute
 from app.api.mission import Mission
 from app.api.problems import problems
 from app.api.schemas import API
-from app.missions.operations import recorrection
+from app.missions.operations import adjustment, recorrection
 from app.missions.operations.recorrection import corrections_view
 from app.missions.spec.mission import SoundSpeed
+from app.missions.views.adjustment import AdjustmentRequest, AdjustmentView
 from app.missions.views.corrections import CorrectionsView, TideCorrection
 
 router = APIRouter(
@@ -54,3 +55,41 @@ async def set_sound_speed(sound_speed: SoundSpeed, operator: Operator, mission: 
 async def delete_sound_speed(operator: Operator, mission: Mission) -> CorrectionsView:
     """Correct no sound speed any more."""
     return await recorrection.set_sound_speed(mission, None, operator.name)
+
+
+@router.get(
+    "/adjustment",
+    operation_id="getAdjustment",
+    summary="See how tracks are adjusted",
+    responses=problems("mission-not-found", "invalid-request"),
+)
+async def get_adjustment(reader: Reader, mission: Mission) -> AdjustmentView:
+    """Return by how much vehicles' positions are changed for their drift, how sure that is, and every tie."""
+    return adjustment.adjustment_view(mission)
+
+
+@router.post(
+    "/adjustment",
+    operation_id="adjustTracks",
+    summary="Adjust tracks for drift",
+    responses=_CHANGE | problems("conflict", "pings-unreadable"),
+)
+async def adjust_tracks(
+    operator: Operator, mission: Mission, request: AdjustmentRequest | None = None
+) -> AdjustmentView:
+    """Find by how much positions were off, by overlapping soundings and fixes, and place all soundings anew.
+
+    Raw positions stay. Soundings that come later stay where they are until it is done again, which replaces it.
+    """
+    return await adjustment.adjust(mission, request or AdjustmentRequest(), operator.name)
+
+
+@router.delete(
+    "/adjustment",
+    operation_id="undoAdjustment",
+    summary="Take positions as they came",
+    responses=problems("mission-not-found", "invalid-request"),
+)
+async def undo_adjustment(operator: Operator, mission: Mission) -> AdjustmentView:
+    """Undo the adjustment of tracks."""
+    return await adjustment.undo(mission, operator.name)

@@ -264,3 +264,58 @@ def tide(
 
         view = with_missions(command_settings(database_url=database), run, changing="tide", mission=mission)
     typer.echo(f"depths are below {view.vertical_datum}; {view.accepted} soundings accepted, {view.rejected} rejected")
+
+
+def adjust(
+    mission: Annotated[str, typer.Argument(metavar="MISSION", help="Its id, or the begin of it.")],
+    undo: Annotated[bool, typer.Option("--undo", help="Take positions as they came again.")] = False,
+    fixes: Annotated[
+        Path | None,
+        typer.Option(
+            exists=True, dir_okay=False, readable=True, help="JSON: a list of fixes as POST …/adjustment takes them."
+        ),
+    ] = None,
+    url: Url = None,
+    token: Token = None,
+    database: Database = None,
+) -> None:
+    """Adjust a mission's tracks for their drift, by overlapping soundings and fixes; repeat it when logs came in."""
+    import json
+
+    from app.missions.operations import adjustment
+    from app.missions.views.adjustment import AdjustmentRequest, AdjustmentView
+
+    try:
+        given = {} if fixes is None else {"fixes": json.loads(fixes.read_text(encoding="utf-8"))}
+    except ValueError as error:
+        raise CommandError(f"{fixes} is not JSON: {error}", "send a list of fixes") from None
+    request = checked(AdjustmentRequest, given)
+    if url is not None:
+        content: dict[str, Any] = {} if undo else {"json": request.model_dump(mode="json")}
+        answer = ask_service(url, token, mission, "DELETE" if undo else "POST", "adjustment", **content)
+        view = AdjustmentView.model_validate(answer)
+    else:
+
+        async def run(service: "MissionService") -> AdjustmentView:
+            live = await resting_mission(service, mission)
+            if undo:
+                return await adjustment.undo(live, "command line")
+            return await adjustment.adjust(live, request, "command line")
+
+        view = with_missions(command_settings(database_url=database), run, changing="adjust", mission=mission)
+    if not view.applied:
+        typer.echo("positions are taken as they came")
+        return
+    how = f"{view.ties_used} ties and {view.fixes} fixes" if view.by_ties else f"{view.fixes} fixes alone"
+    typer.echo(f"tracks are adjusted by {how}; {view.ties_rejected} ties were rejected")
+    if view.held_out is not None:
+        typer.echo(
+            f"depths of {view.held_out.sections} sections that were held out, less those of others: "
+            f"{view.held_out.before_m:.3f} m before, {view.held_out.by_fixes_m:.3f} m by fixes alone, "
+            f"{view.held_out.after_m:.3f} m by ties too (RMS)"
+        )
+    for track in view.tracks:
+        typer.echo(
+            f"{track.vehicle}: moved by {track.mean_m:.2f} m on the mean, {track.max_m:.2f} m at most; "
+            f"deviation {track.sd_m:.2f} m, before {track.before_sd_m:.2f} m"
+        )

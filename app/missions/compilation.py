@@ -8,6 +8,7 @@ import structlog
 
 from app.compiled import wait_for_compiling
 from app.estimation import Sensor, SingleBeam
+from app.estimation.adjustment import warm_up as warm_up_adjustment
 from app.exploration.planners import warm_up_planner
 from app.exploration.survey.local_search import warm_up as warm_up_search
 from app.mapping.gp import warm_up as warm_up_maps
@@ -74,6 +75,7 @@ class Compilation:
         self._maps.set_result(None)
         with suppress(RuntimeError):  # the service ends
             self._executor.submit(warm_up_crossings).add_done_callback(_log_failure)
+            self._executor.submit(warm_up_adjustment).add_done_callback(_log_failure)
 
 
 def _warm_up_later() -> None:

@@ -311,6 +311,20 @@ class TideTableRow(Base):
     text: Mapped[str] = mapped_column(Text)
 
 
+class AdjustmentRow(Base):
+    """By how much the positions of a mission's vehicles were off, and how that was found.
+
+    ``content`` is JSON, compressed by zlib (``missions/soundings/adjustment.py``).
+    """
+
+    __tablename__ = "adjustments"
+
+    mission_id: Mapped[str] = mapped_column(ForeignKey("missions.id", ondelete="CASCADE"), primary_key=True)
+    made_at: Mapped[datetime]
+    actor: Mapped[str] = mapped_column(String(120))
+    content: Mapped[bytes] = mapped_column(LargeBinary)
+
+
 class ImportRow(Base):
     """Soundings or a map from elsewhere that a mission started with, all of them or none.
 

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from app.storage.models import (
+    AdjustmentRow,
     AuditRow,
     BatchRow,
     EventRow,
@@ -238,6 +239,7 @@ def one_of_each() -> list[list[Any]]:
                 digest="0" * 64,
                 content=b"map",
             ),
+            AdjustmentRow(mission_id="m1", made_at=TIME, actor="me", content=b"offsets"),
             TideTableRow(mission_id="m1", name="Leixoes", text="2026/01/01 00:00 1.0"),
             ImportRow(
                 id="i1",

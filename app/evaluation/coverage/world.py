@@ -30,7 +30,7 @@ LEAD_S = 2.5
 
 
 @njit(cache=True, nogil=True)
-def _sound(
+def sounded(
     z_m: FloatArray,
     cell_m: float,
     poses: FloatArray,
@@ -214,7 +214,7 @@ class Fleet:
         terrain, sonar = self.scenario.terrain, self.scenario.sonar
         depths = _depths(terrain.z_m, terrain.cell_m, poses, CRUISE_M, MIN_ALTITUDE_M)
         rolls = self._rng.normal(0.0, ROLL_SD_RAD, len(poses))
-        starboard, depth = _sound(terrain.z_m, terrain.cell_m, poses, depths, self._angles, rolls, sonar.range_m)
+        starboard, depth = sounded(terrain.z_m, terrain.cell_m, poses, depths, self._angles, rolls, sonar.range_m)
         met = np.isfinite(depth)
         ping, _ = np.nonzero(met)
         heading = poses[ping, 2]

@@ -28,10 +28,13 @@ def spread(values: Sequence[float]) -> Spread:
 
 
 def summarise(runs: Sequence[Mapping[str, Any]]) -> dict[str, dict[str, dict[str, float]]]:
-    """Return planner -> metric -> spread, for every metric that is a number in at least one run of the planner."""
+    """Return planner -> metric -> spread, for every metric that is a number in at least one run of the planner.
+
+    Runs that have no planner are all together, as ``all``.
+    """
     result: dict[str, dict[str, dict[str, float]]] = {}
-    for planner in dict.fromkeys(str(run["planner"]) for run in runs):
-        mine = [run for run in runs if run["planner"] == planner]
+    for planner in dict.fromkeys(_group(run) for run in runs):
+        mine = [run for run in runs if _group(run) == planner]
         metrics: dict[str, dict[str, float]] = {}
         for key in mine[0]:
             numbers = [run[key] for run in mine if _is_number(run[key])]
@@ -43,3 +46,7 @@ def summarise(runs: Sequence[Mapping[str, Any]]) -> dict[str, dict[str, dict[str
 
 def _is_number(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _group(run: Mapping[str, Any]) -> str:
+    return str(run.get("planner", "all"))

@@ -13,6 +13,7 @@ from app.missions.live.journal import Counts
 from app.missions.live.mission import RISES, LiveMission, builder_of
 from app.missions.search.scan_log import report_of
 from app.missions.search.state import Search
+from app.missions.soundings.adjustment import TrackAdjustment
 from app.missions.spec.mission import MissionSpec, VehicleSpec
 from app.missions.states import ENDED
 from app.missions.targets.filters import warm_up as tracking_warm_up
@@ -24,7 +25,7 @@ from app.storage import soundings as sounding_queries
 from app.storage import stored_maps
 from app.storage import telemetry as telemetry_queries
 from app.storage.database import Database
-from app.storage.models import MissionRow, PositionRow, TideTableRow
+from app.storage.models import AdjustmentRow, MissionRow, PositionRow, TideTableRow
 from app.storage.ping_files import PingFiles
 
 
@@ -47,6 +48,7 @@ async def take_up(
         positions = await mission_queries.last_positions(session, row.id)
         reference = await sounding_queries.reference_grid(session, row.id)
         tide = await session.get(TideTableRow, row.id)
+        drift = await session.get(AdjustmentRow, row.id)
         heard = await telemetry_queries.last_heard(session, row.id)
         risings = await event_queries.count_by_vehicle(session, row.id, "surface", RISES)
     # Building the spec checks geometry, which takes milliseconds: not on the event loop.
@@ -55,13 +57,18 @@ async def take_up(
     table = None
     if tide is not None:
         table = await loop.run_in_executor(executor, partial(parse_tid, tide.text, name=tide.name))
+    adjustment = None
+    if drift is not None:
+        adjustment = await loop.run_in_executor(executor, TrackAdjustment.unpack, drift.content)
     search = None
     if spec.search is not None:
         search = await loop.run_in_executor(executor, Search, spec, spec.search, spec.frame(), time_scale)
     counts = Counts(stored.accepted, stored.rejected)
     # Which cells lie in the area is quick to tell of hundreds, and holds everyone up of millions.
     builder = await asyncio.to_thread(builder_of, spec)
-    live = LiveMission(database, hub, executor, row, spec, counts, ping_files, table, time_scale, search, builder)
+    live = LiveMission(
+        database, hub, executor, row, spec, counts, ping_files, table, adjustment, time_scale, search, builder
+    )
     async with database.reading() as session:
         pinged = await live.pings.open(session)
     live.journal.counts = replace(counts, pings=pinged.pings, beams=pinged.beams, rejected_pings=pinged.rejected)

@@ -56,6 +56,7 @@ from app.missions.recovery.failsafes import STRENGTH
 from app.missions.search.progress import progress_of
 from app.missions.search.scan_log import take
 from app.missions.search.state import Search
+from app.missions.soundings.adjustment import TrackAdjustment
 from app.missions.soundings.corrections import Corrections
 from app.missions.soundings.gate import Gate
 from app.missions.spec.failsafes import Response
@@ -144,6 +145,7 @@ class LiveMission:
         counts: Counts,
         ping_files: PingFiles,
         tide_table: TideTable | None = None,
+        adjustment: TrackAdjustment | None = None,
         time_scale: float = 1.0,
         search: Search | None = None,
         builder: MapBuilder | None = None,
@@ -160,7 +162,9 @@ class LiveMission:
         self.builder = builder or builder_of(spec)
         self.margin_m = 2 * spec.limits.max_step_m
         """How far outside the area what vehicles measured still belongs to the mission and helps the map's edge."""
-        corrections = Corrections(self.frame, spec.tide, table=tide_table, sound_speed=spec.sound_speed)
+        corrections = Corrections(
+            self.frame, spec.tide, table=tide_table, sound_speed=spec.sound_speed, adjustment=adjustment
+        )
         self.gate = self._gate_with(corrections)
         self.reference_m: FloatArray | None = None
         """Depths of the grid that the map is compared with, at the map's cells."""

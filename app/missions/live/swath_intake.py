@@ -44,16 +44,16 @@ class SwathIntake:
                     self._begun, self.behind = True, False
                 self._grid.begin_anew()
                 try:
-                    async for _, pings in self._store.all_accepted(until):
-                        await asyncio.to_thread(self._grid.add, pings)
+                    async for vehicle, pings in self._store.all_accepted(until):
+                        await asyncio.to_thread(self._grid.add, vehicle, pings)
                 except BaseException:
                     self._begun, self.behind = False, True
                     self._noted.clear()
                     raise
             noted, self._noted = self._noted, defaultdict(list)
             self.behind = False
-            for some in noted.values():
-                await asyncio.to_thread(self._grid.add, Pings.joined(some))
+            for vehicle, some in noted.items():
+                await asyncio.to_thread(self._grid.add, vehicle, Pings.joined(some))
 
     def correct(self, corrections: Corrections) -> None:
         """Place all pings anew, by other corrections, before the next map."""

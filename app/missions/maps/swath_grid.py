@@ -17,8 +17,8 @@ from app.mapping.swath.spikes import spikes
 from app.mapping.tiers import asked_of, by_depth
 from app.mapping.types import BathymetricMap, Grid, SoundingRows
 
-Place = Callable[[Pings], Footprints | None]
-"""Returns where beams met the bottom, corrected; None where that is nowhere near."""
+Place = Callable[[str, Pings], Footprints | None]
+"""Returns where the beams of a vehicle's pings met the bottom, corrected; None where that is nowhere near."""
 
 
 @dataclass(frozen=True)
@@ -34,9 +34,9 @@ class Beams:
         return self.uncertainty.vertical_sd_m
 
 
-def beams_of(pings: Pings, place: Place, errors: SoundingErrors) -> Beams | None:
+def beams_of(vehicle: str, pings: Pings, place: Place, errors: SoundingErrors) -> Beams | None:
     """Return the beams of one vehicle's pings whose depth is known; None where they are nowhere near."""
-    beams = place(pings)
+    beams = place(vehicle, pings)
     if beams is None:
         return None
     wrong = spikes(pings)
@@ -55,16 +55,16 @@ class SwathGrid:
 
     def __init__(self, grid: Grid, mask: BoolArray, errors: SoundingErrors, cell_of_depth: float | None = None) -> None:
         self._grid, self._mask, self._cell_of_depth = grid, mask, cell_of_depth
-        self.place: Place = lambda pings: None
+        self.place: Place = lambda vehicle, pings: None
         self.errors = errors
         self._density = DensityGrid(grid, mask)
         self._lock = threading.Lock()
         self.beams = 0
         """How many were taken in, spikes left out."""
 
-    def add(self, pings: Pings) -> None:
+    def add(self, vehicle: str, pings: Pings) -> None:
         """Take in the pings of one vehicle."""
-        beams = beams_of(pings, self.place, self.errors)
+        beams = beams_of(vehicle, pings, self.place, self.errors)
         if beams is None:
             return
         at = beams.footprints

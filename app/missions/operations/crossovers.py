@@ -105,14 +105,14 @@ async def survey_check(live: LiveMission) -> SurveyCheck:
     main = DensityGrid(live.builder.grid, live.builder.mask)
     async for vehicle, pings in live.pings.all_accepted(until):
         own = pings.take(~check.crossed_at(vehicle, pings.time_s))
-        beams = await asyncio.to_thread(beams_of, own, place, live.spec.uncertainty)
+        beams = await asyncio.to_thread(beams_of, vehicle, own, place, live.spec.uncertainty)
         if beams is not None:
             at = beams.footprints
             await asyncio.to_thread(main.add, at.east_m, at.north_m, at.depth_m, beams.sd_m)
     compared = BeamCheck(live.builder.grid, main.depth_m)
     async for vehicle, pings in live.pings.all_accepted(until):
         own = pings.take(check.crossed_at(vehicle, pings.time_s))
-        beams = await asyncio.to_thread(beams_of, own, place, live.spec.uncertainty)
+        beams = await asyncio.to_thread(beams_of, vehicle, own, place, live.spec.uncertainty)
         if beams is not None:
             at = beams.footprints
             await asyncio.to_thread(compared.add, at.east_m, at.north_m, at.depth_m, at.angle_rad)
@@ -130,7 +130,7 @@ async def survey_tracks(live: LiveMission, until_block: int | None = None) -> Tr
     spacing_m = SPACING_CELLS * live.spec.cell_m
     nadirs: dict[str, list[FloatArray]] = {}
     async for vehicle, pings in live.pings.all_accepted(until_block):
-        beams = await asyncio.to_thread(beams_of, pings, place, live.spec.uncertainty)
+        beams = await asyncio.to_thread(beams_of, vehicle, pings, place, live.spec.uncertainty)
         if beams is not None:
             nadirs.setdefault(vehicle, []).append(await asyncio.to_thread(nadir_track, pings, beams, spacing_m))
     tables |= {vehicle: np.concatenate(parts) for vehicle, parts in nadirs.items()}

@@ -1,6 +1,6 @@
 """Changing a mission's corrections: every stored sounding is corrected anew from its raw values."""
 
-from collections.abc import Sequence
+from collections.abc import Awaitable, Callable, Sequence
 from functools import partial
 from typing import Any
 
@@ -12,6 +12,7 @@ from app.missions.clock import now
 from app.missions.errors import ConflictError, InvalidRequestError
 from app.missions.fleet.interface import BeamGeometry, Position, SoundingReport
 from app.missions.live.mission import LiveMission
+from app.missions.soundings.adjustment import TrackAdjustment
 from app.missions.soundings.corrections import NO_LEVEL, Corrections
 from app.missions.soundings.gate import Gate
 from app.missions.spec.mission import MissionSpec, SoundSpeed, Tide
@@ -60,7 +61,8 @@ async def set_tide(live: LiveMission, tide: TideCorrection, actor: str) -> Corre
             session.add(row)
 
     async with live.correcting:
-        await _recorrect(live, live.spec.model_copy(update={"tide": plain}), table, store)
+        spec = live.spec.model_copy(update={"tide": plain})
+        await recorrect(live, spec, table, live.gate.corrections.adjustment, store)
     what = f"tide table {table.name}" if table is not None else f"a constant level of {plain.level_m:+.2f} m"
     await live.journal.log(Level.INFO, "corrections", f"tide corrected by {what}, set by {actor}", actor=actor)
     return corrections_view(live)
@@ -74,7 +76,8 @@ async def set_sound_speed(live: LiveMission, sound_speed: SoundSpeed | None, act
 
     async with live.correcting:
         spec = live.spec.model_copy(update={"sound_speed": sound_speed})
-        await _recorrect(live, spec, live.gate.corrections.table, store)
+        before = live.gate.corrections
+        await recorrect(live, spec, before.table, before.adjustment, store)
     words = "sound speed is not corrected" if sound_speed is None else f"sound speed: {sound_speed.source or 'profile'}"
     await live.journal.log(Level.INFO, "corrections", f"{words}, set by {actor}", actor=actor)
     return corrections_view(live)
@@ -88,8 +91,15 @@ def check_level_is_known(live: LiveMission) -> None:
         raise ConflictError(why, "send a table that covers today, or a constant level: PUT /api/v1/missions/{id}/tide")
 
 
-async def _recorrect(live: LiveMission, spec: MissionSpec, table: TideTable | None, store: Any) -> None:
-    corrections = Corrections(live.frame, spec.tide, table=table, sound_speed=spec.sound_speed)
+async def recorrect(
+    live: LiveMission,
+    spec: MissionSpec,
+    table: TideTable | None,
+    adjustment: TrackAdjustment | None,
+    store: Callable[[AsyncSession], Awaitable[None]],
+) -> None:
+    """Correct every stored sounding anew; ``store`` writes what else changes. The caller holds ``correcting``."""
+    corrections = Corrections(live.frame, spec.tide, table=table, sound_speed=spec.sound_speed, adjustment=adjustment)
     async with live.journal.writing:
         # Nothing else changes soundings meanwhile. Computing may have to wait for a thread, and the database's turn is
         # for all missions, whose stops are written, too.

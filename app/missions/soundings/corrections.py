@@ -1,4 +1,7 @@
-"""From what a sonar reported to a depth below the datum: sound speed, then tide. The report itself stays as it came."""
+"""From what a sonar reported to a place and a depth below the datum: sound speed, drift, tide.
+
+The report itself stays as it came.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -12,6 +15,7 @@ from app.mapping.swath.pings import Footprints, Pings, placed
 from app.mapping.tides import TideTable
 from app.mapping.vertical import INSTANTANEOUS_WATER_LEVEL, VerticalDatum
 from app.missions.fleet.interface import Position, SoundingReport
+from app.missions.soundings.adjustment import TrackAdjustment
 from app.missions.spec.mission import SoundSpeed, Tide
 from imc_bridge.printable import printable
 
@@ -56,14 +60,23 @@ class Corrections:
         A constant level; where there is a ``table`` its levels count instead.
     sound_speed
         None: the sonars' own ranges are taken.
+    adjustment
+        By how much positions were off; None: they are taken as they came.
     """
 
     def __init__(
-        self, frame: LocalFrame, tide: Tide, *, table: TideTable | None = None, sound_speed: SoundSpeed | None = None
+        self,
+        frame: LocalFrame,
+        tide: Tide,
+        *,
+        table: TideTable | None = None,
+        sound_speed: SoundSpeed | None = None,
+        adjustment: TrackAdjustment | None = None,
     ) -> None:
         self._frame = frame
         self._tide = tide
         self.table = table
+        self.adjustment = adjustment
         self._profile = _profile(sound_speed)
         self._sound_speed = sound_speed
 
@@ -104,6 +117,8 @@ class Corrections:
         places = self._places([report.footprint for report in reports])
         raw = np.array([report.footprint.depth_m for report in reports])
         shift, depth = self._sound_speed_corrected(reports, raw, places)
+        if self.adjustment is not None:
+            shift = shift - self.adjustment.offsets_of(reports)
         levels = self._levels(reports)
         results = []
         for report, place, moved, bottom, level in zip(reports, places, shift, depth, levels, strict=True):
@@ -119,15 +134,18 @@ class Corrections:
             results.append(PlacedSounding(report, east, north, below, float(level)))
         return results
 
-    def beams(self, pings: Pings) -> Footprints | None:
-        """Return where the beams of pings met the bottom, depths below the datum; None where the frame has no place.
+    def beams(self, vehicle: str, pings: Pings) -> Footprints | None:
+        """Return where the beams of a vehicle's pings met the bottom, depths below the datum.
 
-        Footprints of pings for whose time there is no water level have a depth of NaN.
+        None where the frame has no place for them. Depths for whose time there is no water level are NaN.
         """
         try:
             found = placed(pings, self._frame, self._profile)
         except ValueError:
             return None
+        if self.adjustment is not None:
+            off = self.adjustment.offsets(vehicle, pings.time_s)[found.ping]
+            found = replace(found, east_m=found.east_m - off[:, 0], north_m=found.north_m - off[:, 1])
         levels = np.full(len(pings), self._tide.level_m) if self.table is None else self.table.levels_at(pings.time_s)
         return replace(found, depth_m=found.depth_m - levels[found.ping] + self._tide.datum_offset_m)
 

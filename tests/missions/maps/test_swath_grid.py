@@ -24,8 +24,8 @@ def swept(depth_m: float, cell_of_depth: float | None) -> Coverage:
     pings = Pings(time_s, zeros, zeros, zeros, zeros, zeros, zeros, zeros, angle, range_m)
     depth = np.full(number, depth_m)
     beams = Footprints(np.arange(number), east, north, depth, zeros, range_m[:, 0].astype(float))
-    swath.place = lambda _: beams
-    swath.add(pings)
+    swath.place = lambda vehicle, pings: beams
+    swath.add("rover", pings)
     return swath.coverage(None)
 
 

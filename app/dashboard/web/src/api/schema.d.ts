@@ -503,6 +503,36 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/missions/{mission_id}/adjustment": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * See how tracks are adjusted
+         * @description Return by how much vehicles' positions are changed for their drift, how sure that is, and every tie.
+         */
+        get: operations["getAdjustment"];
+        put?: never;
+        /**
+         * Adjust tracks for drift
+         * @description Find by how much positions were off, by overlapping soundings and fixes, and place all soundings anew.
+         *
+         *     Raw positions stay. Soundings that come later stay where they are until it is done again, which replaces it.
+         */
+        post: operations["adjustTracks"];
+        /**
+         * Take positions as they came
+         * @description Undo the adjustment of tracks.
+         */
+        delete: operations["undoAdjustment"];
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/missions/{mission_id}/imports": {
         parameters: {
             query?: never;
@@ -1401,6 +1431,71 @@ export interface components {
             stops: components["schemas"]["StopView"][];
         };
         /**
+         * AdjustmentRequest
+         * @description What is known beside the soundings; all of it may be left out.
+         */
+        AdjustmentRequest: {
+            /**
+             * Fixes
+             * @description GPS fixes. Jumps of a vehicle's positions at the surface are taken for fixes without being named
+             * @default []
+             */
+            fixes: components["schemas"]["FixRequest"][];
+            /**
+             * Walk M
+             * @description Deviation of the random walk of positions after an hour
+             * @default 3
+             */
+            walk_m: number;
+            /**
+             * Rate Mph
+             * @description Deviation of the slowly changing rate of their drift, metres an hour
+             * @default 15
+             */
+            rate_mph: number;
+        };
+        /**
+         * AdjustmentView
+         * @description By how much positions of vehicles were changed for their drift; their raw positions stay.
+         */
+        AdjustmentView: {
+            /** Applied */
+            applied: boolean;
+            /**
+             * Made At
+             * @description Null: nothing is applied
+             */
+            made_at: string | null;
+            /** Actor */
+            actor: string | null;
+            /**
+             * By Ties
+             * @description Whether ties were used; else fixes alone
+             */
+            by_ties: boolean;
+            /** Fixes */
+            fixes: number;
+            /** Tracks */
+            tracks: components["schemas"]["TrackOffsetView"][];
+            /** Ties Used */
+            ties_used: number;
+            /** Ties Rejected */
+            ties_rejected: number;
+            /**
+             * Before M
+             * @description RMS of depths less others' over all ties, unadjusted
+             */
+            before_m: number | null;
+            /**
+             * After M
+             * @description The same, adjusted
+             */
+            after_m: number | null;
+            /** @description Null: too little overlaps */
+            held_out: components["schemas"]["HeldOutView"] | null;
+            ties: components["schemas"]["TieFeaturesView"];
+        };
+        /**
          * AgreementView
          * @description Differences of depths that should be the same, metres.
          */
@@ -2109,6 +2204,41 @@ export interface components {
          */
         Fit: "data" | "from_zero" | "about_zero";
         /**
+         * FixRequest
+         * @description A position of a vehicle at the surface that is known better than the one it had reckoned.
+         */
+        FixRequest: {
+            /** Vehicle */
+            vehicle: string;
+            /**
+             * Time S
+             * @description The vehicle's clock, Unix seconds
+             */
+            time_s: number;
+            /**
+             * Lat Deg
+             * @description Latitude, WGS84 degrees
+             */
+            lat_deg: number;
+            /**
+             * Lon Deg
+             * @description Longitude, WGS84 degrees
+             */
+            lon_deg: number;
+            /**
+             * Sd M
+             * @description Standard deviation east and north, each
+             * @default 1
+             */
+            sd_m: number;
+            /**
+             * Resets
+             * @description Whether the vehicle reckoned on from the fix
+             * @default true
+             */
+            resets: boolean;
+        };
+        /**
          * ForecastRange
          * @description From where to where a figure went, over floors of different roughness: 10 % were below, 10 % above.
          */
@@ -2187,6 +2317,34 @@ export interface components {
          * @enum {string}
          */
         Guidance: "follow" | "legs" | "acoustic";
+        /**
+         * HeldOutView
+         * @description How well sections fit that were left out: RMS of their depths less the others'.
+         */
+        HeldOutView: {
+            /** Sections */
+            sections: number;
+            /**
+             * Before M
+             * @description Unadjusted
+             */
+            before_m: number;
+            /**
+             * By Fixes M
+             * @description Adjusted by fixes alone
+             */
+            by_fixes_m: number;
+            /**
+             * After M
+             * @description Adjusted by fixes and the other ties
+             */
+            after_m: number;
+            /**
+             * Significance
+             * @description How much better they fit than by fixes alone, in standard errors
+             */
+            significance: number;
+        };
         /**
          * HistogramView
          * @description Counts of differences; the outer bins hold those beyond the ends, too.
@@ -4756,6 +4914,76 @@ export interface components {
             sha256: string;
         };
         /**
+         * TieFeatureView
+         * @description A tie as GeoJSON.
+         */
+        TieFeatureView: {
+            /**
+             * Type
+             * @constant
+             */
+            type: "Feature";
+            properties: components["schemas"]["TieView"];
+            geometry: components["schemas"]["PointView"];
+        };
+        /**
+         * TieFeaturesView
+         * @description Ties as GeoJSON.
+         */
+        TieFeaturesView: {
+            /**
+             * Type
+             * @constant
+             */
+            type: "FeatureCollection";
+            /** Features */
+            features: components["schemas"]["TieFeatureView"][];
+        };
+        /**
+         * TieView
+         * @description A section of a track that was compared with what others sounded there.
+         */
+        TieView: {
+            /** Number */
+            number: number;
+            /** Vehicle */
+            vehicle: string;
+            /**
+             * Time S
+             * @description The vehicle's clock in its middle, Unix seconds
+             */
+            time_s: number;
+            /**
+             * Other
+             * @description The vehicle that it was compared with most; null: it was not used
+             */
+            other: string | null;
+            /**
+             * Outcome
+             * @description Used, or why not: others' soundings are too far, the terrain says nothing, depths differ wherever it is moved to, it contradicts the others, or no tie at all made held-out ones fit better
+             * @enum {string}
+             */
+            outcome: "used" | "no-overlap" | "flat" | "misfit" | "outlier" | "not-significant";
+            /**
+             * Before M
+             * @description RMS of its depths less the others', unadjusted
+             */
+            before_m: number | null;
+            /**
+             * After M
+             * @description The same, adjusted
+             */
+            after_m: number | null;
+            /**
+             * Sd M
+             * @description How well it tells by how much to move it, in its best and its worst direction; null: not at all
+             */
+            sd_m: [
+                number | null,
+                number | null
+            ];
+        };
+        /**
          * TileJson
          * @description Where a layer's tiles are (TileJSON 3.0).
          */
@@ -4838,6 +5066,33 @@ export interface components {
             tvu_m: number;
             /** Thu M */
             thu_m: number;
+        };
+        /**
+         * TrackOffsetView
+         * @description By how much a vehicle's positions were changed.
+         */
+        TrackOffsetView: {
+            /** Vehicle */
+            vehicle: string;
+            /** Nodes */
+            nodes: number;
+            /**
+             * Mean M
+             * @description Mean length of the change
+             */
+            mean_m: number;
+            /** Max M */
+            max_m: number;
+            /**
+             * Before Sd M
+             * @description How uncertain its reckoned positions are by the assumed drift, east or north, at the worst
+             */
+            before_sd_m: number;
+            /**
+             * Sd M
+             * @description The same of its adjusted ones
+             */
+            sd_m: number;
         };
         /**
          * Tracking
@@ -7954,6 +8209,277 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["CorrectionsView"];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such mission */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too many requests */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    getAdjustment: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description The mission's id */
+                mission_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["AdjustmentView"];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such mission */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too many requests */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    adjustTracks: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description The mission's id */
+                mission_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: {
+            content: {
+                "application/json": components["schemas"]["AdjustmentRequest"] | null;
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["AdjustmentView"];
+                };
+            };
+            /** @description The body cannot be read */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such mission */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The request took too long to arrive */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description It contradicts the present state */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body is too large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body's media type is not supported */
+            415: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too much is sent at once; too many requests */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description A file of pings is missing or damaged */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too much is under way */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    undoAdjustment: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description The mission's id */
+                mission_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["AdjustmentView"];
                 };
             };
             /** @description An access token is needed */

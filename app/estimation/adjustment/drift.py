@@ -1,0 +1,187 @@
+"""How the errors of reckoned positions grow, as rows of a sparse least-squares problem over nodes of the tracks."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy import sparse
+
+from app.arrays import FloatArray, IntArray
+from app.estimation.adjustment.tracks import Fixes, TrackSoundings
+
+HOUR_S = 3600.0
+
+
+@dataclass(frozen=True)
+class DriftModel:
+    """How a vehicle's reckoned position drifts from where it is; the same for east and north.
+
+    The error is the sum of a random walk and of a rate that changes slowly (a Gauss-Markov process of first order), as
+    currents and a wrong heading make it.
+
+    Attributes
+    ----------
+    walk_m
+        Standard deviation of the random walk after an hour.
+    rate_mph
+        Standard deviation of the rate, metres an hour.
+    rate_time_s
+        After so long the rate is mostly another one.
+    start_sd_m
+        Standard deviation of the error at the begin of a dive.
+    """
+
+    walk_m: float = 3.0
+    rate_mph: float = 15.0
+    rate_time_s: float = 600.0
+    start_sd_m: float = 1.0
+
+    def sd_m(self, time_s: FloatArray) -> FloatArray:
+        """Return the standard deviation of each coordinate so long after the begin of a dive."""
+        tau, rate = self.rate_time_s, self.rate_mph / HOUR_S
+        grown = 2.0 * tau * (time_s - tau * (1.0 - np.exp(-time_s / tau)))
+        return np.sqrt(self.start_sd_m**2 + self.walk_m**2 * time_s / HOUR_S + rate**2 * grown)
+
+    def scaled_to(self, ends_s: FloatArray, off_m: FloatArray) -> "DriftModel":
+        """Return the model with a factor on its growth, by which errors off_m (k, 2) so long after begins are likely.
+
+        The model as it is counts as two such errors; the factor is between a third and five.
+        """
+        if not len(ends_s):
+            return self
+        ratio = (off_m**2).sum(axis=1) / (2.0 * self.sd_m(ends_s) ** 2)
+        factor = float(np.clip(np.sqrt((2.0 + ratio.sum()) / (2.0 + len(ratio))), 1.0 / 3.0, 5.0))
+        return replace(self, walk_m=factor * self.walk_m, rate_mph=factor * self.rate_mph)
+
+
+@dataclass(frozen=True)
+class Nodes:
+    """Nodes of all tracks, m of them; errors between two of a dive are linear in time.
+
+    Attributes
+    ----------
+    vehicle, dive : (m,)
+        Dives are numbered over all vehicles; a fix that the vehicle reckons from begins another one.
+    time_s : (m,)
+    """
+
+    vehicle: IntArray
+    dive: IntArray
+    time_s: FloatArray
+
+    def __len__(self) -> int:
+        return len(self.time_s)
+
+    @classmethod
+    def along(cls, soundings: TrackSoundings, fixes: Fixes, spacing_s: float) -> "Nodes":
+        """Return nodes about so many seconds apart, from the first sounding or fix of each dive to its last."""
+        vehicle: list[int] = []
+        dives: list[FloatArray] = []
+        for one in np.unique(soundings.vehicle).tolist():
+            at = soundings.time_s[soundings.vehicle == one]
+            of_fixes = fixes.time_s[fixes.vehicle == one]
+            cuts = np.unique(fixes.time_s[(fixes.vehicle == one) & fixes.resets])
+            low, high = min(at.min(), of_fixes.min(initial=np.inf)), max(at.max(), of_fixes.max(initial=-np.inf))
+            cuts = cuts[(cuts > low) & (cuts < high)]
+            for begin, end in zip([low, *cuts], [*cuts, high], strict=True):
+                count = max(1, round((end - begin) / spacing_s))
+                vehicle.append(one)
+                dives.append(np.linspace(begin, end, count + 1))
+        sizes = [len(times) for times in dives]
+        return cls(
+            vehicle=np.repeat(np.array(vehicle, dtype=np.int64), sizes),
+            dive=np.repeat(np.arange(len(dives)), sizes),
+            time_s=np.concatenate([np.zeros(0), *dives]),
+        )
+
+    def weights(self, vehicle: IntArray, time_s: FloatArray) -> tuple[IntArray, FloatArray]:
+        """Return which two nodes an error at some times (n,) lies between, (n, 2), and the share of each, (n, 2).
+
+        Before the first and after the last node it is that node's. At the end of a dive it is still of this dive.
+        """
+        rows = np.zeros((len(time_s), 2), dtype=np.int64)
+        share = np.zeros((len(time_s), 2))
+        share[:, 0] = 1.0
+        for one in np.unique(vehicle).tolist():
+            mine = np.flatnonzero(vehicle == one)
+            own = np.flatnonzero(self.vehicle == one)
+            if not len(own):
+                continue
+            at = self.time_s[own]
+            after = np.clip(np.searchsorted(at, time_s[mine], side="left"), 1, max(len(own) - 1, 1))
+            after = np.minimum(after, len(own) - 1)
+            before = np.maximum(after - 1, 0)
+            span = at[after] - at[before]
+            part = np.clip((time_s[mine] - at[before]) / np.where(span > 0.0, span, 1.0), 0.0, 1.0)
+            part = np.where(span > 0.0, part, 1.0)
+            rows[mine] = np.column_stack([own[before], own[after]])
+            share[mine] = np.column_stack([1.0 - part, part])
+        return rows, share
+
+    def interpolation(self, vehicle: IntArray, time_s: FloatArray) -> sparse.csr_array:
+        """Return the matrix (n, m) that makes errors at some times of the nodes' errors."""
+        rows, share = self.weights(vehicle, time_s)
+        at = np.repeat(np.arange(len(time_s)), 2)
+        return sparse.csr_array((share.ravel(), (at, rows.ravel())), shape=(len(time_s), len(self)))
+
+
+def prior_rows(nodes: Nodes, fixes: Fixes, model: DriftModel) -> tuple[sparse.csr_array, FloatArray]:
+    """Return what drift and fixes say of errors and rates of one coordinate at a time.
+
+    Returns
+    -------
+    A matrix (r, 2 m) of weighted rows, errors of all nodes first, then their rates (m/s), and what it is to be
+    multiplied to, (r, 2) for east and north.
+    """
+    m = len(nodes)
+    rate_sd = model.rate_mph / HOUR_S
+    rows: list[IntArray] = []
+    cols: list[IntArray] = []
+    values: list[FloatArray] = []
+    right: list[FloatArray] = []
+    count = 0
+
+    def add(entries: list[tuple[IntArray, FloatArray]], sd: FloatArray, to: FloatArray | None = None) -> None:
+        nonlocal count
+        n = len(sd)
+        for column, value in entries:
+            rows.append(count + np.arange(n))
+            cols.append(column)
+            values.append(value / sd)
+        right.append(np.zeros((n, 2)) if to is None else to / sd[:, None])
+        count += n
+
+    joined = np.flatnonzero(np.diff(nodes.dive) == 0)
+    step = nodes.time_s[joined + 1] - nodes.time_s[joined]
+    one = np.ones(len(joined))
+    walk_sd = np.maximum(model.walk_m * np.sqrt(step / HOUR_S), 1e-3)
+    add([(joined + 1, one), (joined, -one), (m + joined, -0.5 * step), (m + joined + 1, -0.5 * step)], walk_sd)
+    kept = np.exp(-step / model.rate_time_s)
+    add([(m + joined + 1, one), (m + joined, -kept)], rate_sd * np.sqrt(np.maximum(1.0 - kept**2, 1e-6)))
+    first = np.flatnonzero(np.diff(nodes.dive, prepend=-1) != 0)
+    start = np.ones(len(first))
+    add([(m + first, start)], rate_sd * start)
+    start_sd = model.start_sd_m * start
+    for k in range(len(fixes)):
+        # A dive that begins at a fix is as well known as that.
+        begins = (nodes.vehicle[first] == fixes.vehicle[k]) & (np.abs(nodes.time_s[first] - fixes.time_s[k]) < 1e-6)
+        if fixes.resets[k]:
+            start_sd[begins] = fixes.sd_m[k]
+    add([(first, start)], start_sd)
+    last = np.append(first[1:], m) - 1
+    for k in range(len(fixes)):
+        mine = nodes.vehicle == fixes.vehicle[k]
+        if not mine.any():
+            continue
+        ends = last[(nodes.vehicle[last] == fixes.vehicle[k]) & (np.abs(nodes.time_s[last] - fixes.time_s[k]) < 1e-6)]
+        begins_here = (first[nodes.vehicle[first] == fixes.vehicle[k]]).min()
+        if fixes.resets[k] and not len(ends) and fixes.time_s[k] <= nodes.time_s[begins_here]:
+            continue  # nothing was reckoned before it
+        at, share = nodes.weights(fixes.vehicle[k : k + 1], fixes.time_s[k : k + 1])
+        if len(ends):
+            at, share = np.array([[ends[0], ends[0]]]), np.array([[1.0, 0.0]])
+        off = np.array([[fixes.east_m[k], fixes.north_m[k]]])
+        add([(at[:, 0], share[:, 0]), (at[:, 1], share[:, 1])], fixes.sd_m[k : k + 1], off)
+    matrix = sparse.csr_array(
+        (np.concatenate(values), (np.concatenate(rows), np.concatenate(cols))), shape=(count, 2 * m)
+    )
+    return matrix, np.concatenate(right)

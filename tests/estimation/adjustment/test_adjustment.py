@@ -1,0 +1,133 @@
+"""Tracks are adjusted where the terrain tells by how much, and only there."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from app.arrays import FloatArray
+from app.estimation.adjustment import AdjustedTracks, DriftModel, Fixes, TrackSoundings, adjusted, thinned
+
+Bottom = Callable[[FloatArray, FloatArray], FloatArray]
+
+OFF_M = np.array([3.0, -2.0])
+"""By how much the second vehicle is off when its dive ends."""
+
+
+def hills(east: FloatArray, north: FloatArray) -> FloatArray:
+    return np.asarray(8.0 + np.sin(east / 4.0) * np.cos(north / 5.0) + 0.5 * np.sin((east + 2.0 * north) / 7.0))
+
+
+def furrows(east: FloatArray, north: FloatArray) -> FloatArray:
+    return np.asarray(8.0 + np.sin(east / 4.0) + 0.5 * np.cos(east / 2.3) + 0.0 * north)
+
+
+def flat(east: FloatArray, north: FloatArray) -> FloatArray:
+    return np.asarray(8.0 + 0.0 * east * north)
+
+
+def swaths(bottom: Bottom) -> tuple[TrackSoundings, Fixes]:
+    """What two vehicles sounded, one on lines to the north, one on lines to the east, of which the second drifts."""
+    rng = np.random.default_rng(5)
+    parts = []
+    for number in (0, 1):
+        time_s, along, across = [], [], []
+        for k, line in enumerate(np.arange(4.0, 60.0, 8.0)):
+            at = np.arange(0.0, 60.0, 1.0)
+            beams = np.linspace(-6.0, 6.0, 13)
+            time_s.append(np.repeat(80.0 * k + at, len(beams)))
+            along.append(np.repeat(at, len(beams)))
+            across.append(np.tile(line + beams, len(at)))
+        at_s, north, east = (np.concatenate(column) for column in (time_s, along, across))
+        if number:
+            east, north = north, east
+        depth = bottom(east, north) + 0.03 * rng.standard_normal(len(east))
+        off = number * at_s[:, None] / at_s.max() * OFF_M
+        sd = np.full(len(east), 0.03)
+        of = np.full(len(east), number, dtype=np.int64)
+        parts.append(TrackSoundings(of, at_s, east + off[:, 0], north + off[:, 1], depth, sd))
+    soundings = thinned(TrackSoundings.joined(parts), 1.0, 5.0)
+    begin, end = 0.0, float(soundings.time_s.max()) + 1.0
+    fixes = Fixes(
+        vehicle=np.array([0, 0, 1]),
+        time_s=np.array([begin, end, begin]),
+        east_m=np.zeros(3),
+        north_m=np.zeros(3),
+        sd_m=np.full(3, 0.1),
+        resets=np.ones(3, dtype=bool),
+    )
+    return soundings, fixes
+
+
+def offsets(found: AdjustedTracks) -> FloatArray:
+    """How far the second vehicle's errors at its nodes are from what they are in truth, (m, 2)."""
+    own = found.nodes.vehicle == 1
+    time_s = found.nodes.time_s[own]
+    return np.asarray(found.offset_m[own] - time_s[:, None] / time_s.max() * OFF_M)
+
+
+def test_hills_tell_how_a_vehicle_drifted() -> None:
+    found = adjusted(*swaths(hills))
+    assert found.by_ties
+    assert np.sqrt(np.mean(offsets(found) ** 2)) < 0.25
+    assert found.held_out is not None
+    assert found.held_out.after_m < 0.5 * found.held_out.before_m
+    assert found.sd_m.max() < 0.3 * found.before_sd_m.max()
+
+
+def test_furrows_tell_nothing_along_themselves() -> None:
+    found = adjusted(*swaths(furrows))
+    off = offsets(found)
+    assert np.sqrt(np.mean(off[:, 0] ** 2)) < 0.3
+    sd = found.sd_m[found.nodes.vehicle == 1]
+    assert sd[-1, 1] > 3.0 * sd[-1, 0]
+
+
+def test_a_flat_bottom_tells_nothing() -> None:
+    found = adjusted(*swaths(flat))
+    assert not found.by_ties
+    assert np.abs(found.offset_m).max() < 1e-6
+    assert not any(tie.outcome == "used" for tie in found.ties)
+
+
+def test_nothing_is_adjusted_without_soundings() -> None:
+    with pytest.raises(ValueError, match="no sounding"):
+        adjusted(TrackSoundings.joined([]), Fixes.none())
+
+
+@settings(max_examples=20, deadline=None)
+@given(
+    off=st.tuples(st.floats(-20, 20), st.floats(-20, 20)),
+    share=st.floats(0.05, 0.95),
+    minutes=st.floats(5, 300),
+)
+def test_a_random_walk_between_two_fixes_is_a_straight_line(
+    off: tuple[float, float], share: float, minutes: float
+) -> None:
+    end_s = 60.0 * minutes
+    time_s = np.linspace(0.0, end_s, 50)
+    level = np.zeros(50)
+    soundings = TrackSoundings(np.zeros(50, np.int64), time_s, time_s, level, level + 5.0, level + 0.1)
+    fixes = Fixes(
+        vehicle=np.zeros(2, np.int64),
+        time_s=np.array([0.0, end_s]),
+        east_m=np.array([0.0, off[0]]),
+        north_m=np.array([0.0, off[1]]),
+        sd_m=np.full(2, 1e-3),
+        resets=np.ones(2, dtype=bool),
+    )
+    found = adjusted(soundings, fixes, DriftModel(walk_m=5.0, rate_mph=1e-3))
+    np.testing.assert_allclose(found.at(0, np.array([share * end_s]))[0], share * np.array(off), atol=0.01)
+
+
+def test_thinned_soundings_are_means_without_spikes() -> None:
+    rng = np.random.default_rng(1)
+    depth = 5.0 + 0.01 * rng.standard_normal(40)
+    depth[7] = 3.0
+    ones, none = np.full(40, 0.5), np.zeros(40, np.int64)
+    found = thinned(TrackSoundings(none, np.linspace(100.0, 104.0, 40), ones, ones, depth, 0.1 * ones), 1.0, 5.0)
+    assert len(found) == 1
+    assert found.depth_m[0] == pytest.approx(np.delete(depth, 7).mean(), abs=1e-6)
+    assert 0.0 < found.sd_m[0] < 0.05
