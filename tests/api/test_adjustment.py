@@ -119,6 +119,10 @@ async def test_a_map_bent_by_drift_is_straightened_and_bent_again(client: httpx.
     events = (await client.get(f"{path}/events", headers={"Accept": "application/json"})).json()
     assert any("tracks adjusted by" in event["message"] for event in events)
 
+    report = (await client.get(f"{path}/report.html")).text
+    assert f'value="{found["ties_used"]}" data-of="adjustment.ties_used"' in report
+    assert "Positions are those that the vehicles told" not in report
+
     again = (await client.post(f"{path}/adjustment", json={"fixes": fixes})).json()
     assert again["tracks"] == found["tracks"]  # it begins from raw positions
 

@@ -149,6 +149,7 @@ async def answers_of(client: httpx.AsyncClient, path: str) -> dict[str, Any]:
         "map": await get("/map"),
         "quality": await get("/quality"),
         "corrections": await get("/corrections"),
+        "adjustment": await get("/adjustment"),
         "crosslines": await get("/crosslines"),
         "holidays": await get("/holidays"),
         "uncertainty_budget": await get("/uncertainty-budget"),

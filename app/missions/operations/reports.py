@@ -31,6 +31,7 @@ from app.missions.maps.products import (
     snapshot_holidays,
 )
 from app.missions.maps.snapshot import MapSnapshot, quality_of
+from app.missions.operations.adjustment import adjustment_view
 from app.missions.operations.crossovers import FoundCheck, check_of, crossovers_view
 from app.missions.operations.history import soundings_of
 from app.missions.operations.imports import imports_of, reference_of
@@ -134,6 +135,7 @@ class Reports:
         views: dict[str, View | Sequence[View] | None] = {
             "mission": mission_view(live),
             "corrections": corrections_view(live),
+            "adjustment": adjustment_view(live),
             "pings": pings,
             "imports": await imports_of(live),
             "reference": None if live.reference_m is None else await reference_of(live),

@@ -29,8 +29,8 @@ class Answers:
     Attributes
     ----------
     rest
-        What REST answers, by name: ``mission``, ``map``, ``quality``, ``corrections``, ``crosslines``, ``pings``,
-        ``imports`` and, where the mission has them, ``holidays``, ``uncertainty_budget`` and ``reference``.
+        What REST answers, by name: ``mission``, ``map``, ``quality``, ``corrections``, ``adjustment``, ``crosslines``,
+        ``pings``, ``imports`` and, where the mission has them, ``holidays``, ``uncertainty_budget`` and ``reference``.
         ``period`` holds the times of the first and last sounding, ``rejected`` how many soundings each state has that
         is not used, ``refusals`` why, and how many each (numbers in reasons are left out), ``files`` name, title, size
         and SHA-256 of files.

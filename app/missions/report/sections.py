@@ -257,6 +257,37 @@ def _vehicles(w: Writer) -> list[Block]:
     return blocks
 
 
+def _adjustment(w: Writer) -> list[tuple[str, Text]]:
+    t, source = w.t, "adjustment"
+    facts: list[tuple[str, Text]] = [
+        (t("fact_adjustment"), w.moment(f"{source}.made_at")),
+        (t("fact_ties"), w.number(f"{source}.ties_used")),
+        (t("fact_fixes"), w.number(f"{source}.fixes")),
+    ]
+    if w.answers.at(f"{source}.after_m") is not None:
+        facts += [
+            (t("fact_ties_before"), w.number(f"{source}.before_m", 2, "m")),
+            (t("fact_ties_after"), w.number(f"{source}.after_m", 2, "m")),
+        ]
+    return facts
+
+
+def _offsets(w: Writer) -> Table:
+    """Return by how much the positions of each vehicle were changed."""
+    tracks = [f"adjustment.tracks.{index}" for index in range(len(w.answers.at("adjustment.tracks")))]
+    rows = [
+        [
+            w.string(f"{track}.vehicle"),
+            w.number(f"{track}.mean_m", 2, "m"),
+            w.number(f"{track}.max_m", 2, "m"),
+            w.number(f"{track}.sd_m", 2, "m"),
+        ]
+        for track in tracks
+    ]
+    columns = [w.t(f"column_{name}") for name in ("vehicle", "moved_mean", "moved_most", "sd")]
+    return Table(columns, rows, numbers=(1, 2, 3), caption=w.t("caption_offsets"))
+
+
 def _corrections(w: Writer) -> list[Block]:
     t, answers = w.t, w.answers
     tide = "corrections.tide"
@@ -294,9 +325,12 @@ def _corrections(w: Writer) -> list[Block]:
         (t("fact_draught"), t("draught")),
         (t("fact_waterline"), w.number("mission.spec.uncertainty.waterline_m", 3, "m")),
         (t("fact_attitude"), t("attitude")),
-        (t("fact_adjustment"), t("adjustment_none")),
     ]
+    adjusted = bool(answers.at("adjustment.applied"))
+    facts += _adjustment(w) if adjusted else [(t("fact_adjustment"), t("adjustment_none"))]
     blocks: list[Block] = [Facts(facts), Paragraph(t("raw_stays"))]
+    if adjusted:
+        blocks.append(_offsets(w))
     imports = answers.at("imports")
     if imports:
         rows = [
@@ -604,7 +638,8 @@ def _not_said(w: Writer) -> list[Text]:
         said.append(t("cannot_crossings"))
     elif answers.at("crosslines.at_crosslines") is None:
         said.append(t("cannot_crosslines"))
-    said += [t("cannot_positions"), t("cannot_calibration")]
+    adjusted = w.answers.at("adjustment.applied")
+    said += [t("cannot_adjusted" if adjusted else "cannot_positions"), t("cannot_calibration")]
     if answers.at("imports"):
         said.append(t("cannot_imports"))
     return said
@@ -740,7 +775,6 @@ SECTIONS: Mapping[str, Callable[[Writer], list[Block]]] = {
     "holidays": _holidays,
     "uncertainty": _uncertainty,
     "crosslines": _crosslines,
-    # An adjustment for drift comes here, with ``adjustment_none`` in the corrections and ``cannot_positions`` below.
     "s44": _s44,
     "rejected": _rejected,
     "incidents": _incidents,
