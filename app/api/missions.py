@@ -14,7 +14,7 @@ from app.api.schemas import API, ActionRequest, EndRequest, NoteRequest, Vehicle
 from app.api.state import Service, State
 from app.missions.operations import history
 from app.missions.preflight.survey import preflight
-from app.missions.running.homecoming import call_home
+from app.missions.running.homecoming import call_home, hold
 from app.missions.running.mission_views import action_view, mission_view
 from app.missions.spec.mission import MissionSpec, VehicleSpec
 from app.missions.states import Action
@@ -245,6 +245,18 @@ async def abort_vehicle(name: VehicleName, service: Service, operator: Operator,
 async def return_vehicle(name: VehicleName, operator: Operator, mission: Mission) -> MissionView:
     """Send a vehicle to its recovery point, for a new battery or for good; the others go on with its part."""
     await call_home(mission, name, operator.name)
+    return mission_view(mission)
+
+
+@router.post(
+    "/{mission_id}/vehicles/{name}/hold",
+    operation_id="holdVehicle",
+    summary="Keep one vehicle where it is",
+    **_OF_A_VEHICLE,
+)
+async def hold_vehicle(name: VehicleName, operator: Operator, mission: Mission) -> MissionView:
+    """Let a vehicle wait where it is until it is resumed, goes home or its energy asks for that; the others go on."""
+    await hold(mission, name, operator.name)
     return mission_view(mission)
 
 

@@ -65,21 +65,26 @@ class Withdrawal:
         Whether it has come to where that leads: home, up, stopped.
     led
         Whether it was sent on its way in this run.
+    asked
+        Whether a person wanted it: then only a person ends it.
     """
 
     response: Response
     why: str
     over: bool = False
     led: bool = False
+    asked: bool = False
 
     def remember(self) -> dict[str, Any]:
         """Return what is stored, so that a restart goes on with it."""
-        return {"response": self.response, "why": self.why, "over": self.over}
+        return {"response": self.response, "why": self.why, "over": self.over, "asked": self.asked}
 
     @classmethod
     def recall(cls, stored: dict[str, Any] | None) -> "Withdrawal | None":
         """Return what was stored."""
-        return None if not stored else cls(Response(stored["response"]), stored["why"], stored["over"])
+        if not stored:
+            return None
+        return cls(Response(stored["response"]), stored["why"], stored["over"], asked=stored.get("asked", False))
 
 
 @dataclass

@@ -1,6 +1,7 @@
 """Every way out of a mission with a recovery point leads home."""
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -8,10 +9,11 @@ import pytest
 from app.missions.errors import ConflictError
 from app.missions.flown import Phase
 from app.missions.operations.history import events_after
-from app.missions.running.homecoming import call_home
+from app.missions.running.homecoming import call_home, hold
 from app.missions.service import MissionService
 from app.missions.spec.mission import MissionSpec
 from app.missions.states import Action, MissionState
+from app.missions.team import Withdrawal
 from app.missions.views.mission import MissionView, VehicleView
 from tests.support.missions.harbour import Harbour, act, sim_spec, until_state, until_step, view_of
 from tests.support.missions.specs import FRAME, lon_lat, rectangle
@@ -130,6 +132,39 @@ async def test_a_vehicle_goes_home_for_a_battery_and_comes_back(service: Mission
     await service.send_on(live, "a", "Ana")
     await until(lambda: live.team.members["a"].legs > before + 2, "a surveys again")
     assert await phase_of(service, mission, "a") in (Phase.SURVEY, Phase.TRANSIT)
+    await act(service, mission.id, "abort")
+
+
+async def test_a_vehicle_that_is_held_waits_until_it_is_sent_on_and_the_last_one_is_not_held(
+    service: MissionService,
+) -> None:
+    mission = await service.create(recovered("a", "b", point=OUTSIDE, steps=1000))
+    await act(service, mission.id, "start")
+    await until_step(service, mission.id, 2)
+    live = await service.get(mission.id)
+    a, b = live.team.members["a"], live.team.members["b"]
+    await hold(live, "a", "Ana")
+    with pytest.raises(ConflictError, match="held by Ana"):
+        await hold(live, "a", "Ana")
+    with pytest.raises(ConflictError, match="nobody but 'b' surveys"):
+        await hold(live, "b", "Ana")
+    await until(lambda: a.withdrawal is not None and a.withdrawal.led and not a.ordered, "a is held")
+    before, other = a.legs, b.legs
+    await until(lambda: b.legs > other + 3, "b goes on meanwhile")
+    assert a.legs == before
+    assert await phase_of(service, mission, "a") is Phase.STOPPED
+    # What is stored lets a restart go on with it.
+    assert a.withdrawal is not None
+    assert Withdrawal.recall(a.withdrawal.remember()) == replace(a.withdrawal, led=False)
+    await service.send_on(live, "a", "Ana")
+    await until(lambda: a.legs > before + 2, "a surveys again")
+    await hold(live, "b", "Ana")
+    await call_home(live, "b", "Ana")
+
+    async def is_home() -> bool:
+        return await phase_of(service, mission, "b") is Phase.HOME
+
+    await until(is_home, "b is home, though it was held")
     await act(service, mission.id, "abort")
 
 

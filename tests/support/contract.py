@@ -70,6 +70,7 @@ CONTRACT = {
     "DELETE /missions/{mission_id}": "deleteMission",
     "POST /missions/{mission_id}/vehicles/{name}/rejoin": "rejoinVehicle",
     "POST /missions/{mission_id}/vehicles/{name}/return": "returnVehicle",
+    "POST /missions/{mission_id}/vehicles/{name}/hold": "holdVehicle",
     "POST /missions/{mission_id}/vehicles/{name}/resume": "resumeVehicle",
     "GET /planners": "listPlanners",
     "GET /layers": "listLayers",

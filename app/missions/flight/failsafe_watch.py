@@ -93,7 +93,8 @@ class FailsafeWatch:
 
     def _act(self, member: Member, found: list[Active]) -> None:
         strongest = next(iter(found), None)
-        held = member.withdrawal is not None and member.withdrawal.response is Response.HOLD
+        withdrawal = member.withdrawal
+        held = withdrawal is not None and withdrawal.response is Response.HOLD and not withdrawal.asked
         if strongest is not None and strongest.response is not Response.WARN:
             self._live.withdraw(member, strongest.response, strongest.message)
         elif held:

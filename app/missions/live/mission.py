@@ -400,15 +400,15 @@ class LiveMission:
         endurance_s = None if vehicle.endurance_min is None else 60.0 * vehicle.endurance_min
         return Energy(self.spec.speed_of(vehicle), endurance_s)
 
-    def withdraw(self, member: Member, response: Response, why: str) -> bool:
+    def withdraw(self, member: Member, response: Response, why: str, *, asked: bool = False) -> bool:
         """Take a vehicle out of the survey, unless it left that for something as strong; whether it does so now.
 
-        The flight sends it where the response leads.
+        The flight sends it where the response leads. ``asked``: a person wants it.
         """
         before = member.withdrawal
         if before is not None and (STRENGTH[before.response] >= STRENGTH[response] or before.over):
             return False
-        member.withdrawal = Withdrawal(response, why)
+        member.withdrawal = Withdrawal(response, why, asked=asked)
         member.pursuing = None
         self.changed.set()
         return True

@@ -43,6 +43,18 @@ async def call_home(live: LiveMission, name: str, actor: str) -> None:
     live.publish_summary()
 
 
+async def hold(live: LiveMission, name: str, actor: str) -> None:
+    """Keep one vehicle where it is until it is sent on. Raises VehicleNotFoundError, ConflictError."""
+    member = _member(live, name)
+    if live.header.state is not MissionState.RUNNING or live.ending is not None:
+        raise ConflictError(f"the mission is {_what(live)}: nobody is held", "see to the mission first")
+    if member.withdrawal is None and live.team.surveying == [member]:
+        raise ConflictError(f"nobody but {name!r} surveys", "pause the mission: that holds it, too")
+    if not live.withdraw(member, Response.HOLD, f"held by {actor}", asked=True):
+        raise ConflictError(f"vehicle {name!r} surveys no more: {_why(member)}", "send it on first")
+    live.publish_summary()
+
+
 async def send_on(live: LiveMission, supervisor: MissionSupervisor, name: str, actor: str) -> None:
     """Let a vehicle survey again that went home or was stopped. Raises VehicleNotFoundError, ConflictError."""
     member = _member(live, name)
@@ -72,6 +84,10 @@ def _member(live: LiveMission, name: str) -> Member:
         present = ", ".join(m.name for m in live.team) or "none"
         raise VehicleNotFoundError(f"vehicle {name!r} takes no part in this mission", f"those that do: {present}")
     return member
+
+
+def _what(live: LiveMission) -> str:
+    return str(live.header.state) if live.ending is None else "ending"
 
 
 def _why(member: Member) -> str:

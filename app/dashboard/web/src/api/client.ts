@@ -154,6 +154,7 @@ export const api = {
   abortVehicle: (id: string, name: string) => post<ActionView>(`${vehiclePath(id, name)}/abort`),
   rejoin: (id: string, name: string) => post<MissionView>(`${vehiclePath(id, name)}/rejoin`),
   returnVehicle: (id: string, name: string) => post<MissionView>(`${vehiclePath(id, name)}/return`),
+  holdVehicle: (id: string, name: string) => post<MissionView>(`${vehiclePath(id, name)}/hold`),
   resumeVehicle: (id: string, name: string) => post<MissionView>(`${vehiclePath(id, name)}/resume`),
   soundings: (id: string, after: number, state?: SoundingState) =>
     request<SoundingPage>(

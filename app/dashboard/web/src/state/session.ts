@@ -323,6 +323,12 @@ export async function returnVehicle(name: string): Promise<void> {
   if (id) await send(`return of ${name}`, api.returnVehicle(id, name));
 }
 
+/** Lets a vehicle wait where it is. */
+export async function holdVehicle(name: string): Promise<void> {
+  const id = selectedId.value;
+  if (id) await send(`holding ${name}`, api.holdVehicle(id, name));
+}
+
 /** Lets a vehicle survey again that went home or was stopped. */
 export async function resumeVehicle(name: string): Promise<void> {
   const id = selectedId.value;

@@ -3,7 +3,7 @@ import type { VehicleView } from "../api/types";
 import { age, clock, distance, metres, percent } from "../state/format";
 import { localizationWords } from "../state/localization";
 import { replayed } from "../state/replay";
-import { rejoin, resumeVehicle, returnVehicle } from "../state/session";
+import { holdVehicle, rejoin, resumeVehicle, returnVehicle } from "../state/session";
 import {
   abortDialogOpen,
   abortOne,
@@ -226,6 +226,7 @@ function Orders({ of: v, ended }: { of: VehicleView; ended: boolean }) {
   const again = ended && unstopped.value.has(v.name);
   if (!present || (ended && !again)) return null;
   const led = present.state === "running" && present.ending === null;
+  const others = present.vehicles.some((one) => one.name !== v.name && one.withdrawn === "");
   return (
     <div class="orders">
       {led && v.recovery_point !== null && v.withdrawn === "" ? (
@@ -236,6 +237,16 @@ function Orders({ of: v, ended }: { of: VehicleView; ended: boolean }) {
           onClick={() => void returnVehicle(v.name)}
         >
           Return
+        </Button>
+      ) : null}
+      {led && v.withdrawn === "" && others ? (
+        <Button
+          id={`hold-${v.name}`}
+          commands
+          title="Let it wait where it is until it is resumed; the others go on"
+          onClick={() => void holdVehicle(v.name)}
+        >
+          Hold
         </Button>
       ) : null}
       {led && isThere(v) ? (
