@@ -9,12 +9,12 @@ import asyncio
 import json
 import logging
 import math
+import statistics
 import tempfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import numpy as np
 import typer
 
 if TYPE_CHECKING:
@@ -33,6 +33,8 @@ JOINER = "late"
 
 def drawn(seed: int, *, still: bool) -> "tuple[MissionSpec, SimulationSettings, VehicleSpec | None]":
     """Return a mission, the sea that it is flown in, and who joins it later."""
+    import numpy as np
+
     from app.mapping.georeference import LocalFrame
     from app.missions.settings import SimulationSettings
     from app.missions.spec.mission import MissionSpec, VehicleSpec
@@ -169,7 +171,7 @@ def summary(missions: Sequence[dict[str, Any]]) -> dict[str, Any]:
         "home_pct": round(100.0 * len(home) / len(vehicles), 2),
         "worst_m": max((v["from_point_m"] for v in vehicles if v["from_point_m"] is not None), default=None),
         "least_energy_pct": min((v["energy_left_pct"] or 0.0 for v in vehicles), default=None),
-        "survey_share_pct": round(float(np.median(shares)), 1) if shares else None,
+        "survey_share_pct": round(statistics.median(shares), 1) if shares else None,
         "least_survey_share_pct": min(shares, default=None),
         "zones_entered": sum(mission["zones_entered"] for mission in missions),
         "too_close": sum(mission["too_close"] for mission in missions),
