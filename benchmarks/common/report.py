@@ -64,6 +64,19 @@ and aperture detects the bottom. Beams are evenly spaced on a flat bottom, and t
 The floors called *own*, and seeds 0 and 1 of the *unseen* ones, were looked at while the planner was made.
 """,
 )
+ADJUSTMENT = Page(
+    "adjustment.md",
+    """# Adjusted tracks: what was measured
+
+Every section is written by the command that stands in it (`--write`). Two simulated vehicles, 3 m above the bottom,
+survey the floor on lines and crosslines (swath sonars of 120 degrees with 40 % overlap, or single beams on lines 5 m
+apart), with a GPS fix of 0.3 m at both ends of the dive. Their positions drift until then: a rate that changes
+slowly, a random walk, and a wrong heading. The simulated drift is of the same kind as the one that the adjustment
+assumes. Figures are after over before, where before is by reckoned positions: fixes alone make part of it. The *own*
+floors monterey_canyon, fortbragg_gully, fortbragg_plateau, jd211_pit and leixoes_sharp_diagonal were looked at while
+the adjustment was made, and a generated flat one that is not listed.
+""",
+)
 PLANNING = Page(
     "planning.md",
     """# Planners: what was measured
