@@ -74,8 +74,7 @@ async def get_tile_json(
     kind = _kind(layer)
     spec = await service.spec(mission_id)
     range_ = _range(kind, spec, min, max)
-    lon, lat = zip(*spec.area.ring, strict=True)
-    west, south, east, north = _least(lon), _least(lat), _most(lon), _most(lat)
+    west, south, east, north = _bounds(spec)
     maxzoom = finest_zoom(spec.cell_m, (south + north) / 2)
     query = "" if min is None and max is None else f"?min={range_[0]!r}&max={range_[1]!r}"
     return TileJson(
@@ -85,7 +84,7 @@ async def get_tile_json(
         minzoom=0,
         maxzoom=maxzoom,
         bounds=[west, south, east, north],
-        center=[(west + east) / 2, (south + north) / 2, _most((maxzoom - 3, 0))],
+        center=[(west + east) / 2, (south + north) / 2, _first_zoom(maxzoom)],
         layer=layer,
         unit=kind.unit,
         range=list(range_),
@@ -182,6 +181,17 @@ async def _answer(
     return Response(picture.content, media_type="image/png", headers=headers)
 
 
+def _bounds(spec: MissionSpec) -> tuple[float, float, float, float]:
+    """Return the area's west, south, east and north, degrees."""
+    lon, lat = zip(*spec.area.ring, strict=True)
+    return min(lon), min(lat), max(lon), max(lat)
+
+
+def _first_zoom(finest: int) -> int:
+    """Return the zoom that programs may begin with, where a layer has tiles up to the finest."""
+    return max(finest - 3, 0)
+
+
 def _tile(z: int, x: int, y: int) -> WebTile:
     """Return a tile. Raises ProblemError where there is none."""
     try:
@@ -215,6 +225,3 @@ def _range(kind: WebLayer, spec: MissionSpec, low: float | None, high: float | N
             "invalid-request", f"max is {found[1]:g} but min is {found[0]:g}", remedy="Give a max above min"
         )
     return found
-
-
-_least, _most = min, max

@@ -8,6 +8,7 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
+from sqlalchemy import select
 
 from app.missions.errors import InvalidRequestError
 from app.missions.live.mission import LiveMission
@@ -17,6 +18,7 @@ from app.missions.settings import ServiceSettings
 from app.missions.spec.mission import MissionSpec, Tide
 from app.missions.states import ENDED, MissionState
 from app.missions.views.mission import CheckStatus
+from app.storage.models import TelemetryRow
 from tests.support.missions.harbour import Harbour, act, until_state, view_of
 from tests.support.missions.pings import ping
 from tests.support.missions.specs import spec_json
@@ -152,6 +154,24 @@ async def test_pings_are_placed_anew_when_the_tide_is_known(harbour: Harbour) ->
     assert seen.any()
     assert np.array_equal(seen, np.isfinite(after.map.depth_m))
     assert np.allclose((before - after.map.depth_m)[seen], 1.5)
+
+
+async def test_vehicles_keep_a_height_above_a_bottom_that_falls_away(harbour_closed: Harbour) -> None:
+    harbour = harbour_closed
+    await harbour.open(simulation={"family": "slope", "seed": 2}, time_scale=30.0)
+    vehicle = {"name": "a", "kind": "sim", "sensor": "multibeam", "sonar": SONAR, "depth_m": 1.0, "altitude_m": 4.0}
+    live = await started(harbour, vehicles=[vehicle])
+    await until_state(harbour.service, live.id, MissionState.FINISHED)
+    built, progress = await live.build_map(), live.progress()
+    assert built is not None
+    assert progress.ensonified_pct is not None
+    assert progress.ensonified_pct > 99.0
+    async with harbour.database.reading() as session:
+        samples = (await session.scalars(select(TelemetryRow).where(TelemetryRow.mission_id == live.id))).all()
+    heights = np.array([sample.altitude_m for sample in samples if sample.altitude_m is not None])
+    depths = np.array([sample.depth_m for sample in samples if sample.depth_m is not None])
+    assert heights.min() > 3.5, "it keeps its height"
+    assert depths.max() > 4.0, "it goes down with the bottom, beyond its depth"
 
 
 async def test_it_is_said_what_the_planner_needs(harbour: Harbour) -> None:

@@ -4,8 +4,7 @@ A further section is a function that returns its blocks, none where there is not
 ``SECTIONS``; its title is the text ``section_`` and its name.
 """
 
-import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -15,7 +14,7 @@ from app.mapping.products.colours import depth_range
 from app.mapping.products.contours import usual_interval_m
 from app.mapping.products.hillshade import exaggeration, hillshade
 from app.mapping.products.sheet import Sheet, sheet_png
-from app.missions.report.answers import Answers, as_value
+from app.missions.report.answers import Answers
 from app.missions.report.charts import by_angle, histogram, overview
 from app.missions.report.document import (
     Block,
@@ -30,7 +29,9 @@ from app.missions.report.document import (
     Table,
     Text,
 )
+from app.missions.report.listing import listing
 from app.missions.report.texts import NONE, Texts
+from app.missions.report.writer import Writer
 from app.missions.states import ENDED
 from imc_bridge.printable import printable
 
@@ -49,60 +50,6 @@ MOST_HOLIDAYS, MOST_INCIDENTS, MOST_LINES, MOST_OUTLIERS, MOST_PAIRS, MOST_REASO
 
 LEAST_COUNTED = 5.0
 """Colours of numbers of soundings reach at least so far."""
-
-LISTED_WIDTH = 100
-"""Characters of a line of the listing."""
-
-
-class Writer:
-    """Puts values of answers into words.
-
-    Parameters
-    ----------
-    answers
-    texts
-        Words and numbers of the report's language.
-    """
-
-    def __init__(self, answers: Answers, texts: Texts) -> None:
-        self.answers = answers
-        self.t = texts
-
-    def number(self, source: str, decimals: int = 0, unit: str = "", *, signed: bool = False) -> Shown:
-        """Return the number at a place of an answer."""
-        value = self.answers.at(source)
-        return Shown(self.t.number(value, decimals, unit, signed=signed), source, as_value(value))
-
-    def moment(self, source: str) -> Shown:
-        """Return the time at a place of an answer."""
-        value = self.answers.at(source)
-        return Shown(self.t.moment(value), source, as_value(value))
-
-    def string(self, source: str, *, mono: bool = False) -> Shown:
-        """Return the text at a place of an answer, fit to be shown."""
-        value = self.answers.at(source)
-        return Shown(printable(str(value or "")).strip() or NONE, source, as_value(value), mono)
-
-    def word(self, group: str, source: str) -> Shown:
-        """Return the word for the value of an enumeration at a place of an answer."""
-        value = self.answers.at(source)
-        return Shown(NONE if value is None else self.t.of(group, value), source, as_value(value))
-
-    def left_off(self, shown: int, of: int, name: str = "") -> str:
-        """Return what is said where a table has no place for all rows; ``name`` is the file that has them."""
-        if of <= shown:
-            return ""
-        count = self.t.number(of - shown)
-        return self.t("left_off_file", count=count, file=name) if name else self.t("left_off", count=count)
-
-    def order(self, name: str) -> str:
-        """Return the name of an order of S-44."""
-        return self.t(f"order_{name}")
-
-    @property
-    def is_swath(self) -> bool:
-        """Whether swath sonars measured."""
-        return self.answers.at("mission.progress.ensonified_pct") is not None
 
 
 def _purpose(w: Writer) -> list[Block]:
@@ -731,37 +678,6 @@ def _repeat(w: Writer) -> list[Block]:
         Paragraph(t("repeat_words")),
         Listing(listing(w.answers.at("mission.spec"))),
     ]
-
-
-def listing(value: Any, indent: str = "") -> str:
-    """Return JSON with a line for each field; lists of numbers flow."""
-    deeper = indent + "  "
-    if isinstance(value, Mapping) and value:
-        fields = (f"{deeper}{_flat(name)}: {listing(inner, deeper)}" for name, inner in value.items())
-        return "{\n" + ",\n".join(fields) + f"\n{indent}}}"
-    if isinstance(value, Sequence) and not isinstance(value, str) and value:
-        if any(isinstance(entry, Mapping) for entry in value):
-            return "[\n" + ",\n".join(deeper + listing(entry, deeper) for entry in value) + f"\n{indent}]"
-        flat = _flat(value)
-        return flat if '"' in flat else _wrapped(flat, deeper)
-    return _flat(value)
-
-
-def _flat(value: Any) -> str:
-    """Return JSON in one line; letters of other languages stay unless some character is not fit to be shown."""
-    text = json.dumps(value, ensure_ascii=False)
-    return text if printable(text) == text else json.dumps(value)
-
-
-def _wrapped(text: str, indent: str) -> str:
-    """Return flat JSON without texts in lines that are not too long."""
-    words, lines = text.split(", "), [""]
-    for number, word in enumerate(words):
-        piece = word + (", " if number < len(words) - 1 else "")
-        if lines[-1] and len(indent) + len(lines[-1]) + len(piece) > LISTED_WIDTH:
-            lines.append("")
-        lines[-1] += piece
-    return f"\n{indent}".join(line.rstrip() if index < len(lines) - 1 else line for index, line in enumerate(lines))
 
 
 SECTIONS: Mapping[str, Callable[[Writer], list[Block]]] = {

@@ -151,6 +151,8 @@ def test_a_key_in_the_address_is_for_looking_only(gis: Gis, caplog: pytest.LogCa
 
         assert bare.get(f"{gis.url}/ogc").status_code == httpx.codes.UNAUTHORIZED
         assert bare.get(f"{gis.url}{tiles}.json").status_code == httpx.codes.UNAUTHORIZED
+        for opening in ("", f"/key/{gis.key[:-1]}_"):
+            assert bare.get(f"{gis.url}{opening}{tiles}/0/0/0.png").status_code == httpx.codes.UNAUTHORIZED
         wrong = bare.get(f"{gis.url}/key/{gis.key[:-1]}_/ogc")
         assert wrong.status_code == httpx.codes.UNAUTHORIZED
         too_much = bare.get(f"{gis.url}/key/{gis.operator}/ogc")

@@ -21,6 +21,7 @@ from app.missions.report import sections
 from app.missions.report.answers import Incident
 from app.missions.report.charts import ticks
 from app.missions.report.kinds import REPORTS
+from app.missions.report.listing import listing
 from app.missions.report.page import html
 from app.missions.report.print import pdf
 from app.missions.report.texts import Language, Texts
@@ -126,7 +127,7 @@ async def test_a_mission_under_way_has_a_report_of_what_is_known(harbour: Harbou
     )
 )
 def test_a_listing_is_the_json_that_it_lists(value: object) -> None:
-    assert json.loads(sections.listing(value)) == value
+    assert json.loads(listing(value)) == value
 
 
 @given(st.floats(-1e5, 1e5), st.floats(1e-3, 1e5), st.integers(2, 9))
