@@ -71,6 +71,19 @@ def test_vehicles_on_their_way_home_are_stopped(
     expect(by_id(page, "stop-now")).to_be_hidden()
 
 
+def test_a_vehicle_is_held_and_resumed(page: Page, service: Service) -> None:
+    under_way(page, service, "One waits", NEAR)
+    by_id(page, "hold-sim-1").click()
+    expect(page.get_by_text("held by local operator")).to_be_visible()
+    expect(by_id(page, "state-sim-1")).to_contain_text("Stopped")
+    expect(by_id(page, "hold-sim-1")).to_have_count(0)
+    # The last one that surveys is not held: the mission is paused for that.
+    expect(by_id(page, "hold-sim-2")).to_have_count(0)
+    by_id(page, "resume-sim-1").click()
+    expect(by_id(page, "hold-sim-1")).to_be_visible()
+    expect(by_id(page, "hold-sim-2")).to_be_visible()
+
+
 def test_one_vehicle_goes_home_and_surveys_again(page: Page, service: Service) -> None:
     under_way(page, service, "One goes home", NEAR, vehicles=[PAIR[0], PAIR[1] | {"endurance_min": 90.0}])
     words = r"min.left · way.home.takes.+turn.back.at.\d\d:\d\d.UTC"
