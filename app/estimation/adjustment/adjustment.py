@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import SuperLU, splu
+from scipy.stats import t as student_t
 
 from app.arrays import BoolArray, FloatArray, IntArray
 from app.estimation.adjustment.drift import DriftModel, Nodes, prior_rows
@@ -16,8 +17,8 @@ ROUNDS, LAST_ROUNDS = 4, 2
 HELD_OUT_EACH = 4
 """Of so many sections one is left out of the first adjustment, which has to make it fit better all the same."""
 
-SIGNIFICANT = 2.0
-"""So many standard errors the held-out sections have to fit better on the mean."""
+BY_CHANCE = 0.01
+"""Held-out sections have to fit better by so much that this is how probable it is by chance at most (Student's t)."""
 
 WORTHWHILE = 0.92
 """So much of their RMS by fixes alone they may have left at most."""
@@ -85,7 +86,8 @@ class HeldOut:
     @property
     def speaks_for_ties(self) -> bool:
         """Whether ties made them fit better, by more than chance and by enough to matter."""
-        return self.significance >= SIGNIFICANT and self.after_m <= WORTHWHILE * self.by_fixes_m
+        needed = float(student_t.isf(BY_CHANCE, self.sections - 1))
+        return self.significance >= needed and self.after_m <= WORTHWHILE * self.by_fixes_m
 
 
 @dataclass(frozen=True)
