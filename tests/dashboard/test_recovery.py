@@ -74,7 +74,7 @@ def test_vehicles_on_their_way_home_are_stopped(
 def test_a_vehicle_is_held_and_resumed(page: Page, service: Service) -> None:
     under_way(page, service, "One waits", NEAR)
     by_id(page, "hold-sim-1").click()
-    expect(page.get_by_text("held by local operator")).to_be_visible()
+    expect(by_id(page, "withdrawn-sim-1")).to_contain_text("held by local operator")
     expect(by_id(page, "state-sim-1")).to_contain_text("Stopped")
     expect(by_id(page, "hold-sim-1")).to_have_count(0)
     # The last one that surveys is not held: the mission is paused for that.
