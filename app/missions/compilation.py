@@ -40,7 +40,7 @@ class Compilation:
     def begin(self) -> None:
         """Begin to compile what nearly every mission needs."""
         # One after the other: the compiler does one function at a time, and planners come first.
-        self._planner(PlannerSpec().name, SingleBeam()).add_done_callback(lambda _: self._begin_maps())
+        self._planner(PlannerSpec().name, SingleBeam()).add_done_callback(self._begin_maps)
 
     async def planner(self, name: str, sensor: Sensor) -> None:
         """Return when a planner is compiled for a sensor."""
@@ -62,17 +62,22 @@ class Compilation:
             self._planners[name, sensor] = begun
         return self._planners[name, sensor]
 
-    def _begin_maps(self) -> None:
+    def _begin_maps(self, planner: Future[None]) -> None:
+        if planner.cancelled():  # by the executor's end, which holds the lock that submitting takes
+            self._maps.cancel()
+            return
         try:
             begun = self._executor.submit(_warm_up_later)
         except RuntimeError:  # the service ends
             self._maps.cancel()
             return
         begun.add_done_callback(_log_failure)
-        begun.add_done_callback(lambda _: self._begin_checks())
+        begun.add_done_callback(self._begin_checks)
 
-    def _begin_checks(self) -> None:
+    def _begin_checks(self, maps: Future[None]) -> None:
         self._maps.set_result(None)
+        if maps.cancelled():
+            return
         with suppress(RuntimeError):  # the service ends
             self._executor.submit(warm_up_crossings).add_done_callback(_log_failure)
             self._executor.submit(warm_up_adjustment).add_done_callback(_log_failure)

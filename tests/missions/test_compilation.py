@@ -3,10 +3,12 @@
 import subprocess
 import sys
 import threading
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
 from app.missions import compilation
+from app.missions.compilation import Compilation
 from tests.support.missions.harbour import Harbour, act, sim_spec, until_step
 
 COMPILED = """
@@ -63,3 +65,22 @@ async def test_the_first_waypoint_does_not_wait_for_what_maps_need(
         assert not compiled.is_set()
     finally:
         compiled.set()
+
+
+def test_an_executor_that_ends_while_compiling_waits_ends() -> None:
+    executor, begun, let_go = ThreadPoolExecutor(max_workers=1), threading.Event(), threading.Event()
+
+    def busy() -> None:
+        begun.set()
+        let_go.wait()
+
+    executor.submit(busy)
+    begun.wait()
+    compilation = Compilation(executor)
+    compilation.begin()
+    ended = threading.Thread(target=lambda: executor.shutdown(wait=False, cancel_futures=True), daemon=True)
+    ended.start()
+    ended.join(timeout=30.0)
+    let_go.set()
+    assert not ended.is_alive()
+    assert compilation.done
