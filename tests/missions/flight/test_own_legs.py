@@ -178,14 +178,14 @@ async def test_a_vehicle_that_comes_back_while_its_leg_is_written_gets_numbers_o
             await service.team_changes.rejoin(live, "a", actor="Ana")
 
     monkeypatch.setattr(LegCommit, "_store", stored_while_it_leaves)
-    mission = (await service.create(sim_spec(steps=5, side_m=60.0, **APART))).id
+    mission = (await service.create(sim_spec(steps=15, side_m=60.0, **APART))).id
     await act(service, mission, "start")
     await until_state(service, mission, MissionState.FINISHED)
     async with database.reading() as session:
         rows = (await session.scalars(select(WaypointRow))).all()
     assert gone
-    assert sorted(row.step for row in rows if row.vehicle == "b") == [1, 2, 3, 4, 5]
-    assert max(row.step for row in rows if row.vehicle == "a") == 5
+    assert sorted(row.step for row in rows if row.vehicle == "b") == list(range(1, 16))
+    assert max(row.step for row in rows if row.vehicle == "a") == 15
 
 
 async def test_a_fast_vehicle_flies_more_legs_in_the_same_minutes(harbour_closed: Harbour) -> None:
