@@ -1,8 +1,8 @@
 """What missions compute with is compiled before they need it, or loaded from the cache of an earlier start."""
 
 import asyncio
+from collections.abc import Callable
 from concurrent.futures import Executor, Future
-from contextlib import suppress
 
 import structlog
 
@@ -63,24 +63,30 @@ class Compilation:
         return self._planners[name, sensor]
 
     def _begin_maps(self, planner: Future[None]) -> None:
-        if planner.cancelled():  # by the executor's end, which holds the lock that submitting takes
+        begun = self._submit_after(planner, _warm_up_later)
+        if begun is None:
             self._maps.cancel()
-            return
-        try:
-            begun = self._executor.submit(_warm_up_later)
-        except RuntimeError:  # the service ends
-            self._maps.cancel()
-            return
-        begun.add_done_callback(_log_failure)
-        begun.add_done_callback(self._begin_checks)
+        else:
+            begun.add_done_callback(self._begin_checks)
 
     def _begin_checks(self, maps: Future[None]) -> None:
-        self._maps.set_result(None)
         if maps.cancelled():
-            return
-        with suppress(RuntimeError):  # the service ends
-            self._executor.submit(warm_up_crossings).add_done_callback(_log_failure)
-            self._executor.submit(warm_up_adjustment).add_done_callback(_log_failure)
+            self._maps.cancel()
+        else:
+            self._maps.set_result(None)
+        for work in (warm_up_crossings, warm_up_adjustment):
+            self._submit_after(maps, work)
+
+    def _submit_after(self, before: Future[None], work: Callable[[], None]) -> Future[None] | None:
+        """Submit what comes after another; None where the service ends."""
+        if before.cancelled():  # by the executor's shutdown, which holds the lock that submitting waits for
+            return None
+        try:
+            begun = self._executor.submit(work)
+        except RuntimeError:
+            return None
+        begun.add_done_callback(_log_failure)
+        return begun
 
 
 def _warm_up_later() -> None:

@@ -8,7 +8,6 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 
 from app.missions import compilation
-from app.missions.compilation import Compilation
 from tests.support.missions.harbour import Harbour, act, sim_spec, until_step
 
 COMPILED = """
@@ -67,20 +66,28 @@ async def test_the_first_waypoint_does_not_wait_for_what_maps_need(
         compiled.set()
 
 
-def test_an_executor_that_ends_while_compiling_waits_ends() -> None:
-    executor, begun, let_go = ThreadPoolExecutor(max_workers=1), threading.Event(), threading.Event()
+@pytest.mark.parametrize("waiting", ["planner", "maps"])
+def test_an_executor_that_ends_cancels_what_waits_to_be_compiled(waiting: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    executor, busy, let_go = ThreadPoolExecutor(max_workers=1), threading.Event(), threading.Event()
 
-    def busy() -> None:
-        begun.set()
+    def block() -> None:
+        busy.set()
         let_go.wait()
 
-    executor.submit(busy)
-    begun.wait()
-    compilation = Compilation(executor)
-    compilation.begin()
-    ended = threading.Thread(target=lambda: executor.shutdown(wait=False, cancel_futures=True), daemon=True)
-    ended.start()
-    ended.join(timeout=30.0)
+    def compile_planner(*_: object) -> None:
+        executor.submit(block)  # ahead of the maps, which are submitted when this has ended
+
+    monkeypatch.setattr(compilation, "_warm_up", compile_planner)
+    if waiting == "planner":
+        executor.submit(block)
+        busy.wait()
+    compiling = compilation.Compilation(executor)
+    compiling.begin()
+    busy.wait()
+    # A deadlock would keep the interpreter from ending, but for a daemon.
+    end = threading.Thread(target=executor.shutdown, kwargs={"wait": False, "cancel_futures": True}, daemon=True)
+    end.start()
+    end.join(timeout=10.0)
     let_go.set()
-    assert not ended.is_alive()
-    assert compilation.done
+    assert not end.is_alive()
+    assert compiling.done
