@@ -1,5 +1,7 @@
 """What takes long says so, and keeps nothing else from being done."""
 
+from pathlib import Path
+
 import pytest
 from playwright.sync_api import Page, Route, expect
 
@@ -9,14 +11,33 @@ from tests.support.dashboard.steps import by_id, show
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(600)]
 
 
-def test_the_page_says_that_vehicles_wait_for_a_decision(page: Page, service: Service) -> None:
-    thorough = {"name": "cao", "options": {"search": 100_000}}
-    mission = service.create(name="Thinking", steps=40, planner=thorough)
-    service.act(mission, "start")
-    show(page, mission)
-    expect(by_id(page, "deciding")).to_contain_text("vehicles wait at their waypoints")
-    service.act(mission, "abort")
-    expect(by_id(page, "deciding")).to_be_hidden()
+SLOW_DECISIONS = """
+import time
+from app.missions.flight import deciding
+
+decide = deciding.decide
+
+def decide_late(*arguments):
+    time.sleep(8)
+    return decide(*arguments)
+
+deciding.decide = decide_late
+"""
+"""Every decision takes longer than the leg that it is about."""
+
+
+def test_the_page_says_that_vehicles_wait_for_a_decision(page: Page, built: None, tmp_path: Path) -> None:
+    service = Service(tmp_path, before=SLOW_DECISIONS)
+    service.start()
+    try:
+        mission = service.create(name="Thinking", steps=40)
+        service.act(mission, "start")
+        page.goto(f"{service.url}/#/missions/{mission}")
+        expect(by_id(page, "deciding")).to_contain_text("vehicles wait at their waypoints")
+        service.act(mission, "abort")
+        expect(by_id(page, "deciding")).to_be_hidden()
+    finally:
+        service.kill()
 
 
 def test_one_file_that_is_being_made_keeps_no_other_from_being_fetched(page: Page, service: Service) -> None:

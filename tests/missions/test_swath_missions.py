@@ -158,7 +158,7 @@ async def test_pings_are_placed_anew_when_the_tide_is_known(harbour: Harbour) ->
 
 async def test_vehicles_keep_a_height_above_a_bottom_that_falls_away(harbour_closed: Harbour) -> None:
     harbour = harbour_closed
-    await harbour.open(simulation={"family": "slope", "seed": 2}, time_scale=30.0)
+    await harbour.open(simulation={"family": "slope", "seed": 2}, time_scale=10.0)
     vehicle = {"name": "a", "kind": "sim", "sensor": "multibeam", "sonar": SONAR, "depth_m": 1.0, "altitude_m": 4.0}
     live = await started(harbour, vehicles=[vehicle])
     await until_state(harbour.service, live.id, MissionState.FINISHED)
