@@ -15,11 +15,13 @@ from app.api.limits import RequestLimits, host_of, network_of
 from app.api.metrics import LIVE_VIEWERS
 from app.api.problems import ProblemError
 from app.api.processes import PeerClients
-from app.api.quotas import Holder, Shares, holder_of
+from app.api.quotas import Shares, holder_of
 from app.api.sessions import SessionStore
 from app.api.tokens import TokenStore
 from app.missions.service import MissionService
 from app.settings import Settings
+
+REPLAYS_AT_ONCE = 2
 
 
 @dataclass
@@ -32,6 +34,9 @@ class EdgeState:
         Set when the process was asked to end: streams and long polls finish then instead of holding it up.
     run_id
         Differs between runs of the process, whose map versions all begin at 1.
+    replays
+        Pages of old log entries that are written at a time: many streams that open at once take turns, so that other
+        requests come between them.
     """
 
     settings: Settings
@@ -43,6 +48,7 @@ class EdgeState:
     stopping: asyncio.Event = field(default_factory=asyncio.Event)
     run_id: str = field(default_factory=lambda: secrets.token_hex(4))
     peers: PeerClients = field(default_factory=PeerClients)
+    replays: asyncio.Semaphore = field(default_factory=lambda: asyncio.Semaphore(REPLAYS_AT_ONCE))
     streams: Shares = field(init=False)
 
     def __post_init__(self) -> None:
@@ -53,8 +59,9 @@ class EdgeState:
         """Tell whether a token, or a session's secret, that a request carries may be valid."""
         return await self.tokens.exists(token) or await self.sessions.principal(token) is not None
 
-    def check_stream(self, connection: HTTPConnection) -> Holder:
-        """Return to whom another live view would be counted. Raises ProblemError when there is none left for him."""
+    @contextmanager
+    def stream(self, kind: str, connection: HTTPConnection) -> Iterator[None]:
+        """Count a live view (``websocket``) or event stream (``sse``). Raises ProblemError above the limits."""
         who = holder_of(connection.scope.get("state", {}).get("principal"), network_of(host_of(connection.scope)))
         if not self.streams.has_room(who):
             raise ProblemError(
@@ -64,12 +71,6 @@ class EdgeState:
                 remedy="Close some, or raise max_streams in the settings",
                 headers={"Retry-After": "10"},
             )
-        return who
-
-    @contextmanager
-    def stream(self, kind: str, connection: HTTPConnection) -> Iterator[None]:
-        """Count a live view (``websocket``) or event stream (``sse``). Raises ProblemError above the limits."""
-        who = self.check_stream(connection)
         self.streams.take(who)
         LIVE_VIEWERS.labels(kind).inc()
         try:

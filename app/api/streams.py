@@ -10,6 +10,7 @@ import structlog
 from fastapi import APIRouter, Header, Query, Request, Response, WebSocket, WebSocketDisconnect
 from pydantic import TypeAdapter
 from sse_starlette import EventSourceResponse, ServerSentEvent
+from starlette.types import Receive, Scope, Send
 
 from app.api.auth import Reader, authenticate, until_unwelcome
 from app.api.first_completed import first_of
@@ -20,7 +21,7 @@ from app.api.state import EdgeState, State, edge_state
 from app.missions.errors import MissionError
 from app.missions.live.broadcast import WatchEndedError
 from app.missions.operations.history import events_after
-from app.missions.running.mission_views import watched
+from app.missions.running.mission_views import followed, watched
 from app.missions.views.messages import EventMessage, LiveMessage, SnapshotMessage
 from app.missions.views.mission import EventView
 
@@ -88,12 +89,24 @@ async def get_events(
     if _wants_list(request.headers.get("accept", "*/*")):
         entries = await events_after(mission, start, limit)
         return Response(_events.dump_json(entries), media_type="application/json")
-    state.check_stream(request)  # before the answer begins
-    return EventSourceResponse(
-        _stream(state, mission.id, start, request),
-        ping=KEEP_ALIVE_S,
-        headers={"Cache-Control": "no-store", "X-Accel-Buffering": "no"},
-    )
+    return _EventStream(state, mission.id, start, request)
+
+
+class _EventStream(EventSourceResponse):
+    """The log as a stream. It counts as a live view from before its first byte: one too many gets a problem instead."""
+
+    def __init__(self, state: EdgeState, mission_id: str, start: int, request: Request) -> None:
+        super().__init__(
+            _stream(state, mission_id, start, request),
+            ping=KEEP_ALIVE_S,
+            headers={"Cache-Control": "no-store", "X-Accel-Buffering": "no"},
+        )
+        self._view = state.stream("sse", request)
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer. Raises ProblemError where all live views are taken."""
+        with self._view:
+            await super().__call__(scope, receive, send)
 
 
 def _wants_list(accept: str) -> bool:
@@ -128,29 +141,27 @@ def _wants_list(accept: str) -> bool:
 
 async def _stream(state: EdgeState, mission_id: str, start: int, request: Request) -> AsyncIterator[ServerSentEvent]:
     """Yield the log after ``start``, first what is stored, then what happens, as long as the client may see it."""
-    with state.stream("sse", request):
-        mission = await state.service.get(mission_id)
-        async with watched(mission) as messages:
-            snapshot = await anext(messages)
-            assert isinstance(snapshot, SnapshotMessage)  # noqa: S101 - the subscription's contract
-            sent = start
-            while sent < snapshot.last_event_id:
-                page = await events_after(mission, sent, PAGE)
-                if not page:
-                    break
-                for event in page:
-                    yield _sse(event)
-                    sent = event.id
-            unwelcome = asyncio.create_task(until_unwelcome(request, state))
-            try:
-                async for message in _until_either(messages, state.stopping, unwelcome):
-                    if isinstance(message, EventMessage) and message.event.id > sent:
-                        yield _sse(message.event)
-                        sent = message.event.id
-            except WatchEndedError:
-                return  # the client reconnects with its Last-Event-ID and misses nothing
-            finally:
-                unwelcome.cancel()
+    mission = await state.service.get(mission_id)
+    async with followed(mission) as (newest_id, messages):
+        sent = start
+        while sent < newest_id:
+            async with state.replays:
+                page = [(event.id, _sse(event)) for event in await events_after(mission, sent, PAGE)]
+            if not page:
+                break
+            for event_id, text in page:
+                yield text
+                sent = event_id
+        unwelcome = asyncio.create_task(until_unwelcome(request, state))
+        try:
+            async for message in _until_either(aiter(messages), state.stopping, unwelcome):
+                if isinstance(message, EventMessage) and message.event.id > sent:
+                    yield _sse(message.event)
+                    sent = message.event.id
+        except WatchEndedError:
+            return  # the client reconnects with its Last-Event-ID and misses nothing
+        finally:
+            unwelcome.cancel()
 
 
 def _sse(event: EventView) -> ServerSentEvent:

@@ -170,6 +170,26 @@ async def test_no_viewer_takes_all_views_and_some_are_for_operators(
     await database.close()
 
 
+async def test_streams_that_open_at_once_are_refused_before_their_answer_begins(
+    make_settings: Callable[..., Settings],
+) -> None:
+    most = 16
+    async with running(make_settings(max_streams=most)) as server, make_client(server) as client:
+        mission = (await client.post("/missions", json=mission_spec())).json()
+        port = client.base_url.port
+        lines = [await asyncio.open_connection("127.0.0.1", port) for _ in range(4 * most)]
+        path = f"/api/v1/missions/{mission['id']}/events"
+        head = f"GET {path} HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nAccept: text/event-stream\r\n\r\n"
+        for _, writer in lines:
+            writer.write(head.encode())
+        begun = [(await reader.readuntil(b"\r\n\r\n")).decode() for reader, _ in lines]
+        statuses = sorted(int(text.split()[1]) for text in begun)
+        for _, writer in lines:
+            writer.close()
+            await writer.wait_closed()
+    assert statuses == most * [200] + 3 * most * [429]
+
+
 async def test_a_stopping_service_ends_streams_and_sockets(make_settings: Callable[..., Settings]) -> None:
     async with running(make_settings()) as server, make_client(server) as client:
         mission = (await client.post("/missions", json=mission_spec())).json()

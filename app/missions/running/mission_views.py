@@ -43,11 +43,18 @@ async def watched(live: LiveMission) -> AsyncIterator[AsyncIterator[LiveMessage]
         yield _beginning_with(await _snapshot_message(live), subscription)
 
 
+@asynccontextmanager
+async def followed(live: LiveMission) -> AsyncIterator[tuple[int, Subscription]]:
+    """Yield the id of the newest log entry, 0 without one, and the live messages that come after it."""
+    with live.broadcaster.subscribe() as subscription:
+        live.telling.start()
+        yield await _last_event_id(live), subscription
+
+
 async def _snapshot_message(live: LiveMission) -> SnapshotMessage:
     """Return everything that is needed to draw the picture of a mission."""
     tracks = await live.trails.newest()
-    async with live.database.reading() as session:
-        last_event_id = await event_queries.last_event_id(session, live.id)
+    last_event_id = await _last_event_id(live)
     built = live.builder.newest
     return SnapshotMessage(
         mission=mission_view(live),
@@ -55,6 +62,11 @@ async def _snapshot_message(live: LiveMission) -> SnapshotMessage:
         map_version=built.version if built else 0,
         last_event_id=last_event_id,
     )
+
+
+async def _last_event_id(live: LiveMission) -> int:
+    async with live.database.reading() as session:
+        return await event_queries.last_event_id(session, live.id)
 
 
 async def _beginning_with(first: LiveMessage, rest: Subscription) -> AsyncIterator[LiveMessage]:
