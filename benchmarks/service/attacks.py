@@ -80,6 +80,8 @@ async def watched(service: Service, figures: dict[str, Any]) -> AsyncIterator[No
 
     looking = asyncio.create_task(look())
     try:
+        if watcher.stdout is not None:
+            await watcher.stdout.readline()  # on a busy machine it takes a while to begin
         await asyncio.sleep(1.0)
         yield
         await asyncio.sleep(1.0)
