@@ -1,4 +1,4 @@
-"""How soundings are corrected: tide, sound speed, and the drift of vehicles."""
+"""How soundings are corrected: tide, sound speed, systematic errors, and the drift of vehicles."""
 
 from fastapi import APIRouter
 
@@ -7,11 +7,16 @@ from app.api.json_route import JsonRoute
 from app.api.mission import Mission
 from app.api.problems import problems
 from app.api.schemas import API
+from app.api.state import Service
 from app.missions.operations import adjustment, recorrection
+from app.missions.operations.mission_maps import newest_map
 from app.missions.operations.recorrection import corrections_view
+from app.missions.operations.systematic_errors import systematic_errors
 from app.missions.spec.mission import SoundSpeed
+from app.missions.spec.systematic_errors import SystematicErrors
 from app.missions.views.adjustment import AdjustmentRequest, AdjustmentView
 from app.missions.views.corrections import CorrectionsView, TideCorrection
+from app.missions.views.systematic_errors import SystematicErrorsView
 
 router = APIRouter(
     route_class=JsonRoute,
@@ -55,6 +60,42 @@ async def set_sound_speed(sound_speed: SoundSpeed, operator: Operator, mission: 
 async def delete_sound_speed(operator: Operator, mission: Mission) -> CorrectionsView:
     """Correct no sound speed any more."""
     return await recorrection.set_sound_speed(mission, None, operator.name)
+
+
+@router.get(
+    "/systematic-errors",
+    operation_id="getSystematicErrors",
+    summary="See what is always wrong",
+    responses=problems("mission-not-found", "invalid-request", "map-not-ready", "pings-unreadable"),
+)
+async def get_systematic_errors(service: Service, reader: Reader, mission: Mission) -> SystematicErrorsView:
+    """Return what lines that cross and swaths that overlap show of depth offsets, water level, roll and sound speed.
+
+    Each with how sure it is; `proposal` is what to send to PUT to take out what is large and sure enough.
+    """
+    return await systematic_errors(mission, await newest_map(mission, service.maps, patient=False))
+
+
+@router.put(
+    "/systematic-errors",
+    operation_id="setSystematicErrors",
+    summary="Take out what is always wrong",
+    responses=_CHANGE,
+)
+async def set_systematic_errors(errors: SystematicErrors, operator: Operator, mission: Mission) -> CorrectionsView:
+    """Set what is taken out of every depth, at any time: all soundings are corrected anew from their raw values."""
+    return await recorrection.set_systematic_errors(mission, errors, operator.name)
+
+
+@router.delete(
+    "/systematic-errors",
+    operation_id="deleteSystematicErrors",
+    summary="Take nothing out",
+    responses=problems("mission-not-found", "invalid-request"),
+)
+async def delete_systematic_errors(operator: Operator, mission: Mission) -> CorrectionsView:
+    """Take no systematic errors out any more."""
+    return await recorrection.set_systematic_errors(mission, SystematicErrors(), operator.name)
 
 
 @router.get(

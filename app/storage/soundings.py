@@ -64,6 +64,13 @@ def accepted_query(
     return query if until_step is None else query.where(SoundingRow.step <= until_step)
 
 
+async def vehicles_of(session: AsyncSession, mission_id: str) -> set[str]:
+    """Return the names of those who sounded something."""
+    return set(
+        await session.scalars(select(SoundingRow.vehicle).where(SoundingRow.mission_id == mission_id).distinct())
+    )
+
+
 def track_query(mission_id: str) -> Select[*tuple[Any, ...]]:
     """Return the query of accepted soundings along the vehicles' ways.
 

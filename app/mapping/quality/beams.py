@@ -34,6 +34,20 @@ class AngleAgreement:
     within_pct: float
 
 
+def expected_m(grid: Grid, depth_m: FloatArray, east_m: FloatArray, north_m: FloatArray) -> FloatArray:
+    """Return a grid's depth at places (n,), NaN where unknown: between the centres of four cells, else the cell's own.
+
+    ``depth_m`` (rows, cols) are the depths of the grid's cells.
+    """
+    col, row = (east_m - grid.west_m) / grid.cell_m - 0.5, (north_m - grid.south_m) / grid.cell_m - 0.5
+    between = map_coordinates(depth_m, [row, col], order=1, mode="constant", cval=np.nan)
+    i, j = np.rint(row).astype(np.int64), np.rint(col).astype(np.int64)
+    inside = (i >= 0) & (i < grid.rows) & (j >= 0) & (j < grid.cols)
+    own = np.full(len(between), np.nan)
+    own[inside] = depth_m[i[inside], j[inside]]
+    return np.where(np.isfinite(between) & np.isfinite(own), between, own)
+
+
 class BeamCheck:
     """Compares beams with a grid as they come; memory does not grow with their number.
 
@@ -52,7 +66,7 @@ class BeamCheck:
 
     def add(self, east_m: FloatArray, north_m: FloatArray, depth_m: FloatArray, angle_rad: FloatArray) -> None:
         """Take in beams of crosslines, arrays (n,)."""
-        expected = self._expected_m(east_m, north_m)
+        expected = expected_m(self._grid, self._depth_m, east_m, north_m)
         known = np.isfinite(expected) & np.isfinite(depth_m)
         depth, off = depth_m[known], depth_m[known] - expected[known]
         place = np.floor((np.degrees(angle_rad[known]) + MAX_DEG) / BIN_DEG).astype(np.int64)
@@ -62,17 +76,6 @@ class BeamCheck:
         self._squares += np.bincount(place, off**2, BINS)
         for order, counts in self._within.items():
             counts += np.bincount(place[np.abs(off) <= max_tvu_m(depth, order)], minlength=BINS)
-
-    def _expected_m(self, east_m: FloatArray, north_m: FloatArray) -> FloatArray:
-        """Return the grid's depth at each place: between the centres of four cells, else the cell's own."""
-        grid = self._grid
-        col, row = (east_m - grid.west_m) / grid.cell_m - 0.5, (north_m - grid.south_m) / grid.cell_m - 0.5
-        between = map_coordinates(self._depth_m, [row, col], order=1, mode="constant", cval=np.nan)
-        i, j = np.rint(row).astype(np.int64), np.rint(col).astype(np.int64)
-        inside = (i >= 0) & (i < grid.rows) & (j >= 0) & (j < grid.cols)
-        own = np.full(len(between), np.nan)
-        own[inside] = self._depth_m[i[inside], j[inside]]
-        return np.where(np.isfinite(between) & np.isfinite(own), between, own)
 
     def by_angle(self, order: Order) -> list[AngleAgreement]:
         """Return what was found for each bin of angles that had a beam."""

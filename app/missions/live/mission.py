@@ -162,9 +162,7 @@ class LiveMission:
         self.builder = builder or builder_of(spec)
         self.margin_m = 2 * spec.limits.max_step_m
         """How far outside the area what vehicles measured still belongs to the mission and helps the map's edge."""
-        corrections = Corrections(
-            self.frame, spec.tide, table=tide_table, sound_speed=spec.sound_speed, adjustment=adjustment
-        )
+        corrections = Corrections.of(spec, self.frame, tide_table, adjustment)
         self.gate = self._gate_with(corrections)
         self.reference_m: FloatArray | None = None
         """Depths of the grid that the map is compared with, at the map's cells."""

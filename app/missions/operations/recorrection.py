@@ -16,12 +16,16 @@ from app.missions.soundings.adjustment import TrackAdjustment
 from app.missions.soundings.corrections import NO_LEVEL, Corrections
 from app.missions.soundings.gate import Gate
 from app.missions.spec.mission import MissionSpec, SoundSpeed, Tide
+from app.missions.spec.systematic_errors import SystematicErrors
 from app.missions.views.corrections import CorrectionsView, TideCorrection, TideTableView
 from app.missions.views.mission import Level
 from app.missions.views.soundings import Ruling, Verdict
 from app.storage import soundings as sounding_queries
 from app.storage import stored_maps
 from app.storage.models import MissionRow, SoundingRow, TideTableRow
+
+CORRECTIONS = {"tide", "sound_speed", "systematic_errors"}
+"""Fields of a mission's description that say how soundings are corrected."""
 
 
 def corrections_view(live: LiveMission) -> CorrectionsView:
@@ -34,6 +38,7 @@ def corrections_view(live: LiveMission) -> CorrectionsView:
             name=table.name, first=table.first, last=table.last, entries=len(table.times_s), sha256=table.digest
         ),
         sound_speed=live.spec.sound_speed,
+        systematic_errors=live.spec.systematic_errors,
         vertical_datum=live.facts.vertical_datum.statement,
         accepted=live.journal.counts.accepted,
         rejected=live.journal.counts.rejected,
@@ -70,17 +75,56 @@ async def set_tide(live: LiveMission, tide: TideCorrection, actor: str) -> Corre
 
 async def set_sound_speed(live: LiveMission, sound_speed: SoundSpeed | None, actor: str) -> CorrectionsView:
     """Change the sound speed profile; None: the sonars' own ranges are taken."""
+    async with live.correcting:
+        await _correct_by(live, live.spec.model_copy(update={"sound_speed": sound_speed}))
+    words = "sound speed is not corrected" if sound_speed is None else f"sound speed: {sound_speed.source or 'profile'}"
+    await live.journal.log(Level.INFO, "corrections", f"{words}, set by {actor}", actor=actor)
+    return corrections_view(live)
+
+
+async def set_systematic_errors(live: LiveMission, errors: SystematicErrors, actor: str) -> CorrectionsView:
+    """Change what is always wrong and is taken out of every depth. Raises InvalidRequestError."""
+    known = await _who_sounded(live)
+    for name in errors.vehicles:
+        if name not in known:
+            who = ", ".join(sorted(known)) or "none so far"
+            raise InvalidRequestError("vehicles", f"{name!r} takes no part in the mission", f"these do: {who}")
+    async with live.correcting:
+        await _correct_by(live, live.spec.model_copy(update={"systematic_errors": errors}))
+    words = "no systematic errors are taken out" if errors.is_empty else f"systematic errors: {_described(errors)}"
+    await live.journal.log(Level.INFO, "corrections", f"{words}, set by {actor}", actor=actor)
+    return corrections_view(live)
+
+
+async def _correct_by(live: LiveMission, spec: MissionSpec) -> None:
+    """Correct soundings by what a changed description says, with tide table and adjustment as they are."""
 
     async def store(_session: AsyncSession) -> None:
         pass
 
-    async with live.correcting:
-        spec = live.spec.model_copy(update={"sound_speed": sound_speed})
-        before = live.gate.corrections
-        await recorrect(live, spec, before.table, before.adjustment, store)
-    words = "sound speed is not corrected" if sound_speed is None else f"sound speed: {sound_speed.source or 'profile'}"
-    await live.journal.log(Level.INFO, "corrections", f"{words}, set by {actor}", actor=actor)
-    return corrections_view(live)
+    before = live.gate.corrections
+    await recorrect(live, spec, before.table, before.adjustment, store)
+
+
+async def _who_sounded(live: LiveMission) -> set[str]:
+    """Return the mission's vehicles, and whose logs were imported."""
+    async with live.database.reading() as session:
+        sounded = await sounding_queries.vehicles_of(session, live.id)
+    return {vehicle.name for vehicle in live.spec.vehicles} | {member.name for member in live.team} | sounded
+
+
+def _described(errors: SystematicErrors) -> str:
+    parts = []
+    for name, one in errors.vehicles.items():
+        wrong = [
+            *([f"{one.depth_m:+.3f} m"] if one.depth_m else []),
+            *([f"roll {one.roll_offset_deg:+.2f} degrees"] if one.roll_offset_deg else []),
+            *([f"sound speed {one.sound_speed_mps:+.1f} m/s"] if one.sound_speed_mps else []),
+        ]
+        parts += [f"{name} {', '.join(wrong)}"] if wrong else []
+    if errors.water_level:
+        parts.append(f"water level of up to {max(abs(level) for _, level in errors.water_level):.3f} m")
+    return "; ".join(parts)
 
 
 def check_level_is_known(live: LiveMission) -> None:
@@ -99,7 +143,7 @@ async def recorrect(
     store: Callable[[AsyncSession], Awaitable[None]],
 ) -> None:
     """Correct every stored sounding anew; ``store`` writes what else changes. The caller holds ``correcting``."""
-    corrections = Corrections(live.frame, spec.tide, table=table, sound_speed=spec.sound_speed, adjustment=adjustment)
+    corrections = Corrections.of(spec, live.frame, table, adjustment)
     async with live.journal.writing:
         # Nothing else changes soundings meanwhile. Computing may have to wait for a thread, and the database's turn is
         # for all missions, whose stops are written, too.
@@ -110,7 +154,7 @@ async def recorrect(
             if changes:
                 await session.execute(update(SoundingRow), changes)
             mission = await session.get_one(MissionRow, live.id)
-            mission.spec = mission.spec | spec.model_dump(mode="json", include={"tide", "sound_speed"})
+            mission.spec = mission.spec | spec.model_dump(mode="json", include=CORRECTIONS)
             await store(session)
             await session.flush()
             await stored_maps.forget(session, live.id)

@@ -1,4 +1,4 @@
-"""From what a sonar reported to a place and a depth below the datum: sound speed, drift, tide.
+"""From what a sonar reported to a place and a depth below the datum: sound speed, drift, tide, systematic errors.
 
 The report itself stays as it came.
 """
@@ -16,11 +16,17 @@ from app.mapping.tides import TideTable
 from app.mapping.vertical import INSTANTANEOUS_WATER_LEVEL, VerticalDatum
 from app.missions.fleet.interface import Position, SoundingReport
 from app.missions.soundings.adjustment import TrackAdjustment
-from app.missions.spec.mission import SoundSpeed, Tide
+from app.missions.spec.mission import MissionSpec, SoundSpeed, Tide
+from app.missions.spec.systematic_errors import InstrumentErrors, SystematicErrors
 from imc_bridge.printable import printable
 
 NO_LEVEL = "tide: "
 """How the reason of a sounding begins that is refused because no water level is known for its time."""
+
+ASSUMED_MPS = 1500.0
+"""Speed that is set in sonars where nobody says otherwise."""
+
+_RIGHT = InstrumentErrors()
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,6 +68,8 @@ class Corrections:
         None: the sonars' own ranges are taken.
     adjustment
         By how much positions were off; None: they are taken as they came.
+    systematic
+        What is always wrong with sonars and water levels.
     """
 
     def __init__(
@@ -72,6 +80,7 @@ class Corrections:
         table: TideTable | None = None,
         sound_speed: SoundSpeed | None = None,
         adjustment: TrackAdjustment | None = None,
+        systematic: SystematicErrors | None = None,
     ) -> None:
         self._frame = frame
         self._tide = tide
@@ -79,6 +88,23 @@ class Corrections:
         self.adjustment = adjustment
         self._profile = _profile(sound_speed)
         self._sound_speed = sound_speed
+        self._systematic = systematic or SystematicErrors()
+        self._residual = np.array(self._systematic.water_level, dtype=float).reshape(-1, 2)
+        self._assumed_mps = ASSUMED_MPS if sound_speed is None else sound_speed.assumed_mps
+
+    @classmethod
+    def of(
+        cls, spec: MissionSpec, frame: LocalFrame, table: TideTable | None, adjustment: TrackAdjustment | None
+    ) -> "Corrections":
+        """Return the corrections that a mission's description states, with its tide table and adjustment."""
+        return cls(
+            frame,
+            spec.tide,
+            table=table,
+            sound_speed=spec.sound_speed,
+            adjustment=adjustment,
+            systematic=spec.systematic_errors,
+        )
 
     @property
     def vertical_datum(self) -> VerticalDatum:
@@ -108,7 +134,7 @@ class Corrections:
             level = float(self.table.levels_at(time_s))
             if not np.isfinite(level):
                 level = float(self.table.levels_m.min())
-        return level - self._tide.datum_offset_m
+        return level + float(self._residual_m([time_s])[0]) - self._tide.datum_offset_m
 
     def apply(self, reports: Sequence[SoundingReport]) -> list[PlacedSounding]:
         """Return one result per report, in their order. Every number in a report is finite."""
@@ -119,7 +145,8 @@ class Corrections:
         shift, depth = self._sound_speed_corrected(reports, raw, places)
         if self.adjustment is not None:
             shift = shift - self.adjustment.offsets_of(reports)
-        levels = self._levels(reports)
+        depth = depth - [self._errors_of(report.vehicle).depth_m for report in reports]
+        levels = self._levels([report.time_s for report in reports])
         results = []
         for report, place, moved, bottom, level in zip(reports, places, shift, depth, levels, strict=True):
             if isinstance(place, str):
@@ -139,20 +166,38 @@ class Corrections:
 
         None where the frame has no place for them. Depths for whose time there is no water level are NaN.
         """
+        errors = self._errors_of(vehicle)
         try:
-            found = placed(pings, self._frame, self._profile)
+            found = placed(self._steered(pings, errors), self._frame, self._profile)
         except ValueError:
             return None
         if self.adjustment is not None:
             off = self.adjustment.offsets(vehicle, pings.time_s)[found.ping]
             found = replace(found, east_m=found.east_m - off[:, 0], north_m=found.north_m - off[:, 1])
-        levels = np.full(len(pings), self._tide.level_m) if self.table is None else self.table.levels_at(pings.time_s)
-        return replace(found, depth_m=found.depth_m - levels[found.ping] + self._tide.datum_offset_m)
+        levels = self._levels(pings.time_s)
+        return replace(found, depth_m=found.depth_m - errors.depth_m - levels[found.ping] + self._tide.datum_offset_m)
 
-    def _levels(self, reports: Sequence[SoundingReport]) -> NDArray[np.float64]:
-        if self.table is None:
-            return np.full(len(reports), self._tide.level_m)
-        return self.table.levels_at([report.time_s for report in reports])
+    def _errors_of(self, vehicle: str) -> InstrumentErrors:
+        return self._systematic.vehicles.get(vehicle, _RIGHT)
+
+    def _steered(self, pings: Pings, errors: InstrumentErrors) -> Pings:
+        """Return pings whose beams point where they really did."""
+        if not errors.has_swath_errors:
+            return pings
+        faster = 1.0 + errors.sound_speed_mps / self._assumed_mps
+        angle = np.arcsin(np.clip(np.sin(pings.angle_rad) * faster, -1.0, 1.0)) + np.radians(errors.roll_offset_deg)
+        return replace(pings, angle_rad=angle.astype(pings.angle_rad.dtype))
+
+    def _levels(self, time_s: Sequence[float] | NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return what is subtracted from depths at some times (n,) beside the datum's offset, NaN where unknown."""
+        found = np.full(len(time_s), self._tide.level_m) if self.table is None else self.table.levels_at(time_s)
+        return found + self._residual_m(time_s)
+
+    def _residual_m(self, time_s: Sequence[float] | NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return how much higher than the tide says the water stood at some times (n,)."""
+        if not len(self._residual):
+            return np.zeros(len(time_s))
+        return np.asarray(np.interp(np.asarray(time_s, dtype=float), self._residual[:, 0], self._residual[:, 1]))
 
     def _sound_speed_corrected(
         self,

@@ -26,6 +26,7 @@ from app.missions.spec.recovery import Recovery
 from app.missions.spec.search import DEFAULTS as SEARCH_DEFAULTS
 from app.missions.spec.search import SearchSpec, filled_in
 from app.missions.spec.sonar import SwathSonarSpec
+from app.missions.spec.systematic_errors import SystematicErrors
 from app.missions.spec.targets import MOST_TARGETS, TargetSpec, Tracking
 
 Speed = Annotated[float, Field(gt=0, le=5)]
@@ -435,6 +436,9 @@ class MissionSpec(Model):
     tide: Tide = Field(default_factory=Tide)
     sound_speed: SoundSpeed | None = Field(
         default=None, description="Sound speed correction; null: the sonars' own ranges are taken"
+    )
+    systematic_errors: SystematicErrors = Field(
+        default_factory=SystematicErrors, description="What is always wrong with sonars and water levels"
     )
     seed: int = Field(default=0, ge=0, lt=2**63, description="Seed of every random decision")
 

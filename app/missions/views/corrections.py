@@ -5,6 +5,7 @@ from datetime import datetime
 from pydantic import Field
 
 from app.missions.spec.mission import SoundSpeed, Tide
+from app.missions.spec.systematic_errors import SystematicErrors
 from app.missions.views.base import View
 
 
@@ -36,6 +37,7 @@ class CorrectionsView(View):
     tide: Tide
     tide_table: TideTableView | None = Field(description="Its levels count in place of tide.level_m")
     sound_speed: SoundSpeed | None
+    systematic_errors: SystematicErrors
     vertical_datum: str = Field(description="What corrected depths are counted from")
     accepted: int = Field(description="Soundings accepted under these corrections")
     rejected: int
