@@ -73,3 +73,27 @@ def test_crossings_are_summed_up_drawn_and_gone_to(watched: Watched, surveyed: s
     card.scroll_into_view_if_needed()
     picture(page, "crosslines-phone")
     assert watched.complaints == []
+
+
+def test_what_is_always_wrong_is_taken_out_by_a_click_and_put_back_by_another(
+    watched: Watched, surveyed: str, service: Service
+) -> None:
+    for number, north in enumerate((22.3, 44.3)):
+        way = flown([(-2, north), (62, north + 0.4)], spacing_m=1.0, start_s=START_S + 1000.0 * (1 + number))
+        service.post(f"/missions/{surveyed}/measurements", {"items": measured("scout", way, DEPTH_M + 0.6)})
+    page = watched.page
+    show(page, surveyed)
+    expect(by_id(page, "crossings")).to_have_text("36")
+    by_id(page, "look-for-errors").click()
+    errors = by_id(page, "systematic-errors")
+    expect(errors).to_contain_text(re.compile(r"scout: depths too large by \+0\.\d+ m"))
+    expect(errors).to_contain_text("Not known: water level")
+    by_id(page, "look-for-errors").scroll_into_view_if_needed()
+    picture(page, "systematic-errors")
+    before = by_id(page, "crossings-within").inner_text()
+    by_id(page, "take-out-errors").click()
+    expect(by_id(page, "undo-errors")).to_be_visible()
+    expect(by_id(page, "crossings-within")).to_have_text("100.0 %")
+    by_id(page, "undo-errors").click()
+    expect(by_id(page, "undo-errors")).to_have_count(0)
+    expect(by_id(page, "crossings-within")).to_have_text(before)

@@ -268,6 +268,14 @@ def _corrections(w: Writer) -> list[Block]:
             (t("fact_profile_bottom"), w.number(f"{speed}.profile.{len(profile) - 1}.1", 1, "m/s")),
             (t("fact_assumed"), w.number(f"{speed}.assumed_mps", 1, "m/s")),
         ]
+    systematic = "corrections.systematic_errors"
+    for name, errors in answers.at(f"{systematic}.vehicles").items():
+        for key, digits, unit in (("depth_m", 3, "m"), ("roll_offset_deg", 2, "°"), ("sound_speed_mps", 1, "m/s")):
+            if errors[key]:
+                value = w.number(f"{systematic}.vehicles.{name}.{key}", digits, unit, signed=True)
+                facts.append((t(f"fact_{key}", vehicle=name), value))
+    if answers.at(f"{systematic}.water_level"):
+        facts.append((t("fact_residual"), t("residual", count=t.number(len(answers.at(f"{systematic}.water_level"))))))
     facts += [
         (t("fact_draught"), t("draught")),
         (t("fact_waterline"), w.number("mission.spec.uncertainty.waterline_m", 3, "m")),

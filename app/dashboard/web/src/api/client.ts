@@ -22,6 +22,8 @@ import type {
   SoundingState,
   SoundingView,
   StepView,
+  SystematicErrors,
+  SystematicErrorsView,
   TelemetryView,
   TimedTracks,
   VehicleView,
@@ -171,6 +173,15 @@ export const api = {
   mapTiles,
   site: (id: string) => request<SearchGridView>(`${missionPath(id)}/search`),
   crossovers: (id: string) => request<CrossoversView>(`${missionPath(id)}/crosslines`),
+  systematicErrors: (id: string) => request<SystematicErrorsView>(`${missionPath(id)}/systematic-errors`),
+  setSystematicErrors: (id: string, errors: SystematicErrors) =>
+    request<unknown>(`${missionPath(id)}/systematic-errors`, {
+      method: "PUT",
+      body: JSON.stringify(errors),
+      headers: { "Content-Type": "application/json" },
+    }),
+  deleteSystematicErrors: (id: string) =>
+    request<unknown>(`${missionPath(id)}/systematic-errors`, { method: "DELETE" }),
   holidays: (id: string) => request<Holidays>(`${missionPath(id)}/holidays`),
   products: (id: string) => request<ProductView[]>(`${missionPath(id)}/products`),
   quality: (id: string) => request<QualityView>(`${missionPath(id)}/quality`),

@@ -523,6 +523,36 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/missions/{mission_id}/systematic-errors": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * See what is always wrong
+         * @description Return what lines that cross and swaths that overlap show of depth offsets, water level, roll and sound speed.
+         *
+         *     Each with how sure it is; `proposal` is what to send to PUT to take out what is large and sure enough.
+         */
+        get: operations["getSystematicErrors"];
+        /**
+         * Take out what is always wrong
+         * @description Set what is taken out of every depth, at any time: all soundings are corrected anew from their raw values.
+         */
+        put: operations["setSystematicErrors"];
+        post?: never;
+        /**
+         * Take nothing out
+         * @description Take no systematic errors out any more.
+         */
+        delete: operations["deleteSystematicErrors"];
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/missions/{mission_id}/adjustment": {
         parameters: {
             query?: never;
@@ -1828,6 +1858,7 @@ export interface components {
             /** @description Its levels count in place of tide.level_m */
             tide_table: components["schemas"]["TideTableView"] | null;
             sound_speed: components["schemas"]["SoundSpeed"] | null;
+            systematic_errors: components["schemas"]["SystematicErrors"];
             /**
              * Vertical Datum
              * @description What corrected depths are counted from
@@ -2114,6 +2145,12 @@ export interface components {
              */
             return?: boolean | null;
         };
+        /**
+         * ErrorKind
+         * @description What may be wrong.
+         * @enum {string}
+         */
+        ErrorKind: "depth" | "water_level" | "roll_offset" | "sound_speed";
         /**
          * EventMessage
          * @description A new line of the log.
@@ -2432,6 +2469,30 @@ export interface components {
              * @default false
              */
             replayed: boolean;
+        };
+        /**
+         * InstrumentErrors
+         * @description How one vehicle's sonar is wrong.
+         */
+        InstrumentErrors: {
+            /**
+             * Depth M
+             * @description By how much its depths are too large, metres
+             * @default 0
+             */
+            depth_m: number;
+            /**
+             * Roll Offset Deg
+             * @description How far the beams of its swath sonar point to starboard of where they are said to, degrees: the roll of a patch test
+             * @default 0
+             */
+            roll_offset_deg: number;
+            /**
+             * Sound Speed Mps
+             * @description How much faster sound is at its swath sonar than it assumes when it steers its beams, m/s: bent swaths
+             * @default 0
+             */
+            sound_speed_mps: number;
         };
         /**
          * ItemVerdict
@@ -2983,6 +3044,8 @@ export interface components {
             tide?: components["schemas"]["Tide"];
             /** @description Sound speed correction; null: the sonars' own ranges are taken */
             sound_speed?: components["schemas"]["SoundSpeed"] | null;
+            /** @description What is always wrong with sonars and water levels */
+            systematic_errors?: components["schemas"]["SystematicErrors"];
             /**
              * Seed
              * @description Seed of every random decision
@@ -3164,6 +3227,8 @@ export interface components {
                 tide?: components["schemas"]["Tide"];
                 /** @description Sound speed correction; null: the sonars' own ranges are taken */
                 sound_speed?: components["schemas"]["SoundSpeed"] | null;
+                /** @description What is always wrong with sonars and water levels */
+                systematic_errors?: components["schemas"]["SystematicErrors"];
                 /**
                  * Seed
                  * @description Seed of every random decision
@@ -4609,6 +4674,105 @@ export interface components {
              * @default 100
              */
             range_m: number;
+        };
+        /**
+         * SystematicErrorView
+         * @description One error, as the survey shows it beside those that are taken out already.
+         */
+        SystematicErrorView: {
+            /** @description depth: a vehicle's depths beside the mean of those that cross each other; water_level: the largest residual beside the tide; roll_offset and sound_speed: of a swath sonar */
+            kind: components["schemas"]["ErrorKind"];
+            /**
+             * Vehicle
+             * @description Null: of all
+             */
+            vehicle: string | null;
+            /** Unit */
+            unit: string;
+            /**
+             * Found
+             * @description What is left in soundings as they are corrected now
+             */
+            found: number;
+            /**
+             * Sd
+             * @description Its standard deviation, from leaving lines or pieces of tracks out
+             */
+            sd: number;
+            /**
+             * Significance
+             * @description How many standard deviations it is from zero
+             */
+            significance: number;
+            /**
+             * Observations
+             * @description Crossings, or beams, that tell of it
+             */
+            observations: number;
+            /**
+             * Rms Before M
+             * @description RMS of the differences it was found in
+             */
+            rms_before_m: number;
+            /**
+             * Rms After M
+             * @description What would be left of them
+             */
+            rms_after_m: number;
+            /**
+             * Proposed
+             * @description Whether it is large and sure enough to be taken out
+             */
+            proposed: boolean;
+            /**
+             * Why
+             * @description Why it is proposed, or not
+             */
+            why: string;
+        };
+        /**
+         * SystematicErrors
+         * @description Errors that are the same for many soundings; they are taken out of every depth beside tide and sound speed.
+         */
+        SystematicErrors: {
+            /**
+             * Vehicles
+             * @description By vehicle; one that is missing is right
+             */
+            vehicles?: {
+                [key: string]: components["schemas"]["InstrumentErrors"];
+            };
+            /**
+             * Water Level
+             * @description By how much depths are still too large at some times, beside the tide: [Unix seconds of the vehicles' clocks, metres], in order; linear between them, and as at the nearest before and after
+             */
+            water_level?: [
+                number,
+                number
+            ][];
+            /**
+             * Source
+             * @description Where these come from, kept with the product
+             * @default
+             */
+            source: string;
+        };
+        /**
+         * SystematicErrorsView
+         * @description What a survey shows of systematic errors.
+         */
+        SystematicErrorsView: {
+            /** @description What is taken out of soundings now */
+            applied: components["schemas"]["SystematicErrors"];
+            /** Errors */
+            errors: components["schemas"]["SystematicErrorView"][];
+            /**
+             * Unknown
+             * @description What cannot be told, and why
+             */
+            unknown: string[];
+            /** @description What to send to PUT .../systematic-errors to take out what is proposed, what is applied included; null: nothing is proposed */
+            proposal: components["schemas"]["SystematicErrors"] | null;
         };
         /**
          * TargetRangePage
@@ -8290,6 +8454,268 @@ export interface operations {
         };
     };
     deleteSoundSpeed: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description The mission's id */
+                mission_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["CorrectionsView"];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such mission */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too many requests */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    getSystematicErrors: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description The mission's id */
+                mission_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["SystematicErrorsView"];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such mission; there is no map yet */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too many requests */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description A file of pings is missing or damaged */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    setSystematicErrors: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description The mission's id */
+                mission_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["SystematicErrors"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["CorrectionsView"];
+                };
+            };
+            /** @description The body cannot be read */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such mission */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The request took too long to arrive */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body is too large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body's media type is not supported */
+            415: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too much is sent at once; too many requests */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too much is under way */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    deleteSystematicErrors: {
         parameters: {
             query?: never;
             header?: never;

@@ -6,6 +6,12 @@ export function metres(value: number | null | undefined, digits = 1): string {
   return value == null ? UNKNOWN : `${value.toFixed(digits)} m`;
 }
 
+/** A signed value with as many digits as its unit asks for. */
+export function quantity(value: number, unit: string): string {
+  const digits = unit === "m" ? 3 : unit === "m/s" ? 1 : 2;
+  return `${value < 0 ? "-" : "+"}${Math.abs(value).toFixed(digits)} ${unit}`;
+}
+
 export function percent(value: number | null | undefined, digits = 0): string {
   return value == null ? UNKNOWN : `${value.toFixed(digits)} %`;
 }

@@ -10,6 +10,7 @@ import {
   destination,
 } from "../state/store";
 import { Button } from "./Controls";
+import { SystematicErrors } from "./SystematicErrors";
 
 /** More are on the map and in the file. */
 const MOST_LISTED = 100;
@@ -58,6 +59,7 @@ export function CrosslinesCard() {
         />
       </details>
       <Outliers found={found} />
+      <SystematicErrors />
     </article>
   );
 }
