@@ -4,9 +4,9 @@
 
 Two simulated vehicles with swath sonars of 120 degrees survey generated floors of 60 x 60 m on lines 8 m apart and
 three crosslines. Depths of the second are too large, the sonars are mounted askew, and sound at them is faster than
-they assume, each by a chance amount; positions scatter by 0.3 m from line to line. The service is the real one, over REST:
-it gets the pings, is asked for systematic errors, and is told to take out what it proposes. Told are the errors of what
-was taken out beside what there was, and the map's RMSE against the true floor before and after.
+they assume, each by a chance amount; positions scatter by 0.3 m from line to line. The service is the real one, over
+REST: it gets the pings, is asked for systematic errors, and is told to take out what it proposes. Told are the errors
+of what was taken out beside what there was, and the map's RMSE against the true floor before and after.
 """
 
 import asyncio
