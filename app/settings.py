@@ -29,6 +29,9 @@ _OTHER_VARIABLES = {
     *(PREFIX + name for name in ("TOKEN", "TERRAINS", "CAPTURES", "SKIP_DASHBOARD")),
 }
 
+_SECRET = {"database_url", "alarms"}
+"""Settings with passwords in them: a value that is wrong is not shown."""
+
 _DRIVERS = {"sqlite": "sqlite+aiosqlite", "postgresql": "postgresql+asyncpg", "postgres": "postgresql+asyncpg"}
 
 
@@ -323,5 +326,5 @@ def _describe(error: ValidationError, overrides: dict[str, Any]) -> Iterable[str
             yield _unknown(f"{name} (from {source})", path[-1], model.model_fields)
         else:
             message = entry["msg"].removeprefix("Value error, ")
-            shown = "" if path[0] == "database_url" else f" is {entry['input']!r}"
+            shown = "" if path[0] in _SECRET else f" is {entry['input']!r}"
             yield f"{name}{shown} (from {source}): {message[0].lower()}{message[1:]}"

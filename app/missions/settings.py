@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from app.missions.alarm_settings import AlarmSettings
 from imc_bridge.settings import ConsoleSettings
 
 if TYPE_CHECKING:
@@ -168,3 +169,4 @@ class ServiceSettings(Section):
     provider: ProviderSettings = Field(
         default=ProviderSettings(), description="Who hands soundings in as crowdsourced bathymetry"
     )
+    alarms: AlarmSettings = Field(default=AlarmSettings(), description="Who is told of alarms, and by which way")

@@ -8,6 +8,8 @@ import numpy as np
 
 from app.storage.models import (
     AdjustmentRow,
+    AlarmDeliveryRow,
+    AlarmRow,
     AuditRow,
     BatchRow,
     EventRow,
@@ -208,6 +210,24 @@ def ping_chunk(mission_id: str = "m1") -> PingChunkRow:
     )
 
 
+def alarm(**changes: Any) -> AlarmRow:
+    values = {
+        "id": "a1",
+        "mission_id": "m1",
+        "event_id": None,
+        "kind": "vehicle_lost",
+        "severity": "major",
+        "vehicle": "a",
+        "message": "a is lost: silent",
+        "raised_at": TIME,
+        "acknowledged_at": None,
+        "acknowledged_by": None,
+        "told_after_s": None,
+        "next_at": TIME,
+    }
+    return AlarmRow(**(values | changes))
+
+
 def one_of_each() -> list[list[Any]]:
     """Rows in the order in which foreign keys allow them."""
     return [
@@ -226,6 +246,7 @@ def one_of_each() -> list[list[Any]]:
             ),
             BatchRow(mission_id="m1", key="k", digest="d", answer={"accepted": 1}, created_at=TIME),
             EventRow(mission_id="m1", time=TIME, level="info", kind="state", message="made", data={"by": "me"}),
+            alarm(),
             StoredMapRow(
                 mission_id="m1",
                 made_at=TIME,
@@ -285,4 +306,19 @@ def one_of_each() -> list[list[Any]]:
             ),
         ],
         [SessionRow(secret_hash="e" * 64, token_hash="f" * 64, created_at=TIME, expires_at=TIME)],
+        [
+            AlarmDeliveryRow(
+                id="d1",
+                alarm_id="a1",
+                recipient="bridge",
+                notice="raised",
+                state="waiting",
+                attempts=0,
+                created_at=TIME,
+                next_try_at=TIME,
+                done_at=None,
+                error="",
+                process_id=1,
+            )
+        ],
     ]

@@ -14,6 +14,7 @@ from app.exploration.core.problem import Belief, Planner
 from app.exploration.planners import COVERERS
 from app.exploration.site_search import SearchTask
 from app.missions import metrics
+from app.missions.alarm_kinds import AlarmKind
 from app.missions.clock import now
 from app.missions.flight.decision import Decision, Place, decide, swath_task
 from app.missions.flight.step_maps import StepMaps
@@ -143,7 +144,7 @@ class Decider:
         live.standstill = words
         live.publish_summary()
         message = f"no vehicle can be sent anywhere: {words}; they stay, and the step does not count"
-        await live.journal.log(Level.ALARM, "waiting", message, vehicles=list(refusals))
+        await live.journal.alarm(AlarmKind.NO_WAYPOINT, message, vehicles=list(refusals))
 
 
 def place_of(member: Member, live: LiveMission) -> Place:

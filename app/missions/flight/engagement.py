@@ -8,6 +8,7 @@ from functools import partial
 
 import structlog
 
+from app.missions.alarm_kinds import AlarmKind
 from app.missions.fleet.hub import FleetHub
 from app.missions.fleet.interface import LinkState, VehicleInfo, VehicleRefusedError
 from app.missions.live.mission import LiveMission
@@ -99,14 +100,14 @@ class Engagement:
         lost = member.followed and info.state is LinkState.LOST
         if lost == (member.name in self._lost):
             return
+        journal = self._live.journal
         if lost:
             self._lost.add(member.name)
-            message = f"{member.name} is lost: {info.reason or 'silent'}"
+            words = f"{member.name} is lost: {info.reason or 'silent'}"
+            await journal.alarm(AlarmKind.VEHICLE_LOST, words, vehicle=member.name)
         else:
             self._lost.discard(member.name)
-            message = f"{member.name} is heard again"
-        level = Level.ALARM if lost else Level.INFO
-        await self._live.journal.log(level, "vehicle", message, vehicle=member.name)
+            await journal.log(Level.INFO, "vehicle", f"{member.name} is heard again", vehicle=member.name)
 
     async def _advise(self, member: Member, info: VehicleInfo) -> None:
         if info.advice and member.name not in self._advised:
@@ -165,8 +166,10 @@ class Engagement:
         self._refused[member.name] = _Refused(asyncio.get_running_loop().time(), wait_s, link)
         told, member.refusal = member.refusal, str(error)
         if _without_figures(member.refusal) != _without_figures(told):
-            level = Level.ALARM if member.followed else Level.WARNING
-            await live.journal.log(level, "vehicle", str(error), vehicle=member.name)
+            if member.followed:
+                await live.journal.alarm(AlarmKind.VEHICLE_REFUSES, str(error), vehicle=member.name)
+            else:
+                await live.journal.log(Level.WARNING, "vehicle", str(error), vehicle=member.name)
 
 
 def _without_figures(reason: str) -> str:

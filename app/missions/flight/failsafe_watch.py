@@ -8,6 +8,7 @@ from itertools import combinations
 import numpy as np
 import structlog
 
+from app.missions.alarm_kinds import AlarmKind
 from app.missions.fleet.hub import FleetHub
 from app.missions.fleet.interface import FaultKind, LinkState
 from app.missions.flight.range_left import RangeLeft
@@ -183,14 +184,12 @@ class FailsafeWatch:
         who = f"{name}: " if name else ""
         for failsafe, one in now.items():
             if failsafe not in before:
-                await self._live.journal.log(
-                    Level.WARNING if failsafe is Failsafe.SEPARATION_LOST else Level.ALARM,
-                    "failsafe",
-                    f"{who}{one.message}",
-                    failsafe=failsafe,
-                    response=one.response,
-                    **({"vehicle": name} if name else {}),
-                )
+                words = f"{who}{one.message}"
+                facts = {"failsafe": failsafe, "response": one.response} | ({"vehicle": name} if name else {})
+                if failsafe is Failsafe.SEPARATION_LOST:
+                    await self._live.journal.log(Level.WARNING, "failsafe", words, **facts)
+                else:
+                    await self._live.journal.alarm(AlarmKind(failsafe.value), words, **facts)
         for failsafe in before.keys() - now.keys():
             words = f"{who}{failsafe.replace('_', ' ')} is over"
             await self._live.journal.log(

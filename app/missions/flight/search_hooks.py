@@ -6,6 +6,7 @@ from collections.abc import Awaitable, Callable
 import numpy as np
 
 from app.exploration.site_search import SearchTask
+from app.missions.alarm_kinds import AlarmKind
 from app.missions.flight.decision import Decision
 from app.missions.live.mission import LiveMission
 from app.missions.search.course import IDLE_STEPS, REST_S, Course
@@ -71,7 +72,7 @@ class SearchHooks:
             return
         blind = course.unseen(live.team.present)
         message = f"no scan tells what is around {', '.join(blind)}: the search waits for one"
-        await live.journal.log(Level.ALARM, "waiting", message, vehicles=blind)
+        await live.journal.alarm(AlarmKind.NO_SCAN, message, vehicles=blind)
         await self._wait(lambda: not course.unseen(live.team.present), None)
 
     async def tell_of(self, barred: list[Member]) -> None:
@@ -96,11 +97,11 @@ class SearchHooks:
             why = "the time is up" if course.search.left_s() <= 0 else "every step is done"
             then = "the mission ends where they are" if last else "they go on to the entry"
             message = f"{why} and not everybody is back (from the entry: {far}): {then}"
-            await live.journal.log(Level.ALARM, "late", message, vehicles=away)
+            await live.journal.alarm(AlarmKind.SEARCH_LATE, message, vehicles=away)
         if away and course.idle == IDLE_STEPS:
             message = (
                 f"nobody can go anywhere from where {', '.join(away)} stand: no way that was looked at is wide enough "
                 "and leads on, or to the entry. Bring them there, or make search.safety_m smaller in a new mission"
             )
-            await live.journal.log(Level.ALARM, "stuck", message, vehicles=away)
+            await live.journal.alarm(AlarmKind.SEARCH_STUCK, message, vehicles=away)
         return course.over(team, int(decision.terms.get("homebound", 0)))

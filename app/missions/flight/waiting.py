@@ -3,8 +3,8 @@
 import asyncio
 from collections.abc import Callable
 
+from app.missions.alarm_kinds import AlarmKind
 from app.missions.live.mission import LiveMission
-from app.missions.views.mission import Level
 
 LOOK_S = 1.0
 """How often is looked how each vehicle is, seconds of the vehicles' time."""
@@ -44,7 +44,7 @@ class Waiting:
         message = (
             "no vehicle can be sent anywhere; waiting for one" if absent else "every vehicle left; add one to go on"
         )
-        await live.journal.log(Level.ALARM, "waiting", message, vehicles=absent)
+        await live.journal.alarm(AlarmKind.NO_VEHICLE, message, vehicles=absent)
         await self.until(lambda: bool(team.present) or self._nobody_surveys, None)
 
     @property

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import structlog
 
+from app.missions.alarm_kinds import AlarmKind
 from app.missions.fleet.hub import FleetHub
 from app.missions.fleet.interface import WaypointReport, WaypointStatus
 from app.missions.flight.commit import LegCommit, home_of, point_of
@@ -86,7 +87,7 @@ class Withdrawals:
             if len(lost) == len(away):
                 for member in lost:
                     words = f"{member.name} did not come home: it cannot be reached"
-                    await self._live.journal.log(Level.ALARM, "recovery", words, vehicle=member.name)
+                    await self._live.journal.alarm(AlarmKind.NOT_COME_HOME, words, vehicle=member.name)
                 return
             await until_next_look(self._time_scale)
 
@@ -158,7 +159,7 @@ class Withdrawals:
         way_m = self._range.way_from(here_m, home_m)
         if way_m is None:
             words = "no way leads home that keeps clear of zones: it comes up where it is"
-            await self._live.journal.log(Level.ALARM, "recovery", f"{member.name}: {words}", vehicle=member.name)
+            await self._live.journal.alarm(AlarmKind.NO_WAY_HOME, f"{member.name}: {words}", vehicle=member.name)
             member.withdrawal = Withdrawal(Response.SURFACE, words)
             return
         depths_m = self._range.depths_m(member, here_m, way_m)
@@ -188,8 +189,11 @@ class Withdrawals:
         try:
             stop = await self._hub.stop(member.key)
             await self._keep(member, withdrawal)
-            level = Level.INFO if stop.acknowledged else Level.ALARM
-            await self._live.journal.log(level, "recovery", f"{words}; {stop.detail}", vehicle=member.name, **facts)
+            said, facts = f"{words}; {stop.detail}", {"vehicle": member.name} | facts
+            if stop.acknowledged:
+                await self._live.journal.log(Level.INFO, "recovery", said, **facts)
+            else:
+                await self._live.journal.alarm(AlarmKind.STOP_NOT_ACKNOWLEDGED, said, event="recovery", **facts)
         finally:
             self._ending.discard(member.name)
         self._live.changed.set()

@@ -7,7 +7,7 @@ import shapely
 from shapely.geometry import Point, Polygon
 
 from app.arrays import FloatArray
-from app.missions.views.mission import Level
+from app.missions.alarm_kinds import AlarmKind
 
 OUTSIDE_ALARM_M = 20.0
 """Vehicles that wait circle across the border; farther outside than this they have gone astray."""
@@ -27,7 +27,8 @@ class _Breach:
 class Crossing:
     """A vehicle that went where it must not be, or came back: a line for the log."""
 
-    level: Level
+    alarm: AlarmKind | None
+    """None: it came back."""
     message: str
     data: dict[str, Any]
 
@@ -101,7 +102,8 @@ class Boundaries:
                 return []
             known[key] = _Breach(words, at_s, by_m)
             message = f"{vehicle} is {words}, at {depth_m:.1f} m depth: abort it if it goes on"
-            return [Crossing(Level.ALARM, message, data | {"begins": True})]
+            alarm = AlarmKind.ZONE_ENTERED if key else AlarmKind.AREA_LEFT
+            return [Crossing(alarm, message, data | {"begins": True})]
         breach.farthest_m = max(breach.farthest_m, by_m)
         if not over:
             return []
@@ -110,7 +112,7 @@ class Boundaries:
             f"{vehicle} is no longer {words}: it was for {max(at_s - breach.began_s, 0.0):.0f} s, "
             f"by up to {breach.farthest_m:.1f} m"
         )
-        return [Crossing(Level.WARNING, message, data | {"begins": False, "farthest_m": round(breach.farthest_m, 2)})]
+        return [Crossing(None, message, data | {"begins": False, "farthest_m": round(breach.farthest_m, 2)})]
 
 
 def _signed_distance_m(polygon: Polygon, place: Point) -> float:

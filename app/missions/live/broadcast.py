@@ -5,7 +5,7 @@ from collections import deque
 from collections.abc import AsyncIterator, Iterator
 from contextlib import contextmanager
 
-from app.missions.views.messages import EventMessage, LiveMessage, WaypointsMessage
+from app.missions.views.messages import AlarmMessage, EventMessage, LiveMessage, WaypointsMessage
 
 MAX_BACKLOG = 5000
 """A watcher that is this far behind is cut off; it reconnects and gets a fresh snapshot."""
@@ -16,7 +16,7 @@ class WatchEndedError(Exception):
 
 
 class Subscription:
-    """What one watcher has yet to receive: every event and waypoint change, of everything else only the newest."""
+    """What one watcher has yet to receive: every event, alarm and waypoint change, of all else only the newest."""
 
     def __init__(self) -> None:
         self._all: deque[LiveMessage] = deque()
@@ -26,7 +26,7 @@ class Subscription:
 
     def put(self, message: LiveMessage) -> None:
         """Queue a message."""
-        if isinstance(message, EventMessage | WaypointsMessage):
+        if isinstance(message, AlarmMessage | EventMessage | WaypointsMessage):
             if len(self._all) >= MAX_BACKLOG:
                 self.end(f"more than {MAX_BACKLOG} messages were not taken in time")
             else:

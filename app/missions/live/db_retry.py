@@ -22,6 +22,8 @@ class DatabaseRetry:
     ----------
     tell
         Called when a trouble begins or ends.
+    begun
+        Called with what it is when one begins.
     over
         Called with words for the mission's log when one has ended.
 
@@ -31,10 +33,17 @@ class DatabaseRetry:
         What keeps the database from being used and what to do about it; empty when nothing does.
     """
 
-    def __init__(self, mission_id: str, tell: Callable[[], None], over: Callable[[str], None]) -> None:
+    def __init__(
+        self,
+        mission_id: str,
+        tell: Callable[[], None],
+        begun: Callable[[str], None],
+        over: Callable[[str], None],
+    ) -> None:
         self.trouble = ""
         self._mission_id = mission_id
         self._tell = tell
+        self._begun = begun
         self._over = over
         self._since_s = 0.0
 
@@ -57,6 +66,7 @@ class DatabaseRetry:
             raise error
         if not self.trouble:
             self._since_s = asyncio.get_running_loop().time()
+            self._begun(trouble)
         if trouble != self.trouble:
             log.error("the database cannot be used, trying again", mission=self._mission_id, why=trouble)
             self.trouble = trouble

@@ -16,9 +16,12 @@ from sqlalchemy.ext.asyncio import AsyncSession
 
 from app.mapping.swath.pings import Pings
 from app.missions import metrics
+from app.missions.alarm_kinds import ALARMS, AlarmKind
+from app.missions.alarms.raised import copy_of, make_alarm
 from app.missions.clock import now
 from app.missions.fleet.interface import PingReport, ScanReport, SoundingReport, VehicleReport, WaypointReport
 from app.missions.large_batches import made_of
+from app.missions.live.alarms import MissionAlarms
 from app.missions.live.broadcast import Broadcaster
 from app.missions.live.db_retry import DatabaseRetry
 from app.missions.live.write_behind import Committed, WriteBehind
@@ -33,7 +36,7 @@ from app.storage import missions as mission_queries
 from app.storage import soundings as sounding_queries
 from app.storage import telemetry as telemetry_queries
 from app.storage.database import Database
-from app.storage.models import EventRow
+from app.storage.models import AlarmRow, EventRow
 from app.storage.uncancellable import to_the_end
 
 FLUSH_PERIOD_S = 0.1
@@ -98,10 +101,17 @@ class Journal(WriteBehind[Noted]):
         take_scans: TakeScans | None = None,
     ) -> None:
         super().__init__(
-            database, mission_id, DatabaseRetry(mission_id, on_trouble, self._note_trouble), FLUSH_PERIOD_S
+            database,
+            mission_id,
+            DatabaseRetry(mission_id, on_trouble, self._begin_trouble, self._note_trouble),
+            FLUSH_PERIOD_S,
         )
         self._gate = gate
         self._broadcaster = broadcaster
+        self.alarms = MissionAlarms(mission_id, broadcaster)
+        """Those of the mission that nobody has acknowledged."""
+        self._trouble: AlarmRow | None = None
+        """Raised when the database could not be written; its line comes when it can be again."""
         self._on_accepted = on_accepted
         self._pings = pings
         self._on_pings = on_pings
@@ -150,16 +160,22 @@ class Journal(WriteBehind[Noted]):
         self._note(*samples)
 
     def note_line(self, row: EventRow) -> None:
-        """Note a line; it is written within a moment, or when that is possible again."""
-        self._note(row)
+        """Note a line; it is written within a moment, or when that is possible again. An alarm is shown at once."""
+        self._note_lines(row)
+
+    def _note_lines(self, *rows: EventRow) -> None:
+        for row in rows:
+            if row.alarm is not None:
+                self.alarms.noted(row.alarm)
+        self._note(*rows)
 
     async def flush(self) -> None:
         """Write everything noted so far. What could not be written stays noted."""
         await super().flush()
         if self._untold:
             why, self._untold = self._untold, ""
-            await self.log(
-                Level.ALARM, "corrections", f"soundings are rejected: {why}. Send a tide table that covers them"
+            await self.alarm(
+                AlarmKind.NO_WATER_LEVEL, f"soundings are rejected: {why}. Send a tide table that covers them"
             )
 
     async def _store(self, noted: Sequence[Noted], session: AsyncSession) -> Committed:
@@ -252,16 +268,20 @@ class Journal(WriteBehind[Noted]):
         """
         await self.log_all([self.line(level, kind, message, **data)])
 
+    async def alarm(self, kind: AlarmKind, message: str, *, event: str | None = None, **data: Any) -> None:
+        """Raise an alarm: a line of the log as by :meth:`log`, and what has to be acknowledged."""
+        await self.log_all([self.alarm_line(kind, message, event=event, **data)])
+
     async def log_all(self, rows: Sequence[EventRow]) -> None:
         """Write lines of the mission's log together and show them; what cannot be written is noted, as by :meth:`log`.
 
         Parameters
         ----------
         rows
-            Made by :meth:`line`.
+            Made by :meth:`line` or :meth:`alarm_line`.
         """
         if self.storage.trouble or _of(EventRow, self._noted):
-            self._note(*rows)
+            self._note_lines(*rows)
             return
         copies = [_copy(row) for row in rows]
         async with self._logging:
@@ -269,7 +289,7 @@ class Journal(WriteBehind[Noted]):
                 await to_the_end(self._add(*rows))
             except Exception as error:
                 self.storage.note(error)
-                self._note(*copies)
+                self._note_lines(*copies)
                 return
             for row in rows:
                 self.tell(row)
@@ -283,12 +303,35 @@ class Journal(WriteBehind[Noted]):
         async with self._database.writing() as session:
             session.add_all(rows)
 
+    def _begin_trouble(self, trouble: str) -> None:
+        """Raise an alarm that nothing can be written: it is told before it can be stored."""
+        words = f"nothing can be written down: {trouble}"
+        self._trouble = make_alarm(AlarmKind.DATABASE_UNWRITABLE, self._mission_id, words, now())
+        self.alarms.noted(self._trouble)
+
     def _note_trouble(self, message: str) -> None:
-        self.note_line(self.line(Level.ALARM, "storage", message))
+        line = self.alarm_line(AlarmKind.DATABASE_UNWRITABLE, message)
+        if self._trouble is not None:
+            self._trouble.message, line.alarm, self._trouble = message, self._trouble, None
+        self.note_line(line)
 
     def line(self, level: Level, kind: str, message: str, **data: Any) -> EventRow:
-        """Return a line of the mission's log for a transaction of the caller's; ``tell`` of it once that is done."""
-        return EventRow(mission_id=self._mission_id, time=now(), level=level, kind=kind, message=message, data=data)
+        """Return a line of the mission's log for a transaction of the caller's; ``tell`` of it once that is done.
+
+        Lines of level alarm are made by :meth:`alarm_line`.
+        """
+        return EventRow(
+            mission_id=self._mission_id, time=now(), level=level, kind=kind, message=message, data=data, alarm=None
+        )
+
+    def alarm_line(self, kind: AlarmKind, message: str, *, event: str | None = None, **data: Any) -> EventRow:
+        """Return a line that raises an alarm, which is stored with it, for a transaction as that of :meth:`line`.
+
+        ``event`` is the line's kind where it is not the one that the table of alarms has.
+        """
+        row = self.line(Level.ALARM, event or ALARMS[kind].event, message, **data)
+        row.alarm = make_alarm(kind, self._mission_id, message, row.time, vehicle=data.get("vehicle"))
+        return row
 
     def tell(self, row: EventRow) -> None:
         """Show a line that was written to everyone who watches."""
@@ -296,6 +339,8 @@ class Journal(WriteBehind[Noted]):
         said = {"mission": self._mission_id, "level": str(row.level), "kind": row.kind, "message": row.message}
         log.info("mission event", **(row.data | said))
         self._broadcaster.publish(EventMessage(event=event_view(row)))
+        if row.alarm is not None:
+            self.alarms.stored(row.alarm)
 
     def tell_of_missing_level(self) -> None:
         """Write into the log again, once, when no water level is known for soundings."""
@@ -377,7 +422,13 @@ def _of(kind: type[T], noted: Sequence[Noted]) -> list[T]:
 
 def _copy(row: EventRow) -> EventRow:
     return EventRow(
-        mission_id=row.mission_id, time=row.time, level=row.level, kind=row.kind, message=row.message, data=row.data
+        mission_id=row.mission_id,
+        time=row.time,
+        level=row.level,
+        kind=row.kind,
+        message=row.message,
+        data=row.data,
+        alarm=None if row.alarm is None else copy_of(row.alarm),
     )
 
 

@@ -18,6 +18,7 @@ from app.estimation import Sensor, SingleBeam
 from app.mapping.georeference import LocalFrame
 from app.mapping.swath.pings import Pings, reach_m
 from app.mapping.tides import TideTable
+from app.missions.alarm_kinds import AlarmKind
 from app.missions.clock import now
 from app.missions.fleet.hub import FleetHub
 from app.missions.fleet.interface import (
@@ -346,7 +347,8 @@ class LiveMission:
                     member.engaged = False
             case RestartReport():
                 words = f"{event.vehicle}: {event.reason}"
-                self.journal.note_line(self.journal.line(Level.ALARM, "vehicle", words, vehicle=event.vehicle))
+                line = self.journal.alarm_line(AlarmKind.VEHICLE_RESTARTED, words, vehicle=event.vehicle)
+                self.journal.note_line(line)
             case WaypointReport():
                 self._receive_waypoint(member, event)
         self.changed.set()
@@ -441,7 +443,11 @@ class LiveMission:
             asyncio.get_running_loop().time(),
             may_leave=on_its_way_home,
         ):
-            self.journal.note_line(self.journal.line(crossing.level, "boundary", crossing.message, **crossing.data))
+            journal, words, data = self.journal, crossing.message, crossing.data
+            if crossing.alarm is None:
+                journal.note_line(journal.line(Level.WARNING, "boundary", words, **data))
+            else:
+                journal.note_line(journal.alarm_line(crossing.alarm, words, **data))
 
     def _receive_waypoint(self, member: Member, event: WaypointReport) -> None:
         if event.mission_id != self.id or member.order is None or event.step != member.order.step:

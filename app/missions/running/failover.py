@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import structlog
 from sqlalchemy.exc import SQLAlchemyError
 
+from app.missions.alarm_kinds import AlarmKind
 from app.missions.errors import ConflictError, MissionElsewhereError
 from app.missions.fleet.hub import FleetHub
 from app.missions.live.mission import LiveMission
@@ -78,7 +79,7 @@ class Failover:
             self._claims.claim_team(live)
         except ConflictError as error:
             # The settings changed while nobody had it: one mission's trouble is not the others'.
-            await self._supervisor.set_state(live, MissionState.FAILED, str(error), "service", Level.ALARM)
+            await self._supervisor.set_state(live, MissionState.FAILED, str(error), "service", AlarmKind.MISSION_FAILED)
             return
         if live.header.state is MissionState.RUNNING:
             self._supervisor.run(live)

@@ -61,6 +61,7 @@ async def _snapshot_message(live: LiveMission) -> SnapshotMessage:
         tracks=tracks,
         map_version=built.version if built else 0,
         last_event_id=last_event_id,
+        alarms=live.journal.alarms.open,
     )
 
 

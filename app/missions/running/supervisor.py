@@ -7,6 +7,7 @@ from functools import partial
 
 import structlog
 
+from app.missions.alarm_kinds import AlarmKind
 from app.missions.clock import now
 from app.missions.compilation import Compilation
 from app.missions.errors import MissionElsewhereError
@@ -95,18 +96,18 @@ class MissionSupervisor:
             return
         except Exception as error:
             log.exception("the step loop failed", mission=live.id)
-            target, level, reason = MissionState.FAILED, Level.ALARM, f"the step loop failed: {error}"
+            target, alarm, reason = MissionState.FAILED, AlarmKind.MISSION_FAILED, f"the step loop failed: {error}"
         else:
-            target, level = MissionState.FINISHED, Level.INFO
+            target, alarm = MissionState.FINISHED, None
             if live.ending is not None:
                 target, reason = live.ending.state, live.ending.reason or "everybody is back"
         async with self.acting(live.id):
             try:
-                await to_the_end(self._conclude(live, target, reason, level))
+                await to_the_end(self._conclude(live, target, reason, alarm))
             finally:
                 self.runs.pop(live.id, None)
 
-    async def _conclude(self, live: LiveMission, target: MissionState, reason: str, level: Level) -> None:
+    async def _conclude(self, live: LiveMission, target: MissionState, reason: str, alarm: AlarmKind | None) -> None:
         """Bring a mission whose flight ended to its end."""
         live.halt()
         stops = await self.stop_team(live)
@@ -114,14 +115,14 @@ class MissionSupervisor:
         await self.log_stops(live, stops)
         # Who reads that the mission has ended finds its vehicles free.
         self._claims.release_team(live)
-        await self._settle(live, self._begin_state(live, target, reason, "service", level), target, reason)
+        await self._settle(live, self._begin_state(live, target, reason, "service", alarm), target, reason)
         self._maps.map_last(live)
 
     def _begin_state(
-        self, live: LiveMission, state: MissionState, reason: str, actor: str, level: Level = Level.INFO
+        self, live: LiveMission, state: MissionState, reason: str, actor: str, alarm: AlarmKind | None = None
     ) -> asyncio.Task[None]:
         """Begin to write a state down, if need be when the database can be used again."""
-        work = live.journal.storage.done(partial(self._write_state, live, state, reason, actor, level))
+        work = live.journal.storage.done(partial(self._write_state, live, state, reason, actor, alarm))
         return asyncio.create_task(work, name=f"{state} of {live.id}")
 
     async def _settle(self, live: LiveMission, written: asyncio.Task[None], state: MissionState, reason: str) -> None:
@@ -245,10 +246,12 @@ class MissionSupervisor:
         """
         lines = []
         for stop in stops:
-            level = Level.INFO if stop.acknowledged else Level.ALARM
             words = "acknowledged the stop" if stop.acknowledged else "has NOT acknowledged the stop"
             text = f"{stop.vehicle} {words}: {stop.detail}"
-            lines.append(live.journal.line(level, "stop", text, **receipt(stop)))
+            if stop.acknowledged:
+                lines.append(live.journal.line(Level.INFO, "stop", text, **receipt(stop)))
+            else:
+                lines.append(live.journal.alarm_line(AlarmKind.STOP_NOT_ACKNOWLEDGED, text, **receipt(stop)))
         if live.id in self._unwritten:
             for line in lines:
                 live.journal.note_line(line)
@@ -263,16 +266,18 @@ class MissionSupervisor:
         state: MissionState,
         reason: str,
         actor: str,
-        level: Level = Level.INFO,
+        alarm: AlarmKind | None = None,
         *,
         check: Guard | None = None,
     ) -> None:
         """Commit a mission's new state together with its line in the log, then tell everyone.
 
+        ``alarm`` is what that raises, if it does.
+
         ``check`` is called within the transaction before anything is changed, and raises what speaks against it.
         """
         self._supersede(live)
-        await self._write_state(live, state, reason, actor, level, check)
+        await self._write_state(live, state, reason, actor, alarm, check)
 
     def _supersede(self, live: LiveMission) -> None:
         """Leave off writing an earlier state down: another one comes."""
@@ -286,12 +291,16 @@ class MissionSupervisor:
         state: MissionState,
         reason: str,
         actor: str,
-        level: Level,
+        alarm: AlarmKind | None,
         check: Guard | None = None,
     ) -> None:
         changed_at = now()
         words = f"{state} by {actor}" + (f": {reason}" if reason else "")
-        line = live.journal.line(level, "state", words, state=state, actor=actor)
+        facts = {"state": state, "actor": actor}
+        if alarm is None:
+            line = live.journal.line(Level.INFO, "state", words, **facts)
+        else:
+            line = live.journal.alarm_line(alarm, words, **facts)
         async with live.database.writing() as session:
             if check is not None:
                 await check(session)

@@ -5,6 +5,7 @@ from typing import Literal
 
 from pydantic import Field
 
+from app.missions.views.alarms import AlarmView
 from app.missions.views.base import View
 from app.missions.views.mission import EventView, MissionSummary, MissionView, VehicleView, WaypointView
 from app.missions.views.search import SearchMessage
@@ -21,6 +22,7 @@ class SnapshotMessage(View):
     )
     map_version: int
     last_event_id: int
+    alarms: list[AlarmView] = Field(description="Those of the mission that nobody has acknowledged, oldest first")
 
 
 class VehiclesMessage(View):
@@ -71,6 +73,13 @@ class EventMessage(View):
     event: EventView
 
 
+class AlarmMessage(View):
+    """An alarm was raised or acknowledged; by its id the page knows whether it has it already."""
+
+    type: Literal["alarm"] = "alarm"
+    alarm: AlarmView
+
+
 LiveMessage = (
     SnapshotMessage
     | VehiclesMessage
@@ -80,4 +89,5 @@ LiveMessage = (
     | StateMessage
     | MapMessage
     | EventMessage
+    | AlarmMessage
 )

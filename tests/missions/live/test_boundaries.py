@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from app.missions.alarm_kinds import AlarmKind
 from app.missions.fleet.links.sim import Launch, SimFleetLink
 from app.missions.flight.decision import make_constraints
 from app.missions.live.boundaries import Boundaries
@@ -24,16 +25,16 @@ AREA = np.array([[0.0, 0], [100, 0], [100, 100], [0, 100]])
 ZONE = np.array([[40.0, 40], [60, 40], [60, 60], [40, 60]])
 
 
-def told(boundaries: Boundaries, places: list[tuple[float, float]]) -> list[tuple[Level, str]]:
+def told(boundaries: Boundaries, places: list[tuple[float, float]]) -> list[tuple[AlarmKind | None, str]]:
     lines = [boundaries.judge("a", place, 2.0, at_s) for at_s, place in enumerate(places)]
-    return [(line.level, line.message) for found in lines for line in found]
+    return [(line.alarm, line.message) for found in lines for line in found]
 
 
 def test_an_entry_into_a_zone_is_one_alarm_and_its_end_says_how_long_and_how_far() -> None:
     way = [(30.0, 50.0), (39.9, 50.0), (41.0, 50.0), (44.0, 50.0), (40.5, 50.0), (39.5, 50.0), (40.2, 50.0), (35, 50)]
     assert told(Boundaries(AREA, [ZONE]), way) == [
-        (Level.ALARM, "a is in keep-out zone 1, at 2.0 m depth: abort it if it goes on"),
-        (Level.WARNING, "a is no longer in keep-out zone 1: it was for 5 s, by up to 4.0 m"),
+        (AlarmKind.ZONE_ENTERED, "a is in keep-out zone 1, at 2.0 m depth: abort it if it goes on"),
+        (None, "a is no longer in keep-out zone 1: it was for 5 s, by up to 4.0 m"),
     ]
 
 
@@ -41,11 +42,11 @@ def test_leaving_the_area_is_an_alarm_beyond_the_circle_of_waiting_and_coming_fr
     boundaries = Boundaries(AREA, [])
     assert told(boundaries, [(-80, 50), (-30, 50), (5, 50), (-15, 50), (5, 50)]) == []
     assert told(boundaries, [(-21, 50)]) == [
-        (Level.ALARM, "a is outside the area, at 2.0 m depth: abort it if it goes on")
+        (AlarmKind.AREA_LEFT, "a is outside the area, at 2.0 m depth: abort it if it goes on")
     ]
     assert boundaries.breach("a") == "outside the area"
     assert told(boundaries, [(-15, 50)]) == []
-    assert [level for level, _ in told(boundaries, [(-9, 50)])] == [Level.WARNING]
+    assert [alarm for alarm, _ in told(boundaries, [(-9, 50)])] == [None]
     assert boundaries.breach("a") == ""
 
 

@@ -23,8 +23,9 @@ class Numbers(WriteBehind[int]):
     """Written is what was stored by a transaction that committed."""
 
     def __init__(self, database: Database, period_s: float = 60.0) -> None:
+        self.begun: list[str] = []
         self.over: list[str] = []
-        super().__init__(database, "m", DatabaseRetry("m", lambda: None, self.over.append), period_s)
+        super().__init__(database, "m", DatabaseRetry("m", lambda: None, self.begun.append, self.over.append), period_s)
         self.written: list[int] = []
         self.transactions: list[list[int]] = []
         self.errors: list[Exception] = []

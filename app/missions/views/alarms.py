@@ -1,0 +1,71 @@
+"""Alarms and what was told of them, as they are answered."""
+
+from datetime import datetime
+from enum import StrEnum
+
+from pydantic import Field
+
+from app.missions.alarm_kinds import AlarmKind, AlarmSeverity
+from app.missions.views.base import View
+
+
+class AlarmState(StrEnum):
+    """Whether somebody has taken an alarm."""
+
+    OPEN = "open"
+    ACKNOWLEDGED = "acknowledged"
+
+
+class Notice(StrEnum):
+    """Why somebody is told of an alarm."""
+
+    RAISED = "raised"
+    ESCALATED = "escalated"
+    """Nobody acknowledged it in time."""
+    ACKNOWLEDGED = "acknowledged"
+
+
+class DeliveryState(StrEnum):
+    """How far the telling has come."""
+
+    WAITING = "waiting"
+    DELIVERED = "delivered"
+    FAILED = "failed"
+    """It was tried for as long as the settings say."""
+    SUPERSEDED = "superseded"
+    """The alarm was acknowledged before anybody could be told."""
+
+
+class AlarmView(View):
+    """An alarm: who has it, or that nobody has."""
+
+    id: str
+    mission_id: str | None = Field(description="null: it concerns no mission")
+    kind: AlarmKind
+    severity: AlarmSeverity
+    vehicle: str | None
+    message: str
+    raised_at: datetime
+    state: AlarmState
+    acknowledged_at: datetime | None
+    acknowledged_by: str | None = Field(description="The name of the token, or of the user, that acknowledged it")
+
+
+class DeliveryView(View):
+    """What one recipient is told, and what came of it."""
+
+    id: str = Field(description="What the recipient sees as the message's id; the same at every attempt")
+    recipient: str = Field(description="The recipient's name in the settings")
+    notice: Notice
+    state: DeliveryState
+    attempts: int
+    created_at: datetime
+    next_try_at: datetime | None = Field(description="null: it is not tried again")
+    done_at: datetime | None
+    error: str = Field(description="Why the last attempt failed; empty when none did")
+
+
+class AlarmReport(AlarmView):
+    """An alarm with everything that was told of it."""
+
+    deliveries: list[DeliveryView]
