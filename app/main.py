@@ -22,6 +22,7 @@ from starlette.middleware.cors import CORSMiddleware
 
 from app import __version__
 from app.api import (
+    alarms,
     audit_routes,
     corrections,
     fleet,
@@ -177,6 +178,7 @@ def create_app(settings: Settings | None = None, *, port: int | None = None) -> 
         searches.router,
         streams.router,
         fleet.router,
+        alarms.router,
         audit_routes.router,
         signing_in.router,
         health_router(API),

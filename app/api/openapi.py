@@ -24,6 +24,7 @@ TAGS = [
         "Close codes: 4401 no valid token, 4403 forbidden, 4404 no such mission, "
         "4429 too many viewers, 1013 fell behind (reconnect), 1001 the service ends.",
     },
+    {"name": "alarms", "description": "What somebody on watch has to take, who has taken it, and who was told."},
     {"name": "session", "description": "Who asks, and signing in and out from a browser."},
     {"name": "audit", "description": "Who commanded what, from where, and what came of it."},
     {"name": "planners", "description": "Which planners decide where the vehicles go."},

@@ -19,6 +19,7 @@ from starlette.responses import Response
 from starlette.types import Scope
 
 from app.missions.errors import (
+    AlarmNotFoundError,
     ConflictError,
     FileTooLargeError,
     ImportNotFoundError,
@@ -88,6 +89,7 @@ TITLES: dict[str, tuple[int, str]] = {
     "sounding-not-found": (404, "There is no such sounding"),
     "target-not-found": (404, "The mission has no such target"),
     "import-not-found": (404, "There is no such import"),
+    "alarm-not-found": (404, "There is no such alarm"),
     "feature-not-found": (404, "There is no such feature"),
     "pings-not-found": (404, "There is no such file of pings"),
     "map-not-ready": (404, "There is no map yet"),
@@ -400,6 +402,7 @@ def describe_mission_error(error: Exception) -> tuple[str, str, str]:
         (PingsUnreadableError, "pings-unreadable"),
         (TargetNotFoundError, "target-not-found"),
         (ImportNotFoundError, "import-not-found"),
+        (AlarmNotFoundError, "alarm-not-found"),
         (ImportUnavailableError, "import-unavailable"),
         (FileTooLargeError, "body-too-large"),
         (MapNotReadyError, "map-not-ready"),
@@ -472,6 +475,7 @@ def install(app: FastAPI) -> None:
         SoundingNotFoundError,
         TargetNotFoundError,
         ImportNotFoundError,
+        AlarmNotFoundError,
         ImportUnavailableError,
         FileTooLargeError,
         MapNotReadyError,

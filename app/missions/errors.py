@@ -35,6 +35,10 @@ class InvalidRequestError(MissionError):
         self.field = field
 
 
+class AlarmNotFoundError(MissionError):
+    """There is no such alarm."""
+
+
 class ImportNotFoundError(MissionError):
     """There is no such import, or no reference grid."""
 

@@ -13,6 +13,9 @@ PLANNING_SECONDS = Histogram(
 )
 RUNNING = Gauge("bathyfleet_missions_running", "Missions whose flight runs in this process")
 EVENTS = Counter("bathyfleet_mission_events_total", "Lines written to mission logs by level", ["level"])
+ALARM_DELIVERIES = Counter(
+    "bathyfleet_alarm_deliveries_total", "Attempts to tell somebody of an alarm by result", ["result"]
+)
 PACKETS_DROPPED = Counter(
     "bathyfleet_imc_packets_dropped_total", "IMC packets that this machine threw away because its socket was full"
 )

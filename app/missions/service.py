@@ -11,6 +11,7 @@ from collections.abc import Awaitable, Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 
 from app.missions import states
+from app.missions.alarms.desk import AlarmDesk
 from app.missions.clock import now
 from app.missions.compilation import Compilation
 from app.missions.errors import MissionElsewhereError
@@ -116,6 +117,8 @@ class MissionService:
         )
         self.process = Ownership(database, url, certificate)
         """This process among those that share the database."""
+        self.alarms = AlarmDesk(settings.alarms, database, lambda: self.process.number)
+        """Alarms of all missions: who is told, and who has taken them."""
         self._failover = Failover(database, self.hub, self.process, self._registry, self._supervisor, self._claims)
         self.uploads = Uploads()
         """Files on their way in."""
@@ -132,8 +135,9 @@ class MissionService:
         self._compilation.begin()
         await finish_removing(self._database, self._ping_files)
         await self.hub.start()
-        self._registry.share(self.process, self._failover.may_take_up, self._failover.resume)
+        self._registry.share(self.process, self._failover.may_take_up, self._taken_up)
         await self._failover.begin()
+        self.alarms.start()
         self._started = True
 
     async def shutdown(self) -> None:
@@ -143,6 +147,7 @@ class MissionService:
         """
         self._started = False
         await self._failover.end()
+        await self.alarms.close()
         await asyncio.gather(*(self._supervisor.halt(live) for live in self._registry if live.id in self._runs))
         await self.maps.close()
         await self.hub.close()
@@ -153,6 +158,12 @@ class MissionService:
         self.forecaster.close()
         self.web_tiles.close()
         self._at_once.close()
+
+    async def _taken_up(self, live: LiveMission) -> None:
+        """Let the alarms of a mission that was taken up go out, then go on with it."""
+        live.journal.alarms.watch = self.alarms
+        self.alarms.listen(live.journal.alarms, live.spec.name)
+        await self._failover.resume(live)
 
     @property
     def compiling(self) -> bool:

@@ -58,3 +58,16 @@ def alarm_view(row: AlarmRow) -> AlarmView:
         acknowledged_at=row.acknowledged_at,
         acknowledged_by=row.acknowledged_by,
     )
+
+
+class AlarmBoard(Protocol):
+    """Where people see a mission's alarms."""
+
+    mission_id: str
+
+    @property
+    def open(self) -> list[AlarmView]:
+        """Those that nobody has acknowledged."""
+
+    def show(self, alarm: AlarmView) -> None:
+        """Show an alarm as it is now."""

@@ -1,0 +1,149 @@
+"""What is told of alarms, in the database: planned, taken by one process, settled, each within a transaction.
+
+Two processes that plan the same make the same ids; what one has taken no other takes, until it is settled or the
+process ends: its row goes then, and with it its name on the delivery.
+"""
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+
+from sqlalchemy.ext.asyncio import AsyncSession
+
+from app.missions.alarm_kinds import AlarmKind, AlarmSeverity
+from app.missions.alarm_settings import AlarmSettings
+from app.missions.alarms import routes
+from app.missions.alarms.message import Message
+from app.missions.alarms.raised import alarm_view
+from app.missions.views.alarms import DeliveryState, Notice
+from app.storage import alarms as alarm_queries
+from app.storage.models import AlarmDeliveryRow, AlarmRow, MissionRow
+
+AT_ONCE = 200
+"""Alarms that are planned in one transaction, and deliveries that are looked at to be taken."""
+
+
+@dataclass(frozen=True, slots=True)
+class Attempt:
+    """A delivery that this process has taken.
+
+    Attributes
+    ----------
+    attempts
+        How many there were before.
+    process
+        Under whose number it was taken; 0: it is not in the database yet.
+    """
+
+    recipient: str
+    message: Message
+    attempts: int
+    created_at: datetime
+    process: int
+
+
+def deliveries(
+    settings: AlarmSettings, alarm: AlarmRow, mission_name: str, at: datetime
+) -> tuple[list[AlarmDeliveryRow], datetime | None]:
+    """Return what is to be told of an alarm by now, and when something is next."""
+    ladder = routes.steps(
+        settings, AlarmKind(alarm.kind), AlarmSeverity(alarm.severity), alarm.mission_id, mission_name
+    )
+    age_s = max(0.0, (at - alarm.raised_at).total_seconds())
+    now, next_s = routes.due(ladder, alarm.told_after_s, age_s)
+    made = [
+        new_delivery(alarm.id, step.recipient, Notice.ESCALATED if step.after_s > 0 else Notice.RAISED, at)
+        for step in now
+    ]
+    return made, None if next_s is None else alarm.raised_at + timedelta(seconds=next_s)
+
+
+def new_delivery(alarm_id: str, recipient: str, notice: Notice, at: datetime) -> AlarmDeliveryRow:
+    """Return a delivery that was not tried yet."""
+    return AlarmDeliveryRow(
+        id=routes.delivery_id(alarm_id, recipient, notice),
+        alarm_id=alarm_id,
+        recipient=recipient,
+        notice=notice,
+        state=DeliveryState.WAITING,
+        attempts=0,
+        created_at=at,
+        next_try_at=at,
+        done_at=None,
+        error="",
+        process_id=None,
+    )
+
+
+async def plan(session: AsyncSession, settings: AlarmSettings, at: datetime) -> None:
+    """Store what is to be told by now of every alarm."""
+    planned: list[AlarmDeliveryRow] = []
+    for alarm in await alarm_queries.to_be_told(session, at, AT_ONCE):
+        first = alarm.told_after_s is None
+        if first and await alarm_queries.like_it(session, alarm, settings.repeat_after_s):
+            alarm.next_at = None
+            continue
+        made, alarm.next_at = deliveries(settings, alarm, await _name(session, alarm), at)
+        alarm.told_after_s = max(0.0, (at - alarm.raised_at).total_seconds())
+        planned += made
+    await session.flush()
+    await alarm_queries.add_deliveries(session, planned)
+
+
+async def keep_begun(session: AsyncSession, rows: Sequence[AlarmDeliveryRow]) -> None:
+    """Store deliveries that were begun from memory, of alarms that are stored now, as far as those still exist."""
+    known = {row.id for row in await alarm_queries.of_ids(session, {row.alarm_id for row in rows})}
+    await alarm_queries.add_deliveries(session, [row for row in rows if row.alarm_id in known])
+
+
+async def acknowledge(
+    session: AsyncSession, settings: AlarmSettings, alarm: AlarmRow, actor: str, at: datetime
+) -> None:
+    """Let nobody be told any more that an alarm is open, and everybody who was be told who has taken it."""
+    alarm.acknowledged_at, alarm.acknowledged_by = alarm.acknowledged_at or at, alarm.acknowledged_by or actor
+    alarm.next_at = None
+    reached: set[str] = set()
+    for row in await alarm_queries.deliveries_of(session, [alarm.id]):
+        if row.state == DeliveryState.DELIVERED or row.attempts or row.process_id is not None:
+            reached.add(row.recipient)
+        if row.state == DeliveryState.WAITING and row.process_id is None:
+            row.state, row.done_at = DeliveryState.SUPERSEDED, at
+    await session.flush()
+    kind, severity, name = AlarmKind(alarm.kind), AlarmSeverity(alarm.severity), await _name(session, alarm)
+    told = [
+        new_delivery(alarm.id, recipient, Notice.ACKNOWLEDGED, at)
+        for recipient in sorted(reached)
+        if routes.hears_acknowledgements(settings, recipient, kind, severity, alarm.mission_id, name)
+    ]
+    await alarm_queries.add_deliveries(session, told)
+
+
+async def take(
+    session: AsyncSession, at: datetime, process: int, busy: Collection[str], room: int
+) -> Sequence[AlarmDeliveryRow]:
+    """Take up to ``room`` deliveries whose time has come, one for each recipient that is not ``busy``."""
+    taken: dict[str, AlarmDeliveryRow] = {}
+    for row, _, _ in await alarm_queries.due(session, at, but_not_to=busy, limit=AT_ONCE):
+        if len(taken) < room and row.recipient not in taken:
+            row.process_id = process
+            taken[row.recipient] = row
+    return list(taken.values())
+
+
+async def attempts(session: AsyncSession, rows: Sequence[AlarmDeliveryRow], process: int) -> list[Attempt]:
+    """Return what is to be sent for deliveries that were taken."""
+    alarms = {row.id: row for row in await alarm_queries.of_ids(session, {row.alarm_id for row in rows})}
+    return [attempt_of(row, alarms[row.alarm_id], await _name(session, alarms[row.alarm_id]), process) for row in rows]
+
+
+def attempt_of(row: AlarmDeliveryRow, alarm: AlarmRow, mission_name: str, process: int) -> Attempt:
+    """Return what is to be sent for a delivery."""
+    message = Message(row.id, Notice(row.notice), alarm_view(alarm), mission_name)
+    return Attempt(row.recipient, message, row.attempts, row.created_at, process)
+
+
+async def _name(session: AsyncSession, alarm: AlarmRow) -> str:
+    if alarm.mission_id is None:
+        return ""
+    mission = await session.get(MissionRow, alarm.mission_id)
+    return "" if mission is None else mission.name

@@ -1,0 +1,120 @@
+"""Queries on alarms and on what is told of them."""
+
+from collections.abc import Collection, Sequence
+from datetime import datetime, timedelta
+
+from sqlalchemy import exists, select, update
+from sqlalchemy.dialects import postgresql, sqlite
+from sqlalchemy.ext.asyncio import AsyncSession
+
+from app.storage.models import AlarmDeliveryRow, AlarmRow, MissionRow
+
+WAITING = "waiting"
+"""The state of a delivery that is still to be made."""
+
+
+async def newest(
+    session: AsyncSession, *, acknowledged: bool | None = None, mission_id: str | None = None, limit: int = 200
+) -> Sequence[AlarmRow]:
+    """Return alarms, newest first; ``acknowledged``: None for all."""
+    query = select(AlarmRow).order_by(AlarmRow.raised_at.desc(), AlarmRow.id).limit(limit)
+    if acknowledged is not None:
+        query = query.where(
+            AlarmRow.acknowledged_at.is_not(None) if acknowledged else AlarmRow.acknowledged_at.is_(None)
+        )
+    if mission_id is not None:
+        query = query.where(AlarmRow.mission_id == mission_id)
+    return (await session.scalars(query)).all()
+
+
+async def of_ids(session: AsyncSession, ids: Collection[str]) -> Sequence[AlarmRow]:
+    """Return the alarms of these ids, as far as there are."""
+    return (await session.scalars(select(AlarmRow).where(AlarmRow.id.in_(ids)))).all() if ids else []
+
+
+async def held(session: AsyncSession, alarm_id: str) -> AlarmRow | None:
+    """Return an alarm that no other transaction changes until this one ends."""
+    query = select(AlarmRow).where(AlarmRow.id == alarm_id).with_for_update()
+    return (await session.scalars(query)).first()
+
+
+async def to_be_told(session: AsyncSession, at: datetime, limit: int) -> Sequence[AlarmRow]:
+    """Return alarms of which somebody is to be told by now, and that no other transaction is at, oldest first."""
+    query = select(AlarmRow).where(AlarmRow.next_at <= at).order_by(AlarmRow.next_at).limit(limit)
+    return (await session.scalars(query.with_for_update(skip_locked=True))).all()
+
+
+async def like_it(session: AsyncSession, alarm: AlarmRow, within_s: float) -> bool:
+    """Tell whether the same happened to the same vehicle so shortly before, was told, and nobody acknowledged it."""
+    other = AlarmRow
+    query = select(
+        exists().where(
+            other.mission_id == alarm.mission_id,
+            other.kind == alarm.kind,
+            other.vehicle.is_(None) if alarm.vehicle is None else other.vehicle == alarm.vehicle,
+            other.acknowledged_at.is_(None),
+            other.told_after_s.is_not(None),
+            other.raised_at <= alarm.raised_at,
+            other.raised_at > alarm.raised_at - timedelta(seconds=within_s),
+            other.id != alarm.id,
+        )
+    )
+    return bool(await session.scalar(query))
+
+
+async def add_deliveries(session: AsyncSession, rows: Collection[AlarmDeliveryRow]) -> None:
+    """Add deliveries; one that there is already stays as it is."""
+    if not rows:
+        return
+    insert = sqlite.insert if session.get_bind().dialect.name == "sqlite" else postgresql.insert
+    columns = [column.key for column in AlarmDeliveryRow.__table__.columns]
+    values = [{name: getattr(row, name) for name in columns} for row in rows]
+    await session.execute(insert(AlarmDeliveryRow).on_conflict_do_nothing(), values)
+
+
+async def deliveries_of(session: AsyncSession, alarm_ids: Collection[str]) -> Sequence[AlarmDeliveryRow]:
+    """Return what is told of alarms, oldest first."""
+    query = (
+        select(AlarmDeliveryRow)
+        .where(AlarmDeliveryRow.alarm_id.in_(alarm_ids))
+        .order_by(AlarmDeliveryRow.created_at, AlarmDeliveryRow.id)
+    )
+    return (await session.scalars(query)).all()
+
+
+async def due(
+    session: AsyncSession, at: datetime, *, but_not_to: Collection[str], limit: int
+) -> Sequence[tuple[AlarmDeliveryRow, AlarmRow, str]]:
+    """Return deliveries that nobody is at and whose time has come, each with its alarm and its mission's name."""
+    query = (
+        select(AlarmDeliveryRow, AlarmRow, MissionRow.name)
+        .join(AlarmRow, AlarmRow.id == AlarmDeliveryRow.alarm_id)
+        .outerjoin(MissionRow, MissionRow.id == AlarmRow.mission_id)
+        .where(
+            AlarmDeliveryRow.state == WAITING,
+            AlarmDeliveryRow.process_id.is_(None),
+            AlarmDeliveryRow.next_try_at <= at,
+            AlarmDeliveryRow.recipient.not_in(list(but_not_to)),
+        )
+        .order_by(AlarmDeliveryRow.next_try_at, AlarmDeliveryRow.id)
+        .limit(limit)
+        .with_for_update(of=AlarmDeliveryRow, skip_locked=True)
+    )
+    return [(delivery, alarm, name or "") for delivery, alarm, name in await session.execute(query)]
+
+
+async def anything_to_do(session: AsyncSession, at: datetime) -> bool:
+    """Tell whether an alarm is to be told, or a delivery made, by now."""
+    told = exists().where(AlarmRow.next_at <= at)
+    made = exists().where(
+        AlarmDeliveryRow.state == WAITING, AlarmDeliveryRow.process_id.is_(None), AlarmDeliveryRow.next_try_at <= at
+    )
+    return bool(await session.scalar(select(told | made)))
+
+
+async def settle(session: AsyncSession, delivery_id: str, *, process: int | None, values: dict[str, object]) -> None:
+    """Write down what came of an attempt; ``process``: only while that process is at it."""
+    query = update(AlarmDeliveryRow).where(AlarmDeliveryRow.id == delivery_id, AlarmDeliveryRow.state == WAITING)
+    if process is not None:
+        query = query.where(AlarmDeliveryRow.process_id == process)
+    await session.execute(query.values(values))

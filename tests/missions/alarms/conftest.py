@@ -1,0 +1,29 @@
+from collections.abc import AsyncIterator, Awaitable, Callable
+from contextlib import AsyncExitStack
+
+import pytest
+
+from app.missions.alarm_settings import AlarmSettings
+from app.storage.database import Database
+from tests.support.alarms import Clock, Watch, end_of_process, open_watch, with_mission
+
+
+@pytest.fixture
+def clock() -> Clock:
+    return Clock()
+
+
+@pytest.fixture
+async def keep_watch(either_url: str, clock: Clock) -> AsyncIterator[Callable[[AlarmSettings], Awaitable[Watch]]]:
+    """Opens desks of further processes on one database, SQLite's or PostgreSQL's."""
+    async with AsyncExitStack() as stack:
+        database = Database(either_url)
+        stack.push_async_callback(database.close)
+        await with_mission(database)
+
+        async def keep(settings: AlarmSettings) -> Watch:
+            watch = await open_watch(database, settings, clock)
+            stack.push_async_callback(end_of_process, watch)
+            return watch
+
+        yield keep
