@@ -1,4 +1,4 @@
-"""Who is told of alarms in tests: a real HTTP server, a real mail server, a real MQTT broker; and a desk to tell them."""
+"""Who is told of alarms in tests: real servers of HTTP, mail and MQTT; and a desk to tell them."""
 
 import http.server
 import json
@@ -130,7 +130,7 @@ def mail_server(certificate: Path) -> Iterator[tuple[Mailbox, int]]:
 
     def log_in(_server: Any, _session: Any, _envelope: Any, _mechanism: str, data: Any) -> AuthResult:
         good = isinstance(data, LoginPassword) and (data.login, data.password) == (b"ship", PASSWORD.encode())
-        return AuthResult(success=good)
+        return AuthResult(success=good, handled=good)
 
     [port] = free_ports(1)
     server = Controller(
@@ -141,6 +141,7 @@ def mail_server(certificate: Path) -> Iterator[tuple[Mailbox, int]]:
         require_starttls=True,
         auth_required=True,
         authenticator=log_in,
+        server_hostname="mail.test",
     )
     server.start()
     try:

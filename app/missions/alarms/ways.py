@@ -4,6 +4,7 @@ import asyncio
 import base64
 import hashlib
 import hmac
+import socket
 import ssl
 from collections.abc import Mapping
 from datetime import datetime
@@ -102,6 +103,8 @@ class Ways:
             port=server.port,
             username=server.user or None,
             password=server.password.get_secret_value() or None,
+            # Its own way to find a name asks the network, which at sea may not answer.
+            local_hostname=socket.gethostname(),
             use_tls=server.security == "tls",
             start_tls=server.security == "starttls",
             tls_context=trust,

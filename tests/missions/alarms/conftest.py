@@ -1,5 +1,5 @@
 from collections.abc import AsyncIterator, Awaitable, Callable
-from contextlib import AsyncExitStack
+from contextlib import AsyncExitStack, asynccontextmanager
 
 import pytest
 
@@ -13,11 +13,10 @@ def clock() -> Clock:
     return Clock()
 
 
-@pytest.fixture
-async def keep_watch(either_url: str, clock: Clock) -> AsyncIterator[Callable[[AlarmSettings], Awaitable[Watch]]]:
-    """Opens desks of further processes on one database, SQLite's or PostgreSQL's."""
+@asynccontextmanager
+async def _watches(url: str, clock: Clock) -> AsyncIterator[Callable[[AlarmSettings], Awaitable[Watch]]]:
     async with AsyncExitStack() as stack:
-        database = Database(either_url)
+        database = Database(url)
         stack.push_async_callback(database.close)
         await with_mission(database)
 
@@ -26,4 +25,20 @@ async def keep_watch(either_url: str, clock: Clock) -> AsyncIterator[Callable[[A
             stack.push_async_callback(end_of_process, watch)
             return watch
 
+        yield keep
+
+
+@pytest.fixture
+async def keep_watch(database_url: str, clock: Clock) -> AsyncIterator[Callable[[AlarmSettings], Awaitable[Watch]]]:
+    """Opens desks of further processes on one database."""
+    async with _watches(database_url, clock) as keep:
+        yield keep
+
+
+@pytest.fixture
+async def keep_watch_on_either(
+    either_url: str, clock: Clock
+) -> AsyncIterator[Callable[[AlarmSettings], Awaitable[Watch]]]:
+    """The same on SQLite's and on PostgreSQL's."""
+    async with _watches(either_url, clock) as keep:
         yield keep
