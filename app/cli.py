@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from app import __version__
+from app.commands.alarms import alarms_app
 from app.commands.audit import audit
 from app.commands.backup import backup, prune, restore
 from app.commands.common import CommandError, Database, command_settings, noted
@@ -40,6 +41,7 @@ app.command()(tide)
 app.command()(adjust)
 app.command()(train)
 app.command()(failsafes)
+app.add_typer(alarms_app, name="alarms")
 app.command()(audit)
 app.command()(backup)
 app.command()(restore)

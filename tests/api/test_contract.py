@@ -50,6 +50,7 @@ BEYOND_THE_SCHEMA = {
     "setReference",
     "setTide",
     "setSoundSpeed",
+    "testAlarm",
 }
 
 

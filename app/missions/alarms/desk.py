@@ -102,10 +102,14 @@ class AlarmDesk:
 
     def stored(self, row: AlarmRow) -> None:
         """Take an alarm that was stored."""
-        waiting, _ = self._unstored.pop(row.id, (row, None))
-        if waiting.acknowledged_by is not None:
-            self._acknowledged.append((row.id, waiting.acknowledged_by))
+        self._let_go(row.id)
         self._news.set()
+
+    def _let_go(self, alarm_id: str) -> None:
+        """Keep an alarm no longer in memory: the database has it."""
+        row, _ = self._unstored.pop(alarm_id, (None, None))
+        if row is not None and row.acknowledged_by is not None:
+            self._acknowledged.append((alarm_id, row.acknowledged_by))
 
     # What people say
 
@@ -229,9 +233,11 @@ class AlarmDesk:
         await self._show_what_changed()
         if not self._process():
             return
+        waiting = {*self._unstored, *(row.alarm_id for row in self._begun.values())}
         async with self._database.reading() as session:
             needed = await alarm_queries.anything_to_do(session, self._now())
-        if needed or self._outcomes or self._acknowledged or self._begun:
+            needed = needed or bool(await alarm_queries.of_ids(session, waiting))
+        if needed or self._outcomes or self._acknowledged:
             taken: list[Attempt] = []
             await to_the_end(self._write(taken))
             for attempt in taken:
@@ -242,7 +248,7 @@ class AlarmDesk:
         at, process = self._now(), self._process()
         outcomes, late = list(self._outcomes), list(self._acknowledged)
         sending = {delivery_id: recipient for delivery_id, (recipient, _) in self._sending.items()}
-        begun = [row for row in self._begun.values() if row.alarm_id not in self._unstored]
+        begun, waiting = list(self._begun.values()), list(self._unstored)
         for row in begun:
             # What is under way just now is this process's, as if it had been taken.
             row.process_id = process if row.id in sending else None
@@ -253,7 +259,8 @@ class AlarmDesk:
                 await alarm_queries.settle(
                     session, delivery_id, process=None if arrived else taken_by or process, values=values
                 )
-            await outbox.keep_begun(session, begun)
+            # Whoever stored an alarm may not have had the time to say so.
+            known = await outbox.keep_begun(session, begun, waiting)
             for alarm_id, actor in late:
                 alarm = await alarm_queries.held(session, alarm_id)
                 if alarm is not None:
@@ -262,7 +269,11 @@ class AlarmDesk:
             rows = await outbox.take(session, at, process, set(sending.values()), MOST_AT_ONCE - len(sending))
             taken += await outbox.attempts(session, rows, process)
         del self._outcomes[: len(outcomes)], self._acknowledged[: len(late)]
+        for alarm_id in known:
+            self._let_go(alarm_id)
         for row in begun:
+            if row.alarm_id not in known:
+                continue
             del self._begun[row.id]
             if row.id in sending and row.id not in self._sending:
                 # It ended while this was written.

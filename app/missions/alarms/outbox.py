@@ -90,10 +90,11 @@ async def plan(session: AsyncSession, settings: AlarmSettings, at: datetime) -> 
     await alarm_queries.add_deliveries(session, planned)
 
 
-async def keep_begun(session: AsyncSession, rows: Sequence[AlarmDeliveryRow]) -> None:
-    """Store deliveries that were begun from memory, of alarms that are stored now, as far as those still exist."""
-    known = {row.id for row in await alarm_queries.of_ids(session, {row.alarm_id for row in rows})}
+async def keep_begun(session: AsyncSession, rows: Sequence[AlarmDeliveryRow], waiting: Collection[str]) -> set[str]:
+    """Store deliveries that were begun from memory; returns which of the alarms that are ``waiting`` are stored now."""
+    known = {row.id for row in await alarm_queries.of_ids(session, {row.alarm_id for row in rows}.union(waiting))}
     await alarm_queries.add_deliveries(session, [row for row in rows if row.alarm_id in known])
+    return known
 
 
 async def acknowledge(
