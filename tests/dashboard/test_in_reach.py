@@ -141,6 +141,14 @@ def test_an_entry_into_a_zone_is_told_over_the_map_and_on_the_card(page: Page, s
     expect(by_id(page, "alarms")).to_contain_text("rover is in keep-out zone 1")
     expect(by_id(page, "state-rover")).to_contain_text("In keep-out zone 1")
     expect(by_id(page, "vehicle-mark-rover")).to_contain_text("in keep-out zone 1")
+    other = page.context.new_page()
+    other.goto(page.url)
+    expect(by_id(other, "alarms")).to_contain_text("rover is in keep-out zone 1")
+    by_id(page, "take-alarms").click()
+    for either in (page, other):
+        expect(by_id(either, "alarms")).not_to_be_visible()
+        expect(by_id(either, "taken-alarm")).to_contain_text("took “rover is in keep-out zone 1")
+    other.close()
 
 
 def test_a_mission_is_copied_with_other_names_and_deleted_while_it_is_empty(page: Page, service: Service) -> None:

@@ -1,5 +1,6 @@
 import type {
   ActionView,
+  AlarmView,
   CrossoversView,
   DoctorView,
   EventView,
@@ -152,6 +153,7 @@ export const api = {
     request<StepView[]>(`${missionPath(id)}/steps?after=${after}&limit=1000`),
   telemetry: (id: string) => request<TelemetryView>(`${missionPath(id)}/telemetry`),
   tracks: (id: string) => request<TimedTracks>(`${missionPath(id)}/tracks.geojson`),
+  acknowledge: (alarm: string) => post<AlarmView>(`/alarms/${encodeURIComponent(alarm)}/acknowledge`),
   note: (id: string, text: string) => post<EventView>(`${missionPath(id)}/notes`, { text }),
   abortVehicle: (id: string, name: string) => post<ActionView>(`${vehiclePath(id, name)}/abort`),
   rejoin: (id: string, name: string) => post<MissionView>(`${vehiclePath(id, name)}/rejoin`),

@@ -1316,6 +1316,86 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/alarms": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * List alarms
+         * @description Return alarms of all missions, newest first, each with who was told of it and what came of that.
+         */
+        get: operations["listAlarms"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/alarms/test": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Try who is told
+         * @description Raise a test alarm, which goes out as any other. What comes of it is in its deliveries: ask for it again.
+         */
+        post: operations["testAlarm"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/alarms/{alarm_id}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * See an alarm
+         * @description Return an alarm with who was told of it and what came of that.
+         */
+        get: operations["getAlarm"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/alarms/{alarm_id}/acknowledge": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Take an alarm
+         * @description Note that you have taken the alarm: nobody else is told any more. Who took it first stays.
+         */
+        post: operations["acknowledgeAlarm"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/audit": {
         parameters: {
             query?: never;
@@ -1578,6 +1658,119 @@ export interface components {
              * @description Share that is not larger than the order's largest TVU
              */
             within_pct: number;
+        };
+        /**
+         * AlarmKind
+         * @description What is raised as an alarm. Those of failsafes have the failsafes' names.
+         * @enum {string}
+         */
+        AlarmKind: "leak" | "critical_energy" | "too_deep" | "position_lost" | "low_energy" | "link_lost" | "geofence_left" | "vehicle_error" | "other_console" | "all_links_lost" | "zone_entered" | "area_left" | "vehicle_lost" | "vehicle_restarted" | "vehicle_refuses" | "stop_not_acknowledged" | "not_come_home" | "no_way_home" | "no_vehicle" | "no_waypoint" | "no_scan" | "search_late" | "search_stuck" | "no_water_level" | "database_unwritable" | "mission_failed" | "test";
+        /**
+         * AlarmMessage
+         * @description An alarm was raised or acknowledged; by its id the page knows whether it has it already.
+         */
+        AlarmMessage: {
+            /**
+             * Type
+             * @default alarm
+             * @constant
+             */
+            type: "alarm";
+            alarm: components["schemas"]["AlarmView"];
+        };
+        /**
+         * AlarmReport
+         * @description An alarm with everything that was told of it.
+         */
+        AlarmReport: {
+            /** Id */
+            id: string;
+            /**
+             * Mission Id
+             * @description null: it concerns no mission
+             */
+            mission_id: string | null;
+            kind: components["schemas"]["AlarmKind"];
+            severity: components["schemas"]["AlarmSeverity"];
+            /** Vehicle */
+            vehicle: string | null;
+            /** Message */
+            message: string;
+            /**
+             * Raised At
+             * Format: date-time
+             */
+            raised_at: string;
+            state: components["schemas"]["AlarmState"];
+            /** Acknowledged At */
+            acknowledged_at: string | null;
+            /**
+             * Acknowledged By
+             * @description The name of the token, or of the user, that acknowledged it
+             */
+            acknowledged_by: string | null;
+            /** Deliveries */
+            deliveries: components["schemas"]["DeliveryView"][];
+        };
+        /**
+         * AlarmSeverity
+         * @description How grave an alarm is, least to most, in the words of ITU-T X.733.
+         * @enum {string}
+         */
+        AlarmSeverity: "minor" | "major" | "critical";
+        /**
+         * AlarmState
+         * @description Whether somebody has taken an alarm.
+         * @enum {string}
+         */
+        AlarmState: "open" | "acknowledged";
+        /**
+         * AlarmTrial
+         * @description Whom to try to reach.
+         */
+        AlarmTrial: {
+            /**
+             * @description As grave as this: routes go by it
+             * @default minor
+             */
+            severity: components["schemas"]["AlarmSeverity"];
+            /**
+             * To
+             * @description Only this recipient of the settings; null: whom the routes say
+             */
+            to?: string | null;
+        };
+        /**
+         * AlarmView
+         * @description An alarm: who has it, or that nobody has.
+         */
+        AlarmView: {
+            /** Id */
+            id: string;
+            /**
+             * Mission Id
+             * @description null: it concerns no mission
+             */
+            mission_id: string | null;
+            kind: components["schemas"]["AlarmKind"];
+            severity: components["schemas"]["AlarmSeverity"];
+            /** Vehicle */
+            vehicle: string | null;
+            /** Message */
+            message: string;
+            /**
+             * Raised At
+             * Format: date-time
+             */
+            raised_at: string;
+            state: components["schemas"]["AlarmState"];
+            /** Acknowledged At */
+            acknowledged_at: string | null;
+            /**
+             * Acknowledged By
+             * @description The name of the token, or of the user, that acknowledged it
+             */
+            acknowledged_by: string | null;
         };
         /**
          * AllowedView
@@ -2060,6 +2253,49 @@ export interface components {
              */
             left_off: number;
             features: components["schemas"]["CrossingFeaturesView"];
+        };
+        /**
+         * DeliveryState
+         * @description How far the telling has come.
+         * @enum {string}
+         */
+        DeliveryState: "waiting" | "delivered" | "failed" | "superseded";
+        /**
+         * DeliveryView
+         * @description What one recipient is told, and what came of it.
+         */
+        DeliveryView: {
+            /**
+             * Id
+             * @description What the recipient sees as the message's id; the same at every attempt
+             */
+            id: string;
+            /**
+             * Recipient
+             * @description The recipient's name in the settings
+             */
+            recipient: string;
+            notice: components["schemas"]["Notice"];
+            state: components["schemas"]["DeliveryState"];
+            /** Attempts */
+            attempts: number;
+            /**
+             * Created At
+             * Format: date-time
+             */
+            created_at: string;
+            /**
+             * Next Try At
+             * @description null: it is not tried again
+             */
+            next_try_at: string | null;
+            /** Done At */
+            done_at: string | null;
+            /**
+             * Error
+             * @description Why the last attempt failed; empty when none did
+             */
+            error: string;
         };
         /**
          * DifferenceView
@@ -2732,7 +2968,7 @@ export interface components {
          * @enum {string}
          */
         LinkState: "unknown" | "lost" | "expected_offline" | "heard" | "ready" | "engaged";
-        LiveMessage: components["schemas"]["SnapshotMessage"] | components["schemas"]["VehiclesMessage"] | components["schemas"]["TargetsMessage"] | components["schemas"]["SearchMessage"] | components["schemas"]["WaypointsMessage"] | components["schemas"]["StateMessage"] | components["schemas"]["MapMessage"] | components["schemas"]["EventMessage"];
+        LiveMessage: components["schemas"]["SnapshotMessage"] | components["schemas"]["VehiclesMessage"] | components["schemas"]["TargetsMessage"] | components["schemas"]["SearchMessage"] | components["schemas"]["WaypointsMessage"] | components["schemas"]["StateMessage"] | components["schemas"]["MapMessage"] | components["schemas"]["EventMessage"] | components["schemas"]["AlarmMessage"];
         /**
          * Liveness
          * @description The process answers.
@@ -3287,6 +3523,12 @@ export interface components {
              */
             text: string;
         };
+        /**
+         * Notice
+         * @description Why somebody is told of an alarm.
+         * @enum {string}
+         */
+        Notice: "raised" | "escalated" | "acknowledged";
         /**
          * Order
          * @description An order of survey.
@@ -4339,6 +4581,11 @@ export interface components {
             map_version: number;
             /** Last Event Id */
             last_event_id: number;
+            /**
+             * Alarms
+             * @description Those of the mission that nobody has acknowledged, oldest first
+             */
+            alarms: components["schemas"]["AlarmView"][];
         };
         /**
          * SoundSpeed
@@ -12183,6 +12430,319 @@ export interface operations {
             };
             /** @description Too many requests */
             429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    listAlarms: {
+        parameters: {
+            query?: {
+                /** @description Only these; left out: all */
+                state?: components["schemas"]["AlarmState"];
+                /** @description Only those of the mission with this id */
+                mission?: string;
+                /** @description Most alarms in the answer */
+                limit?: number;
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["AlarmReport"][];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too many requests */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    testAlarm: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: {
+            content: {
+                "application/json": components["schemas"]["AlarmTrial"] | null;
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            201: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["AlarmReport"];
+                };
+            };
+            /** @description The body cannot be read */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The request took too long to arrive */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body is too large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body's media type is not supported */
+            415: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too much is sent at once; too many requests */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The database cannot be used now; too much is under way */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    getAlarm: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description The alarm's id */
+                alarm_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["AlarmReport"];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such alarm */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too many requests */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    acknowledgeAlarm: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description The alarm's id */
+                alarm_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["AlarmReport"];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such alarm */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too many requests */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The database cannot be used now */
+            503: {
                 headers: {
                     [name: string]: unknown;
                 };

@@ -32,6 +32,7 @@ export type SearchGridView = Complete<Schemas["SearchGridView"]>;
 export type WaypointView = Complete<Schemas["WaypointView"]>;
 export type MissionSummary = Complete<Schemas["MissionSummary"]>;
 export type MissionView = Complete<Schemas["MissionView"]>;
+export type AlarmView = Complete<Schemas["AlarmView"]>;
 export type EventView = Complete<Schemas["EventView"]>;
 export type StepView = Complete<Schemas["StepView"]>;
 export type ForecastView = Complete<Schemas["ForecastView"]>;

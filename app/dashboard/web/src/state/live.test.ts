@@ -1,5 +1,5 @@
 import { describe, expect, it } from "vitest";
-import type { EventView, LiveMessage, MissionView, VehicleView, WaypointView } from "../api/types";
+import type { AlarmView, EventView, LiveMessage, MissionView, VehicleView, WaypointView } from "../api/types";
 import { ageSeconds, EMPTY_VIEW, reduce, withEvents, withMission } from "./live";
 
 const vehicle = (
@@ -77,6 +77,7 @@ const mission = (id: string): MissionView =>
 const snapshot = (id: string): LiveMessage => ({
   type: "snapshot",
   mission: mission(id),
+  alarms: [],
   tracks: { a: [[1, 1, 2]] },
   map_version: 4,
   last_event_id: 0,
@@ -194,4 +195,32 @@ it("shows a mission that was asked for, and what the live view tells in its plac
     7000,
   );
   expect(told.tracks.a?.tail).toHaveLength(1);
+});
+
+describe("alarms", () => {
+  const alarm = (id: string, raised_at: string, by: string | null = null): AlarmView => ({
+    id,
+    mission_id: "m",
+    kind: "vehicle_lost",
+    severity: "major",
+    vehicle: "a",
+    message: `${id} is lost`,
+    raised_at,
+    state: by === null ? "open" : "acknowledged",
+    acknowledged_at: by === null ? null : raised_at,
+    acknowledged_by: by,
+  });
+
+  it("are shown once and go when anybody takes them, on whichever page", () => {
+    const later = alarm("later", "2026-01-01T00:00:02Z");
+    const sooner = alarm("sooner", "2026-01-01T00:00:01Z");
+    let view = reduce(EMPTY_VIEW, { ...snapshot("m"), alarms: [later] } as LiveMessage, 1);
+    for (const one of [sooner, later, sooner]) view = reduce(view, { type: "alarm", alarm: one }, 2);
+    expect(view.alarms.map(({ id }) => id)).toEqual(["sooner", "later"]);
+    const taken = alarm("later", later.raised_at, "Ana");
+    view = reduce(view, { type: "alarm", alarm: taken }, 3);
+    expect(view.alarms).toEqual([sooner]);
+    expect(view.taken?.acknowledged_by).toBe("Ana");
+    expect(reduce(view, snapshot("other"), 4).taken).toBeNull();
+  });
 });

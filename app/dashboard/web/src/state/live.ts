@@ -1,6 +1,14 @@
 /** What the page knows of one mission, and how each live message changes it. Pure: no socket, no page, no clock. */
 
-import type { EventView, LiveMessage, MissionView, Place, VehicleView, WaypointView } from "../api/types";
+import type {
+  AlarmView,
+  EventView,
+  LiveMessage,
+  MissionView,
+  Place,
+  VehicleView,
+  WaypointView,
+} from "../api/types";
 
 /** A vehicle's way: the long part behind it, which changes seldom, and the newest part, which begins where that ends. */
 export interface TrackView {
@@ -25,6 +33,9 @@ export interface LiveView {
   samples: Readonly<Record<string, readonly Sample[]>>;
   sampledAt: number;
   events: readonly EventView[];
+  /** Alarms that nobody has acknowledged, oldest first, and the one that was last. */
+  alarms: readonly AlarmView[];
+  taken: AlarmView | null;
   mapVersion: number;
   /** Grows with what was sounded since that map. */
   liveVersion: number;
@@ -41,6 +52,8 @@ export const EMPTY_VIEW: LiveView = {
   samples: {},
   sampledAt: 0,
   events: [],
+  alarms: [],
+  taken: null,
   mapVersion: 0,
   liveVersion: 0,
   lastEventId: 0,
@@ -67,6 +80,8 @@ export function reduce(view: LiveView, message: LiveMessage, at: number): LiveVi
         samples: view.mission?.id === message.mission.id ? view.samples : {},
         sampledAt: view.sampledAt,
         events: view.mission?.id === message.mission.id ? view.events : [],
+        alarms: message.alarms,
+        taken: view.mission?.id === message.mission.id ? view.taken : null,
         mapVersion: message.map_version,
         liveVersion: 0,
         lastEventId: message.last_event_id,
@@ -106,12 +121,21 @@ export function reduce(view: LiveView, message: LiveMessage, at: number): LiveVi
       return { ...view, mapVersion: message.version, liveVersion: message.live };
     case "event":
       return withEvents(view, [message.event]);
+    case "alarm":
+      return withAlarm(view, message.alarm);
   }
 }
 
 /** The mission as it was asked for once, until the live view tells more. */
 export function withMission(view: LiveView, mission: MissionView, at: number): LiveView {
   return { ...view, mission, vehiclesAt: at, progressAt: at };
+}
+
+/** An alarm as it is now: an open one is shown once, one that was acknowledged no more. */
+function withAlarm(view: LiveView, alarm: AlarmView): LiveView {
+  const others = view.alarms.filter(({ id }) => id !== alarm.id);
+  if (alarm.state === "acknowledged") return { ...view, alarms: others, taken: alarm };
+  return { ...view, alarms: [...others, alarm].sort((a, b) => a.raised_at.localeCompare(b.raised_at)) };
 }
 
 /** Adds lines to the log: each once, in the order of their numbers, at most the newest 2000. */

@@ -110,13 +110,14 @@ export const vehicles = computed<Vehicle[]>(() =>
   }),
 );
 
-/** Alarms that nobody has taken yet, newest first. */
-export const takenAlarms = kept<Record<string, number>>("taken-alarms", {});
-export const openAlarms = computed(() => {
-  const id = mission.value?.id;
-  if (!id) return [];
-  const taken = takenAlarms.value[id] ?? 0;
-  return view.value.events.filter((e) => e.level === "alarm" && e.id > taken).reverse();
+/** Alarms that nobody has taken yet, on whichever page, newest first. */
+export const openAlarms = computed(() => [...view.value.alarms].reverse());
+/** For so long everyone sees who took an alarm. */
+const TAKEN_SHOWN_MS = 60_000;
+export const takenAlarm = computed(() => {
+  const { taken } = view.value;
+  const at = taken?.acknowledged_at ? Date.parse(taken.acknowledged_at) : 0;
+  return now.value - at < TAKEN_SHOWN_MS ? taken : null;
 });
 
 /** Vehicles whose last stop was not acknowledged. */
@@ -128,11 +129,6 @@ export const unstopped = computed(() => {
   }
   return new Set([...answers].flatMap(([vehicle, acknowledged]) => (acknowledged ? [] : [vehicle])));
 });
-
-export function takeAlarms(): void {
-  const newest = openAlarms.value[0];
-  if (newest) takenAlarms.value = { ...takenAlarms.value, [newest.mission_id]: newest.id };
-}
 
 export type Theme = "system" | "light" | "dark" | "contrast";
 export const theme = kept<Theme>("theme", "system");

@@ -5,7 +5,7 @@ import type { Level } from "../api/types";
 import { whyNotCommand } from "../state/access";
 import { clock } from "../state/format";
 import { said } from "../state/session";
-import { openAlarms, selectedId, takeAlarms, view } from "../state/store";
+import { openAlarms, selectedId, takenAlarm, view } from "../state/store";
 import { Button, Choice, into, same, Typed } from "./Controls";
 
 const SIGNS: Record<Level, string> = { info: "·", warning: "▲", alarm: "✕" };
@@ -118,20 +118,41 @@ function NoteForm() {
   );
 }
 
-/** Alarms stay over the map until someone takes them. */
+/** Alarms stay over the map, on every page, until someone takes them. */
 export function Alarms() {
   const alarms = openAlarms.value;
+  const fault = useSignal("");
   const newest = alarms[0];
-  if (!newest) return null;
+  if (!newest) return <Taken />;
+  const take = async () => {
+    try {
+      await Promise.all(alarms.map(({ id }) => api.acknowledge(id)));
+      fault.value = "";
+    } catch (error) {
+      fault.value = said(error);
+    }
+  };
   return (
     <section class="alarms" role="alert" data-testid="alarms">
       <p>
-        <b>✕ {clock(new Date(newest.time), "utc")} UTC</b> {newest.message}
+        <b>✕ {clock(new Date(newest.raised_at), "utc")} UTC</b> {newest.message}
         {alarms.length > 1 ? <small> and {alarms.length - 1} more in the log</small> : null}
+        {fault.value ? <small class="fault"> {fault.value}</small> : null}
       </p>
-      <Button id="take-alarms" onClick={takeAlarms}>
+      <Button id="take-alarms" commands onClick={() => void take()}>
         Taken
       </Button>
     </section>
+  );
+}
+
+/** Who took the last alarm, for a moment, so that nobody else sets out for it. */
+function Taken() {
+  const taken = takenAlarm.value;
+  if (!taken?.acknowledged_at) return null;
+  return (
+    <p class="notice" role="status" data-testid="taken-alarm">
+      {clock(new Date(taken.acknowledged_at), "utc")} UTC: {taken.acknowledged_by} took “{taken.message}”
+    </p>
   );
 }
