@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 from urllib.parse import unquote
 
 import httpx
@@ -179,17 +179,41 @@ def test_examples_are_taken_by_the_service(page: Path) -> None:
 
 def settings_rows(model: type[BaseModel] = Settings, prefix: str = "") -> Iterator[str]:
     """Yield the rows of the table of settings as docs/settings.md has to show them."""
-    schema = model.model_json_schema()
+    schema = _without_references(model.model_json_schema())
     kinds = {name: field.annotation for name, field in model.model_fields.items()}
     sections = {name: kind for name, kind in kinds.items() if isinstance(kind, type) and issubclass(kind, BaseModel)}
+    lists = {name: kind for name, kind in ((n, get_args(k)[:1]) for n, k in kinds.items()) if _are_sections(kind)}
     for name, field in model.model_fields.items():
         if name in sections:
             continue
         default = json.dumps(schema["properties"][name].get("default"))
         shown = "–" if default == "null" else f"`{default}`"
         yield f"| `{prefix}{name}` | {shown} | {values_of(schema['properties'][name])} | {field.description} |"
+    for name, (section,) in lists.items():
+        yield from settings_rows(section, f"{prefix}{name}[].")
     for name, section in sections.items():
         yield from settings_rows(section, f"{prefix}{name}.")
+
+
+def _are_sections(kinds: tuple[Any, ...]) -> bool:
+    return any(isinstance(kind, type) and issubclass(kind, BaseModel) for kind in kinds)
+
+
+def _without_references(schema: dict[str, Any]) -> dict[str, Any]:
+    """Return a schema with its definitions in the places that name them."""
+    definitions = schema.get("$defs", {})
+
+    def whole(part: Any) -> Any:
+        if isinstance(part, list):
+            return [whole(item) for item in part]
+        if not isinstance(part, dict):
+            return part
+        if "$ref" in part:
+            own = {key: value for key, value in part.items() if key != "$ref"}
+            return whole(definitions[part["$ref"].rpartition("/")[2]]) | whole(own)
+        return {key: whole(value) for key, value in part.items() if key != "$defs"}
+
+    return dict(whole(schema))
 
 
 def values_of(schema: dict[str, Any]) -> str:
@@ -201,7 +225,10 @@ def values_of(schema: dict[str, Any]) -> str:
     if "prefixItems" in schema:
         return "list of " + " and ".join(values_of(item) for item in schema["prefixItems"])
     if schema["type"] == "array":
-        return "list of " + {"integer": "whole numbers", "string": "texts"}[schema["items"]["type"]]
+        kinds = {"integer": "whole numbers", "string": "texts", "object": "tables"}
+        return "list of " + (
+            "any of " + values_of(schema["items"]) if "enum" in schema["items"] else kinds[schema["items"]["type"]]
+        )
     words = {"boolean": "`true`, `false`", "integer": "whole number", "number": "number", "string": "text"}
     bounds = {"minimum": "≥", "exclusiveMinimum": ">", "maximum": "≤", "exclusiveMaximum": "<"}
     limits = [

@@ -150,7 +150,7 @@ class AlarmSettings(_Section):
 
     @model_validator(mode="after")
     def _fits_together(self) -> Self:
-        names = [one.name for one in (*self.webhooks, *self.emails, *self.topics)]
+        names = [one.name for one in self._everybody]
         twice = sorted({name for name in names if names.count(name) > 1})
         if twice:
             raise ValueError(f"{twice[0]!r} is the name of two recipients: give each its own")
@@ -170,7 +170,11 @@ class AlarmSettings(_Section):
     @property
     def recipients(self) -> dict[str, Webhook | MailRecipient | Topic]:
         """Everybody who can be told, by name."""
-        return {one.name: one for one in (*self.webhooks, *self.emails, *self.topics)}
+        return {one.name: one for one in self._everybody}
+
+    @property
+    def _everybody(self) -> list[Webhook | MailRecipient | Topic]:
+        return [*self.webhooks, *self.emails, *self.topics]
 
     @property
     def secrets(self) -> list[str]:
