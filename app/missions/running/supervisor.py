@@ -4,6 +4,7 @@ import asyncio
 from collections.abc import Awaitable, Callable, Sequence
 from concurrent.futures import Executor
 from functools import partial
+from typing import Any
 
 import structlog
 
@@ -96,7 +97,8 @@ class MissionSupervisor:
             return
         except Exception as error:
             log.exception("the step loop failed", mission=live.id)
-            target, alarm, reason = MissionState.FAILED, AlarmKind.MISSION_FAILED, f"the step loop failed: {error}"
+            target, reason = MissionState.FAILED, f"the step loop failed: {error}"
+            alarm: AlarmKind | None = AlarmKind.MISSION_FAILED
         else:
             target, alarm = MissionState.FINISHED, None
             if live.ending is not None:
@@ -248,10 +250,11 @@ class MissionSupervisor:
         for stop in stops:
             words = "acknowledged the stop" if stop.acknowledged else "has NOT acknowledged the stop"
             text = f"{stop.vehicle} {words}: {stop.detail}"
+            answer: dict[str, Any] = {**receipt(stop)}
             if stop.acknowledged:
-                lines.append(live.journal.line(Level.INFO, "stop", text, **receipt(stop)))
+                lines.append(live.journal.line(Level.INFO, "stop", text, **answer))
             else:
-                lines.append(live.journal.alarm_line(AlarmKind.STOP_NOT_ACKNOWLEDGED, text, **receipt(stop)))
+                lines.append(live.journal.alarm_line(AlarmKind.STOP_NOT_ACKNOWLEDGED, text, **answer))
         if live.id in self._unwritten:
             for line in lines:
                 live.journal.note_line(line)

@@ -95,7 +95,7 @@ async def test_mqtt_takes_it_at_least_once_and_no_broker_is_tried_again(keep_wat
     [delivery] = (await watch.report(alarm)).deliveries
     assert delivery.state is DeliveryState.DELIVERED
     assert (str(message.topic), message.qos) == ("ship/alarms/critical/leak", 1)
-    content = orjson.loads(bytes(message.payload))  # type: ignore[arg-type]
+    content = orjson.loads(bytes(message.payload))
     assert (content["type"], content["id"], content["data"]["id"]) == ("alarm.raised", delivery.id, alarm.id)
 
     later = await watch.raise_alarm(AlarmKind.TOO_DEEP)
