@@ -4,7 +4,6 @@ import json
 import threading
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import httpx
 import numpy as np
@@ -207,7 +206,7 @@ def test_live_messages_come_typed_and_begin_anew_after_a_cut(client: Client, rel
         event = next(message for message in messages if isinstance(message, models.EventMessage))
         noted.join()
         assert event.event.message.endswith("buoy in sight")
-        messages.close()  # type: ignore[attr-defined]
+        messages.close()
 
 
 def test_live_messages_of_no_mission_are_refused(client: Client) -> None:
@@ -220,5 +219,4 @@ def test_small_answers_are_as_typed(client: Client, survey: str) -> None:
     assert client.get_map_overlay(survey, layer="depth").startswith(b"\x89PNG")
     assert client.get_metrics().startswith("#")
     assert isinstance(client.get_health(), models.ComponentHealth)
-    holidays: dict[str, Any] = client.get_holidays(survey)
-    assert holidays["type"] == "FeatureCollection"
+    assert client.get_quality(survey).tvu[0].statement

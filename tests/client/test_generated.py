@@ -37,7 +37,9 @@ def test_both_clients_take_the_same_arguments() -> None:
     for name in sorted({*names} - {"close"}):
         ours, theirs = inspect.signature(getattr(Client, name)), inspect.signature(getattr(AsyncClient, name))
         assert ours.parameters == theirs.parameters, name
-        assert ours.return_annotation == theirs.return_annotation.replace("Async", ""), name
+        # Both are asked for the same; that of a stream has one type more.
+        kinds = [signature.return_annotation.removeprefix("Async").split(",")[0] for signature in (ours, theirs)]
+        assert kinds[0] == kinds[1], name
 
 
 def test_importing_the_client_imports_nothing_of_the_service_and_no_arrays() -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import ssl
 import time
-from collections.abc import AsyncIterator, Iterable, Mapping
+from collections.abc import AsyncGenerator, Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self, TypeVar
 
@@ -145,7 +145,9 @@ class AsyncClient(AsyncOperations):
                 raise TimeoutError(f"mission {mission_id} is still {mission.state} after {timeout_s:g} s")
             await asyncio.sleep(every_s)
 
-    async def events(self, mission_id: str, *, after: int = 0, until_ended: bool = False) -> AsyncIterator[EventView]:
+    async def events(
+        self, mission_id: str, *, after: int = 0, until_ended: bool = False
+    ) -> AsyncGenerator[EventView, None]:
         """Yield the entries of a mission's log, first those that there are, then each as it is made.
 
         After an interruption it goes on where it was; no entry is missed or comes twice.
@@ -181,7 +183,7 @@ class AsyncClient(AsyncOperations):
                 wait_s = attempts.after_error(error)
             await asyncio.sleep(wait_s)
 
-    async def live(self, mission_id: str) -> AsyncIterator[LiveMessage]:
+    async def live(self, mission_id: str) -> AsyncGenerator[LiveMessage, None]:
         """Yield what the live socket of a mission sends: a snapshot, then what changes.
 
         After an interruption it begins anew, with a snapshot.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ssl
 import time
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Generator, Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self, TypeVar
 
@@ -142,7 +142,7 @@ class Client(Operations):
                 raise TimeoutError(f"mission {mission_id} is still {mission.state} after {timeout_s:g} s")
             time.sleep(every_s)
 
-    def events(self, mission_id: str, *, after: int = 0, until_ended: bool = False) -> Iterator[EventView]:
+    def events(self, mission_id: str, *, after: int = 0, until_ended: bool = False) -> Generator[EventView, None, None]:
         """Yield the entries of a mission's log, first those that there are, then each as it is made.
 
         After an interruption it goes on where it was; no entry is missed or comes twice.
@@ -178,7 +178,7 @@ class Client(Operations):
                 wait_s = attempts.after_error(error)
             time.sleep(wait_s)
 
-    def live(self, mission_id: str) -> Iterator[LiveMessage]:
+    def live(self, mission_id: str) -> Generator[LiveMessage, None, None]:
         """Yield what the live socket of a mission sends: a snapshot, then what changes.
 
         After an interruption it begins anew, with a snapshot.

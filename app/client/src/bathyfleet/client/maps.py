@@ -27,5 +27,6 @@ def dataset(content: bytes) -> xr.Dataset:
         from netCDF4 import Dataset
     except ImportError as error:
         raise ImportError("maps need xarray and netCDF4: pip install 'bathyfleet[client]'") from error
-    with Dataset("map.nc", memory=content) as file:
-        return xr.open_dataset(xr.backends.NetCDF4DataStore(file)).load()  # type: ignore[no-untyped-call]
+    file = xr.backends.NetCDF4DataStore(Dataset("map.nc", memory=content))  # type: ignore[no-untyped-call]
+    with xr.open_dataset(file) as found:
+        return found.load()
