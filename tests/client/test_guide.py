@@ -26,4 +26,4 @@ def test_the_examples_of_the_guide_work(
     assert "30 0 0" in shown
     assert "aborted" in shown
     assert any("'rover'" in line for line in shown)
-    assert (tmp_path / "map.tif").exists() or any("map" in line for line in shown)
+    assert (tmp_path / "map.tif").exists()

@@ -990,10 +990,14 @@ class PlannerSpec(Model):
 
 
 class PlannerView(Model):
-    """A planner that a mission may name."""
+    """A planner that a mission may name, or one that is installed and cannot be used."""
 
     name: str
     summary: str
+    package: str
+    """What brings it, with its version"""
+    problem: str
+    """Why it cannot be used; empty: it can"""
     options: dict[str, Any]
     """JSON schema of its options"""
 
