@@ -11,6 +11,7 @@ from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass
 from typing import Any
 
+FULL_QUEUE_S = 1.0
 BEATS = 3
 """So many signs of life are sent in the time after which the supervisor takes the process for dead."""
 
@@ -49,7 +50,8 @@ class Supervisor:
         # An address that begins with @ is no file: a name that only the kernel knows.
         where = "\0" + self.address[1:] if self.address[0] == "@" else self.address
         with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_CLOEXEC) as sending, suppress(OSError):
-            sending.setblocking(False)
+            # A sign of life may be lost, others follow; anything else is worth a moment where its queue is full.
+            sending.settimeout(0.0 if "WATCHDOG" in words else FULL_QUEUE_S)
             sending.sendto(text.encode(), where)
 
     @asynccontextmanager

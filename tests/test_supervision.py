@@ -6,6 +6,8 @@ import socket
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from queue import Queue
+from threading import Thread
 
 import pytest
 
@@ -34,19 +36,33 @@ def waiting(sock: socket.socket) -> list[str]:
 
 
 def test_the_service_is_ready_lives_and_ends(listening: socket.socket, tmp_path: Path) -> None:
-    supervised = environment(NOTIFY_SOCKET=str(tmp_path / "notify"), WATCHDOG_USEC="300000")
-    with serving(tmp_path, supervised) as (process, url):
-        told = [listening.recv(4096).decode()]
-        while not told[-1].startswith("READY=1"):
-            told.append(listening.recv(4096).decode())
-        assert set(told[:-1]) <= {"WATCHDOG=1"}
-        assert told[-1] == f"READY=1\nSTATUS=answers at {url}"
-        assert [listening.recv(4096) for _ in range(3)] == [b"WATCHDOG=1"] * 3
-        process.send_signal(signal.SIGTERM)
-        while (word := listening.recv(4096).decode()) == "WATCHDOG=1":
-            pass
-        assert word == "STOPPING=1\nSTATUS=stops the vehicles"
-        assert process.wait(240) == 0
+    words: Queue[str] = Queue()
+
+    def read() -> None:
+        while (word := listening.recv(4096).decode()) != "enough":
+            words.put(word)
+
+    def told() -> str:
+        return words.get(timeout=240)
+
+    reading = Thread(target=read)
+    reading.start()
+    try:
+        supervised = environment(NOTIFY_SOCKET=str(tmp_path / "notify"), WATCHDOG_USEC="300000")
+        with serving(tmp_path, supervised) as (process, url):
+            while (word := told()) == "WATCHDOG=1":
+                pass
+            assert word == f"READY=1\nSTATUS=answers at {url}"
+            assert [told() for _ in range(3)] == ["WATCHDOG=1"] * 3
+            process.send_signal(signal.SIGTERM)
+            while (word := told()) == "WATCHDOG=1":
+                pass
+            assert word == "STOPPING=1\nSTATUS=stops the vehicles"
+            assert process.wait(240) == 0
+    finally:
+        with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as sock:
+            sock.sendto(b"enough", str(tmp_path / "notify"))
+        reading.join()
 
 
 async def test_who_hangs_gives_no_sign_of_life(listening: socket.socket, tmp_path: Path) -> None:

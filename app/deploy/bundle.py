@@ -17,6 +17,8 @@ from zipfile import ZipFile
 MACHINES = ("x86_64", "aarch64")
 NEWEST_GLIBC = 28
 """Wheels for a newer C library than 2.28 (Debian 10, RHEL 8) are not taken."""
+ONLY_SOURCES = ("pyftpdlib",)
+"""Dependencies that are published without wheels. What is built of them has to be the same for every computer."""
 LIMIT_BYTES = 600 * 2**20
 SCRIPT = Path(__file__).with_name("install.sh")
 
@@ -83,7 +85,7 @@ def bundle(wheel: Path, machine: str, folder: Path, *, command: str, pip_options
         raise BundleError(f"machine: {machine!r} is not one of {', '.join(MACHINES)}")
     own = Wheel.of(wheel)
     with tempfile.TemporaryDirectory() as place:
-        _download(wheel, machine, Path(place), pip_options)
+        _download(wheel, machine, Path(place), [*pip_options, *_built(wheel, Path(place), pip_options)])
         wheels = sorted(map(Wheel.of, Path(place).glob("*.whl")), key=lambda w: w.path.name)
         size = sum(w.path.stat().st_size for w in wheels)
         if size > LIMIT_BYTES:
@@ -93,6 +95,25 @@ def bundle(wheel: Path, machine: str, folder: Path, *, command: str, pip_options
         folder.mkdir(parents=True, exist_ok=True)
         _write(target, stem, own, wheels, machine, command)
     return target
+
+
+def _built(wheel: Path, place: Path, options: Sequence[str]) -> list[str]:
+    """Build wheels of what is published as sources only; returns pip's options to find them."""
+    with ZipFile(wheel) as archive:
+        (metadata,) = (n for n in archive.namelist() if n.endswith(".dist-info/METADATA"))
+        needs = HeaderParser().parsestr(archive.read(metadata).decode()).get_all("Requires-Dist") or []
+    named = [need for need in needs if re.split(r"[^A-Za-z0-9._-]", need)[0] in ONLY_SOURCES and "extra ==" not in need]
+    if not named:
+        return []
+    folder = place / "built"
+    command = [sys.executable, "-m", "pip", "--disable-pip-version-check", "wheel", "--quiet", "--no-deps", *options]
+    done = subprocess.run([*command, "--wheel-dir", str(folder), *named], capture_output=True, text=True, check=False)  # noqa: S603
+    if done.returncode:
+        raise BundleError(f"{', '.join(named)} could not be built: {done.stderr.strip()}")
+    for path in folder.iterdir():
+        if not path.name.endswith("-none-any.whl"):
+            raise BundleError(f"{path.name} is for this kind of computer only")
+    return ["--find-links", str(folder)]
 
 
 def _download(wheel: Path, machine: str, place: Path, options: Sequence[str]) -> None:
