@@ -24,6 +24,9 @@ Cause: TypeAlias = Annotated[Literal["sound", "switched_off", "port_in_use", "no
 CheckStatus: TypeAlias = Annotated[Literal["ok", "note", "warning", "problem"], Open]
 """How a line of the checklist stands."""
 
+ErrorKind: TypeAlias = Annotated[Literal["depth", "water_level", "roll_offset", "sound_speed"], Open]
+"""What may be wrong."""
+
 Failsafe: TypeAlias = Annotated[Literal["leak", "critical_energy", "too_deep", "position_lost", "low_energy", "link_lost", "geofence_left", "separation_lost", "vehicle_error", "other_console", "all_links_lost", "service_restarted"], Open]
 """What may go wrong with a vehicle, or with all of them."""
 
@@ -300,6 +303,7 @@ class CorrectionsView(Model):
     tide_table: TideTableView | None
     """Its levels count in place of tide.level_m"""
     sound_speed: SoundSpeed | None
+    systematic_errors: SystematicErrors
     vertical_datum: str
     """What corrected depths are counted from"""
     accepted: int
@@ -596,6 +600,19 @@ class ImportView(Model):
     """True: the same file was imported before, nothing changed"""
 
 
+class InstrumentErrors(Model):
+    """How one vehicle's sonar is wrong."""
+
+    depth_m: float = 0.0
+    """By how much its depths are too large, metres"""
+    roll_offset_deg: float = 0.0
+    """How far the beams of its swath sonar point to starboard of where they are said to, degrees: the roll of a
+    patch test
+    """
+    sound_speed_mps: float = 0.0
+    """How much faster sound is at its swath sonar than it assumes when it steers its beams, m/s: bent swaths"""
+
+
 class ItemVerdict(Model):
     """The verdict on one item of a batch."""
 
@@ -836,6 +853,8 @@ class MissionSpec(Model):
     tide: Tide | None = None
     sound_speed: SoundSpeed | None = None
     """Sound speed correction; null: the sonars' own ranges are taken"""
+    systematic_errors: SystematicErrors | None = None
+    """What is always wrong with sonars and water levels"""
     seed: int = 0
     """Seed of every random decision"""
 
@@ -1448,6 +1467,61 @@ class SwathSonarSpec(Model):
     """Pings a second, Hz"""
     range_m: float = 100.0
     """Longest slant range, metres"""
+
+
+class SystematicErrorView(Model):
+    """One error, as the survey shows it beside those that are taken out already."""
+
+    kind: ErrorKind
+    """depth: a vehicle's depths beside the mean of those that cross each other; water_level: the largest residual
+    beside the tide; roll_offset and sound_speed: of a swath sonar
+    """
+    vehicle: str | None
+    """Null: of all"""
+    unit: str
+    found: float
+    """What is left in soundings as they are corrected now"""
+    sd: float
+    """Its standard deviation, from leaving lines or pieces of tracks out"""
+    significance: float
+    """How many standard deviations it is from zero"""
+    observations: int
+    """Crossings, or beams, that tell of it"""
+    rms_before_m: float
+    """RMS of the differences it was found in"""
+    rms_after_m: float
+    """What would be left of them"""
+    proposed: bool
+    """Whether it is large and sure enough to be taken out"""
+    why: str
+    """Why it is proposed, or not"""
+
+
+class SystematicErrors(Model):
+    """Errors that are the same for many soundings; they are taken out of every depth beside tide and sound speed."""
+
+    vehicles: dict[str, Any] | None = None
+    """By vehicle; one that is missing is right"""
+    water_level: list[tuple[float, float]] | None = None
+    """By how much depths are still too large at some times, beside the tide: [Unix seconds of the vehicles' clocks,
+    metres], in order; linear between them, and as at the nearest before and after
+    """
+    source: str = ""
+    """Where these come from, kept with the product"""
+
+
+class SystematicErrorsView(Model):
+    """What a survey shows of systematic errors."""
+
+    applied: SystematicErrors
+    """What is taken out of soundings now"""
+    errors: list[SystematicErrorView]
+    unknown: list[str]
+    """What cannot be told, and why"""
+    proposal: SystematicErrors | None
+    """What to send to PUT .../systematic-errors to take out what is proposed, what is applied included; null:
+    nothing is proposed
+    """
 
 
 class TargetRangePage(Model):

@@ -291,6 +291,35 @@ class Operations(ABC):
             models.CorrectionsView,
         ))
 
+    def get_systematic_errors(self, mission_id: str) -> models.SystematicErrorsView:
+        """See what is always wrong: ``GET /missions/{mission_id}/systematic-errors``."""
+        return self._call(Call[models.SystematicErrorsView](
+            "GET",
+            f"/missions/{part(mission_id)}/systematic-errors",
+            models.SystematicErrorsView,
+        ))
+
+    def set_systematic_errors(
+        self,
+        mission_id: str,
+        body: models.SystematicErrors | Mapping[str, Any],
+    ) -> models.CorrectionsView:
+        """Take out what is always wrong: ``PUT /missions/{mission_id}/systematic-errors``."""
+        return self._call(Call[models.CorrectionsView](
+            "PUT",
+            f"/missions/{part(mission_id)}/systematic-errors",
+            models.CorrectionsView,
+            body=body,
+        ))
+
+    def delete_systematic_errors(self, mission_id: str) -> models.CorrectionsView:
+        """Take nothing out: ``DELETE /missions/{mission_id}/systematic-errors``."""
+        return self._call(Call[models.CorrectionsView](
+            "DELETE",
+            f"/missions/{part(mission_id)}/systematic-errors",
+            models.CorrectionsView,
+        ))
+
     def get_adjustment(self, mission_id: str) -> models.AdjustmentView:
         """See how tracks are adjusted: ``GET /missions/{mission_id}/adjustment``."""
         return self._call(Call[models.AdjustmentView](
@@ -1060,6 +1089,35 @@ class AsyncOperations(ABC):
         return await self._call(Call[models.CorrectionsView](
             "DELETE",
             f"/missions/{part(mission_id)}/sound-speed",
+            models.CorrectionsView,
+        ))
+
+    async def get_systematic_errors(self, mission_id: str) -> models.SystematicErrorsView:
+        """See what is always wrong: ``GET /missions/{mission_id}/systematic-errors``."""
+        return await self._call(Call[models.SystematicErrorsView](
+            "GET",
+            f"/missions/{part(mission_id)}/systematic-errors",
+            models.SystematicErrorsView,
+        ))
+
+    async def set_systematic_errors(
+        self,
+        mission_id: str,
+        body: models.SystematicErrors | Mapping[str, Any],
+    ) -> models.CorrectionsView:
+        """Take out what is always wrong: ``PUT /missions/{mission_id}/systematic-errors``."""
+        return await self._call(Call[models.CorrectionsView](
+            "PUT",
+            f"/missions/{part(mission_id)}/systematic-errors",
+            models.CorrectionsView,
+            body=body,
+        ))
+
+    async def delete_systematic_errors(self, mission_id: str) -> models.CorrectionsView:
+        """Take nothing out: ``DELETE /missions/{mission_id}/systematic-errors``."""
+        return await self._call(Call[models.CorrectionsView](
+            "DELETE",
+            f"/missions/{part(mission_id)}/systematic-errors",
             models.CorrectionsView,
         ))
 
