@@ -1,6 +1,7 @@
 """The application: every part put together, opened at the start and closed at the end."""
 
 import asyncio
+import os
 import signal
 import socket
 import ssl
@@ -71,6 +72,7 @@ from app.storage.audit import Command
 from app.storage.database import Database
 from app.storage.membership import MembershipLostError
 from app.storage.prepare import prepare_database
+from app.supervision import Supervisor
 from imc_bridge import PortInUseError
 
 SWITCH_S = 0.001
@@ -372,12 +374,21 @@ async def serve(
     sys.setswitchinterval(SWITCH_S)
     allow_descriptors(settings.max_connections)
     listening = listen(settings)
+    supervisor = Supervisor.of(os.environ)
+
+    def begun(server: Server) -> None:
+        supervisor.tell(READY="1", STATUS=f"answers at {server.url}")
+        if started is not None:
+            started(server)
+
     try:
         app = create_app(settings, port=listening.getsockname()[1])
-        async with app.router.lifespan_context(app):
+        # To the very end: vehicles are stopped when requests are over.
+        async with supervisor.watching(), app.router.lifespan_context(app):
             first_token = await _first_token(app.state.edge) if with_first_token else None
             with settled():
-                await Server(app, listening, started, first_token).serve(sockets=[listening])
+                async with supervisor.told_of(app.state.edge.stopping):
+                    await Server(app, listening, begun, first_token).serve(sockets=[listening])
     finally:
         listening.close()
 

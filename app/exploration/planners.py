@@ -1,4 +1,7 @@
-"""The planners by name. Adding one: a class derived from PlannerBase in its own file, and its name in ``PLANNERS``."""
+"""The planners by name. Adding one: a class derived from PlannerBase in its own file, and its name in ``PLANNERS``.
+
+Those that other packages bring are added to ``PLANNERS`` when this is imported, see :mod:`app.exploration.installed`.
+"""
 
 from functools import cache
 
@@ -9,6 +12,7 @@ from app.exploration.cao.gradient import FdsaPlanner, SpsaPlanner
 from app.exploration.cao.planner import CaoPlanner
 from app.exploration.core.constraints import Constraints
 from app.exploration.core.problem import Belief, Situation
+from app.exploration.installed import find_planners
 from app.exploration.lines.formation import FormationLawnmower
 from app.exploration.lines.lawnmower import LawnmowerPlanner
 from app.exploration.pcao.planner import PcaoPlanner
@@ -72,7 +76,7 @@ def create_planner(
         planner = (PLANNERS | COVERERS)[name]
     except KeyError:
         there = ", ".join(sorted(PLANNERS | COVERERS))
-        raise ValueError(f"planner: there is no {name!r}; choose one of {there}") from None
+        raise ValueError(f"planner: {missing(name)}; choose one of {there}") from None
     if isinstance(sensor, Scanner):
         return _searcher(name)(options, sensor)
     if planner is LawnmowerPlanner and isinstance(sensor, RangeSensor):
@@ -80,6 +84,16 @@ def create_planner(
     if planner is RolloutPlanner and not isinstance(sensor, RangeSensor):
         return CaoPlanner(options, sensor)
     return planner(options, sensor)
+
+
+def missing(name: str) -> str:
+    """Return why there is no planner of a name: not known, or installed and broken."""
+    broken = INSTALLED.broken.get(name)
+    return (
+        f"there is no planner {name!r}"
+        if broken is None
+        else f"{name!r} of {broken.package} cannot be used: {broken.reason}"
+    )
 
 
 def _searcher(name: str) -> type[PlannerBase]:
@@ -136,3 +150,9 @@ def _small_search(scanner: Scanner) -> Situation:
         1, 10, ("a",), unit * here[None], np.full(1, np.nan), nothing, np.zeros((0, 2)),
         Constraints(area, max_step_m=10 * unit, min_altitude_m=0.0), search=task,
     )  # fmt: skip
+
+
+# At the end, so that a planner of another package may import everything from here.
+INSTALLED = find_planners({*PLANNERS, *COVERERS, *SEARCHERS, *ONLY_IN_SIMULATION})
+"""The planners of other packages, also those that cannot be used."""
+PLANNERS |= INSTALLED.planners

@@ -10,6 +10,9 @@ import uuid
 from collections.abc import Awaitable, Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 
+import structlog
+
+from app.exploration.planners import INSTALLED
 from app.missions import states
 from app.missions.alarms.desk import AlarmDesk
 from app.missions.clock import now
@@ -48,6 +51,8 @@ from app.storage.fast_read import AtOnce
 from app.storage.models import MissionRow
 from app.storage.ping_files import PingFiles
 from app.storage.retention import finish_removing
+
+log = structlog.get_logger(__name__)
 
 WORKERS = 2
 
@@ -132,6 +137,8 @@ class MissionService:
 
     async def startup(self) -> None:
         """Open the links, join the processes that share the database and go on with missions that nobody has."""
+        for planner in INSTALLED.broken.values():
+            log.warning("planner cannot be used", planner=planner.name, package=planner.package, reason=planner.reason)
         self._compilation.begin()
         await finish_removing(self._database, self._ping_files)
         await self.hub.start()

@@ -18,6 +18,7 @@ from app.evaluation.runs.summary import summarise
 from app.exploration.core.objective import TERMS
 from app.exploration.pcao.model import PcaoModel
 from app.exploration.planner.options import PlannerOptions
+from app.exploration.planners import missing
 from simulator.terrain import Terrain, TerrainError
 from simulator.terrain_files import load_terrain
 
@@ -101,7 +102,7 @@ def planners_named(text: str, known: tuple[str, ...]) -> list[str]:
     names = [name.strip() for name in text.split(",") if name.strip()]
     for name in names:
         if name not in known:
-            raise typer.BadParameter(f"there is no {name!r}; choose from {', '.join(known)}", param_hint="--planner")
+            raise typer.BadParameter(f"{missing(name)}; choose from {', '.join(known)}", param_hint="--planner")
     if not names:
         raise typer.BadParameter(f"names no planner; choose from {', '.join(known)}", param_hint="--planner")
     return names

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from app.exploration.planners import COVERERS, ONLY_IN_SIMULATION, PLANNERS, REFUSAL, SEARCHERS
+from app.exploration.planners import COVERERS, ONLY_IN_SIMULATION, PLANNERS, REFUSAL, SEARCHERS, missing
 from app.missions.errors import InvalidRequestError
 from app.missions.spec.mission import MissionKind, MissionSpec, Sensor, VehicleKind, VehicleSpec
 
@@ -18,11 +18,7 @@ def check_spec(spec: MissionSpec, kinds: Sequence[VehicleKind]) -> None:
     if name in ONLY_IN_SIMULATION:
         raise InvalidRequestError("planner.name", REFUSAL.format(name=name), use)
     if name not in there:
-        what = (
-            f"{name!r} plans no missions of kind {spec.kind}"
-            if name in PLANNERS | COVERERS
-            else f"there is no planner {name!r}"
-        )
+        what = f"{name!r} plans no missions of kind {spec.kind}" if name in PLANNERS | COVERERS else missing(name)
         raise InvalidRequestError("planner.name", what, use)
     if name in COVERERS and spec.limits.com_range_m is not None:
         raise InvalidRequestError(

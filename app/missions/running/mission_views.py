@@ -4,8 +4,9 @@ import inspect
 from collections.abc import AsyncIterator, Sequence
 from contextlib import asynccontextmanager
 
+from app import __version__
 from app.exploration.planner.options import PlannerOptions
-from app.exploration.planners import COVERERS, PLANNERS
+from app.exploration.planners import COVERERS, INSTALLED, PLANNERS
 from app.missions.fleet.interface import StopReceipt, VehicleInfo
 from app.missions.live.broadcast import Subscription
 from app.missions.live.mission import LiveMission
@@ -98,11 +99,23 @@ def idle_vehicle_view(info: VehicleInfo) -> VehicleView:
 
 
 def planner_views() -> list[PlannerView]:
-    """Return the planners that a mission may name."""
+    """Return the planners that a mission may name, and those that are installed and cannot be used."""
     options = PlannerOptions.model_json_schema()
-    return [
-        PlannerView(name=name, summary=_summary(kind), options=options) for name, kind in (PLANNERS | COVERERS).items()
+    usable = [
+        PlannerView(
+            name=name,
+            summary=_summary(kind),
+            package=INSTALLED.packages.get(name, f"bathyfleet {__version__}"),
+            options=options,
+        )
+        for name, kind in (PLANNERS | COVERERS).items()
     ]
+    broken = [
+        PlannerView(name=planner.name, summary="", package=planner.package, problem=planner.reason, options={})
+        for planner in INSTALLED.broken.values()
+        if planner.name not in PLANNERS | COVERERS
+    ]
+    return usable + broken
 
 
 def _summary(kind: type[object]) -> str:

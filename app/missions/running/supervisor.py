@@ -75,8 +75,12 @@ class MissionSupervisor:
     def run(self, live: LiveMission) -> None:
         """Begin the flight."""
         live.set_off()
-        runner = Runner(live, self._hub, self._executor, self._time_scale)
-        self.runs[live.id] = asyncio.create_task(self._supervise(live, runner.run), name=f"mission {live.id}")
+
+        def fly() -> Awaitable[str]:
+            # Made where its failure ends this mission alone: its planner may be gone since the mission was begun.
+            return Runner(live, self._hub, self._executor, self._time_scale).run()
+
+        self.runs[live.id] = asyncio.create_task(self._supervise(live, fly), name=f"mission {live.id}")
 
     async def _supervise(self, live: LiveMission, run: Callable[[], Awaitable[str]]) -> None:
         """Run a mission to its end; whatever happens, its vehicles are stopped."""

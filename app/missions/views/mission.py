@@ -312,8 +312,10 @@ class ActionView(View):
 
 
 class PlannerView(View):
-    """A planner that a mission may name."""
+    """A planner that a mission may name, or one that is installed and cannot be used."""
 
     name: str
     summary: str
+    package: str = Field(description="What brings it, with its version")
+    problem: str = Field(default="", description="Why it cannot be used; empty: it can")
     options: dict[str, Any] = Field(description="JSON schema of its options")

@@ -45,7 +45,7 @@ def test_planners_are_compared_under_either_clock() -> None:
     ("arguments", "said"),
     [
         (["--scenario", "4"], "'4' is none of 1, 2, 3, harbour"),
-        (["--planner", "lawnmower"], "there is no 'lawnmower'"),
+        (["--planner", "lawnmower"], "there is no planner 'lawnmower'"),
         (["--clock", "sun"], "'sun' is none of way, steps"),
         (["--only", "default"], "goes with --write only"),
     ],

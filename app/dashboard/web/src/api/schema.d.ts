@@ -3802,13 +3802,24 @@ export interface components {
         };
         /**
          * PlannerView
-         * @description A planner that a mission may name.
+         * @description A planner that a mission may name, or one that is installed and cannot be used.
          */
         PlannerView: {
             /** Name */
             name: string;
             /** Summary */
             summary: string;
+            /**
+             * Package
+             * @description What brings it, with its version
+             */
+            package: string;
+            /**
+             * Problem
+             * @description Why it cannot be used; empty: it can
+             * @default
+             */
+            problem: string;
             /**
              * Options
              * @description JSON schema of its options

@@ -300,7 +300,9 @@ function Planner() {
   const presets = Object.entries(PLANNER_PRESETS).filter(
     ([name]) => name === draft.planner || canPlan(name, draft),
   );
-  const others = planners.value.filter((p) => !(p.name in PLANNER_PRESETS));
+  const usable = planners.value.filter((p) => !p.problem);
+  const broken = planners.value.filter((p) => p.problem);
+  const others = usable.filter((p) => !(p.name in PLANNER_PRESETS));
   const other = others.find((p) => p.name === draft.planner);
   return (
     <fieldset class="planner">
@@ -330,12 +332,21 @@ function Planner() {
           Planner
           <Choice
             value={draft.planner}
-            options={same(planners.value.length > 0 ? planners.value.map((p) => p.name) : [draft.planner])}
+            options={same(usable.length > 0 ? usable.map((p) => p.name) : [draft.planner])}
             id="field-planner"
             onChoose={(planner) => set({ planner })}
           />
-          {other ? <small>{other.summary}</small> : null}
+          {other ? (
+            <small>
+              {other.summary} ({other.package})
+            </small>
+          ) : null}
         </label>
+        {broken.map((p) => (
+          <small key={p.name} class="fault" data-testid={`broken-planner-${p.name}`}>
+            ▲ {p.name} of {p.package} cannot be used: {p.problem}
+          </small>
+        ))}
         <Options schema={planners.value.find((p) => p.name === draft.planner)?.options} />
       </details>
       {fault.value ? <span class="fault">▲ {fault.value}</span> : null}

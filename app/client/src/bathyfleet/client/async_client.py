@@ -1,0 +1,277 @@
+"""The client for programs with asyncio."""
+
+from __future__ import annotations
+
+import asyncio
+import ssl
+import time
+from collections.abc import AsyncGenerator, Iterable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Self, TypeVar
+
+import httpx
+from httpx_sse import EventSource
+from websockets.asyncio.client import connect
+from websockets.exceptions import WebSocketException
+
+from bathyfleet.client.call import Call, part
+from bathyfleet.client.connection import (
+    ADDRESS,
+    BATCH,
+    PATIENCE_S,
+    TIMEOUT_S,
+    Item,
+    authorization,
+    batches,
+    new_key,
+    settings,
+    together,
+)
+from bathyfleet.client.files import Arriving
+from bathyfleet.client.maps import dataset
+from bathyfleet.client.models import BatchVerdict, EventView, LiveMessage, MeasurementBatch, MissionView, Order
+from bathyfleet.client.operations import AsyncOperations
+from bathyfleet.client.patience import Attempts
+from bathyfleet.client.streams import (
+    LARGEST_MESSAGE,
+    LogPlace,
+    ends,
+    is_reached,
+    live_address,
+    message_of,
+    refusal,
+    tls_of,
+)
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+T = TypeVar("T")
+
+
+class AsyncClient(AsyncOperations):
+    """A service, with every operation of its REST interface as a coroutine; used in an ``async with`` statement.
+
+    Streams are asynchronous generators: one that is left before its end is closed by ``contextlib.aclosing``.
+
+    Parameters
+    ----------
+    address : str
+        Where it answers, without ``/api/v1``.
+    token : str, optional
+        An access token, where the service has any.
+    patience_s : float
+        For how long requests that may be made twice are repeated while nobody answers or too much is under way.
+    timeout_s : float
+        The longest wait for an answer that has begun to be made.
+    verify : bool or SSLContext
+        How a certificate is checked; ``ssl.create_default_context(cafile=...)`` trusts one that the service made.
+
+    Raises
+    ------
+    ProblemError
+        By all methods, when the service says why not: its subclasses are kinds of reasons.
+    UnreachableError
+        By all methods, when nobody answers.
+    """
+
+    def __init__(
+        self,
+        address: str = ADDRESS,
+        token: str | None = None,
+        *,
+        patience_s: float = PATIENCE_S,
+        timeout_s: float = TIMEOUT_S,
+        verify: bool | ssl.SSLContext = True,
+    ) -> None:
+        self._http = httpx.AsyncClient(**settings(address, token, timeout_s, verify))
+        self._address = address.rstrip("/")
+        self._token = token
+        self._verify = verify
+        self._patience_s = patience_s
+
+    async def __aenter__(self) -> Self:
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        await self.aclose()
+
+    async def aclose(self) -> None:
+        """Close the connections."""
+        await self._http.aclose()
+
+    async def _call(self, call: Call[T]) -> T:
+        attempts = self._attempts(f"{call.method} {call.path}", repeatable=call.repeatable)
+        while True:
+            try:
+                answer = await self._http.send(call.request(self._http))
+            except httpx.TransportError as error:
+                await asyncio.sleep(attempts.after_error(error))
+                continue
+            if answer.is_success:
+                return call.read(answer)
+            await asyncio.sleep(attempts.after_refusal(answer))
+
+    def _attempts(self, what: str, *, repeatable: bool = True) -> Attempts:
+        return Attempts(f"{what} at {self._address}", self._patience_s, repeatable=repeatable)
+
+    async def wait_for(
+        self, mission_id: str, *states: str, timeout_s: float | None = None, every_s: float = 1.0
+    ) -> MissionView:
+        """Return a mission as soon as it is in one of the states; without any named: when it has ended.
+
+        Parameters
+        ----------
+        states : str
+            For example ``"running"``, ``"paused"``.
+        timeout_s : float, optional
+            The longest wait.
+        every_s : float
+            How often is asked.
+
+        Raises
+        ------
+        EndedError
+            When it has ended in another state: none of those can come any more.
+        TimeoutError
+            When the time is over.
+        """
+        until = None if timeout_s is None else time.monotonic() + timeout_s
+        while True:
+            mission = await self.get_mission(mission_id)
+            if is_reached(mission, states):
+                return mission
+            if until is not None and time.monotonic() + every_s > until:
+                raise TimeoutError(f"mission {mission_id} is still {mission.state} after {timeout_s:g} s")
+            await asyncio.sleep(every_s)
+
+    async def events(
+        self, mission_id: str, *, after: int = 0, until_ended: bool = False
+    ) -> AsyncGenerator[EventView, None]:
+        """Yield the entries of a mission's log, first those that there are, then each as it is made.
+
+        After an interruption it goes on where it was; no entry is missed or comes twice.
+
+        Parameters
+        ----------
+        after : int
+            Only entries with a larger id.
+        until_ended : bool
+            Stop after the entry that ends the mission, instead of never.
+        """
+        place = LogPlace(mission_id, after)
+        attempts = self._attempts(place.name)
+        while True:
+            try:
+                answer = await self._http.send(place.request(self._http), stream=True)
+                try:
+                    if answer.is_success:
+                        attempts.reached()
+                        async for event in EventSource(answer).aiter_sse():
+                            entry = place.take(event)
+                            if entry is not None:
+                                yield entry
+                                if until_ended and ends(entry):
+                                    return
+                        wait_s = attempts.after_end()
+                    else:
+                        await answer.aread()
+                        wait_s = attempts.after_refusal(answer)
+                finally:
+                    await answer.aclose()
+            except httpx.TransportError as error:
+                wait_s = attempts.after_error(error)
+            await asyncio.sleep(wait_s)
+
+    async def live(self, mission_id: str) -> AsyncGenerator[LiveMessage, None]:
+        """Yield what the live socket of a mission sends: a snapshot, then what changes.
+
+        After an interruption it begins anew, with a snapshot.
+        """
+        address = live_address(self._address, mission_id)
+        attempts = self._attempts(f"live messages of mission {mission_id}")
+        while True:
+            try:
+                async with connect(
+                    address,
+                    additional_headers=authorization(self._token),
+                    max_size=LARGEST_MESSAGE,
+                    ssl=tls_of(self._address, self._verify),
+                ) as socket:
+                    async for text in socket:
+                        attempts.reached()
+                        message = message_of(text)
+                        if message is not None:
+                            yield message
+                wait_s = attempts.after_end()
+            except (OSError, WebSocketException) as error:
+                refused = refusal(error, address)
+                if refused is not None:
+                    raise refused from error
+                wait_s = attempts.after_error(error)
+            await asyncio.sleep(wait_s)
+
+    async def post_measurements(
+        self,
+        mission_id: str,
+        body: MeasurementBatch | Mapping[str, Any],
+        *,
+        idempotency_key: str | None = None,
+    ) -> BatchVerdict:
+        """Post one batch of measurements, repeated under one key until it is answered: nothing is stored twice."""
+        return await super().post_measurements(mission_id, body, idempotency_key=idempotency_key or new_key())
+
+    async def send_measurements(self, mission_id: str, items: Iterable[Item], *, batch: int = BATCH) -> BatchVerdict:
+        """Post any number of measurements in batches; returns the verdicts on all, in order.
+
+        Where it raises, the batches before are stored: sent again, their items are duplicates.
+        """
+        return together([await self.post_measurements(mission_id, {"items": some}) for some in batches(items, batch)])
+
+    async def map(self, mission_id: str, *, order: Order | None = None) -> xr.Dataset:
+        """Return a mission's map as an xarray dataset with every layer; see :func:`bathyfleet.client.maps.dataset`.
+
+        Parameters
+        ----------
+        order : str, optional
+            The order of IHO S-44 that layers are compared with: ``special``, ``1a`` and so on.
+
+        Raises
+        ------
+        NotFoundError
+            While there is no map yet.
+        ImportError
+            Where xarray is missing.
+        """
+        return await asyncio.to_thread(dataset, await self.get_map_file(mission_id, "nc", order=order))
+
+    async def download(self, mission_id: str, name: str, path: str | Path, **query: Any) -> Path:
+        """Store one of a mission's files, and return its path. The file is there when it is complete.
+
+        Parameters
+        ----------
+        name : str
+            For example ``map.tif``, ``report.pdf``, ``tracks.geojson``: see :meth:`list_products`.
+        path : path
+            Where it goes; what is there is replaced.
+        query
+            Further parameters of the request, such as ``order="special"``.
+        """
+        call: Call[bytes] = Call("GET", f"/missions/{part(mission_id)}/{part(name)}", bytes, query=query)
+        attempts = self._attempts(f"{name} of mission {mission_id}")
+        while True:
+            try:
+                answer = await self._http.send(call.request(self._http), stream=True)
+                try:
+                    if answer.is_success:
+                        with Arriving(path) as file:
+                            async for piece in answer.aiter_bytes():
+                                file.write(piece)
+                        return Path(path)
+                    await answer.aread()
+                    wait_s = attempts.after_refusal(answer)
+                finally:
+                    await answer.aclose()
+            except httpx.TransportError as error:
+                wait_s = attempts.after_error(error)
+            await asyncio.sleep(wait_s)

@@ -1,0 +1,91 @@
+"""A request and how its answer is read, before anything is sent."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cache
+from typing import Any, Generic, TypeVar
+from urllib.parse import quote
+
+import httpx
+from pydantic import BaseModel, TypeAdapter
+
+T = TypeVar("T")
+
+JSON = "application/json"
+
+
+@dataclass(frozen=True)
+class Call(Generic[T]):
+    """One request of the REST interface.
+
+    Parameters
+    ----------
+    method, path : str
+        The path without ``/api/v1``, its parts escaped by :func:`part`.
+    reading : type or None
+        What the answer is: ``bytes`` or ``str`` as they are, anything else is read from JSON, None is no answer.
+    body : Model or mapping, optional
+        Sent as JSON; of a model only what was set, the service knows its own defaults.
+    content : bytes, optional
+        Sent as it is.
+    query, headers : mapping
+        Those that are None are left out.
+    """
+
+    method: str
+    path: str
+    reading: Any
+    body: BaseModel | Mapping[str, Any] | None = None
+    content: bytes | None = None
+    query: Mapping[str, Any] = field(default_factory=dict)
+    headers: Mapping[str, str | None] = field(default_factory=dict)
+
+    @property
+    def repeatable(self) -> bool:
+        """Whether sending it twice does what sending it once does."""
+        return self.method == "GET" or self.headers.get("idempotency-key") is not None
+
+    def request(self, client: httpx.Client | httpx.AsyncClient) -> httpx.Request:
+        """Return the request for a connection whose base is the service's address."""
+        headers = {name: value for name, value in self.headers.items() if value is not None}
+        if self.reading not in (bytes, str, None):
+            headers["Accept"] = f"{JSON}, application/geo+json"
+        content = self.content
+        if self.body is not None:
+            content = _as_json(self.body)
+            headers["Content-Type"] = JSON
+        elif content is not None:
+            headers["Content-Type"] = "application/octet-stream"
+        params = {name: value for name, value in self.query.items() if value is not None}
+        return client.build_request(self.method, f"/api/v1{self.path}", params=params, content=content, headers=headers)
+
+    def read(self, answer: httpx.Response) -> T:
+        """Return what a successful answer says."""
+        value: Any
+        if answer.status_code == httpx.codes.NO_CONTENT or self.reading is None:
+            value = None
+        elif self.reading is bytes:
+            value = answer.content
+        elif self.reading is str:
+            value = answer.text
+        else:
+            value = _adapter(self.reading).validate_json(answer.content)
+        return value  # type: ignore[no-any-return]
+
+
+def part(value: str | int) -> str:
+    """Return a part of a path, escaped."""
+    return quote(str(value), safe="")
+
+
+def _as_json(body: BaseModel | Mapping[str, Any]) -> bytes:
+    if isinstance(body, BaseModel):
+        return body.model_dump_json(exclude_unset=True).encode()
+    return TypeAdapter(dict[str, Any]).dump_json(dict(body), exclude_unset=True)
+
+
+@cache
+def _adapter(reading: Any) -> TypeAdapter[Any]:
+    return TypeAdapter(reading)

@@ -1,0 +1,70 @@
+"""Where the service is and who asks: what both clients are opened with."""
+
+from __future__ import annotations
+
+import ssl
+import uuid
+from collections.abc import Iterable, Iterator, Mapping
+from itertools import islice
+from typing import Any
+
+import httpx
+
+from bathyfleet.client.models import BatchVerdict, ItemVerdict, Measurement
+
+ADDRESS = "http://127.0.0.1:8080"
+PATIENCE_S = 30.0
+TIMEOUT_S = 75.0
+"""A little more than the longest that the service lets a vehicle wait for its waypoint."""
+BATCH = 1000
+
+Item = Measurement | Mapping[str, Any]
+
+
+def settings(address: str, token: str | None, timeout_s: float, verify: bool | ssl.SSLContext) -> dict[str, Any]:
+    """Return the settings of an HTTP connection. Raises ValueError for an address that is none."""
+    url = httpx.URL(address)
+    if url.scheme not in ("http", "https") or not url.host:
+        raise ValueError(f"address: {address!r} is not like {ADDRESS} or https://host:port")
+    return {
+        "base_url": address.rstrip("/"),
+        "headers": authorization(token) | {"Accept": "*/*"},
+        "timeout": httpx.Timeout(timeout_s, connect=10.0),
+        # Loading certificates takes longer than most requests; plain HTTP has no use for them.
+        "verify": verify if url.scheme == "https" else False,
+    }
+
+
+def authorization(token: str | None) -> dict[str, str]:
+    """Return the header that shows a token."""
+    return {} if token is None else {"Authorization": f"Bearer {token}"}
+
+
+def new_key() -> str:
+    """Return a new idempotency key."""
+    return str(uuid.uuid4())
+
+
+def batches(items: Iterable[Item], size: int) -> Iterator[list[Item]]:
+    """Yield the items in lists of at most ``size``. Raises ValueError unless that is 1 to 10 000."""
+    if not 1 <= size <= 10_000:
+        raise ValueError(f"batch: {size} is not from 1 to 10000")
+    rest = iter(items)
+    while batch := list(islice(rest, size)):
+        yield batch
+
+
+def together(verdicts: Iterable[BatchVerdict]) -> BatchVerdict:
+    """Return the verdicts on batches as one, its items numbered through."""
+    parts = list(verdicts)
+    items: list[ItemVerdict] = []
+    for part in parts:
+        start = len(items)
+        items += [item.model_copy(update={"index": start + item.index}) for item in part.items]
+    return BatchVerdict(
+        accepted=sum(part.accepted for part in parts),
+        rejected=sum(part.rejected for part in parts),
+        duplicate=sum(part.duplicate for part in parts),
+        items=items,
+        replayed=any(part.replayed for part in parts),
+    )

@@ -1,0 +1,2017 @@
+"""What the service is told and what it answers.
+
+Written by ``python -m app.client`` from the service's OpenAPI document: changed there, not here.
+"""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Annotated, Any, Literal, TypeAlias
+
+from pydantic import Field
+
+from bathyfleet.client.model import Model, Open
+
+Action: TypeAlias = Annotated[Literal["start", "pause", "resume", "abort", "finish"], Open]
+"""What operators and consoles may ask of a mission."""
+
+BatteryState: TypeAlias = Annotated[Literal["ok", "low", "critical"], Open]
+"""What a battery's level is worth."""
+
+Cause: TypeAlias = Annotated[Literal["sound", "switched_off", "port_in_use", "no_interface", "no_vehicle", "not_heard", "no_announce", "no_service", "announces_ceased", "no_traffic", "unreachable", "blocked_port", "stale_port", "foreign_address", "wrong_version", "same_id_twice", "our_id_taken", "clock_off", "clock_rate", "silent", "radio_gaps", "restarted", "packets_dropped", "low_rate", "no_entities", "no_soundings", "soundings_refused", "no_way_home", "foreign_control", "not_ready", "send_errors", "bad_packets", "refused", "unknown_messages", "crowded"], Open]
+"""What a finding is about; the first of a node's problems is the one to look at."""
+
+CheckStatus: TypeAlias = Annotated[Literal["ok", "note", "warning", "problem"], Open]
+"""How a line of the checklist stands."""
+
+ErrorKind: TypeAlias = Annotated[Literal["depth", "water_level", "roll_offset", "sound_speed"], Open]
+"""What may be wrong."""
+
+Failsafe: TypeAlias = Annotated[Literal["leak", "critical_energy", "too_deep", "position_lost", "low_energy", "link_lost", "geofence_left", "separation_lost", "vehicle_error", "other_console", "all_links_lost", "service_restarted"], Open]
+"""What may go wrong with a vehicle, or with all of them."""
+
+Fit: TypeAlias = Annotated[Literal["data", "from_zero", "about_zero"], Open]
+"""How a range of colours follows the values: from the least, from zero, or as far below zero as above."""
+
+FurtherLayer: TypeAlias = Annotated[Literal["density", "slope", "tvu_fraction", "difference", "tvu", "thu"], Open]
+"""A layer that the tiles hold on request."""
+
+Guidance: TypeAlias = Annotated[Literal["follow", "legs", "acoustic"], Open]
+"""How a vehicle of kind ``imc`` is led."""
+
+Homecoming: TypeAlias = Annotated[Literal["return", "stop"], Open]
+"""What becomes of a vehicle that goes on no further."""
+
+Language: TypeAlias = Annotated[Literal["en", "pt"], Open]
+"""A language that reports are written in."""
+
+LayerName: TypeAlias = Annotated[Literal["uncertainty", "count", "sounded", "density", "slope", "tvu_fraction", "difference", "tvu", "thu", "live"], Open]
+"""A layer of the map beside those that its JSON always has."""
+
+Level: TypeAlias = Annotated[Literal["info", "warning", "alarm"], Open]
+"""How much an event matters."""
+
+LinkState: TypeAlias = Annotated[Literal["unknown", "lost", "expected_offline", "heard", "ready", "engaged"], Open]
+"""How well a vehicle can be reached, worst to best."""
+
+MissionKind: TypeAlias = Annotated[Literal["survey", "search"], Open]
+"""What a mission is for."""
+
+MissionState: TypeAlias = Annotated[Literal["draft", "ready", "running", "paused", "finished", "aborted", "failed"], Open]
+"""Where a mission is in its life."""
+
+NodeState: TypeAlias = Annotated[Literal["heard", "announced", "active", "ready", "in_plan", "lost", "expected_offline"], Open]
+"""How far the acquaintance with a node has come."""
+
+Order: TypeAlias = Annotated[Literal["exclusive", "special", "1a", "1b", "2"], Open]
+"""An order of survey."""
+
+OverlayLayer: TypeAlias = Annotated[Literal["depth", "uncertainty", "count", "density", "slope", "tvu_fraction", "difference", "tvu", "thu", "live"], Open]
+"""A layer that can be seen as a picture."""
+
+Palette: TypeAlias = Annotated[Literal["deep", "violet", "matter", "balance", "landmarks", "classes"], Open]
+"""Colours of the dashboard's map."""
+
+Phase: TypeAlias = Annotated[Literal["transit", "survey", "surfacing", "returning", "home", "stopped"], Open]
+"""What a vehicle is at."""
+
+PositionQuality: TypeAlias = Annotated[Literal["untold", "stated", "good", "fading", "poor"], Open]
+"""How well a vehicle knows where it is."""
+
+Response: TypeAlias = Annotated[Literal["warn", "hold", "return", "surface", "stop"], Open]
+"""What is done, least to most: what is farther down is not undone by what is farther up."""
+
+Role: TypeAlias = Annotated[Literal["viewer", "vehicle", "operator", "admin"], Open]
+"""What the holder of a token may do."""
+
+Sensor: TypeAlias = Annotated[Literal["single_beam", "dvl", "multibeam"], Open]
+"""How a vehicle sounds the bottom."""
+
+Severity: TypeAlias = Annotated[Literal["ok", "note", "problem"], Open]
+"""How much a finding matters."""
+
+SoundingState: TypeAlias = Annotated[Literal["used", "restored", "rejected", "doubted", "withdrawn"], Open]
+"""Whether a sounding is in the map, and who decided that."""
+
+TargetState: TypeAlias = Annotated[Literal["unheard", "searching", "uncertain", "accurate"], Open]
+"""How far the search for a target has come."""
+
+VehicleKind: TypeAlias = Annotated[Literal["imc", "rest", "sim", "neptus"], Open]
+"""Which link reaches a vehicle."""
+
+Verdict: TypeAlias = Annotated[Literal["accepted", "rejected", "duplicate"], Open]
+"""What happened to one measurement."""
+
+WaypointStatus: TypeAlias = Annotated[Literal["planned", "sent", "acknowledged", "reached", "refused", "missed"], Open]
+"""The life of one waypoint. A vehicle's route is drawn from ``ACKNOWLEDGED`` on, not before."""
+
+
+class ActionRequest(Model):
+    """What an operator adds to an action."""
+
+    note: str = ""
+    """Kept in the mission's log beside the action"""
+
+
+class ActionView(Model):
+    """What an action led to, with each vehicle's answer where vehicles were stopped."""
+
+    mission: MissionSummary
+    stops: list[StopView]
+
+
+class AdjustmentRequest(Model):
+    """What is known beside the soundings; all of it may be left out."""
+
+    fixes: list[FixRequest] | None = None
+    """GPS fixes. Jumps of a vehicle's positions at the surface are taken for fixes without being named"""
+    walk_m: float = 3.0
+    """Deviation of the random walk of positions after an hour"""
+    rate_mph: float = 15.0
+    """Deviation of the slowly changing rate of their drift, metres an hour"""
+
+
+class AdjustmentView(Model):
+    """By how much positions of vehicles were changed for their drift; their raw positions stay."""
+
+    applied: bool
+    made_at: datetime | None
+    """Null: nothing is applied"""
+    actor: str | None
+    by_ties: bool
+    """Whether ties were used; else fixes alone"""
+    fixes: int
+    tracks: list[TrackOffsetView]
+    ties_used: int
+    ties_rejected: int
+    before_m: float | None
+    """RMS of depths less others' over all ties, unadjusted"""
+    after_m: float | None
+    """The same, adjusted"""
+    held_out: HeldOutView | None
+    """Null: too little overlaps"""
+    ties: TieFeaturesView
+
+
+class AgreementView(Model):
+    """Differences of depths that should be the same, metres."""
+
+    count: int
+    mean_m: float
+    median_m: float
+    sd_m: float | None
+    """Standard deviation of a sample; null: there is one difference"""
+    rms_m: float
+    p95_m: float
+    """95 % quantile of the absolute differences"""
+    max_m: float
+    """Largest absolute difference"""
+    within_pct: float
+    """Share that is not larger than the order's largest TVU"""
+
+
+class AllowedView(Model):
+    """What an order of IHO S-44 allows at the depth, 95 %."""
+
+    order: Order
+    tvu_m: float
+    thu_m: float
+
+
+class AngleAgreementView(Model):
+    """Beams of crosslines minus the grid of the main lines, for one bin of beam angles."""
+
+    from_deg: float
+    """From straight down in the vehicle, positive to starboard"""
+    to_deg: float
+    count: int
+    mean_m: float
+    sd_m: float | None
+    within_pct: float
+
+
+class AuditEntry(Model):
+    """A command and what came of it."""
+
+    id: int
+    time: datetime
+    actor: str
+    """The token's name; empty where nobody was recognized"""
+    role: str
+    origin: str
+    """The address that it came from, or `command line`"""
+    action: str
+    """The operation's name in this document, or a command's"""
+    target: str
+    """The path, or what the command was given"""
+    mission_id: str | None
+    result: str
+    """done, refused or failed"""
+    status: int | None
+    """The HTTP status of the answer"""
+    detail: str
+    """Why it was refused"""
+    request_id: str
+
+
+class BatchVerdict(Model):
+    """The verdicts on a batch, in its order. Whatever is counted accepted is stored for good."""
+
+    accepted: int
+    rejected: int
+    duplicate: int
+    items: list[ItemVerdict]
+    replayed: bool
+    """True: this idempotency key was seen before, this is the first answer"""
+
+
+class Block(Model):
+    """The blocks of P of one mixing signal; both symmetric, with eigenvalues between e1 and e2."""
+
+    horizontal: list[list[float]]
+    """7 x 7, in the order of state.vectors"""
+    vertical: list[list[float]]
+    """4 x 4, in the order of state.figures"""
+
+
+class Budget(Model):
+    """How long a mission is; exactly one of these."""
+
+    minutes: float | None = None
+    """Minutes of vehicle time under way, each vehicle at its own speed"""
+    km_per_vehicle: float | None = None
+    """Kilometres that each vehicle flies"""
+    steps: int | None = None
+    """Legs that each vehicle flies"""
+
+
+class CheckView(Model):
+    """One line of the checklist before a start."""
+
+    id: str
+    title: str
+    status: CheckStatus
+    message: str
+    remedy: str
+    """What to do about it; empty when all is well"""
+
+
+class ComponentHealth(Model):
+    """Whether the service can do its work."""
+
+    status: str
+    """ok, or failing when a component is not ok"""
+    version: str
+    """Version of bathyfleet"""
+    components: dict[str, str]
+    """Each component: ok, or what is wrong with it"""
+    compiling: bool
+    """Whether what decisions and maps are computed with is still being compiled, as after the first start on a
+    machine: decisions are slow until then
+    """
+
+
+class ComponentView(Model):
+    """A source of error."""
+
+    name: str
+    """Of its field in the mission's `uncertainty`; tide: `tide.sd_m`"""
+    title: str
+    unit: str
+    sd: float
+    """Its standard deviation, in its unit"""
+    shares: list[ShareView]
+
+
+class ConformityView(Model):
+    """How the estimates of TVU and THU stand beside one order of IHO S-44; no order is claimed by it."""
+
+    order: Order
+    cells_pct: float
+    """Share of the cells whose TVU estimate stays within the order's largest"""
+    sounded_pct: float | None
+    """The same among the sounded cells; null: none is"""
+    horizontal_pct: float | None
+    """Share of the cells whose THU estimate stays within the order's largest, of those that have one; null: none has"""
+    statement: str
+
+
+class CorrectionsView(Model):
+    """How soundings are corrected; their raw values stay beside the corrected ones."""
+
+    tide: Tide
+    tide_table: TideTableView | None
+    """Its levels count in place of tide.level_m"""
+    sound_speed: SoundSpeed | None
+    systematic_errors: SystematicErrors
+    vertical_datum: str
+    """What corrected depths are counted from"""
+    accepted: int
+    """Soundings accepted under these corrections"""
+    rejected: int
+
+
+class CoverageSpec(Model):
+    """What full coverage by swath sonars is asked for, where the planner is `swath`."""
+
+    overlap_pct: float = 6.0
+    """Share of half a swath that the next one sounds again, at least; more where position is uncertain"""
+    crosslines_pct: float = 5.0
+    """Length of lines across all others, flown last, as a share of those; by what both measured where they cross a
+    survey is judged. 0: none
+    """
+    cell_of_depth: float | None = None
+    """Cells by depth, in files with cells of several sizes: each depth has the smallest of cell_m, twice and four
+    times as much, and so on, that is at least this share of it, for example 0.05. null: one size
+    """
+
+
+class CrossingFeatureView(Model):
+    """A crossing as GeoJSON."""
+
+    type: Literal["Feature"]
+    properties: CrossingView
+    geometry: PointView
+
+
+class CrossingFeaturesView(Model):
+    """Crossings as GeoJSON, worst first."""
+
+    type: Literal["FeatureCollection"]
+    features: list[CrossingFeatureView]
+
+
+class CrossingView(Model):
+    """A place where two lines cross."""
+
+    number: int
+    """1 is the worst beside what the order allows"""
+    vehicles: tuple[str, str]
+    lines: tuple[int, int]
+    times_s: tuple[float, float]
+    """The vehicles' clocks, Unix seconds"""
+    depths_m: tuple[float, float]
+    difference_m: float
+    """First minus second"""
+    predicted_sd_m: float
+    """As the soundings' standard deviations predict it"""
+    angle_deg: float
+    """Between the lines, 0 to 90"""
+    within: bool
+    """Whether it is not larger than the order's largest TVU"""
+    outlier: bool
+    """Whether it is larger than that, or than three robust standard deviations"""
+    lat_deg: float
+    """Latitude, WGS84 degrees"""
+    lon_deg: float
+    """Longitude, WGS84 degrees"""
+
+
+class CrossoversView(Model):
+    """How well a survey agrees with itself where its lines cross."""
+
+    version: int
+    """Of the map that was newest when this was computed"""
+    order: Order
+    lines: int
+    length_km: float
+    """Of all lines"""
+    crosslines: int
+    """Lines across the dominant direction that cross others, flown as such or not"""
+    crosslines_km: float
+    crosslines_pct: float
+    """Share of the length of all lines"""
+    statistics: AgreementView | None
+    """Of all crossings; null: there is none"""
+    at_crosslines: AgreementView | None
+    """Of those where a crossline crosses a main line"""
+    normalised_rms: float | None
+    """RMS of the differences over what the soundings' standard deviations predict: 1 is as predicted; null: there is
+    no crossing
+    """
+    by_vehicles: list[VehiclesAgreementView]
+    by_line: list[LineAgreementView]
+    """Lines that cross others, largest RMS first"""
+    lines_left_off: int
+    """Lines that `by_line` has no place for"""
+    beams: AngleAgreementView | None
+    """Crosslines' beams of all angles minus the grid of the main lines; null: swath sonars have none"""
+    by_angle: list[AngleAgreementView]
+    """The same for each bin of beam angles"""
+    histogram: HistogramView
+    outliers: int
+    """Crossings beyond the order's largest TVU, or far from the others"""
+    left_off: int
+    """Crossings that `features` has no place for; `crossovers.csv` has all"""
+    features: CrossingFeaturesView
+
+
+class DifferenceView(Model):
+    """Map minus reference grid over the cells that both know."""
+
+    rmse_m: float
+    l2_norm: float
+    """Euclidean norm of all differences; grows with the number of cells"""
+    bias_m: float
+    p95_m: float
+    """95th percentile of the absolute difference"""
+    max_m: float
+    cells: int
+
+
+class DoctorView(Model):
+    """What keeps vehicles on the IMC network from working with this service."""
+
+    healthy: bool
+    """At least one vehicle is there, and nothing stands in any one's way"""
+    seconds: float
+    """For how long was listened"""
+    causes: list[Cause]
+    own: list[Finding]
+    """On this machine's side"""
+    vehicles: list[VehicleDiagnosis]
+
+
+class EllipseView(Model):
+    """Where the target is with 95 % probability, in the plane."""
+
+    semi_major_m: float
+    semi_minor_m: float
+    orientation_deg: float
+    """Of the longer axis, clockwise from north, 0 to 180"""
+
+
+class EndRequest(Model):
+    """What an operator adds when a mission is ended."""
+
+    note: str = ""
+    """Kept in the mission's log beside the action"""
+    return_: bool | None = Field(None, alias="return")
+    """true: vehicles go home to their recovery points, and the mission ends when they are there; false: they stop
+    where they are. null: as recovery.on_finish says, and never with abort
+    """
+
+
+class EventMessage(Model):
+    """A new line of the log."""
+
+    type: Literal["event"]
+    event: EventView
+
+
+class EventView(Model):
+    """One line of a mission's log."""
+
+    id: int
+    mission_id: str
+    time: datetime
+    level: Level
+    kind: str
+    """Machine-readable kind, for example step, state, vehicle, sounding, safety"""
+    message: str
+    data: dict[str, Any]
+
+
+class FailsafeView(Model):
+    """A failsafe in force for a vehicle."""
+
+    failsafe: Failsafe
+    response: Response
+    message: str
+
+
+class FieldProblem(Model):
+    """What is wrong with one value of a request."""
+
+    location: str
+    """Where the value was: body, query, path or header"""
+    field: str
+    """Path of the field, for example limits.max_step_m or vehicles.0.name"""
+    value: Any
+    """What was sent, shortened when long; null when it was missing"""
+    message: str
+    """What is wrong with it"""
+    expected: str
+    """What would be right"""
+
+
+class Finding(Model):
+    """One observation, and what to do about it."""
+
+    severity: Severity
+    cause: Cause
+    """For programs; the texts may change"""
+    text: str
+    remedy: str
+
+
+class FixRequest(Model):
+    """A position of a vehicle at the surface that is known better than the one it had reckoned."""
+
+    vehicle: str
+    time_s: float
+    """The vehicle's clock, Unix seconds"""
+    lat_deg: float
+    """Latitude, WGS84 degrees"""
+    lon_deg: float
+    """Longitude, WGS84 degrees"""
+    sd_m: float = 1.0
+    """Standard deviation east and north, each"""
+    resets: bool = True
+    """Whether the vehicle reckoned on from the fix"""
+
+
+class ForecastRange(Model):
+    """From where to where a figure went, over floors of different roughness: 10 % were below, 10 % above."""
+
+    low: float
+    high: float
+
+
+class ForecastView(Model):
+    """What is to be expected of a mission: a forecast from a simulation, not a promise."""
+
+    duration_s: float
+    """Seconds of the vehicles' time until the last step is done; median"""
+    duration_s_range: ForecastRange
+    vehicles: list[VehicleForecast]
+    coverage_pct: float
+    """Share of the area's cells that will be known to `accuracy_m`; median over the floors"""
+    coverage_pct_range: ForecastRange
+    remaining_pct: float
+    """Share of the landmarks that will not be; median over the floors"""
+    remaining_pct_range: ForecastRange
+    mean_sd_m: float | None
+    """Mean deviation of the map; median; null: nothing was sounded"""
+    mean_sd_m_range: ForecastRange | None
+    steps: int
+    """Steps that are still to be flown"""
+    steps_simulated: int
+    """Of these were simulated in the time allowed; `coverage_pct` and what follows is after as many"""
+    steps_flown: int
+    """The same as `steps_simulated`"""
+    floors: int
+    """Over how many floors of different roughness it was flown"""
+    assumptions: list[str]
+    """What was taken to be so, in words"""
+
+
+class HeldOutView(Model):
+    """How well sections fit that were left out: RMS of their depths less the others'."""
+
+    sections: int
+    before_m: float
+    """Unadjusted"""
+    by_fixes_m: float
+    """Adjusted by fixes alone"""
+    after_m: float
+    """Adjusted by fixes and the other ties"""
+    significance: float
+    """How much better they fit than by fixes alone, in standard errors"""
+
+
+class HistogramView(Model):
+    """Counts of differences; the outer bins hold those beyond the ends, too."""
+
+    edges_m: list[float]
+    """One more than there are counts"""
+    counts: list[int]
+
+
+class ImportView(Model):
+    """Soundings from elsewhere that a mission began with. They are not among its own."""
+
+    id: str
+    filename: str
+    source: str
+    sha256: str
+    """Of the file"""
+    created_at: datetime
+    found: int
+    """Depths in the file"""
+    taken: int
+    """Those in or near the area, as they count in the map"""
+    min_depth_m: float
+    max_depth_m: float
+    median_sd_m: float
+    notes: list[str]
+    """What was assumed or done, in words"""
+    replayed: bool
+    """True: the same file was imported before, nothing changed"""
+
+
+class InstrumentErrors(Model):
+    """How one vehicle's sonar is wrong."""
+
+    depth_m: float = 0.0
+    """By how much its depths are too large, metres"""
+    roll_offset_deg: float = 0.0
+    """How far the beams of its swath sonar point to starboard of where they are said to, degrees: the roll of a
+    patch test
+    """
+    sound_speed_mps: float = 0.0
+    """How much faster sound is at its swath sonar than it assumes when it steers its beams, m/s: bent swaths"""
+
+
+class ItemVerdict(Model):
+    """The verdict on one item of a batch."""
+
+    index: int
+    verdict: Verdict
+    reason: str
+
+
+class LayerView(Model):
+    """A layer of the map: what its values say and how it is shown."""
+
+    name: str
+    title: str
+    meaning: str
+    """What its values say, compared with Order 1a where with one of IHO S-44"""
+    unit: str
+    """By its name in UDUNITS; 1: a number"""
+    palette: Palette
+    fit: Fit
+    range: tuple[float, float] | None
+    """Values of the first and the last colour; null: they follow the data as `fit` says"""
+    classes: list[str]
+    """Words for the values 0, 1, 2 and so on, where there are no others; else empty"""
+    scale: int | None
+    """Tiles hold whole numbers, the value times this; null: no tile has it"""
+    in_every_tile: bool
+    """Tiles have it without being asked for it by `layer`"""
+    in_json: bool
+    """The map's JSON has it when asked for it by `layer`"""
+    in_pictures: bool
+    """It can be seen as `map.overlay.png`"""
+    in_files: bool
+    """Files with every layer have it"""
+    absence: str
+    """Why a mission may have no such layer; empty: each has it"""
+    remedy: str
+
+
+class Limits(Model):
+    """What no waypoint may break. Checked before anything is sent to a vehicle."""
+
+    max_step_m: float = 10.0
+    """Largest distance a vehicle moves in one step"""
+    min_depth_m: float = 2.0
+    """Shallowest depth of travel under water"""
+    max_depth_m: float = 30.0
+    """Deepest depth of travel"""
+    min_altitude_m: float = 1.0
+    """Least clearance above the sea floor"""
+    keep_out_margin_m: float = 10.0
+    """Legs stay this far from keep-out zones: vehicles turn in circles and drift. With less than 10 m the circle in
+    which one waits for its next waypoint can reach into a zone
+    """
+    border_margin_m: float = 0.0
+    """Waypoints stay this far inside the area: vehicles turn in circles at them and drift"""
+    com_range_m: float | None = None
+    """Every vehicle keeps another one within this range; null: unlimited"""
+    min_separation_m: float = 5.0
+    """Least horizontal distance between vehicles at similar depth"""
+    min_vertical_separation_m: float = 1.0
+    """Difference in depth that makes horizontal separation unnecessary"""
+
+
+class LineAgreementView(Model):
+    """Differences of a line to all that cross it: its depths minus theirs."""
+
+    count: int
+    mean_m: float
+    median_m: float
+    sd_m: float | None
+    """Standard deviation of a sample; null: there is one difference"""
+    rms_m: float
+    p95_m: float
+    """95 % quantile of the absolute differences"""
+    max_m: float
+    """Largest absolute difference"""
+    within_pct: float
+    """Share that is not larger than the order's largest TVU"""
+    vehicle: str
+    line: int
+    """Among the vehicle's lines, from 1"""
+    crossline: bool
+    start_s: float
+    """The vehicle's clock at its begin, Unix seconds"""
+    length_m: float
+    heading_deg: float
+
+
+class LinkRecord(Model):
+    """One change of a vehicle's link."""
+
+    at: datetime
+    state: NodeState
+    engaged: bool
+    """Whether the vehicle followed us"""
+    reason: str
+
+
+class Liveness(Model):
+    """The process answers."""
+
+    status: str = "ok"
+
+
+class MapMessage(Model):
+    """A new map can be fetched: ``GET /missions/{id}/map`` or its picture."""
+
+    type: Literal["map"]
+    version: int
+    live: int
+    """Grows with what was sounded since: the tiles show it at once"""
+    step: int
+    min_depth_m: float | None
+    max_depth_m: float | None
+
+
+class MapView(Model):
+    """The map as JSON: row 0 is south, column 0 is west, null outside the area or where unknown."""
+
+    mission_id: str
+    version: int
+    """Grows with every new map; 0: no sounding yet"""
+    step: int
+    west_m: float
+    south_m: float
+    cell_m: float
+    rows: int
+    cols: int
+    corners: list[tuple[float, float]]
+    """[longitude, latitude] of the grid's corners: north-west, north-east, south-east, south-west"""
+    vertical_datum: str
+    """What depths are counted from"""
+    min_depth_m: float | None
+    max_depth_m: float | None
+    model: str
+    depth_m: list[list[float | None]]
+    sd_m: list[list[float | None]]
+    count: list[list[int]]
+    sounded: list[list[bool]]
+    layers: dict[str, list[list[float | None]]]
+    """Further layers that were asked for, by name"""
+
+
+class Measurement(Model):
+    """One measurement posted by a vehicle: its position, and a sounding, a ping or a range to a target, if any."""
+
+    vehicle: str
+    time_s: float
+    """The vehicle's clock, Unix seconds"""
+    lat_deg: float
+    """Latitude of the vehicle, WGS84 degrees"""
+    lon_deg: float
+    """Longitude of the vehicle, WGS84 degrees"""
+    depth_m: float
+    """Depth of the vehicle below the surface, metres"""
+    range_m: float | None = None
+    """Range from the vehicle to the bottom: vertical, or along the beam where beam_off_nadir_deg is given; null:
+    position report only
+    """
+    beam: int = 0
+    beam_off_nadir_deg: float | None = None
+    """Angle of the beam from straight down in the vehicle; the footprint is then computed from it and the vehicle's
+    attitude
+    """
+    beam_azimuth_deg: float = 0.0
+    """Direction of the beam in the vehicle, from the bow to starboard"""
+    roll_deg: float = 0.0
+    """Starboard down is positive"""
+    pitch_deg: float = 0.0
+    """Nose up is positive"""
+    range_sd_m: float | None = None
+    position_sd_m: float | None = None
+    beams: PostedBeams | None = None
+    """One ping of a swath sonar, of vehicles with sensor multibeam; it needs heading_deg and comes without range_m"""
+    target: str | None = None
+    """The moving target that target_range_m was measured to"""
+    target_range_m: float | None = None
+    """Range from the vehicle to that target, metres"""
+    heading_deg: float | None = None
+    speed_mps: float | None = None
+    battery_pct: float | None = None
+
+
+class MeasurementBatch(Model):
+    """Measurements in the order in which they were made. Each item has its own verdict."""
+
+    items: list[Measurement]
+
+
+class MissionSpec(Model):
+    """A mission as an operator describes it."""
+
+    name: str
+    """Shown to people; need not be unique"""
+    area: PolygonGeometry
+    """The area to map, or the site to search"""
+    kind: MissionKind = "survey"
+    """survey: map the sea floor; search: look for something in a partly known site, see `search`"""
+    keep_out: list[PolygonGeometry] | None = None
+    """Zones no vehicle may enter"""
+    vehicles: list[VehicleSpec] | None = None
+    budget: Budget | None = None
+    """How long the mission is: minutes, km_per_vehicle or steps"""
+    steps: int = 100
+    """Steps after which the mission is finished, short for a budget in steps; with another budget as many legs of
+    limits.max_step_m as the vehicle with the longest way needs
+    """
+    cell_m: float = 1.0
+    """Cell of the map's grid"""
+    limits: Limits | None = None
+    planner: PlannerSpec | None = None
+    recovery: Recovery | None = None
+    """Where vehicles come home to, and when; null: they stop where they are"""
+    failsafes: dict[Failsafe, Response] | None = None
+    """What is done when something fails, where it is not what `bathyfleet failsafes` lists"""
+    surface_policy: SurfacePolicy | None = None
+    """When vehicles come up for a GPS fix; null: never because of their position"""
+    coverage: CoverageSpec | None = None
+    targets: list[TargetSpec] | None = None
+    """Moving targets to keep track of"""
+    tracking: Tracking | None = None
+    search: SearchSpec | None = None
+    """With kind search, and only there: what is sought. Then planner.name is rollout unless given, and steps as many
+    as the time window has room for
+    """
+    speed_mps: float = 1.3
+    """Speed asked of vehicles that have none of their own"""
+    arrival_radius_m: float = 3.0
+    """Horizontal distance at which a waypoint counts as reached"""
+    step_deadline_s: float = 60.0
+    """After this many seconds of vehicle time a step goes on without stragglers"""
+    accuracy_m: float = 0.25
+    """Standard deviation below which a cell counts as accurately known"""
+    sounding_noise: float = 0.01
+    """Standard deviation of a range as a fraction of it, where the vehicle states none"""
+    uncertainty: SoundingErrors | None = None
+    """What makes soundings of swath sonars uncertain"""
+    tide: Tide | None = None
+    sound_speed: SoundSpeed | None = None
+    """Sound speed correction; null: the sonars' own ranges are taken"""
+    systematic_errors: SystematicErrors | None = None
+    """What is always wrong with sonars and water levels"""
+    seed: int = 0
+    """Seed of every random decision"""
+
+
+class MissionSummary(Model):
+    """A mission in a list."""
+
+    id: str
+    name: str
+    state: MissionState
+    reason: str
+    """Why it is in this state"""
+    created_at: datetime
+    updated_at: datetime
+    ending: MissionState | None
+    """What it becomes once all its vehicles are home; null while it goes on"""
+    progress: Progress
+    allowed_actions: list[Action]
+    """What may be asked of it in this state: ``POST /missions/{id}/start`` and so on."""
+
+
+class MissionView(Model):
+    """A mission with everything an operator sees of it."""
+
+    id: str
+    name: str
+    state: MissionState
+    reason: str
+    """Why it is in this state"""
+    created_at: datetime
+    updated_at: datetime
+    ending: MissionState | None
+    """What it becomes once all its vehicles are home; null while it goes on"""
+    progress: Progress
+    spec: MissionSpec
+    """A mission as an operator describes it."""
+    origin: tuple[float, float]
+    """Origin of the local frame, [longitude, latitude]"""
+    vehicles: list[VehicleView]
+    waypoints: list[WaypointView]
+    """The newest waypoint of each vehicle"""
+    targets: list[TargetView]
+    """What is known of the moving targets"""
+    allowed_actions: list[Action]
+    """What may be asked of it in this state: ``POST /missions/{id}/start`` and so on."""
+    efficiency_pct: float | None
+    """Share of all metres flown that led along planned legs; null while nothing was flown."""
+
+
+class NoteRequest(Model):
+    """What the next watch should know."""
+
+    text: str
+    """Kept in the mission's log"""
+
+
+class PcaoModel(Model):
+    """A controller that ``bathyfleet train`` wrote."""
+
+    P: list[Block]
+    """One block per mixing signal"""
+    format: Literal["bathyfleet-pcao"] = "bathyfleet-pcao"
+    version: Literal[1] = 1
+    state: StateDefinition | None = None
+    e1: float = 0.01
+    e2: float = 10.0
+    training: Training | None = None
+
+
+class PingPartView(Model):
+    """Some of a vehicle's pings: a file of them, or those that are in none yet."""
+
+    number: int | None
+    """Of the file, for `GET /missions/{mission_id}/pings/{number}`; null: in no file yet"""
+    vehicle: str
+    first_time_s: float
+    """The vehicle's clock at the first ping, Unix seconds"""
+    last_time_s: float
+    """The vehicle's clock at the last ping, Unix seconds"""
+    pings: int
+    """Accepted ones"""
+    beams: int
+    """Their beams that detected something"""
+    rejected: int
+    """Pings that are kept but not used; the file says why"""
+    size_bytes: int | None
+    """Of the file"""
+    sha256: str | None
+    """Of the file"""
+
+
+class PingsView(Model):
+    """All pings of a mission, in the order in which they came."""
+
+    pings: int
+    """Accepted ones of all parts"""
+    beams: int
+    rejected: int
+    parts: list[PingPartView]
+
+
+class PlannerOptions(Model):
+    """Settings of the planners. Every planner reads those that concern it."""
+
+    regressors: Literal["map", "polynomial"] = "map"
+    """What CAO's estimator is linear in: predictions from the current map, or powers of raw positions."""
+    objective: Literal["J", "J+J1", "J+J2", "J+J3", "J+J1+J2", "J+J1+J3", "J+J2+J3", "full", "med13"] = "full"
+    """What CAO measures after each step where landmarks are seen: AURO15's objective up to one of its terms, or
+    MED13's cost.
+    """
+    contribution: Literal["team", "vehicle"] = "vehicle"
+    """What CAO learns from where landmarks are seen: the team's objective, or for each vehicle the difference that
+    its last move made to it.
+    """
+    degree: int = 1
+    """Highest power of a vehicle's position in polynomial regressors."""
+    candidates: int = 48
+    """Candidates per vehicle that CAO weighs in a step (N)."""
+    window: int | None = None
+    """Past steps to which CAO fits its estimator (L + T_h); by default 30, with polynomials 15."""
+    alpha: float = 1.0
+    """First size of random moves, as a fraction of the largest step."""
+    alpha_decay: float = 0.6
+    """Exponent of the decay of alpha; above 0.5 the squares have a finite sum."""
+    alpha_floor: float = 0.2
+    """Least alpha, so that random moves never die out."""
+    search: int = 4000
+    """Changes tried when a survey plan is made anew."""
+    turn_radius_m: float = 0.0
+    """Radius of the tightest circle that vehicles fly; survey plans pay for turns."""
+    cruise_depth_m: float | None = None
+    """Depth at which vehicles survey; by default the depth at which each joined."""
+    rollouts: int = 300
+    """Changes to the team's plan that a rollout step tries."""
+    tries: int = 0
+    """Real tries per step of OSARSES (only in simulation)."""
+    accuracy_sd_m: float = 0.02
+    """Standard deviation below which a landmark counts as accurately estimated."""
+    model: PcaoModel | None = None
+    """What pcao flies with: the content of a model file that bathyfleet train wrote; without one, the controller
+    that ships with bathyfleet.
+    """
+
+
+class PlannerSpec(Model):
+    """Which planner decides, and its options."""
+
+    name: str = "cao"
+    """One of the planners of GET /api/v1/planners"""
+    options: PlannerOptions | None = None
+    """Its settings"""
+
+
+class PlannerView(Model):
+    """A planner that a mission may name, or one that is installed and cannot be used."""
+
+    name: str
+    summary: str
+    package: str
+    """What brings it, with its version"""
+    problem: str
+    """Why it cannot be used; empty: it can"""
+    options: dict[str, Any]
+    """JSON schema of its options"""
+
+
+class PointView(Model):
+    """A GeoJSON point."""
+
+    type: Literal["Point"]
+    coordinates: tuple[float, float]
+
+
+class PolygonGeometry(Model):
+    """A GeoJSON polygon: one closed outer ring of [longitude, latitude] positions, no holes."""
+
+    coordinates: list[list[tuple[float, float]]]
+    """One ring of [longitude, latitude]; the last position repeats the first"""
+    type: Literal["Polygon"] = "Polygon"
+
+
+class PostedBeams(Model):
+    """What a swath sonar measured with one ping: angle and range of each beam, in the same order."""
+
+    angles_deg: list[float]
+    """Across the track, from straight down in the vehicle; positive to starboard"""
+    ranges_m: list[float | None]
+    """Slant ranges, metres; null, 0 or less: nothing was detected"""
+
+
+class PreflightView(Model):
+    """What stands before a start."""
+
+    ready: bool
+    """False while any line is a problem: a start would be refused or fail"""
+    checks: list[CheckView]
+
+
+class Problem(Model):
+    """A problem document (RFC 9457)."""
+
+    type: str
+    """Stable name of the kind of problem, a URN"""
+    title: str
+    """The kind of problem in words"""
+    status: int
+    """The HTTP status"""
+    detail: str
+    """What happened here"""
+    instance: str
+    """The path that was asked, with the request's id after #"""
+    remedy: str
+    """What to do about it"""
+    errors: list[FieldProblem]
+    """The fields that are wrong, if any are"""
+
+
+class ProductView(Model):
+    """A file that can be downloaded."""
+
+    name: str
+    """Its name for bathyfleet export"""
+    title: str
+    media_type: str
+    href: str
+    """Path on this service"""
+    needs_map: bool
+    """Whether a first map is needed"""
+
+
+class Progress(Model):
+    """How far a mission has come."""
+
+    step: int
+    """Last committed step; 0 before the first"""
+    steps: int
+    budget: Budget
+    """How long the mission is, as it was given"""
+    minutes_left: float | None
+    """Vehicle time under way that is left, of the vehicle with most; null: not known"""
+    km_left_per_vehicle: float | None
+    """What is left to fly for the vehicle with most; null: not known"""
+    soundings: int
+    """Accepted soundings"""
+    rejected: int
+    """Soundings and pings kept but not used"""
+    pings: int
+    """Accepted pings of swath sonars"""
+    beams: int
+    """Beams of these that detected something; they are no soundings"""
+    ensonified_pct: float | None
+    """Share of the area's cells that beams of swath sonars met; null without any. With coverage.cell_of_depth cells
+    are those that the depth of a place asks for, here, in dense_pct and in holidays
+    """
+    dense_pct: float | None
+    """Share of the area's cells with at least five soundings; null without swath sonars"""
+    holidays: int | None
+    """Holidays: pieces of ground of at least three by three cells that were missed inside of what was swept; null
+    without swath sonars
+    """
+    distance_m: float
+    """Distance travelled by all vehicles, along their tracks"""
+    coverage_pct: float
+    """Share of the area's cells known to accuracy_m; with swath sonars of those that a beam met"""
+    remaining_pct: float
+    """Share of the landmarks not known to accuracy_m"""
+    mean_sd_m: float | None
+    """Mean standard deviation of the map"""
+    objective: float | None
+    """The planner's objective at the last step"""
+    terms: dict[str, float]
+    elapsed_s: float
+    """Wall-clock seconds in state running"""
+    eta_s: float | None
+    """Estimated wall-clock seconds until the last step"""
+    search: SearchProgress | None
+    """In missions of kind search: how it stands"""
+
+
+class QualityView(Model):
+    """How good the map is, as far as it can be told."""
+
+    version: int
+    """Of the map"""
+    vertical_datum: str
+    common_sd_m: float
+    """Standard deviation of what all soundings share, counted in every TVU"""
+    tvu: list[ConformityView]
+    difference: DifferenceView | None
+    """To the reference grid; null: there is none that it meets"""
+
+
+class Recovery(Model):
+    """Where vehicles are taken out of the water, and what brings them there."""
+
+    point: tuple[float, float]
+    """Where vehicles are taken out of the water, [longitude, latitude]; may lie outside the area"""
+    radius_m: float = 25.0
+    """Who is this close to the point is home"""
+    on_finish: Homecoming = "return"
+    """What vehicles do at the mission's end, unless finish says otherwise"""
+    on_low_energy: Homecoming = "return"
+    """What a vehicle does when its energy is just enough for its way home"""
+    on_lost_link: Homecoming = "return"
+    """What a vehicle does whose link was lost for long, once it is heard again"""
+
+
+class ReferenceView(Model):
+    """The grid that a mission's map is compared with."""
+
+    filename: str
+    source: str
+    created_at: datetime
+    cells: int
+    """Cells of the map's grid that it knows"""
+    notes: list[str]
+
+
+class Scan(Model):
+    """One look round from a vehicle: a laser scanner's turn, or a sweep of an imaging sonar."""
+
+    vehicle: str
+    time_s: float
+    """The vehicle's clock, Unix seconds"""
+    lat_deg: float
+    """Latitude, WGS84 degrees"""
+    lon_deg: float
+    """Longitude, WGS84 degrees"""
+    bearing_step_deg: float
+    """By how much further clockwise each next beam looks"""
+    reach_m: float
+    """Within this range it tells of everything"""
+    ranges_m: list[float | None]
+    """Range of each beam's first echo; null, or more than reach_m: there was none within reach"""
+    depth_m: float = 0.0
+    """Depth of the vehicle below the surface"""
+    first_bearing_deg: float = 0.0
+    """Bearing of the first beam, clockwise from true north"""
+
+
+class ScanBatch(Model):
+    """Scans in the order in which they were made."""
+
+    items: list[Scan]
+
+
+class ScannerSpec(Model):
+    """A laser scanner or an imaging sonar that looks round, on every vehicle."""
+
+    reach_m: float = 8.0
+    """Range within which it tells of everything"""
+    resolution_deg: float = 0.5
+    """Angle between neighbouring beams"""
+
+
+class SearchGridView(Model):
+    """A search's site: what is known of each cell."""
+
+    mission_id: str
+    version: int
+    """Scans that it was made of"""
+    west_m: float
+    south_m: float
+    cell_m: float
+    rows: int
+    cols: int
+    corners: list[tuple[float, float]]
+    """[longitude, latitude] of the grid's corners: north-west, north-east, south-east, south-west"""
+    cells: str
+    """One byte per cell, rows from south to north, each from west to east, in base64. 1: explored and free, 2: not
+    explored, 3: obstacle known beforehand, 4: obstacle found
+    """
+
+
+class SearchMessage(Model):
+    """How a search stands: its grid can be fetched anew."""
+
+    type: Literal["search"]
+    search: SearchProgress
+
+
+class SearchProgress(Model):
+    """How a search stands."""
+
+    version: int
+    """Scans that the site's grid was made of"""
+    explored_pct: float
+    """Share of the site's open cells that were looked at and are free"""
+    goal_pct: float
+    """The same within the goal area"""
+    found_cells: int
+    """Cells with an obstacle that is on no plan"""
+    left_s: float
+    """Vehicle time until everybody has to be back; negative: too late"""
+    began_at: datetime | None
+    """When the time began to run: at the first step"""
+    back: list[str]
+    """Vehicles at the entry"""
+    out_of_contact: list[str]
+    """Vehicles farther from the transmitter than it reaches"""
+
+
+class SearchSpec(Model):
+    """A search: something near the goal is sought, the rest of the site is looked at, and all are back in time."""
+
+    goal: tuple[float, float]
+    """Where it is expected, [longitude, latitude]"""
+    entry: tuple[float, float]
+    """Where vehicles enter, and where they are when the time is up, [longitude, latitude]"""
+    window_s: float
+    """Time from the first step in which every vehicle is back, seconds of vehicle time; pauses count"""
+    goal_radius_m: float = 50.0
+    """Radius of the goal area about it"""
+    transmitter: tuple[float, float] | None = None
+    """Where the team's radio stands; null: at the entry"""
+    transmitter_range_m: float = 200.0
+    """Farther away a vehicle is out of contact"""
+    safety_m: float = 2.0
+    """Legs keep this far from obstacles and from what nobody has looked at; not below arrival_radius_m"""
+    scanner: ScannerSpec | None = None
+    obstacles: list[PolygonGeometry] | None = None
+    """What is known to stand there: quays on a chart, walls on a plan"""
+    simulated_obstacles: list[PolygonGeometry] | None = None
+    """What simulated vehicles meet beyond `obstacles`; planners do not know of it"""
+
+
+class SessionView(Model):
+    """Who asks, and what he may do."""
+
+    name: str
+    """Name of the access token, or `local operator`"""
+    role: Role
+    local: bool
+    """True while no token was made and the user asks who runs the service"""
+    signed_in: bool
+    """True when a browser's session says who asks: it can be signed out"""
+    vehicle: str | None = None
+    """The one vehicle that a token of role vehicle acts for"""
+
+
+class ShareView(Model):
+    """What something adds to the uncertainty of a beam, standard deviations in metres."""
+
+    angle_deg: float
+    """Of the beam from straight down"""
+    vertical_m: float
+    """Of the depth"""
+    horizontal_m: float
+    """Of the place, east and north together"""
+
+
+class SimulatedTarget(Model):
+    """A target that moves about in the service's own simulation; vehicles of kind ``sim`` range to it."""
+
+    start: tuple[float, float]
+    """Where it starts, [longitude, latitude]"""
+    depth_m: float = 2.0
+    course_deg: float = 0.0
+    """Clockwise from north; it turns at the sea's edge"""
+    speed_mps: float = 0.3
+
+
+class SnapshotMessage(Model):
+    """First message on the live socket: everything needed to draw the picture."""
+
+    type: Literal["snapshot"]
+    mission: MissionView
+    tracks: dict[str, list[tuple[float, float, float]]]
+    """Per vehicle its track so far as [longitude, latitude, depth], to within 0.2 m"""
+    map_version: int
+    last_event_id: int
+
+
+class SoundSpeed(Model):
+    """Sound speed correction: every beam is followed through the profile for the time that its sonar measured."""
+
+    profile: list[tuple[float, float]]
+    """Measured speeds as [depth in m, speed in m/s], from top to bottom; one pair: the same everywhere"""
+    assumed_mps: float = 1500.0
+    """Speed that is set in the sonars, m/s"""
+    source: str = ""
+    """Where the profile comes from, kept with the product"""
+
+
+class SoundingErrors(Model):
+    """Standard deviations (1 sigma) of what makes soundings of swath sonars uncertain."""
+
+    range_m: float = 0.03
+    """Range: the part that is the same at all ranges, m"""
+    range_pct: float = 0.5
+    """Range: the part that grows with it, %"""
+    beam_angle_deg: float = 0.1
+    """Direction of a beam in the sonar, degrees"""
+    roll_deg: float = 0.05
+    """Roll as it is measured, degrees"""
+    pitch_deg: float = 0.05
+    """Pitch as it is measured, degrees"""
+    heading_deg: float = 0.5
+    """Heading as it is measured, degrees"""
+    roll_patch_deg: float = 0.1
+    """Roll of the sonar in the vehicle, as a patch test leaves it, degrees"""
+    heave_m: float = 0.05
+    """Depth of the vehicle from moment to moment: heave, waves, m"""
+    waterline_m: float = 0.02
+    """Depth of the sonar below the water level as a whole: draught, m"""
+    surface_sound_speed_mps: float = 0.5
+    """Sound speed at the sonar, by which it steers its beams, m/s"""
+    sound_speed_profile_mps: float = 0.5
+    """Sound speed between the sonar and the bottom, m/s"""
+    position_m: float = 1.5
+    """East and north of a vehicle that does not say how well it knows its place, m each"""
+
+
+class SoundingPage(Model):
+    """Some soundings, in the order they came."""
+
+    total: int
+    """Of all pages"""
+    items: list[SoundingView]
+    next_after: int | None
+    """Give it as `after` for the next page; null: this is the last"""
+
+
+class SoundingView(Model):
+    """A stored sounding; what was measured never changes, only whether it counts."""
+
+    id: int
+    vehicle: str
+    time_s: float
+    """The vehicle's clock, Unix seconds"""
+    beam: int
+    step: int
+    lat_deg: float
+    lon_deg: float
+    range_m: float
+    raw_depth_m: float
+    """Of the bottom below the surface, as measured"""
+    depth_m: float | None
+    """Corrected, below the datum; null where no correction could be made"""
+    sd_m: float | None
+    state: SoundingState
+    reason: str
+    """Why it is not used, or who restored it"""
+
+
+class StateDefinition(Model):
+    """What P multiplies; docs/pcao.md says how each is made."""
+
+    vectors: list[str] | None = None
+    figures: list[str] | None = None
+    mixing_signals: int = 3
+
+
+class StateMessage(Model):
+    """The mission's state or progress changed."""
+
+    type: Literal["mission"]
+    mission: MissionSummary
+
+
+class StepView(Model):
+    """A step that was decided: its figures, and where it sent the vehicles."""
+
+    number: int
+    committed_at: datetime
+    objective: float | None
+    terms: dict[str, float]
+    figures: dict[str, float]
+    """How far the mission had come: coverage_pct, remaining_pct, mean_sd_m, distance_m; empty in steps of before
+    they were kept
+    """
+    soundings: int
+    """Soundings that its map was made of"""
+    waypoints: list[WaypointView]
+
+
+class StopView(Model):
+    """A vehicle's answer to a stop."""
+
+    vehicle: str
+    acknowledged: bool
+    detail: str
+
+
+class SurfacePolicy(Model):
+    """When a vehicle comes up for a GPS fix: by how well it says that it knows where it is, by the clock, or both."""
+
+    max_position_sd_m: float | None = None
+    """Standard deviation of its position (position_sd_m) that a vehicle should not exceed; it comes up at 90 % of
+    it. null: never because of it
+    """
+    every_min: float | None = None
+    """Minutes after which a vehicle comes up, also one that does not say how well it knows where it is. null: never
+    because of the clock
+    """
+    stay_s: float = 60.0
+    """How long a vehicle stays up that comes up by the clock"""
+    good_position_sd_m: float | None = None
+    """It stays at the surface until its position is known this well; null: a third of the limit"""
+
+
+class SwathSonarSpec(Model):
+    """A multibeam sonar, looking down, across the vehicle's heading."""
+
+    aperture_deg: float = 120.0
+    """Angle between its outermost beams, half of it to each side, degrees"""
+    beams: int = 256
+    """How many beams a ping has, at equal angles"""
+    rate_hz: float = 5.0
+    """Pings a second, Hz"""
+    range_m: float = 100.0
+    """Longest slant range, metres"""
+
+
+class SystematicErrorView(Model):
+    """One error, as the survey shows it beside those that are taken out already."""
+
+    kind: ErrorKind
+    """depth: a vehicle's depths beside the mean of those that cross each other; water_level: the largest residual
+    beside the tide; roll_offset and sound_speed: of a swath sonar
+    """
+    vehicle: str | None
+    """Null: of all"""
+    unit: str
+    found: float
+    """What is left in soundings as they are corrected now"""
+    sd: float
+    """Its standard deviation, from leaving lines or pieces of tracks out"""
+    significance: float
+    """How many standard deviations it is from zero"""
+    observations: int
+    """Crossings, or beams, that tell of it"""
+    rms_before_m: float
+    """RMS of the differences it was found in"""
+    rms_after_m: float
+    """What would be left of them"""
+    proposed: bool
+    """Whether it is large and sure enough to be taken out"""
+    why: str
+    """Why it is proposed, or not"""
+
+
+class SystematicErrors(Model):
+    """Errors that are the same for many soundings; they are taken out of every depth beside tide and sound speed."""
+
+    vehicles: dict[str, Any] | None = None
+    """By vehicle; one that is missing is right"""
+    water_level: list[tuple[float, float]] | None = None
+    """By how much depths are still too large at some times, beside the tide: [Unix seconds of the vehicles' clocks,
+    metres], in order; linear between them, and as at the nearest before and after
+    """
+    source: str = ""
+    """Where these come from, kept with the product"""
+
+
+class SystematicErrorsView(Model):
+    """What a survey shows of systematic errors."""
+
+    applied: SystematicErrors
+    """What is taken out of soundings now"""
+    errors: list[SystematicErrorView]
+    unknown: list[str]
+    """What cannot be told, and why"""
+    proposal: SystematicErrors | None
+    """What to send to PUT .../systematic-errors to take out what is proposed, what is applied included; null:
+    nothing is proposed
+    """
+
+
+class TargetRangePage(Model):
+    """Some ranges, in the order they were judged."""
+
+    items: list[TargetRangeView]
+    next_after: int | None
+    """Give it as `after` for the next page; null: this is the last"""
+
+
+class TargetRangeView(Model):
+    """A range to a target as it was measured, and whether it was used."""
+
+    id: int
+    target: str
+    vehicle: str
+    time_s: float
+    """The vehicle's clock, Unix seconds"""
+    received_at: datetime
+    step: int
+    source: str
+    """What told of it: rest, sim, or an IMC message"""
+    range_m: float
+    lat_deg: float
+    """Where the vehicle was"""
+    lon_deg: float
+    depth_m: float
+    used: bool
+    reason: str
+    """Why it was not used"""
+
+
+class TargetSpec(Model):
+    """A moving target with something on it that vehicles range to by sound."""
+
+    name: str
+    """Its name"""
+    acoustic_name: str | None = None
+    """What vehicles' modems call it; lbl-7 is transponder 7 of a long base line; null: its name"""
+    max_speed_mps: float = 1.0
+    """How fast it may be"""
+    velocity_change_mps: float = 0.1
+    """Standard deviation by which its velocity along east and along north changes within a minute"""
+    min_depth_m: float = 0.0
+    """Shallowest depth at which it may be found"""
+    max_depth_m: float | None = None
+    """Deepest; null: limits.max_depth_m of the vehicles"""
+    simulated: SimulatedTarget | None = None
+    """Let it move about in the service's own simulation; null: it is a real one"""
+
+
+class TargetView(Model):
+    """A moving target as an operator sees it now: foretold from the last range until this moment."""
+
+    name: str
+    state: TargetState
+    accurate: bool
+    """Known as well as tracking.accuracy_m asks: within A"""
+    in_area: bool | None
+    """Whether it is thought to be above the area to map"""
+    lat_deg: float | None
+    lon_deg: float | None
+    east_m: float | None
+    north_m: float | None
+    depth_m: float | None
+    speed_mps: float | None
+    """Over ground, horizontally"""
+    course_deg: float | None
+    """Clockwise from north"""
+    sd_east_m: float | None
+    sd_north_m: float | None
+    sd_depth_m: float | None
+    ellipse: EllipseView | None
+    age_s: float | None
+    """Seconds since a range to it was used, as vehicles count them; null: never"""
+    ranges: int
+    """Ranges that were used"""
+    rejected: int
+    """Ranges that were not"""
+    last_refusal: str
+    """Why the last of those was not used"""
+    pursued_by: str | None
+    """The vehicle that left the mapping for it"""
+
+
+class TargetsMessage(Model):
+    """What is known of the moving targets, a few times per second where a mission has any."""
+
+    type: Literal["targets"]
+    time: datetime
+    targets: list[TargetView]
+
+
+class TelemetryView(Model):
+    """What the vehicles told of themselves while the mission ran."""
+
+    times_s: list[float]
+    """The moments, Unix seconds by the service's clock, ascending"""
+    vehicles: list[VehicleTelemetry]
+
+
+class Tide(Model):
+    """Water level correction: depth below the datum = sounded depth - level + datum_offset_m."""
+
+    level_m: float = 0.0
+    """Water level above the zero of the tide gauge or table (chart datum), metres"""
+    source: str = "none applied"
+    """Where the level comes from, kept with the product"""
+    sd_m: float = 0.0
+    """Standard deviation of the level; it counts in every cell's TVU estimate"""
+    datum_epsg: int = 5861
+    """EPSG code of the depth datum that products state once a tide is applied, for example 5861 (LAT depth) or 5715
+    (MSL depth)
+    """
+    datum_offset_m: float = 0.0
+    """How far that datum lies above the zero that levels count from; added to every depth"""
+
+
+class TideCorrection(Model):
+    """A mission's tide: a constant level, or a table of high and low waters in its place."""
+
+    level_m: float = 0.0
+    """Water level above the zero of the tide gauge or table (chart datum), metres"""
+    source: str = "none applied"
+    """Where the level comes from, kept with the product"""
+    sd_m: float = 0.0
+    """Standard deviation of the level; it counts in every cell's TVU estimate"""
+    datum_epsg: int = 5861
+    """EPSG code of the depth datum that products state once a tide is applied, for example 5861 (LAT depth) or 5715
+    (MSL depth)
+    """
+    datum_offset_m: float = 0.0
+    """How far that datum lies above the zero that levels count from; added to every depth"""
+    table: str | None = None
+    """Text of a .tid table, UTC: a line 'YYYY/MM/DD hh:mm:ss.sss level' per high or low water. Levels between two
+    are a half cosine; soundings beyond the table are rejected until it covers them. Null: level_m
+    """
+    table_name: str = ""
+    """Its name; default: the harbour that it states"""
+
+
+class TideTableView(Model):
+    """A tide table in short."""
+
+    name: str
+    first: datetime
+    """Time of the first entry"""
+    last: datetime
+    """Time of the last entry"""
+    entries: int
+    sha256: str
+    """Of the table as it was sent"""
+
+
+class TieFeatureView(Model):
+    """A tie as GeoJSON."""
+
+    type: Literal["Feature"]
+    properties: TieView
+    geometry: PointView
+
+
+class TieFeaturesView(Model):
+    """Ties as GeoJSON."""
+
+    type: Literal["FeatureCollection"]
+    features: list[TieFeatureView]
+
+
+class TieView(Model):
+    """A section of a track that was compared with what others sounded there."""
+
+    number: int
+    vehicle: str
+    time_s: float
+    """The vehicle's clock in its middle, Unix seconds"""
+    other: str | None
+    """The vehicle that it was compared with most; null: it was not used"""
+    outcome: Literal["used", "no-overlap", "flat", "misfit", "outlier", "not-significant"]
+    """Used, or why not: others' soundings are too far, the terrain says nothing, depths differ wherever it is moved
+    to, it contradicts the others, or no tie at all made held-out ones fit better
+    """
+    before_m: float | None
+    """RMS of its depths less the others', unadjusted"""
+    after_m: float | None
+    """The same, adjusted"""
+    sd_m: tuple[float | None, float | None]
+    """How well it tells by how much to move it, in its best and its worst direction; null: not at all"""
+
+
+class TileJson(Model):
+    """Where a layer's tiles are (TileJSON 3.0)."""
+
+    name: str
+    description: str
+    tiles: list[str]
+    """Address of each tile, with {z}, {x} and {y}"""
+    minzoom: int
+    maxzoom: int
+    """A cell of the map is at least four pixels wide there; there are tiles beyond"""
+    bounds: list[float]
+    """West, south, east and north, degrees"""
+    center: list[float]
+    """Longitude, latitude and zoom to begin with"""
+    layer: str
+    unit: str
+    """Of `range`; empty for layers by classes"""
+    range: list[float]
+    """Values of the first and the last colour"""
+    tilejson: str = "3.0.0"
+    version: str = "1.0.0"
+    attribution: str = ""
+    scheme: str = "xyz"
+    format: str = "png"
+
+
+class TotalView(Model):
+    """A beam's total propagated uncertainty, 95 %."""
+
+    angle_deg: float
+    """Of the beam from straight down"""
+    tvu_m: float
+    thu_m: float
+
+
+class TrackOffsetView(Model):
+    """By how much a vehicle's positions were changed."""
+
+    vehicle: str
+    nodes: int
+    mean_m: float
+    """Mean length of the change"""
+    max_m: float
+    before_sd_m: float
+    """How uncertain its reckoned positions are by the assumed drift, east or north, at the worst"""
+    sd_m: float
+    """The same of its adjusted ones"""
+
+
+class Tracking(Model):
+    """How well targets are to be known, and how well vehicles range to them."""
+
+    accuracy_m: float = 5.0
+    """A target counts as accurately known while its standard deviations along east, north and depth are below this"""
+    range_noise: float = 0.01
+    """Standard deviation of a range to a target as a fraction of it"""
+    range_sd_m: float = 0.5
+    """The part of it that is the same at any range, metres"""
+    hearing_m: float | None = None
+    """Farther than this no target is heard; null: unlimited"""
+    pursue: bool = True
+    """Whether a vehicle leaves the mapping for a target that is not known well enough: one of three, none of a team
+    of one
+    """
+    standoff_m: float = 10.0
+    """A vehicle that goes for a target comes no closer to any"""
+
+
+class Training(Model):
+    """How the controller came about."""
+
+    command: str = ""
+    """What makes it again"""
+    bathyfleet: str = ""
+    """The version that trained it"""
+    method: str = ""
+    """pcao, cma or random"""
+    seed: int = 0
+    """Of the optimiser"""
+    terrains: list[str] | None = None
+    seeds: list[int] | None = None
+    """Of the Monte-Carlo runs on each terrain"""
+    robots: int = 3
+    landmarks: int = 1100
+    steps: int = 500
+    evaluations: int = 0
+    """Controllers that were scored"""
+    score: float | None = None
+    """E(P) of eq. (17), per run"""
+
+
+class UncertaintyBudgetView(Model):
+    """Where the uncertainty of a swath sonar's soundings comes from, over level ground, for single beams."""
+
+    depth_m: float
+    """Mean depth of the map"""
+    below_sonar_m: float
+    """That minus the depth at which the highest vehicle travels"""
+    components: list[ComponentView]
+    totals: list[TotalView]
+    allowed: list[AllowedView]
+
+
+class VehicleDiagnosis(Model):
+    """What was found of one vehicle."""
+
+    name: str
+    imc_id: int
+    state: NodeState
+    healthy: bool
+    causes: list[Cause]
+    """Of its problems, the one to look at first in front"""
+    findings: list[Finding]
+    history: list[LinkRecord]
+    """The last changes of its link, oldest first"""
+
+
+class VehicleForecast(Model):
+    """What one vehicle will have done."""
+
+    vehicle: str
+    distance_m: float
+    """Median over the floors"""
+    distance_m_range: ForecastRange
+
+
+class VehicleSpec(Model):
+    """A vehicle that takes part in a mission."""
+
+    name: str
+    """Its name; for IMC the name it announces"""
+    kind: VehicleKind = "imc"
+    """imc: DUNE over UDP; rest: polls and posts by itself; sim: simulated inside the service; neptus: of a session
+    of Neptus' ConvCAO panel, which makes its mission itself
+    """
+    sensor: Sensor = "single_beam"
+    sonar: SwathSonarSpec | None = None
+    """With sensor multibeam: what that sonar can do; null: its defaults"""
+    depth_m: float | None = None
+    """Depth it travels at where the bottom leaves room; null: the first vehicle of a mission at limits.min_depth_m,
+    each further one limits.min_vertical_separation_m deeper
+    """
+    altitude_m: float | None = None
+    """Height above the bottom that it keeps where the bottom is known, down to limits.max_depth_m and never less
+    than limits.min_altitude_m; elsewhere it travels at depth_m. null: it keeps its depth
+    """
+    speed_mps: float | None = None
+    """Speed asked of it; null: the mission's speed_mps"""
+    turn_radius_m: float | None = None
+    """Radius of its turning circle, by which plans pay for turns; null: what it flies in 4 s"""
+    endurance_min: float | None = None
+    """How long its energy lasts at its speed, minutes, from the start of the mission; counts where the vehicle tells
+    no battery level. null: not known
+    """
+    recovery_point: tuple[float, float] | None = None
+    """Where it is taken out of the water, [longitude, latitude]; null: at the mission's recovery.point"""
+    guidance: Guidance = "follow"
+    """How a vehicle of kind imc is led. follow: by references, one a second; legs: by a plan for each whole leg,
+    where radio ends at the surface; acoustic: by legs, and by sound while radio is silent
+    """
+    gateway: str | None = None
+    """With guidance acoustic: the name that the node with the modem announces"""
+    start: tuple[float, float] | None = None
+    """Where a simulated vehicle starts, [longitude, latitude]; default: a corner of the area"""
+
+
+class VehicleTelemetry(Model):
+    """One vehicle's figures, a value or null for each of the moments."""
+
+    vehicle: str
+    depth_m: list[float | None]
+    altitude_m: list[float | None]
+    battery_pct: list[float | None]
+    age_s: list[float | None]
+    """Seconds since it was heard"""
+
+
+class VehicleView(Model):
+    """A vehicle as an operator sees it now."""
+
+    name: str
+    kind: VehicleKind
+    sensor: Sensor | None
+    mission_id: str | None
+    """The mission it takes part in, if any"""
+    active: bool
+    """False once it left its mission"""
+    left_at: datetime | None
+    """When it left the mission; null while it takes part"""
+    breach: str
+    """Where it is that it must not be: in a keep-out zone or outside the area; else empty"""
+    link: LinkState
+    reason: str
+    """What is missing or wrong, and what to do; empty when all is well"""
+    age_s: float | None
+    """Seconds since last heard; null: never"""
+    address: str | None
+    imc_id: int | None
+    lat_deg: float | None
+    lon_deg: float | None
+    east_m: float | None
+    north_m: float | None
+    depth_m: float | None
+    altitude_m: float | None
+    heading_deg: float | None
+    speed_mps: float | None
+    battery_pct: float | None
+    position_sd_m: float | None
+    """How well it says that it knows where it is: standard deviation in metres"""
+    localization: PositionQuality
+    """What that is worth beside the mission's surface_policy"""
+    swath_m: tuple[float, float] | None
+    """How far its swath sonar reached with its last ping, level to port and to starboard, metres; null: it has none,
+    or did not measure within the last seconds
+    """
+    surfacing: bool
+    """On its way up, or at the surface, for a GPS fix"""
+    risings: int
+    """How often it was sent up for a fix in this mission"""
+    pursuing: str | None
+    """The target that it leaves the mapping for"""
+    phase: Phase | None
+    """What it is at; null while it takes part in no mission"""
+    flown_m: float
+    """What it has flown in this mission, along its track"""
+    on_plan_m: float
+    """Of those, metres along planned legs"""
+    idle_s: float
+    """Vehicle time in which it waited for a decision"""
+    withdrawn: str
+    """Why it surveys no more; empty while it does"""
+    energy_left_pct: float | None
+    """What is left of its energy, by its battery or else by endurance_min; null: not known"""
+    energy_left_s: float | None
+    """How long that lasts at its speed for sure, vehicle time; null: not known"""
+    recovery_point: tuple[float, float] | None
+    """Where it comes home to, [longitude, latitude]; null: nowhere"""
+    return_needs_s: float | None
+    """How long its way home takes from where it is, vehicle time; null: not known"""
+    turn_back_at: datetime | None
+    """When it has to turn back, if it goes no farther from home; null: not known"""
+    failsafes: list[FailsafeView]
+    """What is wrong with it and what is done about that, the strongest first"""
+    battery: BatteryState | None
+    """What its battery's level is worth; null while it has not said."""
+
+
+class VehiclesAgreementView(Model):
+    """Differences where two vehicles cross, or one crosses its own way."""
+
+    count: int
+    mean_m: float
+    median_m: float
+    sd_m: float | None
+    """Standard deviation of a sample; null: there is one difference"""
+    rms_m: float
+    p95_m: float
+    """95 % quantile of the absolute differences"""
+    max_m: float
+    """Largest absolute difference"""
+    within_pct: float
+    """Share that is not larger than the order's largest TVU"""
+    vehicles: tuple[str, str]
+    """Depths of the first minus those of the second; twice the same: the later minus the earlier"""
+
+
+class VehiclesMessage(Model):
+    """Positions and links, a few times per second."""
+
+    type: Literal["vehicles"]
+    time: datetime
+    vehicles: list[VehicleView]
+
+
+class WaypointView(Model):
+    """One waypoint of one vehicle."""
+
+    vehicle: str
+    step: int
+    lat_deg: float
+    lon_deg: float
+    east_m: float
+    north_m: float
+    depth_m: float
+    speed_mps: float
+    arrival_radius_m: float
+    min_altitude_m: float
+    way_home: list[tuple[float, float]]
+    """Where it goes when it hears of nobody any more: corners as [longitude, latitude], the last at its recovery
+    point; told to vehicles that ask for their waypoint
+    """
+    status: WaypointStatus
+    reason: str
+
+
+class WaypointsMessage(Model):
+    """Waypoints whose state changed."""
+
+    type: Literal["waypoints"]
+    waypoints: list[WaypointView]
+
+
+LiveMessage: TypeAlias = SnapshotMessage | VehiclesMessage | TargetsMessage | SearchMessage | WaypointsMessage | StateMessage | MapMessage | EventMessage

@@ -1,0 +1,1622 @@
+"""The operations of the service's REST interface.
+
+Written by ``python -m app.client`` from the service's OpenAPI document: changed there, not here.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from typing import Any, Literal, TypeVar
+
+from bathyfleet.client import models
+from bathyfleet.client.call import Call, part
+
+T = TypeVar("T")
+
+
+class Operations(ABC):
+    """Every operation of the service as a method that returns its answer."""
+
+    @abstractmethod
+    def _call(self, call: Call[T]) -> T:
+        """Make a request and return its answer."""
+
+    def list_missions(self) -> list[models.MissionSummary]:
+        """List the missions: ``GET /missions``."""
+        return self._call(Call[list[models.MissionSummary]]("GET", "/missions", list[models.MissionSummary]))
+
+    def create_mission(self, body: models.MissionSpec | Mapping[str, Any]) -> models.MissionView:
+        """Describe a new mission: ``POST /missions``."""
+        return self._call(Call[models.MissionView]("POST", "/missions", models.MissionView, body=body))
+
+    def get_mission(self, mission_id: str) -> models.MissionView:
+        """See a mission: ``GET /missions/{mission_id}``."""
+        return self._call(Call[models.MissionView]("GET", f"/missions/{part(mission_id)}", models.MissionView))
+
+    def delete_mission(self, mission_id: str) -> None:
+        """Delete a mission that was not flown: ``DELETE /missions/{mission_id}``."""
+        return self._call(Call[None]("DELETE", f"/missions/{part(mission_id)}", None))
+
+    def start_mission(
+        self,
+        mission_id: str,
+        body: models.ActionRequest | Mapping[str, Any] | None = None,
+    ) -> models.ActionView:
+        """Start a mission: ``POST /missions/{mission_id}/start``."""
+        return self._call(Call[models.ActionView](
+            "POST",
+            f"/missions/{part(mission_id)}/start",
+            models.ActionView,
+            body=body,
+        ))
+
+    def pause_mission(
+        self,
+        mission_id: str,
+        body: models.ActionRequest | Mapping[str, Any] | None = None,
+    ) -> models.ActionView:
+        """Pause a mission: ``POST /missions/{mission_id}/pause``."""
+        return self._call(Call[models.ActionView](
+            "POST",
+            f"/missions/{part(mission_id)}/pause",
+            models.ActionView,
+            body=body,
+        ))
+
+    def resume_mission(
+        self,
+        mission_id: str,
+        body: models.ActionRequest | Mapping[str, Any] | None = None,
+    ) -> models.ActionView:
+        """Resume a paused mission: ``POST /missions/{mission_id}/resume``."""
+        return self._call(Call[models.ActionView](
+            "POST",
+            f"/missions/{part(mission_id)}/resume",
+            models.ActionView,
+            body=body,
+        ))
+
+    def abort_mission(
+        self,
+        mission_id: str,
+        body: models.EndRequest | Mapping[str, Any] | None = None,
+    ) -> models.ActionView:
+        """Abort a mission: ``POST /missions/{mission_id}/abort``."""
+        return self._call(Call[models.ActionView](
+            "POST",
+            f"/missions/{part(mission_id)}/abort",
+            models.ActionView,
+            body=body,
+        ))
+
+    def finish_mission(
+        self,
+        mission_id: str,
+        body: models.EndRequest | Mapping[str, Any] | None = None,
+    ) -> models.ActionView:
+        """Finish a mission early: ``POST /missions/{mission_id}/finish``."""
+        return self._call(Call[models.ActionView](
+            "POST",
+            f"/missions/{part(mission_id)}/finish",
+            models.ActionView,
+            body=body,
+        ))
+
+    def check_mission(self, mission_id: str) -> models.PreflightView:
+        """See what stands before the start: ``GET /missions/{mission_id}/preflight``."""
+        return self._call(Call[models.PreflightView](
+            "GET",
+            f"/missions/{part(mission_id)}/preflight",
+            models.PreflightView,
+        ))
+
+    def list_steps(
+        self,
+        mission_id: str,
+        *,
+        after: int | None = None,
+        limit: int | None = None,
+    ) -> list[models.StepView]:
+        """See what was decided: ``GET /missions/{mission_id}/steps``."""
+        return self._call(Call[list[models.StepView]](
+            "GET",
+            f"/missions/{part(mission_id)}/steps",
+            list[models.StepView],
+            query={"after": after, "limit": limit},
+        ))
+
+    def get_telemetry(self, mission_id: str, *, points: int | None = None) -> models.TelemetryView:
+        """See the vehicles' figures over time: ``GET /missions/{mission_id}/telemetry``."""
+        return self._call(Call[models.TelemetryView](
+            "GET",
+            f"/missions/{part(mission_id)}/telemetry",
+            models.TelemetryView,
+            query={"points": points},
+        ))
+
+    def write_note(self, mission_id: str, body: models.NoteRequest | Mapping[str, Any]) -> models.EventView:
+        """Write into the log: ``POST /missions/{mission_id}/notes``."""
+        return self._call(Call[models.EventView](
+            "POST",
+            f"/missions/{part(mission_id)}/notes",
+            models.EventView,
+            body=body,
+        ))
+
+    def abort_vehicle(self, mission_id: str, name: str) -> models.ActionView:
+        """Stop one vehicle: ``POST /missions/{mission_id}/vehicles/{name}/abort``."""
+        return self._call(Call[models.ActionView](
+            "POST",
+            f"/missions/{part(mission_id)}/vehicles/{part(name)}/abort",
+            models.ActionView,
+        ))
+
+    def return_vehicle(self, mission_id: str, name: str) -> models.MissionView:
+        """Send one vehicle home: ``POST /missions/{mission_id}/vehicles/{name}/return``."""
+        return self._call(Call[models.MissionView](
+            "POST",
+            f"/missions/{part(mission_id)}/vehicles/{part(name)}/return",
+            models.MissionView,
+        ))
+
+    def hold_vehicle(self, mission_id: str, name: str) -> models.MissionView:
+        """Keep one vehicle where it is: ``POST /missions/{mission_id}/vehicles/{name}/hold``."""
+        return self._call(Call[models.MissionView](
+            "POST",
+            f"/missions/{part(mission_id)}/vehicles/{part(name)}/hold",
+            models.MissionView,
+        ))
+
+    def resume_vehicle(self, mission_id: str, name: str) -> models.MissionView:
+        """Let a vehicle survey again: ``POST /missions/{mission_id}/vehicles/{name}/resume``."""
+        return self._call(Call[models.MissionView](
+            "POST",
+            f"/missions/{part(mission_id)}/vehicles/{part(name)}/resume",
+            models.MissionView,
+        ))
+
+    def add_vehicle(self, mission_id: str, body: models.VehicleSpec | Mapping[str, Any]) -> models.MissionView:
+        """Add a vehicle to a mission: ``POST /missions/{mission_id}/vehicles``."""
+        return self._call(Call[models.MissionView](
+            "POST",
+            f"/missions/{part(mission_id)}/vehicles",
+            models.MissionView,
+            body=body,
+        ))
+
+    def rejoin_vehicle(self, mission_id: str, name: str) -> models.MissionView:
+        """Take back a vehicle that left: ``POST /missions/{mission_id}/vehicles/{name}/rejoin``."""
+        return self._call(Call[models.MissionView](
+            "POST",
+            f"/missions/{part(mission_id)}/vehicles/{part(name)}/rejoin",
+            models.MissionView,
+        ))
+
+    def remove_vehicle(self, mission_id: str, name: str) -> models.MissionView:
+        """Take a vehicle out of a mission: ``DELETE /missions/{mission_id}/vehicles/{name}``."""
+        return self._call(Call[models.MissionView](
+            "DELETE",
+            f"/missions/{part(mission_id)}/vehicles/{part(name)}",
+            models.MissionView,
+        ))
+
+    def forecast_mission(self, mission_id: str, *, floor_depth_m: float | None = None) -> models.ForecastView:
+        """Foretell a mission: ``POST /missions/{mission_id}/forecast``."""
+        return self._call(Call[models.ForecastView](
+            "POST",
+            f"/missions/{part(mission_id)}/forecast",
+            models.ForecastView,
+            query={"floor_depth_m": floor_depth_m},
+        ))
+
+    def forecast_description(
+        self,
+        body: models.MissionSpec | Mapping[str, Any],
+        *,
+        floor_depth_m: float | None = None,
+    ) -> models.ForecastView:
+        """Foretell a mission that is being described: ``POST /forecast``."""
+        return self._call(Call[models.ForecastView](
+            "POST",
+            "/forecast",
+            models.ForecastView,
+            body=body,
+            query={"floor_depth_m": floor_depth_m},
+        ))
+
+    def post_measurements(
+        self,
+        mission_id: str,
+        body: models.MeasurementBatch | Mapping[str, Any],
+        *,
+        idempotency_key: str | None = None,
+    ) -> models.BatchVerdict:
+        """Post measurements: ``POST /missions/{mission_id}/measurements``."""
+        return self._call(Call[models.BatchVerdict](
+            "POST",
+            f"/missions/{part(mission_id)}/measurements",
+            models.BatchVerdict,
+            body=body,
+            headers={"idempotency-key": idempotency_key},
+        ))
+
+    def get_waypoint(
+        self,
+        mission_id: str,
+        name: str,
+        *,
+        after_step: int | None = None,
+        timeout_s: float | None = None,
+    ) -> models.WaypointView | None:
+        """Fetch a vehicle's waypoint: ``GET /missions/{mission_id}/vehicles/{name}/waypoint``."""
+        return self._call(Call[models.WaypointView | None](
+            "GET",
+            f"/missions/{part(mission_id)}/vehicles/{part(name)}/waypoint",
+            models.WaypointView,
+            query={"after_step": after_step, "timeout_s": timeout_s},
+        ))
+
+    def get_corrections(self, mission_id: str) -> models.CorrectionsView:
+        """See how soundings are corrected: ``GET /missions/{mission_id}/corrections``."""
+        return self._call(Call[models.CorrectionsView](
+            "GET",
+            f"/missions/{part(mission_id)}/corrections",
+            models.CorrectionsView,
+        ))
+
+    def set_tide(self, mission_id: str, body: models.TideCorrection | Mapping[str, Any]) -> models.CorrectionsView:
+        """Correct the tide: ``PUT /missions/{mission_id}/tide``."""
+        return self._call(Call[models.CorrectionsView](
+            "PUT",
+            f"/missions/{part(mission_id)}/tide",
+            models.CorrectionsView,
+            body=body,
+        ))
+
+    def set_sound_speed(self, mission_id: str, body: models.SoundSpeed | Mapping[str, Any]) -> models.CorrectionsView:
+        """Correct the sound speed: ``PUT /missions/{mission_id}/sound-speed``."""
+        return self._call(Call[models.CorrectionsView](
+            "PUT",
+            f"/missions/{part(mission_id)}/sound-speed",
+            models.CorrectionsView,
+            body=body,
+        ))
+
+    def delete_sound_speed(self, mission_id: str) -> models.CorrectionsView:
+        """Take the sonars' own ranges: ``DELETE /missions/{mission_id}/sound-speed``."""
+        return self._call(Call[models.CorrectionsView](
+            "DELETE",
+            f"/missions/{part(mission_id)}/sound-speed",
+            models.CorrectionsView,
+        ))
+
+    def get_systematic_errors(self, mission_id: str) -> models.SystematicErrorsView:
+        """See what is always wrong: ``GET /missions/{mission_id}/systematic-errors``."""
+        return self._call(Call[models.SystematicErrorsView](
+            "GET",
+            f"/missions/{part(mission_id)}/systematic-errors",
+            models.SystematicErrorsView,
+        ))
+
+    def set_systematic_errors(
+        self,
+        mission_id: str,
+        body: models.SystematicErrors | Mapping[str, Any],
+    ) -> models.CorrectionsView:
+        """Take out what is always wrong: ``PUT /missions/{mission_id}/systematic-errors``."""
+        return self._call(Call[models.CorrectionsView](
+            "PUT",
+            f"/missions/{part(mission_id)}/systematic-errors",
+            models.CorrectionsView,
+            body=body,
+        ))
+
+    def delete_systematic_errors(self, mission_id: str) -> models.CorrectionsView:
+        """Take nothing out: ``DELETE /missions/{mission_id}/systematic-errors``."""
+        return self._call(Call[models.CorrectionsView](
+            "DELETE",
+            f"/missions/{part(mission_id)}/systematic-errors",
+            models.CorrectionsView,
+        ))
+
+    def get_adjustment(self, mission_id: str) -> models.AdjustmentView:
+        """See how tracks are adjusted: ``GET /missions/{mission_id}/adjustment``."""
+        return self._call(Call[models.AdjustmentView](
+            "GET",
+            f"/missions/{part(mission_id)}/adjustment",
+            models.AdjustmentView,
+        ))
+
+    def adjust_tracks(
+        self,
+        mission_id: str,
+        body: models.AdjustmentRequest | Mapping[str, Any] | None = None,
+    ) -> models.AdjustmentView:
+        """Adjust tracks for drift: ``POST /missions/{mission_id}/adjustment``."""
+        return self._call(Call[models.AdjustmentView](
+            "POST",
+            f"/missions/{part(mission_id)}/adjustment",
+            models.AdjustmentView,
+            body=body,
+        ))
+
+    def undo_adjustment(self, mission_id: str) -> models.AdjustmentView:
+        """Take positions as they came: ``DELETE /missions/{mission_id}/adjustment``."""
+        return self._call(Call[models.AdjustmentView](
+            "DELETE",
+            f"/missions/{part(mission_id)}/adjustment",
+            models.AdjustmentView,
+        ))
+
+    def import_soundings(
+        self,
+        mission_id: str,
+        content: bytes,
+        *,
+        filename: str,
+        source: str | None = None,
+        crs: str | None = None,
+        positive: Literal["down", "up"] | None = None,
+        sd_m: float | None = None,
+        order: models.Order | None = None,
+        datum_offset_m: float | None = None,
+    ) -> models.ImportView:
+        """Begin with soundings or a map from elsewhere: ``POST /missions/{mission_id}/imports``."""
+        return self._call(Call[models.ImportView](
+            "POST",
+            f"/missions/{part(mission_id)}/imports",
+            models.ImportView,
+            content=content,
+            query={"filename": filename, "source": source, "crs": crs, "positive": positive, "sd_m": sd_m, "order": order, "datum_offset_m": datum_offset_m},
+        ))
+
+    def list_imports(self, mission_id: str) -> list[models.ImportView]:
+        """List what was imported: ``GET /missions/{mission_id}/imports``."""
+        return self._call(Call[list[models.ImportView]](
+            "GET",
+            f"/missions/{part(mission_id)}/imports",
+            list[models.ImportView],
+        ))
+
+    def delete_import(self, mission_id: str, import_id: str) -> None:
+        """Take an import back: ``DELETE /missions/{mission_id}/imports/{import_id}``."""
+        return self._call(Call[None]("DELETE", f"/missions/{part(mission_id)}/imports/{part(import_id)}", None))
+
+    def set_reference(
+        self,
+        mission_id: str,
+        content: bytes,
+        *,
+        filename: str,
+        source: str | None = None,
+        crs: str | None = None,
+        positive: Literal["down", "up"] | None = None,
+        sd_m: float | None = None,
+        order: models.Order | None = None,
+        datum_offset_m: float | None = None,
+    ) -> models.ReferenceView:
+        """Compare the map with a grid: ``PUT /missions/{mission_id}/reference``."""
+        return self._call(Call[models.ReferenceView](
+            "PUT",
+            f"/missions/{part(mission_id)}/reference",
+            models.ReferenceView,
+            content=content,
+            query={"filename": filename, "source": source, "crs": crs, "positive": positive, "sd_m": sd_m, "order": order, "datum_offset_m": datum_offset_m},
+        ))
+
+    def get_reference(self, mission_id: str) -> models.ReferenceView:
+        """See what the map is compared with: ``GET /missions/{mission_id}/reference``."""
+        return self._call(Call[models.ReferenceView](
+            "GET",
+            f"/missions/{part(mission_id)}/reference",
+            models.ReferenceView,
+        ))
+
+    def delete_reference(self, mission_id: str) -> None:
+        """Compare the map with nothing: ``DELETE /missions/{mission_id}/reference``."""
+        return self._call(Call[None]("DELETE", f"/missions/{part(mission_id)}/reference", None))
+
+    def get_map(
+        self,
+        mission_id: str,
+        *,
+        layer: list[models.LayerName] | None = None,
+        order: models.Order | None = None,
+    ) -> models.MapView:
+        """See the map: ``GET /missions/{mission_id}/map``."""
+        return self._call(Call[models.MapView](
+            "GET",
+            f"/missions/{part(mission_id)}/map",
+            models.MapView,
+            query={"layer": layer, "order": order},
+        ))
+
+    def get_map_overlay(
+        self,
+        mission_id: str,
+        *,
+        layer: models.OverlayLayer | None = None,
+        order: models.Order | None = None,
+        min: float | None = None,
+        max: float | None = None,
+    ) -> bytes:
+        """See the map as a transparent picture: ``GET /missions/{mission_id}/map.overlay.png``."""
+        return self._call(Call[bytes](
+            "GET",
+            f"/missions/{part(mission_id)}/map.overlay.png",
+            bytes,
+            query={"layer": layer, "order": order, "min": min, "max": max},
+        ))
+
+    def get_map_tiles(
+        self,
+        mission_id: str,
+        *,
+        since: str | None = None,
+        layer: list[models.FurtherLayer] | None = None,
+        step: int | None = None,
+    ) -> bytes:
+        """Follow the map: ``GET /missions/{mission_id}/map/tiles``."""
+        return self._call(Call[bytes](
+            "GET",
+            f"/missions/{part(mission_id)}/map/tiles",
+            bytes,
+            query={"since": since, "layer": layer, "step": step},
+        ))
+
+    def get_quality(self, mission_id: str) -> models.QualityView:
+        """Judge the map: ``GET /missions/{mission_id}/quality``."""
+        return self._call(Call[models.QualityView]("GET", f"/missions/{part(mission_id)}/quality", models.QualityView))
+
+    def get_uncertainty_budget(self, mission_id: str) -> models.UncertaintyBudgetView:
+        """See where uncertainty comes from: ``GET /missions/{mission_id}/uncertainty-budget``."""
+        return self._call(Call[models.UncertaintyBudgetView](
+            "GET",
+            f"/missions/{part(mission_id)}/uncertainty-budget",
+            models.UncertaintyBudgetView,
+        ))
+
+    def get_holidays(self, mission_id: str) -> dict[str, Any]:
+        """See what swath sonars missed: ``GET /missions/{mission_id}/holidays``."""
+        return self._call(Call[dict[str, Any]]("GET", f"/missions/{part(mission_id)}/holidays", dict[str, Any]))
+
+    def get_crosslines(self, mission_id: str, *, order: models.Order | None = None) -> models.CrossoversView:
+        """See how well the survey agrees with itself: ``GET /missions/{mission_id}/crosslines``."""
+        return self._call(Call[models.CrossoversView](
+            "GET",
+            f"/missions/{part(mission_id)}/crosslines",
+            models.CrossoversView,
+            query={"order": order},
+        ))
+
+    def get_crossovers_file(self, mission_id: str, *, order: models.Order | None = None) -> str:
+        """Download the crossings: ``GET /missions/{mission_id}/crossovers.csv``."""
+        return self._call(Call[str]("GET", f"/missions/{part(mission_id)}/crossovers.csv", str, query={"order": order}))
+
+    def list_products(self, mission_id: str) -> list[models.ProductView]:
+        """List the files: ``GET /missions/{mission_id}/products``."""
+        return self._call(Call[list[models.ProductView]](
+            "GET",
+            f"/missions/{part(mission_id)}/products",
+            list[models.ProductView],
+        ))
+
+    def get_holidays_file(self, mission_id: str) -> dict[str, Any]:
+        """Download the holidays: ``GET /missions/{mission_id}/holidays.geojson``."""
+        return self._call(Call[dict[str, Any]]("GET", f"/missions/{part(mission_id)}/holidays.geojson", dict[str, Any]))
+
+    def get_pdf_report(
+        self,
+        mission_id: str,
+        *,
+        lang: models.Language | None = None,
+        order: models.Order | None = None,
+    ) -> bytes:
+        """Download the survey's report as PDF: ``GET /missions/{mission_id}/report.pdf``."""
+        return self._call(Call[bytes](
+            "GET",
+            f"/missions/{part(mission_id)}/report.pdf",
+            bytes,
+            query={"lang": lang, "order": order},
+        ))
+
+    def get_html_report(
+        self,
+        mission_id: str,
+        *,
+        lang: models.Language | None = None,
+        order: models.Order | None = None,
+    ) -> bytes:
+        """Download the survey's report as HTML: ``GET /missions/{mission_id}/report.html``."""
+        return self._call(Call[bytes](
+            "GET",
+            f"/missions/{part(mission_id)}/report.html",
+            bytes,
+            query={"lang": lang, "order": order},
+        ))
+
+    def get_map_file(
+        self,
+        mission_id: str,
+        format: str,
+        *,
+        order: models.Order | None = None,
+        interval_m: float | None = None,
+        min: float | None = None,
+        max: float | None = None,
+        vehicle: str | None = None,
+    ) -> bytes:
+        """Download the map: ``GET /missions/{mission_id}/map.{format}``."""
+        return self._call(Call[bytes](
+            "GET",
+            f"/missions/{part(mission_id)}/map.{part(format)}",
+            bytes,
+            query={"order": order, "interval_m": interval_m, "min": min, "max": max, "vehicle": vehicle},
+        ))
+
+    def get_soundings_file(
+        self,
+        mission_id: str,
+        format: str,
+        *,
+        order: models.Order | None = None,
+        interval_m: float | None = None,
+        min: float | None = None,
+        max: float | None = None,
+        vehicle: str | None = None,
+    ) -> bytes:
+        """Download the soundings: ``GET /missions/{mission_id}/soundings.{format}``."""
+        return self._call(Call[bytes](
+            "GET",
+            f"/missions/{part(mission_id)}/soundings.{part(format)}",
+            bytes,
+            query={"order": order, "interval_m": interval_m, "min": min, "max": max, "vehicle": vehicle},
+        ))
+
+    def get_tracks_file(
+        self,
+        mission_id: str,
+        format: str,
+        *,
+        order: models.Order | None = None,
+        interval_m: float | None = None,
+        min: float | None = None,
+        max: float | None = None,
+        vehicle: str | None = None,
+    ) -> bytes:
+        """Download the tracks: ``GET /missions/{mission_id}/tracks.{format}``."""
+        return self._call(Call[bytes](
+            "GET",
+            f"/missions/{part(mission_id)}/tracks.{part(format)}",
+            bytes,
+            query={"order": order, "interval_m": interval_m, "min": min, "max": max, "vehicle": vehicle},
+        ))
+
+    def list_layers(self) -> list[models.LayerView]:
+        """List the layers of maps: ``GET /layers``."""
+        return self._call(Call[list[models.LayerView]]("GET", "/layers", list[models.LayerView]))
+
+    def get_tile_json(
+        self,
+        mission_id: str,
+        layer: str,
+        *,
+        min: float | None = None,
+        max: float | None = None,
+    ) -> models.TileJson:
+        """See where a layer's tiles are: ``GET /missions/{mission_id}/tiles/{layer}.json``."""
+        return self._call(Call[models.TileJson](
+            "GET",
+            f"/missions/{part(mission_id)}/tiles/{part(layer)}.json",
+            models.TileJson,
+            query={"min": min, "max": max},
+        ))
+
+    def get_tile(
+        self,
+        mission_id: str,
+        layer: str,
+        z: int,
+        x: int,
+        y: str,
+        *,
+        min: float | None = None,
+        max: float | None = None,
+    ) -> bytes:
+        """See the map as tiles: ``GET /missions/{mission_id}/tiles/{layer}/{z}/{x}/{y}.png``."""
+        return self._call(Call[bytes](
+            "GET",
+            f"/missions/{part(mission_id)}/tiles/{part(layer)}/{part(z)}/{part(x)}/{part(y)}.png",
+            bytes,
+            query={"min": min, "max": max},
+        ))
+
+    def list_soundings(
+        self,
+        mission_id: str,
+        *,
+        state: list[models.SoundingState] | None = None,
+        vehicle: str | None = None,
+        after: int | None = None,
+        limit: int | None = None,
+    ) -> models.SoundingPage:
+        """See which soundings are not in the map, and why: ``GET /missions/{mission_id}/soundings``."""
+        return self._call(Call[models.SoundingPage](
+            "GET",
+            f"/missions/{part(mission_id)}/soundings",
+            models.SoundingPage,
+            query={"state": state, "vehicle": vehicle, "after": after, "limit": limit},
+        ))
+
+    def restore_sounding(
+        self,
+        mission_id: str,
+        sounding_id: int,
+        body: models.ActionRequest | Mapping[str, Any] | None = None,
+    ) -> models.SoundingView:
+        """Let a sounding count: ``POST /missions/{mission_id}/soundings/{sounding_id}/restore``."""
+        return self._call(Call[models.SoundingView](
+            "POST",
+            f"/missions/{part(mission_id)}/soundings/{part(sounding_id)}/restore",
+            models.SoundingView,
+            body=body,
+        ))
+
+    def reject_sounding(
+        self,
+        mission_id: str,
+        sounding_id: int,
+        body: models.ActionRequest | Mapping[str, Any] | None = None,
+    ) -> models.SoundingView:
+        """Keep a sounding out: ``POST /missions/{mission_id}/soundings/{sounding_id}/reject``."""
+        return self._call(Call[models.SoundingView](
+            "POST",
+            f"/missions/{part(mission_id)}/soundings/{part(sounding_id)}/reject",
+            models.SoundingView,
+            body=body,
+        ))
+
+    def list_pings(self, mission_id: str) -> models.PingsView:
+        """See which pings there are: ``GET /missions/{mission_id}/pings``."""
+        return self._call(Call[models.PingsView]("GET", f"/missions/{part(mission_id)}/pings", models.PingsView))
+
+    def get_pings(self, mission_id: str, number: int) -> bytes:
+        """Fetch a file of pings: ``GET /missions/{mission_id}/pings/{number}``."""
+        return self._call(Call[bytes]("GET", f"/missions/{part(mission_id)}/pings/{part(number)}", bytes))
+
+    def list_targets(self, mission_id: str) -> list[models.TargetView]:
+        """See what is known of a mission's moving targets: ``GET /missions/{mission_id}/targets``."""
+        return self._call(Call[list[models.TargetView]](
+            "GET",
+            f"/missions/{part(mission_id)}/targets",
+            list[models.TargetView],
+        ))
+
+    def list_target_ranges(
+        self,
+        mission_id: str,
+        *,
+        target: str | None = None,
+        after: int | None = None,
+        limit: int | None = None,
+    ) -> models.TargetRangePage:
+        """See the ranges to targets, and which were used: ``GET /missions/{mission_id}/targets/ranges``."""
+        return self._call(Call[models.TargetRangePage](
+            "GET",
+            f"/missions/{part(mission_id)}/targets/ranges",
+            models.TargetRangePage,
+            query={"target": target, "after": after, "limit": limit},
+        ))
+
+    def post_scans(self, mission_id: str, body: models.ScanBatch | Mapping[str, Any]) -> models.BatchVerdict:
+        """Post scans: ``POST /missions/{mission_id}/scans``."""
+        return self._call(Call[models.BatchVerdict](
+            "POST",
+            f"/missions/{part(mission_id)}/scans",
+            models.BatchVerdict,
+            body=body,
+        ))
+
+    def get_search(self, mission_id: str, *, after: int | None = None) -> models.SearchGridView | None:
+        """See the site of a search as known now: ``GET /missions/{mission_id}/search``."""
+        return self._call(Call[models.SearchGridView | None](
+            "GET",
+            f"/missions/{part(mission_id)}/search",
+            models.SearchGridView,
+            query={"after": after},
+        ))
+
+    def get_search_obstacles(self, mission_id: str) -> dict[str, Any]:
+        """Download the obstacles of a search as GeoJSON: ``GET /missions/{mission_id}/search/obstacles.geojson``."""
+        return self._call(Call[dict[str, Any]](
+            "GET",
+            f"/missions/{part(mission_id)}/search/obstacles.geojson",
+            dict[str, Any],
+        ))
+
+    def get_events(
+        self,
+        mission_id: str,
+        *,
+        after: int | None = None,
+        limit: int | None = None,
+    ) -> list[models.EventView]:
+        """Follow or read a mission's log: ``GET /missions/{mission_id}/events``."""
+        return self._call(Call[list[models.EventView]](
+            "GET",
+            f"/missions/{part(mission_id)}/events",
+            list[models.EventView],
+            query={"after": after, "limit": limit},
+        ))
+
+    def list_vehicles(self) -> list[models.VehicleView]:
+        """List the vehicles: ``GET /vehicles``."""
+        return self._call(Call[list[models.VehicleView]]("GET", "/vehicles", list[models.VehicleView]))
+
+    def examine_links(self) -> models.DoctorView:
+        """Say what is missing: ``GET /doctor``."""
+        return self._call(Call[models.DoctorView]("GET", "/doctor", models.DoctorView))
+
+    def list_planners(self) -> list[models.PlannerView]:
+        """List the planners: ``GET /planners``."""
+        return self._call(Call[list[models.PlannerView]]("GET", "/planners", list[models.PlannerView]))
+
+    def list_audit(
+        self,
+        *,
+        before: int | None = None,
+        days: float | None = None,
+        actor: str | None = None,
+        mission: str | None = None,
+        limit: int | None = None,
+    ) -> list[models.AuditEntry]:
+        """See who commanded what: ``GET /audit``."""
+        return self._call(Call[list[models.AuditEntry]](
+            "GET",
+            "/audit",
+            list[models.AuditEntry],
+            query={"before": before, "days": days, "actor": actor, "mission": mission, "limit": limit},
+        ))
+
+    def get_session(self) -> models.SessionView:
+        """See who you are: ``GET /session``."""
+        return self._call(Call[models.SessionView]("GET", "/session", models.SessionView))
+
+    def sign_in(self) -> models.SessionView:
+        """Sign a browser in: ``POST /session``."""
+        return self._call(Call[models.SessionView]("POST", "/session", models.SessionView))
+
+    def sign_out(self) -> None:
+        """Sign a browser out: ``DELETE /session``."""
+        return self._call(Call[None]("DELETE", "/session", None))
+
+    def get_health(self) -> models.ComponentHealth:
+        """See the service's health: ``GET /health``."""
+        return self._call(Call[models.ComponentHealth]("GET", "/health", models.ComponentHealth))
+
+    def get_liveness(self) -> models.Liveness:
+        """Is the process alive: ``GET /health/live``."""
+        return self._call(Call[models.Liveness]("GET", "/health/live", models.Liveness))
+
+    def get_readiness(self) -> models.ComponentHealth:
+        """Can it do its work: ``GET /health/ready``."""
+        return self._call(Call[models.ComponentHealth]("GET", "/health/ready", models.ComponentHealth))
+
+    def get_metrics(self) -> str:
+        """Measurements for Prometheus: ``GET /metrics``."""
+        return self._call(Call[str]("GET", "/metrics", str))
+
+
+class AsyncOperations(ABC):
+    """Every operation of the service as a coroutine that returns its answer."""
+
+    @abstractmethod
+    async def _call(self, call: Call[T]) -> T:
+        """Make a request and return its answer."""
+
+    async def list_missions(self) -> list[models.MissionSummary]:
+        """List the missions: ``GET /missions``."""
+        return await self._call(Call[list[models.MissionSummary]]("GET", "/missions", list[models.MissionSummary]))
+
+    async def create_mission(self, body: models.MissionSpec | Mapping[str, Any]) -> models.MissionView:
+        """Describe a new mission: ``POST /missions``."""
+        return await self._call(Call[models.MissionView]("POST", "/missions", models.MissionView, body=body))
+
+    async def get_mission(self, mission_id: str) -> models.MissionView:
+        """See a mission: ``GET /missions/{mission_id}``."""
+        return await self._call(Call[models.MissionView]("GET", f"/missions/{part(mission_id)}", models.MissionView))
+
+    async def delete_mission(self, mission_id: str) -> None:
+        """Delete a mission that was not flown: ``DELETE /missions/{mission_id}``."""
+        return await self._call(Call[None]("DELETE", f"/missions/{part(mission_id)}", None))
+
+    async def start_mission(
+        self,
+        mission_id: str,
+        body: models.ActionRequest | Mapping[str, Any] | None = None,
+    ) -> models.ActionView:
+        """Start a mission: ``POST /missions/{mission_id}/start``."""
+        return await self._call(Call[models.ActionView](
+            "POST",
+            f"/missions/{part(mission_id)}/start",
+            models.ActionView,
+            body=body,
+        ))
+
+    async def pause_mission(
+        self,
+        mission_id: str,
+        body: models.ActionRequest | Mapping[str, Any] | None = None,
+    ) -> models.ActionView:
+        """Pause a mission: ``POST /missions/{mission_id}/pause``."""
+        return await self._call(Call[models.ActionView](
+            "POST",
+            f"/missions/{part(mission_id)}/pause",
+            models.ActionView,
+            body=body,
+        ))
+
+    async def resume_mission(
+        self,
+        mission_id: str,
+        body: models.ActionRequest | Mapping[str, Any] | None = None,
+    ) -> models.ActionView:
+        """Resume a paused mission: ``POST /missions/{mission_id}/resume``."""
+        return await self._call(Call[models.ActionView](
+            "POST",
+            f"/missions/{part(mission_id)}/resume",
+            models.ActionView,
+            body=body,
+        ))
+
+    async def abort_mission(
+        self,
+        mission_id: str,
+        body: models.EndRequest | Mapping[str, Any] | None = None,
+    ) -> models.ActionView:
+        """Abort a mission: ``POST /missions/{mission_id}/abort``."""
+        return await self._call(Call[models.ActionView](
+            "POST",
+            f"/missions/{part(mission_id)}/abort",
+            models.ActionView,
+            body=body,
+        ))
+
+    async def finish_mission(
+        self,
+        mission_id: str,
+        body: models.EndRequest | Mapping[str, Any] | None = None,
+    ) -> models.ActionView:
+        """Finish a mission early: ``POST /missions/{mission_id}/finish``."""
+        return await self._call(Call[models.ActionView](
+            "POST",
+            f"/missions/{part(mission_id)}/finish",
+            models.ActionView,
+            body=body,
+        ))
+
+    async def check_mission(self, mission_id: str) -> models.PreflightView:
+        """See what stands before the start: ``GET /missions/{mission_id}/preflight``."""
+        return await self._call(Call[models.PreflightView](
+            "GET",
+            f"/missions/{part(mission_id)}/preflight",
+            models.PreflightView,
+        ))
+
+    async def list_steps(
+        self,
+        mission_id: str,
+        *,
+        after: int | None = None,
+        limit: int | None = None,
+    ) -> list[models.StepView]:
+        """See what was decided: ``GET /missions/{mission_id}/steps``."""
+        return await self._call(Call[list[models.StepView]](
+            "GET",
+            f"/missions/{part(mission_id)}/steps",
+            list[models.StepView],
+            query={"after": after, "limit": limit},
+        ))
+
+    async def get_telemetry(self, mission_id: str, *, points: int | None = None) -> models.TelemetryView:
+        """See the vehicles' figures over time: ``GET /missions/{mission_id}/telemetry``."""
+        return await self._call(Call[models.TelemetryView](
+            "GET",
+            f"/missions/{part(mission_id)}/telemetry",
+            models.TelemetryView,
+            query={"points": points},
+        ))
+
+    async def write_note(self, mission_id: str, body: models.NoteRequest | Mapping[str, Any]) -> models.EventView:
+        """Write into the log: ``POST /missions/{mission_id}/notes``."""
+        return await self._call(Call[models.EventView](
+            "POST",
+            f"/missions/{part(mission_id)}/notes",
+            models.EventView,
+            body=body,
+        ))
+
+    async def abort_vehicle(self, mission_id: str, name: str) -> models.ActionView:
+        """Stop one vehicle: ``POST /missions/{mission_id}/vehicles/{name}/abort``."""
+        return await self._call(Call[models.ActionView](
+            "POST",
+            f"/missions/{part(mission_id)}/vehicles/{part(name)}/abort",
+            models.ActionView,
+        ))
+
+    async def return_vehicle(self, mission_id: str, name: str) -> models.MissionView:
+        """Send one vehicle home: ``POST /missions/{mission_id}/vehicles/{name}/return``."""
+        return await self._call(Call[models.MissionView](
+            "POST",
+            f"/missions/{part(mission_id)}/vehicles/{part(name)}/return",
+            models.MissionView,
+        ))
+
+    async def hold_vehicle(self, mission_id: str, name: str) -> models.MissionView:
+        """Keep one vehicle where it is: ``POST /missions/{mission_id}/vehicles/{name}/hold``."""
+        return await self._call(Call[models.MissionView](
+            "POST",
+            f"/missions/{part(mission_id)}/vehicles/{part(name)}/hold",
+            models.MissionView,
+        ))
+
+    async def resume_vehicle(self, mission_id: str, name: str) -> models.MissionView:
+        """Let a vehicle survey again: ``POST /missions/{mission_id}/vehicles/{name}/resume``."""
+        return await self._call(Call[models.MissionView](
+            "POST",
+            f"/missions/{part(mission_id)}/vehicles/{part(name)}/resume",
+            models.MissionView,
+        ))
+
+    async def add_vehicle(self, mission_id: str, body: models.VehicleSpec | Mapping[str, Any]) -> models.MissionView:
+        """Add a vehicle to a mission: ``POST /missions/{mission_id}/vehicles``."""
+        return await self._call(Call[models.MissionView](
+            "POST",
+            f"/missions/{part(mission_id)}/vehicles",
+            models.MissionView,
+            body=body,
+        ))
+
+    async def rejoin_vehicle(self, mission_id: str, name: str) -> models.MissionView:
+        """Take back a vehicle that left: ``POST /missions/{mission_id}/vehicles/{name}/rejoin``."""
+        return await self._call(Call[models.MissionView](
+            "POST",
+            f"/missions/{part(mission_id)}/vehicles/{part(name)}/rejoin",
+            models.MissionView,
+        ))
+
+    async def remove_vehicle(self, mission_id: str, name: str) -> models.MissionView:
+        """Take a vehicle out of a mission: ``DELETE /missions/{mission_id}/vehicles/{name}``."""
+        return await self._call(Call[models.MissionView](
+            "DELETE",
+            f"/missions/{part(mission_id)}/vehicles/{part(name)}",
+            models.MissionView,
+        ))
+
+    async def forecast_mission(self, mission_id: str, *, floor_depth_m: float | None = None) -> models.ForecastView:
+        """Foretell a mission: ``POST /missions/{mission_id}/forecast``."""
+        return await self._call(Call[models.ForecastView](
+            "POST",
+            f"/missions/{part(mission_id)}/forecast",
+            models.ForecastView,
+            query={"floor_depth_m": floor_depth_m},
+        ))
+
+    async def forecast_description(
+        self,
+        body: models.MissionSpec | Mapping[str, Any],
+        *,
+        floor_depth_m: float | None = None,
+    ) -> models.ForecastView:
+        """Foretell a mission that is being described: ``POST /forecast``."""
+        return await self._call(Call[models.ForecastView](
+            "POST",
+            "/forecast",
+            models.ForecastView,
+            body=body,
+            query={"floor_depth_m": floor_depth_m},
+        ))
+
+    async def post_measurements(
+        self,
+        mission_id: str,
+        body: models.MeasurementBatch | Mapping[str, Any],
+        *,
+        idempotency_key: str | None = None,
+    ) -> models.BatchVerdict:
+        """Post measurements: ``POST /missions/{mission_id}/measurements``."""
+        return await self._call(Call[models.BatchVerdict](
+            "POST",
+            f"/missions/{part(mission_id)}/measurements",
+            models.BatchVerdict,
+            body=body,
+            headers={"idempotency-key": idempotency_key},
+        ))
+
+    async def get_waypoint(
+        self,
+        mission_id: str,
+        name: str,
+        *,
+        after_step: int | None = None,
+        timeout_s: float | None = None,
+    ) -> models.WaypointView | None:
+        """Fetch a vehicle's waypoint: ``GET /missions/{mission_id}/vehicles/{name}/waypoint``."""
+        return await self._call(Call[models.WaypointView | None](
+            "GET",
+            f"/missions/{part(mission_id)}/vehicles/{part(name)}/waypoint",
+            models.WaypointView,
+            query={"after_step": after_step, "timeout_s": timeout_s},
+        ))
+
+    async def get_corrections(self, mission_id: str) -> models.CorrectionsView:
+        """See how soundings are corrected: ``GET /missions/{mission_id}/corrections``."""
+        return await self._call(Call[models.CorrectionsView](
+            "GET",
+            f"/missions/{part(mission_id)}/corrections",
+            models.CorrectionsView,
+        ))
+
+    async def set_tide(
+        self,
+        mission_id: str,
+        body: models.TideCorrection | Mapping[str, Any],
+    ) -> models.CorrectionsView:
+        """Correct the tide: ``PUT /missions/{mission_id}/tide``."""
+        return await self._call(Call[models.CorrectionsView](
+            "PUT",
+            f"/missions/{part(mission_id)}/tide",
+            models.CorrectionsView,
+            body=body,
+        ))
+
+    async def set_sound_speed(
+        self,
+        mission_id: str,
+        body: models.SoundSpeed | Mapping[str, Any],
+    ) -> models.CorrectionsView:
+        """Correct the sound speed: ``PUT /missions/{mission_id}/sound-speed``."""
+        return await self._call(Call[models.CorrectionsView](
+            "PUT",
+            f"/missions/{part(mission_id)}/sound-speed",
+            models.CorrectionsView,
+            body=body,
+        ))
+
+    async def delete_sound_speed(self, mission_id: str) -> models.CorrectionsView:
+        """Take the sonars' own ranges: ``DELETE /missions/{mission_id}/sound-speed``."""
+        return await self._call(Call[models.CorrectionsView](
+            "DELETE",
+            f"/missions/{part(mission_id)}/sound-speed",
+            models.CorrectionsView,
+        ))
+
+    async def get_systematic_errors(self, mission_id: str) -> models.SystematicErrorsView:
+        """See what is always wrong: ``GET /missions/{mission_id}/systematic-errors``."""
+        return await self._call(Call[models.SystematicErrorsView](
+            "GET",
+            f"/missions/{part(mission_id)}/systematic-errors",
+            models.SystematicErrorsView,
+        ))
+
+    async def set_systematic_errors(
+        self,
+        mission_id: str,
+        body: models.SystematicErrors | Mapping[str, Any],
+    ) -> models.CorrectionsView:
+        """Take out what is always wrong: ``PUT /missions/{mission_id}/systematic-errors``."""
+        return await self._call(Call[models.CorrectionsView](
+            "PUT",
+            f"/missions/{part(mission_id)}/systematic-errors",
+            models.CorrectionsView,
+            body=body,
+        ))
+
+    async def delete_systematic_errors(self, mission_id: str) -> models.CorrectionsView:
+        """Take nothing out: ``DELETE /missions/{mission_id}/systematic-errors``."""
+        return await self._call(Call[models.CorrectionsView](
+            "DELETE",
+            f"/missions/{part(mission_id)}/systematic-errors",
+            models.CorrectionsView,
+        ))
+
+    async def get_adjustment(self, mission_id: str) -> models.AdjustmentView:
+        """See how tracks are adjusted: ``GET /missions/{mission_id}/adjustment``."""
+        return await self._call(Call[models.AdjustmentView](
+            "GET",
+            f"/missions/{part(mission_id)}/adjustment",
+            models.AdjustmentView,
+        ))
+
+    async def adjust_tracks(
+        self,
+        mission_id: str,
+        body: models.AdjustmentRequest | Mapping[str, Any] | None = None,
+    ) -> models.AdjustmentView:
+        """Adjust tracks for drift: ``POST /missions/{mission_id}/adjustment``."""
+        return await self._call(Call[models.AdjustmentView](
+            "POST",
+            f"/missions/{part(mission_id)}/adjustment",
+            models.AdjustmentView,
+            body=body,
+        ))
+
+    async def undo_adjustment(self, mission_id: str) -> models.AdjustmentView:
+        """Take positions as they came: ``DELETE /missions/{mission_id}/adjustment``."""
+        return await self._call(Call[models.AdjustmentView](
+            "DELETE",
+            f"/missions/{part(mission_id)}/adjustment",
+            models.AdjustmentView,
+        ))
+
+    async def import_soundings(
+        self,
+        mission_id: str,
+        content: bytes,
+        *,
+        filename: str,
+        source: str | None = None,
+        crs: str | None = None,
+        positive: Literal["down", "up"] | None = None,
+        sd_m: float | None = None,
+        order: models.Order | None = None,
+        datum_offset_m: float | None = None,
+    ) -> models.ImportView:
+        """Begin with soundings or a map from elsewhere: ``POST /missions/{mission_id}/imports``."""
+        return await self._call(Call[models.ImportView](
+            "POST",
+            f"/missions/{part(mission_id)}/imports",
+            models.ImportView,
+            content=content,
+            query={"filename": filename, "source": source, "crs": crs, "positive": positive, "sd_m": sd_m, "order": order, "datum_offset_m": datum_offset_m},
+        ))
+
+    async def list_imports(self, mission_id: str) -> list[models.ImportView]:
+        """List what was imported: ``GET /missions/{mission_id}/imports``."""
+        return await self._call(Call[list[models.ImportView]](
+            "GET",
+            f"/missions/{part(mission_id)}/imports",
+            list[models.ImportView],
+        ))
+
+    async def delete_import(self, mission_id: str, import_id: str) -> None:
+        """Take an import back: ``DELETE /missions/{mission_id}/imports/{import_id}``."""
+        return await self._call(Call[None]("DELETE", f"/missions/{part(mission_id)}/imports/{part(import_id)}", None))
+
+    async def set_reference(
+        self,
+        mission_id: str,
+        content: bytes,
+        *,
+        filename: str,
+        source: str | None = None,
+        crs: str | None = None,
+        positive: Literal["down", "up"] | None = None,
+        sd_m: float | None = None,
+        order: models.Order | None = None,
+        datum_offset_m: float | None = None,
+    ) -> models.ReferenceView:
+        """Compare the map with a grid: ``PUT /missions/{mission_id}/reference``."""
+        return await self._call(Call[models.ReferenceView](
+            "PUT",
+            f"/missions/{part(mission_id)}/reference",
+            models.ReferenceView,
+            content=content,
+            query={"filename": filename, "source": source, "crs": crs, "positive": positive, "sd_m": sd_m, "order": order, "datum_offset_m": datum_offset_m},
+        ))
+
+    async def get_reference(self, mission_id: str) -> models.ReferenceView:
+        """See what the map is compared with: ``GET /missions/{mission_id}/reference``."""
+        return await self._call(Call[models.ReferenceView](
+            "GET",
+            f"/missions/{part(mission_id)}/reference",
+            models.ReferenceView,
+        ))
+
+    async def delete_reference(self, mission_id: str) -> None:
+        """Compare the map with nothing: ``DELETE /missions/{mission_id}/reference``."""
+        return await self._call(Call[None]("DELETE", f"/missions/{part(mission_id)}/reference", None))
+
+    async def get_map(
+        self,
+        mission_id: str,
+        *,
+        layer: list[models.LayerName] | None = None,
+        order: models.Order | None = None,
+    ) -> models.MapView:
+        """See the map: ``GET /missions/{mission_id}/map``."""
+        return await self._call(Call[models.MapView](
+            "GET",
+            f"/missions/{part(mission_id)}/map",
+            models.MapView,
+            query={"layer": layer, "order": order},
+        ))
+
+    async def get_map_overlay(
+        self,
+        mission_id: str,
+        *,
+        layer: models.OverlayLayer | None = None,
+        order: models.Order | None = None,
+        min: float | None = None,
+        max: float | None = None,
+    ) -> bytes:
+        """See the map as a transparent picture: ``GET /missions/{mission_id}/map.overlay.png``."""
+        return await self._call(Call[bytes](
+            "GET",
+            f"/missions/{part(mission_id)}/map.overlay.png",
+            bytes,
+            query={"layer": layer, "order": order, "min": min, "max": max},
+        ))
+
+    async def get_map_tiles(
+        self,
+        mission_id: str,
+        *,
+        since: str | None = None,
+        layer: list[models.FurtherLayer] | None = None,
+        step: int | None = None,
+    ) -> bytes:
+        """Follow the map: ``GET /missions/{mission_id}/map/tiles``."""
+        return await self._call(Call[bytes](
+            "GET",
+            f"/missions/{part(mission_id)}/map/tiles",
+            bytes,
+            query={"since": since, "layer": layer, "step": step},
+        ))
+
+    async def get_quality(self, mission_id: str) -> models.QualityView:
+        """Judge the map: ``GET /missions/{mission_id}/quality``."""
+        return await self._call(Call[models.QualityView](
+            "GET",
+            f"/missions/{part(mission_id)}/quality",
+            models.QualityView,
+        ))
+
+    async def get_uncertainty_budget(self, mission_id: str) -> models.UncertaintyBudgetView:
+        """See where uncertainty comes from: ``GET /missions/{mission_id}/uncertainty-budget``."""
+        return await self._call(Call[models.UncertaintyBudgetView](
+            "GET",
+            f"/missions/{part(mission_id)}/uncertainty-budget",
+            models.UncertaintyBudgetView,
+        ))
+
+    async def get_holidays(self, mission_id: str) -> dict[str, Any]:
+        """See what swath sonars missed: ``GET /missions/{mission_id}/holidays``."""
+        return await self._call(Call[dict[str, Any]]("GET", f"/missions/{part(mission_id)}/holidays", dict[str, Any]))
+
+    async def get_crosslines(self, mission_id: str, *, order: models.Order | None = None) -> models.CrossoversView:
+        """See how well the survey agrees with itself: ``GET /missions/{mission_id}/crosslines``."""
+        return await self._call(Call[models.CrossoversView](
+            "GET",
+            f"/missions/{part(mission_id)}/crosslines",
+            models.CrossoversView,
+            query={"order": order},
+        ))
+
+    async def get_crossovers_file(self, mission_id: str, *, order: models.Order | None = None) -> str:
+        """Download the crossings: ``GET /missions/{mission_id}/crossovers.csv``."""
+        return await self._call(Call[str](
+            "GET",
+            f"/missions/{part(mission_id)}/crossovers.csv",
+            str,
+            query={"order": order},
+        ))
+
+    async def list_products(self, mission_id: str) -> list[models.ProductView]:
+        """List the files: ``GET /missions/{mission_id}/products``."""
+        return await self._call(Call[list[models.ProductView]](
+            "GET",
+            f"/missions/{part(mission_id)}/products",
+            list[models.ProductView],
+        ))
+
+    async def get_holidays_file(self, mission_id: str) -> dict[str, Any]:
+        """Download the holidays: ``GET /missions/{mission_id}/holidays.geojson``."""
+        return await self._call(Call[dict[str, Any]](
+            "GET",
+            f"/missions/{part(mission_id)}/holidays.geojson",
+            dict[str, Any],
+        ))
+
+    async def get_pdf_report(
+        self,
+        mission_id: str,
+        *,
+        lang: models.Language | None = None,
+        order: models.Order | None = None,
+    ) -> bytes:
+        """Download the survey's report as PDF: ``GET /missions/{mission_id}/report.pdf``."""
+        return await self._call(Call[bytes](
+            "GET",
+            f"/missions/{part(mission_id)}/report.pdf",
+            bytes,
+            query={"lang": lang, "order": order},
+        ))
+
+    async def get_html_report(
+        self,
+        mission_id: str,
+        *,
+        lang: models.Language | None = None,
+        order: models.Order | None = None,
+    ) -> bytes:
+        """Download the survey's report as HTML: ``GET /missions/{mission_id}/report.html``."""
+        return await self._call(Call[bytes](
+            "GET",
+            f"/missions/{part(mission_id)}/report.html",
+            bytes,
+            query={"lang": lang, "order": order},
+        ))
+
+    async def get_map_file(
+        self,
+        mission_id: str,
+        format: str,
+        *,
+        order: models.Order | None = None,
+        interval_m: float | None = None,
+        min: float | None = None,
+        max: float | None = None,
+        vehicle: str | None = None,
+    ) -> bytes:
+        """Download the map: ``GET /missions/{mission_id}/map.{format}``."""
+        return await self._call(Call[bytes](
+            "GET",
+            f"/missions/{part(mission_id)}/map.{part(format)}",
+            bytes,
+            query={"order": order, "interval_m": interval_m, "min": min, "max": max, "vehicle": vehicle},
+        ))
+
+    async def get_soundings_file(
+        self,
+        mission_id: str,
+        format: str,
+        *,
+        order: models.Order | None = None,
+        interval_m: float | None = None,
+        min: float | None = None,
+        max: float | None = None,
+        vehicle: str | None = None,
+    ) -> bytes:
+        """Download the soundings: ``GET /missions/{mission_id}/soundings.{format}``."""
+        return await self._call(Call[bytes](
+            "GET",
+            f"/missions/{part(mission_id)}/soundings.{part(format)}",
+            bytes,
+            query={"order": order, "interval_m": interval_m, "min": min, "max": max, "vehicle": vehicle},
+        ))
+
+    async def get_tracks_file(
+        self,
+        mission_id: str,
+        format: str,
+        *,
+        order: models.Order | None = None,
+        interval_m: float | None = None,
+        min: float | None = None,
+        max: float | None = None,
+        vehicle: str | None = None,
+    ) -> bytes:
+        """Download the tracks: ``GET /missions/{mission_id}/tracks.{format}``."""
+        return await self._call(Call[bytes](
+            "GET",
+            f"/missions/{part(mission_id)}/tracks.{part(format)}",
+            bytes,
+            query={"order": order, "interval_m": interval_m, "min": min, "max": max, "vehicle": vehicle},
+        ))
+
+    async def list_layers(self) -> list[models.LayerView]:
+        """List the layers of maps: ``GET /layers``."""
+        return await self._call(Call[list[models.LayerView]]("GET", "/layers", list[models.LayerView]))
+
+    async def get_tile_json(
+        self,
+        mission_id: str,
+        layer: str,
+        *,
+        min: float | None = None,
+        max: float | None = None,
+    ) -> models.TileJson:
+        """See where a layer's tiles are: ``GET /missions/{mission_id}/tiles/{layer}.json``."""
+        return await self._call(Call[models.TileJson](
+            "GET",
+            f"/missions/{part(mission_id)}/tiles/{part(layer)}.json",
+            models.TileJson,
+            query={"min": min, "max": max},
+        ))
+
+    async def get_tile(
+        self,
+        mission_id: str,
+        layer: str,
+        z: int,
+        x: int,
+        y: str,
+        *,
+        min: float | None = None,
+        max: float | None = None,
+    ) -> bytes:
+        """See the map as tiles: ``GET /missions/{mission_id}/tiles/{layer}/{z}/{x}/{y}.png``."""
+        return await self._call(Call[bytes](
+            "GET",
+            f"/missions/{part(mission_id)}/tiles/{part(layer)}/{part(z)}/{part(x)}/{part(y)}.png",
+            bytes,
+            query={"min": min, "max": max},
+        ))
+
+    async def list_soundings(
+        self,
+        mission_id: str,
+        *,
+        state: list[models.SoundingState] | None = None,
+        vehicle: str | None = None,
+        after: int | None = None,
+        limit: int | None = None,
+    ) -> models.SoundingPage:
+        """See which soundings are not in the map, and why: ``GET /missions/{mission_id}/soundings``."""
+        return await self._call(Call[models.SoundingPage](
+            "GET",
+            f"/missions/{part(mission_id)}/soundings",
+            models.SoundingPage,
+            query={"state": state, "vehicle": vehicle, "after": after, "limit": limit},
+        ))
+
+    async def restore_sounding(
+        self,
+        mission_id: str,
+        sounding_id: int,
+        body: models.ActionRequest | Mapping[str, Any] | None = None,
+    ) -> models.SoundingView:
+        """Let a sounding count: ``POST /missions/{mission_id}/soundings/{sounding_id}/restore``."""
+        return await self._call(Call[models.SoundingView](
+            "POST",
+            f"/missions/{part(mission_id)}/soundings/{part(sounding_id)}/restore",
+            models.SoundingView,
+            body=body,
+        ))
+
+    async def reject_sounding(
+        self,
+        mission_id: str,
+        sounding_id: int,
+        body: models.ActionRequest | Mapping[str, Any] | None = None,
+    ) -> models.SoundingView:
+        """Keep a sounding out: ``POST /missions/{mission_id}/soundings/{sounding_id}/reject``."""
+        return await self._call(Call[models.SoundingView](
+            "POST",
+            f"/missions/{part(mission_id)}/soundings/{part(sounding_id)}/reject",
+            models.SoundingView,
+            body=body,
+        ))
+
+    async def list_pings(self, mission_id: str) -> models.PingsView:
+        """See which pings there are: ``GET /missions/{mission_id}/pings``."""
+        return await self._call(Call[models.PingsView]("GET", f"/missions/{part(mission_id)}/pings", models.PingsView))
+
+    async def get_pings(self, mission_id: str, number: int) -> bytes:
+        """Fetch a file of pings: ``GET /missions/{mission_id}/pings/{number}``."""
+        return await self._call(Call[bytes]("GET", f"/missions/{part(mission_id)}/pings/{part(number)}", bytes))
+
+    async def list_targets(self, mission_id: str) -> list[models.TargetView]:
+        """See what is known of a mission's moving targets: ``GET /missions/{mission_id}/targets``."""
+        return await self._call(Call[list[models.TargetView]](
+            "GET",
+            f"/missions/{part(mission_id)}/targets",
+            list[models.TargetView],
+        ))
+
+    async def list_target_ranges(
+        self,
+        mission_id: str,
+        *,
+        target: str | None = None,
+        after: int | None = None,
+        limit: int | None = None,
+    ) -> models.TargetRangePage:
+        """See the ranges to targets, and which were used: ``GET /missions/{mission_id}/targets/ranges``."""
+        return await self._call(Call[models.TargetRangePage](
+            "GET",
+            f"/missions/{part(mission_id)}/targets/ranges",
+            models.TargetRangePage,
+            query={"target": target, "after": after, "limit": limit},
+        ))
+
+    async def post_scans(self, mission_id: str, body: models.ScanBatch | Mapping[str, Any]) -> models.BatchVerdict:
+        """Post scans: ``POST /missions/{mission_id}/scans``."""
+        return await self._call(Call[models.BatchVerdict](
+            "POST",
+            f"/missions/{part(mission_id)}/scans",
+            models.BatchVerdict,
+            body=body,
+        ))
+
+    async def get_search(self, mission_id: str, *, after: int | None = None) -> models.SearchGridView | None:
+        """See the site of a search as known now: ``GET /missions/{mission_id}/search``."""
+        return await self._call(Call[models.SearchGridView | None](
+            "GET",
+            f"/missions/{part(mission_id)}/search",
+            models.SearchGridView,
+            query={"after": after},
+        ))
+
+    async def get_search_obstacles(self, mission_id: str) -> dict[str, Any]:
+        """Download the obstacles of a search as GeoJSON: ``GET /missions/{mission_id}/search/obstacles.geojson``."""
+        return await self._call(Call[dict[str, Any]](
+            "GET",
+            f"/missions/{part(mission_id)}/search/obstacles.geojson",
+            dict[str, Any],
+        ))
+
+    async def get_events(
+        self,
+        mission_id: str,
+        *,
+        after: int | None = None,
+        limit: int | None = None,
+    ) -> list[models.EventView]:
+        """Follow or read a mission's log: ``GET /missions/{mission_id}/events``."""
+        return await self._call(Call[list[models.EventView]](
+            "GET",
+            f"/missions/{part(mission_id)}/events",
+            list[models.EventView],
+            query={"after": after, "limit": limit},
+        ))
+
+    async def list_vehicles(self) -> list[models.VehicleView]:
+        """List the vehicles: ``GET /vehicles``."""
+        return await self._call(Call[list[models.VehicleView]]("GET", "/vehicles", list[models.VehicleView]))
+
+    async def examine_links(self) -> models.DoctorView:
+        """Say what is missing: ``GET /doctor``."""
+        return await self._call(Call[models.DoctorView]("GET", "/doctor", models.DoctorView))
+
+    async def list_planners(self) -> list[models.PlannerView]:
+        """List the planners: ``GET /planners``."""
+        return await self._call(Call[list[models.PlannerView]]("GET", "/planners", list[models.PlannerView]))
+
+    async def list_audit(
+        self,
+        *,
+        before: int | None = None,
+        days: float | None = None,
+        actor: str | None = None,
+        mission: str | None = None,
+        limit: int | None = None,
+    ) -> list[models.AuditEntry]:
+        """See who commanded what: ``GET /audit``."""
+        return await self._call(Call[list[models.AuditEntry]](
+            "GET",
+            "/audit",
+            list[models.AuditEntry],
+            query={"before": before, "days": days, "actor": actor, "mission": mission, "limit": limit},
+        ))
+
+    async def get_session(self) -> models.SessionView:
+        """See who you are: ``GET /session``."""
+        return await self._call(Call[models.SessionView]("GET", "/session", models.SessionView))
+
+    async def sign_in(self) -> models.SessionView:
+        """Sign a browser in: ``POST /session``."""
+        return await self._call(Call[models.SessionView]("POST", "/session", models.SessionView))
+
+    async def sign_out(self) -> None:
+        """Sign a browser out: ``DELETE /session``."""
+        return await self._call(Call[None]("DELETE", "/session", None))
+
+    async def get_health(self) -> models.ComponentHealth:
+        """See the service's health: ``GET /health``."""
+        return await self._call(Call[models.ComponentHealth]("GET", "/health", models.ComponentHealth))
+
+    async def get_liveness(self) -> models.Liveness:
+        """Is the process alive: ``GET /health/live``."""
+        return await self._call(Call[models.Liveness]("GET", "/health/live", models.Liveness))
+
+    async def get_readiness(self) -> models.ComponentHealth:
+        """Can it do its work: ``GET /health/ready``."""
+        return await self._call(Call[models.ComponentHealth]("GET", "/health/ready", models.ComponentHealth))
+
+    async def get_metrics(self) -> str:
+        """Measurements for Prometheus: ``GET /metrics``."""
+        return await self._call(Call[str]("GET", "/metrics", str))

@@ -1,0 +1,120 @@
+"""What both clients share of their streams: where to go on, what is a message, when to give up."""
+
+from __future__ import annotations
+
+import ssl
+from collections.abc import Collection
+from typing import Annotated, get_args
+
+import httpx
+from httpx_sse import ServerSentEvent
+from pydantic import Field, TypeAdapter
+from pydantic_core import from_json
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+
+from bathyfleet.client.call import part
+from bathyfleet.client.models import EventView, LiveMessage, MissionView, Problem
+from bathyfleet.client.problems import MEDIA_TYPE, EndedError, ProblemError, made_up, raised
+
+ENDED = ("finished", "aborted", "failed")
+QUIET_S = 45.0
+"""The service says something at least every 15 s; a stream that is silent for longer is dead."""
+LARGEST_MESSAGE = 64 << 20
+REFUSALS = {4401: 401, 4403: 403, 4404: 404, 4429: 429}
+"""Codes that a live socket is closed with for good, and the HTTP status that says the same."""
+
+_messages: TypeAdapter[LiveMessage] = TypeAdapter(Annotated[LiveMessage, Field(discriminator="type")])
+_kinds = frozenset(get_args(message.model_fields["type"].annotation)[0] for message in get_args(LiveMessage))
+
+
+class LogPlace:
+    """How far a mission's log was read."""
+
+    def __init__(self, mission_id: str, after: int) -> None:
+        self._mission_id = mission_id
+        self.newest = after
+
+    @property
+    def name(self) -> str:
+        """What is read, for messages."""
+        return f"events of mission {self._mission_id}"
+
+    def request(self, client: httpx.Client | httpx.AsyncClient) -> httpx.Request:
+        """Return the request that goes on after the newest entry."""
+        return client.build_request(
+            "GET",
+            f"/api/v1/missions/{part(self._mission_id)}/events",
+            headers={"Accept": "text/event-stream", "Last-Event-ID": str(self.newest)},
+            timeout=httpx.Timeout(QUIET_S, connect=10.0),
+        )
+
+    def take(self, event: ServerSentEvent) -> EventView | None:
+        """Return the entry that an event brings, if it is a new one."""
+        if not event.data:
+            return None
+        entry = EventView.model_validate_json(event.data)
+        if entry.id <= self.newest:
+            return None
+        self.newest = entry.id
+        return entry
+
+
+def ends(entry: EventView) -> bool:
+    """Tell whether with this entry of its log a mission has ended."""
+    return entry.kind == "state" and entry.data.get("state") in ENDED
+
+
+def is_reached(mission: MissionView, states: Collection[str]) -> bool:
+    """Tell whether a mission is in one of the states, or has ended where none is named.
+
+    Raises
+    ------
+    EndedError
+        When it has ended in a state that is none of these.
+    """
+    if mission.state in (states or ENDED):
+        return True
+    if mission.state in ENDED:
+        wanted = " or ".join(states)
+        raise EndedError(
+            f"mission {mission.id} is {mission.state}, not {wanted}: {mission.reason or 'no reason given'}"
+        )
+    return False
+
+
+def message_of(text: str | bytes) -> LiveMessage | None:
+    """Return a message of a live socket; None for a kind that this client does not know."""
+    value = from_json(text)
+    return _messages.validate_python(value) if value.get("type") in _kinds else None
+
+
+def refusal(error: Exception, name: str) -> ProblemError | None:
+    """Return why a live socket is closed for good; None where connecting again may help."""
+    if isinstance(error, ConnectionClosed) and error.rcvd is not None and error.rcvd.code in REFUSALS:
+        return raised(made_up(REFUSALS[error.rcvd.code], error.rcvd.reason, name))
+    if isinstance(error, InvalidStatus):
+        answer = error.response
+        if answer.status_code in (httpx.codes.TOO_MANY_REQUESTS, httpx.codes.SERVICE_UNAVAILABLE):
+            return None
+        if (answer.headers.get("content-type") or "").startswith(MEDIA_TYPE):
+            return raised(Problem.model_validate_json(answer.body or b""))
+        return raised(made_up(answer.status_code, "", name))
+    return None
+
+
+def live_address(address: str, mission_id: str) -> str:
+    """Return the address of a mission's live socket."""
+    return f"ws{address.removeprefix('http')}/api/v1/missions/{part(mission_id)}/live"
+
+
+def tls_of(address: str, verify: bool | ssl.SSLContext) -> ssl.SSLContext | None:
+    """Return how the other end of a live socket is checked; None without HTTPS."""
+    if not address.startswith("https"):
+        return None
+    if isinstance(verify, ssl.SSLContext):
+        return verify
+    context = ssl.create_default_context()
+    if not verify:
+        context.check_hostname = False
+        context.verify_mode = ssl.CERT_NONE
+    return context

@@ -1,0 +1,154 @@
+"""The file for computers without internet, with small packages in place of the large ones."""
+
+import hashlib
+import platform
+import subprocess
+import sys
+import tarfile
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from app.deploy import bundle as module
+from app.deploy.bundle import BundleError, bundle
+
+MACHINE = platform.machine()
+PYTHON = f"{sys.version_info.major}.{sys.version_info.minor}"
+PLAIN = "py3-none-any"
+
+
+def make_wheel(folder: Path, name: str, version: str, tag: str = PLAIN, *, needs: str = "", code: str = "") -> Path:
+    path, info = folder / f"{name}-{version}-{tag}.whl", f"{name}-{version}.dist-info"
+    metadata = f"Metadata-Version: 2.1\nName: {name}\nVersion: {version}\n"
+    with zipfile.ZipFile(path, "w") as wheel:
+        wheel.writestr(f"{name}.py", code)
+        wheel.writestr(f"{name}-{version}.data/data/lib/systemd/system/{name}.service", "ExecStart=/opt/bathyfleet/x")
+        wheel.writestr(f"{info}/METADATA", metadata + (f"Requires-Dist: {needs}\n" if needs else ""))
+        wheel.writestr(f"{info}/WHEEL", f"Wheel-Version: 1.0\nRoot-Is-Purelib: true\nTag: {tag}\n")
+        wheel.writestr(f"{info}/entry_points.txt", f"[console_scripts]\n{name} = {name}:main\n" if needs else "")
+        wheel.writestr(f"{info}/RECORD", "")
+    return path
+
+
+@pytest.fixture
+def index(tmp_path: Path) -> Path:
+    """Packages to choose from: pip itself, and a dependency for two kinds of computers."""
+    folder = tmp_path / "index"
+    folder.mkdir()
+    for machine in ("x86_64", "aarch64"):
+        code = f"def told() -> str:\n    return 'depth on {machine}'\n"
+        make_wheel(folder, "sounder", "2.0", f"py3-none-manylinux_2_24_{machine}", code=code)
+    make_wheel(folder, "sounder", "3.0", "py3-none-manylinux_2_40_x86_64", code="too new a C library")
+    make_wheel(folder, "sounder", "3.0", "py3-none-manylinux_2_40_aarch64", code="too new a C library")
+    _pack_pip(folder)
+    return folder
+
+
+def _pack_pip(folder: Path) -> None:
+    """Make pip's wheel again from what is installed of it."""
+    import pip
+
+    here = Path(pip.__file__).parent
+    with zipfile.ZipFile(folder / f"pip-{pip.__version__}-{PLAIN}.whl", "w") as wheel:
+        (info,) = here.parent.glob("pip-*.dist-info")
+        for path in [*here.rglob("*.py"), *here.rglob("*.pem"), *here.rglob("*.txt"), *info.rglob("*")]:
+            if path.is_file() and path.name not in ("RECORD", "INSTALLER", "REQUESTED"):
+                wheel.write(path, path.relative_to(here.parent))
+        wheel.writestr(f"{info.name}/RECORD", "")
+
+
+@pytest.fixture
+def boat(tmp_path: Path) -> Path:
+    code = "import sounder\ndef main() -> None:\n    print('boat 1.0:', sounder.told())\n"
+    return make_wheel(tmp_path, "boat", "1.0", needs="sounder>=2", code=code)
+
+
+def made(boat: Path, index: Path, machine: str = MACHINE) -> Path:
+    options = ["--no-index", "--find-links", str(index)]
+    return bundle(boat, machine, boat.parent / "dist", command="boat", pip_options=options)
+
+
+def unpacked(file: Path, folder: Path) -> Path:
+    with tarfile.open(file) as archive:
+        archive.extractall(folder, filter="data")
+    return folder / file.name.removesuffix(".tar")
+
+
+def install(files: Path, folder: Path) -> "subprocess.CompletedProcess[str]":
+    variables = {
+        "PATH": "/usr/bin:/bin",
+        "PYTHON": sys.executable,
+        "HOME": str(folder.parent),
+        "PIP_INDEX_URL": "http://none.invalid",
+    }
+    return subprocess.run(
+        ["sh", files / "install.sh", folder], env=variables, capture_output=True, text=True, check=False
+    )
+
+
+def test_it_installs_upgrades_and_keeps_the_version_before(boat: Path, index: Path, tmp_path: Path) -> None:
+    file = made(boat, index)
+    assert file.name == f"boat-1.0-python{PYTHON}-linux-{MACHINE}.tar"
+    files, folder = unpacked(file, tmp_path / "stick"), tmp_path / "opt" / "boat"
+    first = install(files, folder)
+    assert (first.returncode, first.stderr) == (0, "")
+    told = subprocess.run([folder / "bin" / "boat"], capture_output=True, text=True, check=True).stdout
+    assert told == f"boat 1.0: depth on {MACHINE}\n"
+    assert (folder / "lib/systemd/system/boat.service").read_text() == f"ExecStart={folder}/x"
+    second = install(files, folder)
+    assert second.stdout == f"boat 1.0 is in {folder}, the version before in {folder}.old\n"
+    subprocess.run([folder / "bin" / "boat"], check=True)
+
+
+@pytest.mark.parametrize("victim", ["wheels/sounder-2.0", "requirements.txt", "install.sh"])
+def test_a_damaged_file_is_not_installed(boat: Path, index: Path, tmp_path: Path, victim: str) -> None:
+    files, folder = unpacked(made(boat, index), tmp_path / "stick"), tmp_path / "boat"
+    (path,) = (path for path in files.rglob("*") if str(path.relative_to(files)).startswith(victim))
+    path.write_bytes(path.read_bytes() + b"\n# x")
+    done = install(files, folder)
+    assert done.returncode == 1
+    assert "a file is damaged or missing: copy the whole file again" in done.stderr
+    assert not folder.exists()
+
+
+def test_a_wheel_that_was_added_is_not_taken(boat: Path, index: Path, tmp_path: Path) -> None:
+    files, folder = unpacked(made(boat, index), tmp_path / "stick"), tmp_path / "boat"
+    make_wheel(files / "wheels", "sounder", "2.0", PLAIN, code="def told() -> str:\n    return 'a lie'\n")
+    if install(files, folder).returncode == 0:
+        told = subprocess.run([folder / "bin" / "boat"], capture_output=True, text=True, check=True).stdout
+        assert "a lie" not in told
+
+
+def test_another_kind_of_computer_gets_its_own_wheels_and_refuses_others(
+    boat: Path, index: Path, tmp_path: Path
+) -> None:
+    (other,) = {"x86_64", "aarch64"} - {MACHINE}
+    files = unpacked(made(boat, index, other), tmp_path / "stick")
+    assert [path.name for path in files.glob("wheels/sounder*")] == [f"sounder-2.0-py3-none-manylinux_2_24_{other}.whl"]
+    done = install(files, tmp_path / "boat")
+    assert done.returncode == 1
+    assert f"these files are for Linux on {other}, this is Linux on {MACHINE}" in done.stderr
+
+
+def test_the_same_wheels_give_the_same_file(boat: Path, index: Path) -> None:
+    digests = {hashlib.sha256(made(boat, index).read_bytes()).hexdigest() for _ in range(2)}
+    assert len(digests) == 1
+
+
+def test_what_cannot_be_put_in_is_said(
+    boat: Path, index: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with pytest.raises(BundleError, match="'riscv64' is not one of x86_64, aarch64"):
+        made(boat, index, "riscv64")
+    needy = make_wheel(tmp_path, "needy", "1.0", needs="oarlock", code="")
+    with pytest.raises(BundleError, match="oarlock"):
+        made(needy, index)
+    monkeypatch.setattr(module, "LIMIT_BYTES", 1000)
+    with pytest.raises(BundleError, match="more than 0"):
+        made(boat, index)
+    empty = tmp_path / "empty-1.0-py3-none-any.whl"
+    with zipfile.ZipFile(empty, "w"):
+        pass
+    with pytest.raises(BundleError, match="is no wheel"):
+        made(empty, index)
