@@ -155,9 +155,9 @@ async def _stream(state: EdgeState, mission_id: str, start: int, request: Reques
         unwelcome = asyncio.create_task(until_unwelcome(request, state))
         try:
             async for message in _until_either(aiter(messages), state.stopping, unwelcome):
+                # Two that were written at the same moment may come in either order.
                 if isinstance(message, EventMessage) and message.event.id > sent:
                     yield _sse(message.event)
-                    sent = message.event.id
         except WatchEndedError:
             return  # the client reconnects with its Last-Event-ID and misses nothing
         finally:

@@ -15,6 +15,7 @@ from pydantic import TypeAdapter
 from app.api.tokens import Role, TokenStore
 from app.main import Server
 from app.missions.views.messages import LiveMessage
+from app.missions.views.mission import Level
 from app.settings import Settings
 from app.storage.database import Database
 from tests.support.rest import make_client, mission_spec, running, soundings
@@ -73,6 +74,24 @@ async def test_a_stream_resumes_without_gap_or_repetition(client: httpx.AsyncCli
         headers = {"Last-Event-ID": str(stored[done - 1]["id"])} if done else {}
         async with aconnect_sse(client, "GET", f"{path}/events", headers=headers) as source:
             assert await take(source.aiter_sse(), len(stored) - done) == stored[done:]
+
+
+async def test_lines_that_are_told_in_another_order_than_written_all_reach_the_stream(
+    server: Server, client: httpx.AsyncClient, mission: dict[str, Any]
+) -> None:
+    live = await server.config.app.state.edge.service.get(mission["id"])
+    async with aconnect_sse(client, "GET", f"/missions/{mission['id']}/events") as source:
+        stream = source.aiter_sse()
+        await take(stream, 1)
+        one, other = (live.journal.line(Level.INFO, "note", words) for words in ("written first", "written later"))
+        async with live.database.writing() as session:
+            session.add(one)
+            await session.flush()
+            session.add(other)
+        live.journal.tell(other)
+        live.journal.tell(one)
+        told = await take(stream, 2)
+    assert [entry["message"] for entry in told] == ["written later", "written first"]
 
 
 async def test_a_wrong_last_event_id_is_named(client: httpx.AsyncClient, mission: dict[str, Any]) -> None:

@@ -296,8 +296,9 @@ class Journal(WriteBehind[Noted]):
 
     async def write(self, row: EventRow) -> None:
         """Write a line now and show it; raises when that cannot be."""
-        await to_the_end(self._add(row))
-        self.tell(row)
+        async with self._logging:
+            await to_the_end(self._add(row))
+            self.tell(row)
 
     async def _add(self, *rows: EventRow) -> None:
         async with self._database.writing() as session:
