@@ -266,6 +266,17 @@ class MapBuilder:
         self._version += 1
         return BuiltMap(self._version, len(self._soundings), bathymetry, digest, thorough)
 
+    def own_map(self) -> BathymetricMap | None:
+        """Return the map of the mission's own soundings, without those that were imported; None where it has none.
+
+        It is of what the newest map was made of; outliers that were told by then are left out.
+        """
+        with self._building:
+            if self.swath.beams:
+                measured = self.swath.map(self._soundings)
+                return None if measured is None else without_guesses(measured)
+            return self._measured() if len(self._soundings) else None
+
     def _with_margin(self, bathymetry: BathymetricMap) -> BathymetricMap:
         """Ask more of cells that were not known in the newest map."""
         bound = bathymetry.claim_sd_m
