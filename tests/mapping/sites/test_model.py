@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from app.arrays import FloatArray
-from app.mapping.sites import Survey, fuse_surveys
+from app.mapping.sites import SiteFusion, Survey, fuse_surveys
 from app.mapping.sites.model import CHANGED, NONE, YEAR_S
 from app.mapping.types import Grid
 
@@ -38,7 +38,7 @@ def seen(draw: st.DrawFn) -> list[Survey]:
 def slow_model(surveys: list[Survey], yearly_m: float, row: int, col: int) -> tuple[float, float, int, int]:
     """Depth, variance, newest survey and how many count, of one cell, in plain words."""
     depth, variance, newest, number, then_s = math.nan, math.nan, NONE, 0, 0.0
-    for index, one in sorted(enumerate(surveys), key=lambda item: item[1].time_s):
+    for index, one in enumerate(sorted(surveys, key=lambda item: item.time_s)):
         z, noise = one.depth_m[row, col], one.sd_m[row, col] ** 2 + one.shared_sd_m**2
         if math.isnan(z):
             continue
@@ -124,3 +124,18 @@ def test_a_survey_on_another_grid_is_refused() -> None:
     other = replace(survey(1.0, 0.1, 0.0), grid=replace(GRID, cell_m=2.0))
     with pytest.raises(ValueError, match="resample it first"):
         fuse_surveys(GRID, [other], 0.0, NOW_S)
+
+
+def test_a_survey_out_of_turn_is_refused() -> None:
+    fusion = SiteFusion(GRID, 0.0)
+    fusion.add(survey(1.0, 0.1, 2.0))
+    with pytest.raises(ValueError, match="older ones first"):
+        fusion.add(survey(1.0, 0.1, 1.0))
+
+
+def test_each_survey_tells_how_much_of_what_was_known_it_found_changed() -> None:
+    fusion = SiteFusion(GRID, 0.0)
+    assert math.isnan(fusion.add(survey(10.0, 0.1, 1.0)))
+    depth = np.full((3, 4), 10.1)
+    depth[0, :3], depth[2, 1:] = 11.0, np.nan
+    assert fusion.add(survey(depth, 0.1, 2.0)) == pytest.approx(3 / 9)
