@@ -45,7 +45,7 @@ class SiteModel:
     @property
     def known(self) -> BoolArray:
         """Return where something is known, (rows, cols)."""
-        return self.newest != NONE
+        return np.asarray(self.newest != NONE)
 
 
 class SiteFusion:
@@ -53,7 +53,7 @@ class SiteFusion:
 
     A floor that changes at random has, after each year, another independent change of the deviation
     ``yearly_change_m``: the variance of what was known grows by its square a year. So a Kalman filter of one state a
-    cell takes the surveys in; that gives the mean of all, weighted by their precision, where nothing ever changes. Where
+    cell takes the surveys in; that gives the mean of all, weighted by precision, where nothing ever changes. Where
     a survey differs from what was foretold by more than ``CHANGED`` deviations, the floor is not the one that was
     surveyed before: the newer survey counts alone.
     """
@@ -64,7 +64,7 @@ class SiteFusion:
         shape = (grid.rows, grid.cols)
         self._depth, self._variance = np.full(shape, np.nan), np.full(shape, np.nan)
         self._sounded = np.zeros(shape, dtype=bool)
-        self._newest, self._number = np.full(shape, NONE, dtype=np.int32), np.zeros(shape, dtype=np.int32)
+        self._newest, self._number = np.full(shape, NONE), np.zeros(shape, dtype=np.int64)
         self._taken = 0
         self._at_s = -np.inf
 

@@ -31,7 +31,7 @@ class Survey:
     shared_sd_m
         Standard deviation of what all its depths share, such as the water level.
     correlation_length_m
-        How far its errors belong together.
+        How far its errors belong together: taken to be as far as depths do, which is the most they can.
     """
 
     grid: Grid

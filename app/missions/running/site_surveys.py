@@ -1,4 +1,4 @@
-"""What a mission that ended found of its site: made of its own soundings alone, stored once, made anew when they change."""
+"""What a mission that ended found of its site: of its own soundings alone, made anew when they change."""
 
 import hashlib
 from typing import Any
