@@ -211,8 +211,8 @@ async def test_a_mission_counts_once_and_as_it_is_corrected_later(client: httpx.
     assert after["vertical_datum"].startswith("EPSG:5861")
     assert np.array(after["count"]).max() == 1
 
-    (worst,) = (await get(client, f"/missions/{mission}/soundings", limit=1))["items"]
-    ruled = await client.put(f"/missions/{mission}/soundings/{worst['id']}/ruling", json={"ruling": "rejected"})
+    (worst,) = (await get(client, f"/missions/{mission}/soundings", state="used", limit=1))["items"]
+    ruled = await client.post(f"/missions/{mission}/soundings/{worst['id']}/reject")
     assert ruled.status_code == 200, ruled.text
     listed = await get(client, f"/sites/{site}/surveys")
     assert [one["soundings"] for one in listed] == [399]

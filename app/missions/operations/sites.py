@@ -294,8 +294,8 @@ class Sites:
 
         def compute() -> SiteChange:
             facts = _facts(site_id, spec)
-            surveys = [_placed(contents[one.mission_id][1], facts) for one in pair]
-            return SiteChange(facts, compare(*surveys, confidence), *surveys, pair)
+            before, after = (_placed(contents[one.mission_id][1], facts) for one in pair)
+            return SiteChange(facts, compare(before, after, confidence), before, after, pair)
 
         async with self._fusing:
             return await asyncio.to_thread(compute)
