@@ -128,7 +128,7 @@ class MissionService:
         """Files that missions begin with or are compared with."""
         self.reports = Reports(self.maps, settings.provider)
         """Reports of surveys."""
-        self.sites = Sites(database, self.get, self.maps, self.imports)
+        self.sites = Sites(database, self.get, self.maps, self.imports, lambda: self._started)
         """Places that are surveyed again and again."""
         self._started = False
 

@@ -13,6 +13,7 @@ import rasterio
 from app.settings import Settings
 from tests.support.missions.specs import lon_lat, rectangle
 from tests.support.rest import Guarded, make_client, mission_spec, running
+from tests.support.waiting import until
 
 SIDE_M = 40.0
 SITE: dict[str, Any] = {"name": "Harbour mouth", "area": rectangle(0, 0, SIDE_M, SIDE_M), "cell_m": 2.0}
@@ -315,3 +316,43 @@ async def test_who_may_look_may_not_change(guarded: Guarded) -> None:
     assert (await client.delete(f"/sites/{site}", headers=viewer)).status_code == 403
     assert (await client.get(f"/sites/{site}/surveys", headers=viewer)).json() == []
     assert (await client.get("/sites")).status_code == 401
+
+
+async def test_two_processes_tell_the_same_of_a_site(make_settings: Callable[..., Settings]) -> None:
+    settings = make_settings()
+    async with (
+        running(settings) as one,
+        running(settings) as two,
+        make_client(one) as at_one,
+        make_client(two) as at_two,
+    ):
+        site = await new_site(at_one)
+        mission = await surveyed(at_one, site, START_S)
+        first = await get(at_one, f"/sites/{site}/map")
+        other = await get(at_two, f"/sites/{site}/map")
+        assert (other["depth_m"], other["surveys"]) == (first["depth_m"], first["surveys"])
+
+        # Corrected by the other one, which sends that on.
+        corrected = await at_two.put(f"/missions/{mission}/tide", json={"level_m": 2.0})
+        assert corrected.status_code == 200, corrected.text
+
+        async def corrected_there() -> bool:
+            answer = await at_two.get(f"/sites/{site}/map")
+            return answer.status_code == 200 and bool(
+                np.allclose(array(answer.json()["depth_m"]), array(first["depth_m"]) - 2.0, atol=0.05)
+            )
+
+        # The process that has the mission maps it anew without being asked.
+        await until(corrected_there, "the site's map is that of corrected depths")
+        begun = await new_mission(at_two, site)
+        assert len(await get(at_two, f"/missions/{begun}/imports")) == 1
+
+
+async def test_soundings_that_come_after_the_end_count_as_well(client: httpx.AsyncClient) -> None:
+    site = await new_site(client)
+    mission = await surveyed(client, site, START_S, north_to_m=20.0)
+    before = (await get(client, f"/sites/{site}/map"))["known_pct"]
+    late = soundings(START_S)[len(soundings(START_S, north_to_m=20.0)) :]
+    await post(client, mission, late)
+    assert (await get(client, f"/sites/{site}/map"))["known_pct"] == 100.0 > before
+    assert len(await get(client, f"/sites/{site}/surveys")) == 1

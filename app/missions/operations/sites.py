@@ -85,6 +85,8 @@ class Sites:
         Makes what is missing of missions' surveys.
     imports
         Lets a mission begin with a site's depths.
+    makes
+        Tells whether this process has missions of its own, whose surveys it makes; else it only reads.
     """
 
     def __init__(
@@ -93,11 +95,13 @@ class Sites:
         get: Callable[[str], Awaitable[LiveMission]],
         maps: FinalMaps,
         imports: Imports,
+        makes: Callable[[], bool],
     ) -> None:
         self._database = database
         self._get = get
         self._maps = maps
         self._imports = imports
+        self._makes = makes
         self._fused: OrderedDict[tuple[Any, ...], _Fused] = OrderedDict()
         # One model at a time takes its memory.
         self._fusing = asyncio.Lock()
@@ -308,7 +312,7 @@ class Sites:
             behind = [
                 one.id for one in missions if one.state in ENDED and not await site_queries.is_current(session, one.id)
             ]
-        for mission_id in behind:
+        for mission_id in behind if self._makes() else ():
             try:
                 self._maps.survey(await self._get(mission_id))
             except MissionElsewhereError:
