@@ -479,6 +479,7 @@ def install(app: FastAPI) -> None:
         TargetNotFoundError,
         ImportNotFoundError,
         AlarmNotFoundError,
+        SiteNotFoundError,
         ImportUnavailableError,
         FileTooLargeError,
         MapNotReadyError,

@@ -288,7 +288,7 @@ async def test_changes_of_missions_that_are_not_there_are_refused_by_name(client
         ({"from": "nobody"}, 422, "no mission of the site"),
         ({"to": running_}, 404, "no depth yet"),
         ({"from": first, "to": first}, 422, "the same survey"),
-        ({"confidence": 1.0}, 400, "confidence"),
+        ({"confidence": 1.0}, 422, "confidence"),
     ):
         answer = await client.get(f"/sites/{site}/changes", params=query)
         assert (answer.status_code, word in answer.text) == (status, True), answer.text

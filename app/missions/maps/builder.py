@@ -248,7 +248,7 @@ class MapBuilder:
             new = np.zeros(len(self._soundings) - len(self._trusted), dtype=bool)
             self._trusted = np.concatenate([self._trusted, new])
 
-    def _build(self, *, thorough: bool) -> BuiltMap:
+    def _build(self, *, thorough: bool) -> BuiltMap | None:
         bathymetry = self._prior
         measured = self.swath.map(self._soundings) if self.swath.beams else None
         if measured is None and len(self._soundings):
@@ -256,7 +256,7 @@ class MapBuilder:
         if measured is not None:
             bathymetry = measured if bathymetry is None else fuse(measured, bathymetry)
         if bathymetry is None:
-            raise ValueError("there is no sounding to make a map of")
+            return None  # Every beam so far fell outside of the area.
         bathymetry = self._with_margin(bathymetry)
         # Vehicles rather believe a guess than nothing; people are shown none.
         self._believed = bathymetry
