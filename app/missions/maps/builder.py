@@ -267,11 +267,16 @@ class MapBuilder:
         return BuiltMap(self._version, len(self._soundings), bathymetry, digest, thorough)
 
     def own_map(self) -> BathymetricMap | None:
-        """Return the map of the mission's own soundings, without those that were imported; None where it has none.
+        """Return the map of the mission's own soundings, without those that were imported.
 
-        It is of what the newest map was made of; outliers that were told by then are left out.
+        It is of what the newest map was made of; outliers that were told by then are left out. None where it has
+        none, or they are not in memory.
         """
         with self._building:
+            if self.arrivals.at_rest:
+                return None
+            if self._prior is None and self._newest is not None:
+                return self._newest.map
             if self.swath.beams:
                 measured = self.swath.map(self._soundings)
                 return None if measured is None else without_guesses(measured)
