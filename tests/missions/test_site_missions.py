@@ -1,4 +1,4 @@
-"""Two simulated surveys of one site whose floor is dredged between them."""
+"""Missions of a site: they begin with its depths, and it keeps what they found; its floor is dredged between two."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -7,12 +7,16 @@ from typing import Any
 import numpy as np
 
 from app.missions.operations.imports import imports_of
+from app.missions.operations.measurements import measure
 from app.missions.settings import ServiceSettings
 from app.missions.spec.mission import MissionSpec
 from app.missions.spec.site import SiteSpec
 from app.missions.states import MissionState
-from tests.support.missions.harbour import Harbour, act, until_state
-from tests.support.missions.specs import LAT, LON, rectangle, spec_json
+from app.storage.database import Database
+from app.storage.retention import remove
+from tests.support.missions.harbour import Harbour, act, sim_spec, until_state
+from tests.support.missions.measured import measured
+from tests.support.missions.specs import LAT, LON, make_spec, rectangle, spec_json
 
 SIDE_M = 50.0
 PIT_M = (18.0, 32.0)
@@ -85,3 +89,41 @@ async def test_the_second_survey_begins_with_the_first_and_finds_what_was_dredge
         assert np.median(model.depth_m[inside] - known.depth_m[inside]) > 0.9 * DUG_M
     finally:
         await harbour.close()
+
+
+async def test_a_mission_takes_the_depths_of_its_site_as_they_are_when_it_starts(harbour: Harbour) -> None:
+    service = harbour.service
+    site = (await service.sites.create(SiteSpec.model_validate(SITE))).id
+    waiting = (await service.create(sim_spec(steps=2, site=site))).id
+    assert await imports_of(await service.get(waiting)) == []
+
+    first = (await service.create(make_spec(site=site))).id
+    await measure(await service.get(first), measured(80, wrong=None)[:80])
+    await act(service, first, "abort")
+    assert [one.surveyed for one in await service.sites.surveys(site)] == [True, False]
+
+    await act(service, waiting, "start")
+    (begun,) = await imports_of(await service.get(waiting))
+    assert (begun.site, begun.taken > 50) == (site, True)
+    await service.imports.delete(await service.get(waiting), begun.id, "Ana")
+    assert await imports_of(await service.get(waiting)) == [], "once under way an operator may leave them out"
+    await act(service, waiting, "abort")
+
+
+async def test_a_site_keeps_what_a_mission_found_that_was_removed_to_make_room(harbour: Harbour) -> None:
+    service = harbour.service
+    site = (await service.sites.create(SiteSpec.model_validate(SITE))).id
+    mission = (await service.create(make_spec(site=site))).id
+    await measure(await service.get(mission), measured(80, wrong=None)[:80])
+    await act(service, mission, "abort")
+    before = await service.sites.map(site)
+    url = harbour.database.url
+    await harbour.close()
+    database = Database(url)
+    assert await remove(database, mission, -1.0)
+    await database.close()
+    service = await harbour.open()
+    after = await service.sites.map(site)
+    np.testing.assert_array_equal(after.model.depth_m, before.model.depth_m)
+    (kept,) = await service.sites.surveys(site)
+    assert (kept.mission_id, kept.state, kept.surveyed) == (mission, None, True)
