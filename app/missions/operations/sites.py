@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import shapely
 import structlog
+from pydantic import ValidationError
 from shapely.geometry import Polygon
 from sqlalchemy.ext.asyncio import AsyncSession
 
@@ -143,8 +144,11 @@ class Sites:
             given = changes.model_dump(mode="json", exclude_none=True)
             try:
                 spec = await asyncio.to_thread(SiteSpec.model_validate, row.spec | given)
-            except ValueError as error:
-                raise InvalidRequestError("area", str(error.errors()[0]["msg"]), "see PATCH /sites/{id}") from None  # type: ignore[attr-defined]
+            except ValidationError as error:
+                first = error.errors(include_url=False)[0]
+                field = ".".join(str(part) for part in first["loc"]) or next(iter(given), "area")
+                words = first["msg"].removeprefix("Value error, ")
+                raise InvalidRequestError(field, words, "change the area or the cell, or both together") from None
             row.name, row.spec, row.updated_at = spec.name, spec.model_dump(mode="json"), now()
         return await self.view(site_id)
 
@@ -488,7 +492,7 @@ def _awaited(mission: site_queries.SiteMission) -> SurveyView:
         name=mission.name,
         state=mission.state,
         surveyed=False,
-        left_out="it has no map of its own yet" if mission.state in ENDED else "it has not ended",
+        left_out="it has found no depth yet" if mission.state in ENDED else "it has not ended",
         began_at=None,
         ended_at=None,
         soundings=0,
