@@ -42,7 +42,7 @@ async def keep_survey(live: LiveMission) -> None:
         survey = survey_of(own, period[1], live.facts.common_sd_m)
         content = await live.in_thread(pack_survey, survey, live.frame)
     async with live.journal.writing:
-        if live.builder.stale or live.builder.arrivals.at_rest or made_of != _made_of(live):
+        if live.map_is_missing or live.builder.arrivals.at_rest or made_of != _made_of(live):
             return  # Something else is the case by now.
         await to_the_end(_store(live, survey, content, period or (0.0, 0.0)))
 
