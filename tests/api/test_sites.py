@@ -283,9 +283,10 @@ async def test_a_mission_has_to_be_of_a_site_that_is_there(
 
 async def test_changes_of_missions_that_are_not_there_are_refused_by_name(client: httpx.AsyncClient) -> None:
     site = await new_site(client)
-    first = await surveyed(client, site, START_S)
+    first = await surveyed(client, site, START_S, seed=1)
     running_ = await new_mission(client, site)
-    await surveyed(client, site, START_S + DAY_S)
+    await surveyed(client, site, START_S, seed=2)
+    assert (await get(client, f"/sites/{site}/changes"))["compared_m2"] > 0, "though both end at the same moment"
     for query, status, word in (
         ({"from": "nobody"}, 422, "no mission of the site"),
         ({"to": running_}, 404, "no depth yet"),

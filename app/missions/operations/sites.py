@@ -281,8 +281,8 @@ class Sites:
                 raise InvalidRequestError(field, f"{mission!r} is no mission of the site", "see the site's surveys")
         second = known[later] if later is not None else next((row for row in reversed(rows)), None)
         if earlier is None and second is not None:
-            before = [row for row in rows if row.last_time_s < second.last_time_s]
-            first = before[-1] if before else None
+            place = rows.index(second)
+            first = rows[place - 1] if place else None
         else:
             first = known.get(earlier or "")
         if first is None or second is None:
