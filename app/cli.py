@@ -19,6 +19,7 @@ from app.commands.data import adjust, export, import_file, report, tide
 from app.commands.failsafes import failsafes
 from app.commands.home import home
 from app.commands.logs import import_logs
+from app.commands.sites import sites_app
 from app.commands.train import train
 
 if TYPE_CHECKING:
@@ -33,6 +34,7 @@ app = typer.Typer(
 )
 token_app = typer.Typer(help="Make, list and revoke access tokens.", no_args_is_help=True)
 app.add_typer(token_app, name="token")
+app.add_typer(sites_app, name="sites")
 app.command()(export)
 app.command()(report)
 app.command("import")(import_file)

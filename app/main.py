@@ -38,6 +38,7 @@ from app.api import (
     problems,
     searches,
     signing_in,
+    sites,
     soundings,
     streams,
     targets,
@@ -165,6 +166,8 @@ def create_app(settings: Settings | None = None, *, port: int | None = None) -> 
     )
     routers = (
         missions.router,
+        sites.router,
+        sites.mission_router,
         forecasts.router,
         measurements.router,
         corrections.router,

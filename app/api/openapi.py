@@ -13,6 +13,7 @@ TAGS = [
     {"name": "missions", "description": "Describe a mission, start it, pause, resume, abort or finish it."},
     {"name": "vehicles", "description": "Which vehicles there are; how one that speaks REST measures and is guided."},
     {"name": "maps", "description": "The map as JSON, picture and files."},
+    {"name": "sites", "description": "Places that are surveyed again and again: one map, and what changed."},
     {"name": "searches", "description": "Missions of kind search: scans in, what is known of the site out."},
     {"name": "targets", "description": "Moving targets: where they are thought to be, and the ranges that tell so."},
     {"name": "imports", "description": "Soundings and maps from elsewhere, and a grid to compare the map with."},

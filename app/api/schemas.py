@@ -21,6 +21,7 @@ from app.missions.operations.scans import MAX_SCANS
 from app.missions.search.scan_schema import Scan
 from app.missions.soundings.measurement import Measurement
 from app.missions.spec.base import Name
+from app.missions.spec.site import SiteId
 
 API = "/api/v1"
 
@@ -61,6 +62,14 @@ class EndRequest(ActionRequest):
         description="true: vehicles go home to their recovery points, and the mission ends when they are there; false: "
         "they stop where they are. null: as recovery.on_finish says, and never with abort",
     )
+
+
+class SiteChoice(BaseModel):
+    """Which site a mission belongs to."""
+
+    model_config = ConfigDict(extra="forbid", json_schema_extra={"examples": [{"site": None}]})
+
+    site: SiteId | None = Field(description="The site; null: none")
 
 
 class NoteRequest(BaseModel):

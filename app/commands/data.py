@@ -75,7 +75,7 @@ def export(
     if out == Path("-"):
         sys.stdout.buffer.write(product.content)
         return
-    _write(product, out, settings.output_dir)
+    write_product(product, out, settings.output_dir)
 
 
 def report(
@@ -110,10 +110,11 @@ def report(
     async def run(service: MissionService) -> Product:
         return await service.reports.report(await meant_mission(service, mission), options)
 
-    _write(with_missions(settings, run), out, settings.output_dir)
+    write_product(with_missions(settings, run), out, settings.output_dir)
 
 
-def _write(product: "Product", out: Path | None, folder: Path) -> None:
+def write_product(product: "Product", out: Path | None, folder: Path) -> None:
+    """Write a file that leaves the service; without ``out`` into a folder. Raises CommandError."""
     from app.storage import private
 
     path = out or folder / product.filename

@@ -15,6 +15,10 @@ class MissionNotFoundError(MissionError):
     """There is no such mission."""
 
 
+class SiteNotFoundError(MissionError):
+    """There is no such site."""
+
+
 class VehicleNotFoundError(MissionError):
     """There is no such vehicle, or it takes no part in the mission."""
 

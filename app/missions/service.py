@@ -28,6 +28,7 @@ from app.missions.operations.imports import Imports
 from app.missions.operations.reading import Reader
 from app.missions.operations.recorrection import check_level_is_known
 from app.missions.operations.reports import Reports
+from app.missions.operations.sites import Sites
 from app.missions.operations.uploads import Uploads
 from app.missions.operations.web_tiles import WebTiles
 from app.missions.running.admission import check_spec
@@ -51,6 +52,7 @@ from app.storage.fast_read import AtOnce
 from app.storage.models import MissionRow
 from app.storage.ping_files import PingFiles
 from app.storage.retention import finish_removing
+from app.storage.sites import set_site
 
 log = structlog.get_logger(__name__)
 
@@ -131,6 +133,8 @@ class MissionService:
         """Files that missions begin with or are compared with."""
         self.reports = Reports(self.maps, settings.provider)
         """Reports of surveys."""
+        self.sites = Sites(database, self.get, self.maps, self.imports, lambda: self._started)
+        """Places that are surveyed again and again."""
         self._started = False
 
     # Life of the service
@@ -192,6 +196,7 @@ class MissionService:
     async def create(self, spec: MissionSpec, *, actor: str = "operator") -> MissionView:
         """Store a new mission; it is ready when it has a vehicle. Raises InvalidRequestError, ConflictError."""
         check_spec(spec, self.hub.kinds)
+        await self.sites.check(spec)
         created = now()
         row = MissionRow(
             id=str(uuid.uuid4()),
@@ -208,8 +213,10 @@ class MissionService:
             session.add(row)
             await session.flush()
             session.add_all(vehicle_row(row.id, vehicle, slot) for slot, vehicle in enumerate(spec.vehicles))
+            await set_site(session, row.id, spec.site)
         live = await self.get(row.id)
         await live.journal.log(Level.INFO, "state", f"created by {actor}", state=row.state, actor=actor)
+        await self.sites.begin(live)
         return mission_view(live)
 
     async def missions(self) -> list[MissionSummary]:
@@ -272,6 +279,8 @@ class MissionService:
                 check_level_is_known(live)
                 if action == Action.START:
                     self._claims.check_links(live)
+                    # The site may have been surveyed since the mission was described.
+                    await self.sites.begin(live)
                 self._claims.claim_team(live)
                 try:
                     await self._supervisor.set_state(live, target, note, actor, check=free_elsewhere(live))

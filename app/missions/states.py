@@ -26,6 +26,7 @@ class Action(StrEnum):
     FINISH = "finish"
 
 
+NOT_STARTED = (MissionState.DRAFT, MissionState.READY)
 AT_SEA = (MissionState.RUNNING, MissionState.PAUSED)
 """States in which its vehicles are out there."""
 

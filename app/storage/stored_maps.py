@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 from sqlalchemy import delete, func, select
 from sqlalchemy.ext.asyncio import AsyncSession
 
-from app.storage.models import SoundingRow, StoredMapRow
+from app.storage.models import SiteSurveyRow, SoundingRow, StoredMapRow
 
 
 class Stored(NamedTuple):
@@ -44,5 +44,6 @@ async def keep(session: AsyncSession, values: dict[str, Any]) -> None:
 
 
 async def forget(session: AsyncSession, mission_id: str) -> None:
-    """Drop a mission's stored map: what it was made of changes in the same transaction."""
+    """Drop a mission's stored map, and what its site has of it: what they were made of changes in this transaction."""
     await session.execute(delete(StoredMapRow).where(StoredMapRow.mission_id == mission_id))
+    await session.execute(delete(SiteSurveyRow).where(SiteSurveyRow.mission_id == mission_id))

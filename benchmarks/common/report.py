@@ -77,6 +77,17 @@ floors monterey_canyon, fortbragg_gully, fortbragg_plateau, jd211_pit and leixoe
 the adjustment was made, and a generated flat one that is not listed.
 """,
 )
+SITES = Page(
+    "sites.md",
+    """# Sites: changes between surveys, what was measured
+
+Every section is written by the command that stands in it (`--write`). Generated floors, single beams along lines that
+cross those of the other survey; positions, water level and sound speed are exact. *false* is the share of unchanged
+ground that is called changed at 95 % (5 % where deviations are right, less where they are wide), *found* the share of
+changed ground that is called so with the right sign, *volume* how far the net volume is off in its own standard
+deviations (RMS). Half of the pit's rim lies between lines: not all of it can be found.
+""",
+)
 PLANNING = Page(
     "planning.md",
     """# Planners: what was measured

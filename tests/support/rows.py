@@ -24,6 +24,9 @@ from app.storage.models import (
     ReferenceRow,
     ScanRow,
     SessionRow,
+    SiteMissionRow,
+    SiteRow,
+    SiteSurveyRow,
     SoundingRow,
     StepRow,
     StoredMapRow,
@@ -260,6 +263,7 @@ def one_of_each() -> list[list[Any]]:
                 digest="0" * 64,
                 content=b"map",
             ),
+            SiteRow(id="s1", name="Harbour mouth", spec={"cell_m": 1.0}, created_at=TIME, updated_at=TIME),
             AdjustmentRow(mission_id="m1", made_at=TIME, actor="me", content=b"offsets"),
             TideTableRow(mission_id="m1", name="Leixoes", text="2026/01/01 00:00 1.0"),
             ImportRow(
@@ -305,7 +309,6 @@ def one_of_each() -> list[list[Any]]:
                 revoked_at=None,
             ),
         ],
-        [SessionRow(secret_hash="e" * 64, token_hash="f" * 64, created_at=TIME, expires_at=TIME)],
         [
             AlarmDeliveryRow(
                 id="d1",
@@ -320,5 +323,23 @@ def one_of_each() -> list[list[Any]]:
                 error="",
                 process_id=1,
             )
+        ],
+        [
+            SessionRow(secret_hash="e" * 64, token_hash="f" * 64, created_at=TIME, expires_at=TIME),
+            SiteMissionRow(mission_id="m1", site_id="s1"),
+            SiteSurveyRow(
+                mission_id="m1",
+                site_id="s1",
+                mission_name="Harbour",
+                made_at=TIME,
+                first_time_s=5.0,
+                last_time_s=6.0,
+                last_sounding=1,
+                last_import=0,
+                last_block=0,
+                summary={"cells": 1},
+                digest="0" * 64,
+                content=b"survey",
+            ),
         ],
     ]

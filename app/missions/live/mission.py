@@ -215,6 +215,8 @@ class LiveMission:
         self.vehicles = VehicleViews(row.id, spec, self.frame, hub, self.team, self.boundaries.breach, time_scale)
         targets = self.target_views if spec.targets else None
         self.telling = LiveFeed(self.broadcaster, self.vehicles.all, targets, self.search_progress)
+        self.measured_late: Callable[[], None] = _nothing
+        """Called when what was measured changes after the mission has ended."""
         self._time_scale = time_scale
         self._executor = executor
         self._parts: dict[Callable[[LiveMission], Any], Any] = {}
@@ -253,6 +255,11 @@ class LiveMission:
 
         await self.journal.count_again(read)
         self.publish_summary()
+        self._note_late_change()
+
+    def _note_late_change(self) -> None:
+        if self.header.state in ENDED:
+            self.measured_late()
 
     @property
     def has_swath_sonars(self) -> bool:
@@ -294,6 +301,7 @@ class LiveMission:
         """Note that stored soundings changed, of which there are so many now."""
         self.journal.counts = counts
         self.whole.changed()
+        self._note_late_change()
 
     def halt(self) -> None:
         """Keep the flight from sending anything more, and wake everyone who waits for a waypoint."""
@@ -527,10 +535,12 @@ class LiveMission:
         """Take in committed soundings, shape (n, 4): east, north, depth, standard deviation."""
         self.builder.add(soundings)
         self.telling.of_soundings(len(soundings), self.header.step)
+        self._note_late_change()
 
     def _take_pings(self, pings: Mapping[str, Pings]) -> None:
         """Take in committed pings by their vehicle."""
         self.swath.add(pings)
+        self._note_late_change()
         if not self.running:
             # No flight makes maps: one is made for who asks.
             self.telling.of_soundings(sum(some.beams for some in pings.values()), self.header.step)
@@ -647,6 +657,10 @@ class LiveMission:
         await self.journal.close()
         await self.pings.close()
         await self.whole.close(self.header.step)
+
+
+def _nothing() -> None:
+    return None
 
 
 def phase_of(withdrawal: Withdrawal) -> Phase:

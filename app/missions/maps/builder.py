@@ -248,7 +248,7 @@ class MapBuilder:
             new = np.zeros(len(self._soundings) - len(self._trusted), dtype=bool)
             self._trusted = np.concatenate([self._trusted, new])
 
-    def _build(self, *, thorough: bool) -> BuiltMap:
+    def _build(self, *, thorough: bool) -> BuiltMap | None:
         bathymetry = self._prior
         measured = self.swath.map(self._soundings) if self.swath.beams else None
         if measured is None and len(self._soundings):
@@ -256,7 +256,7 @@ class MapBuilder:
         if measured is not None:
             bathymetry = measured if bathymetry is None else fuse(measured, bathymetry)
         if bathymetry is None:
-            raise ValueError("there is no sounding to make a map of")
+            return None  # Every beam so far fell outside of the area.
         bathymetry = self._with_margin(bathymetry)
         # Vehicles rather believe a guess than nothing; people are shown none.
         self._believed = bathymetry
@@ -265,6 +265,22 @@ class MapBuilder:
         digest = digest_of(bathymetry)
         self._version += 1
         return BuiltMap(self._version, len(self._soundings), bathymetry, digest, thorough)
+
+    def own_map(self) -> BathymetricMap | None:
+        """Return the map of the mission's own soundings, without those that were imported.
+
+        It is of what the newest map was made of; outliers that were told by then are left out. None where it has
+        none, or they are not in memory.
+        """
+        with self._building:
+            if self.arrivals.at_rest:
+                return None
+            if self._prior is None and self._newest is not None:
+                return self._newest.map
+            if self.swath.beams:
+                measured = self.swath.map(self._soundings)
+                return None if measured is None else without_guesses(measured)
+            return self._measured() if len(self._soundings) else None
 
     def _with_margin(self, bathymetry: BathymetricMap) -> BathymetricMap:
         """Ask more of cells that were not known in the newest map."""

@@ -233,7 +233,7 @@ def _tiers(material: Material, options: ProductOptions) -> bytes:
         for tier in tiers(material.snapshot.built.map, _cell_of_depth(material)):
             layers = file_layers(LayerSource(tier.map, options.order, facts.common_sd_m))
             content = geotiff(tier.map, layers, facts.frame, vertical_datum=facts.vertical_datum)
-            name = zipfile.ZipInfo(f"{_slug(facts.spec.name)}-{tier.map.grid.cell_m:g}m.tif", ZIP_EPOCH)
+            name = zipfile.ZipInfo(f"{slug(facts.spec.name)}-{tier.map.grid.cell_m:g}m.tif", ZIP_EPOCH)
             file.writestr(name, content)
     return archive.getvalue()
 
@@ -515,9 +515,10 @@ def make_product(name: str, material: Material, options: ProductOptions) -> Prod
 
 def product_name(facts: MissionFacts, part: str, extension: str) -> str:
     """Return what a file is saved as; ``part`` says what it shows of the mission, empty for the map."""
-    return f"{_slug(facts.spec.name)}{part and f'-{part}'}.{extension}"
+    return f"{slug(facts.spec.name)}{part and f'-{part}'}.{extension}"
 
 
-def _slug(name: str) -> str:
+def slug(name: str) -> str:
+    """Return a name as part of a file's name."""
     words = "".join(c if c.isascii() and c.isalnum() else " " for c in name).split()
     return "-".join(words).lower() or "mission"

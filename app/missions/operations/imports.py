@@ -1,7 +1,9 @@
 """Soundings, maps and reference grids from elsewhere, for a mission: everything in a file or nothing."""
 
 import asyncio
+import hashlib
 import uuid
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -9,18 +11,20 @@ import shapely
 from numpy.typing import NDArray
 from shapely.geometry import Polygon
 from sqlalchemy import select
+from sqlalchemy.ext.asyncio import AsyncSession
+from sqlalchemy.orm import defer
 
 from app.mapping.readers.endings import ending
 from app.mapping.readers.types import MapExtent, ReadError, ReadOptions
 from app.mapping.supersoundings import merge_soundings
-from app.mapping.types import Soundings
+from app.mapping.types import SoundingRows, Soundings
 from app.missions.clock import now
 from app.missions.errors import ConflictError, ImportNotFoundError, InvalidRequestError
 from app.missions.live.mission import LiveMission
 from app.missions.operations.reading import Reader
 from app.missions.operations.uploads import Upload
 from app.missions.running.final_maps import FinalMaps
-from app.missions.states import ENDED
+from app.missions.states import ENDED, NOT_STARTED
 from app.missions.views.imports import ImportOptions, ImportView, ReferenceView
 from app.missions.views.mission import Level
 from app.storage import soundings as sounding_queries
@@ -124,6 +128,52 @@ class Imports:
         self._show(live)
         return view
 
+    async def begin_with(
+        self, live: LiveMission, depths: SoundingRows | None, described: Mapping[str, Any] | None = None
+    ) -> None:
+        """Begin with a site's depths in place of those that were taken before; None: with none of a site.
+
+        Parameters
+        ----------
+        depths : (n, 4)
+            In the mission's frame.
+        described
+            ``site``, ``source`` and ``notes``, as they are answered.
+        """
+        async with live.database.reading() as session:
+            known = [row for row in await _rows_of(session, live.id) if row.summary.get("site")]
+        row = None
+        if depths is not None:
+            kept, merged = await live.in_thread(_kept, live, depths)
+            notes = [f"{merged} depths were merged per cell of the map"] if merged else []
+            row = await asyncio.to_thread(_row_of_site, live, kept, len(depths), dict(described or {}), notes)
+            if [one.digest for one in known] == [row.digest]:
+                return
+        if row is None and not known:
+            return
+        await to_the_end(self._exchange(live, [one.id for one in known], row))
+        self._show(live)
+        words = "no depths of a site" if row is None else f"{row.count} depths of {row.filename}"
+        await live.journal.log(Level.INFO, "import", f"the mission begins with {words}")
+
+    async def _exchange(self, live: LiveMission, known: Sequence[str], row: ImportRow | None) -> None:
+        async with self._storing, live.journal.writing:
+            _refuse_ended(live)
+            async with live.database.writing() as session:
+                for import_id in known:
+                    gone = await session.get(ImportRow, import_id)
+                    if gone is not None:
+                        await session.delete(gone)
+                await session.flush()
+                if row is not None:
+                    row.created_at = now()
+                    session.add(row)
+                    await session.flush()
+                await stored_maps.forget(session, live.id)
+            live.builder.arrivals.replace_prior(await _imported(live))
+        live.changed.set()
+        live.publish_summary()
+
     def _show(self, live: LiveMission) -> None:
         if not live.running:
             self._maps.take_up(live)
@@ -143,6 +193,11 @@ class Imports:
                     if row is None or row.mission_id != live.id:
                         raise ImportNotFoundError(
                             f"there is no import {import_id!r}", "GET /api/v1/missions/{id}/imports lists them"
+                        )
+                    if row.summary.get("site") and live.header.state in NOT_STARTED:
+                        raise ConflictError(
+                            "these are the depths of the mission's site, which it begins with",
+                            "create the mission with site_prior false to begin without them",
                         )
                     filename = row.filename
                     await session.delete(row)
@@ -196,8 +251,7 @@ class Imports:
 async def imports_of(live: LiveMission) -> list[ImportView]:
     """Return what was imported, oldest first."""
     async with live.database.reading() as session:
-        query = select(ImportRow).where(ImportRow.mission_id == live.id).order_by(ImportRow.created_at, ImportRow.id)
-        return [_view(row) for row in await session.scalars(query)]
+        return [_view(row) for row in await _rows_of(session, live.id)]
 
 
 async def reference_of(live: LiveMission) -> ReferenceView:
@@ -207,6 +261,33 @@ async def reference_of(live: LiveMission) -> ReferenceView:
     if row is None:
         raise ImportNotFoundError("the mission has no reference grid", "PUT /api/v1/missions/{id}/reference sets one")
     return _reference_view(row)
+
+
+async def _rows_of(session: AsyncSession, mission_id: str) -> Sequence[ImportRow]:
+    query = select(ImportRow).where(ImportRow.mission_id == mission_id).order_by(ImportRow.created_at, ImportRow.id)
+    return (await session.scalars(query.options(defer(ImportRow.soundings)))).all()
+
+
+def _row_of_site(
+    live: LiveMission, kept: SoundingRows, found: int, described: dict[str, Any], notes: Sequence[str]
+) -> ImportRow:
+    content = sounding_queries.pack(kept)
+    return ImportRow(
+        id=str(uuid.uuid4()),
+        mission_id=live.id,
+        digest=hashlib.sha256(content).hexdigest(),
+        filename=f"site {described['site']}",
+        count=len(kept),
+        summary=described
+        | {
+            "notes": [*described["notes"], *notes],
+            "found": found,
+            "min_depth_m": float(kept[:, 2].min()),
+            "max_depth_m": float(kept[:, 2].max()),
+            "median_sd_m": float(np.median(kept[:, 3])),
+        },
+        soundings=content,
+    )
 
 
 def _checked(upload: Upload, options: ImportOptions) -> str:
@@ -277,6 +358,7 @@ def _view(row: ImportRow) -> ImportView:
         id=row.id,
         filename=row.filename,
         source=row.summary["source"],
+        site=row.summary.get("site"),
         sha256=row.digest,
         created_at=row.created_at,
         found=row.summary["found"],

@@ -3,6 +3,7 @@
 import asyncio
 from collections.abc import Awaitable, Callable, Iterator
 from concurrent.futures import Executor
+from functools import partial
 
 import structlog
 from sqlalchemy import delete, select
@@ -16,6 +17,7 @@ from app.missions.running.ownership import Ownership
 from app.missions.spec.mission import MissionSpec
 from app.missions.states import AT_SEA, ENDED
 from app.missions.views.mission import MissionSummary
+from app.storage import sites as site_queries
 from app.storage.database import Database
 from app.storage.models import MissionRow
 from app.storage.ping_files import PingFiles
@@ -123,6 +125,9 @@ class MissionRegistry:
             self._live[mission_id] = live
             self._left.pop(mission_id, None)
             self._maps.take_up(live)
+            if self._ownership is not None:
+                live.measured_late = partial(self._maps.survey, live)
+                self._maps.survey(live)
             await self._taken_up(live)
             return live
 
@@ -130,7 +135,7 @@ class MissionRegistry:
         idle = [
             m
             for m in self._live.values()
-            if m.header.state in ENDED and not m.broadcaster.watched and not self._maps.busy(m.id)
+            if m.header.state in ENDED and not m.broadcaster.watched and not self._maps.holds(m.id)
         ]
         for live in idle[: max(0, len(idle) - ENDED_MISSIONS_IN_MEMORY + 1)]:
             self._left[live.id] = live.summary()
@@ -156,6 +161,7 @@ class MissionRegistry:
         self._maps.forget(live.id)
         async with live.database.writing() as session:
             await session.execute(delete(MissionRow).where(MissionRow.id == live.id))
+            await site_queries.forget_survey(session, live.id)
         self._left.pop(live.id, None)
         if self._live.pop(live.id, None) is not None:
             live.abandon("the mission was deleted")

@@ -25,6 +25,7 @@ from app.missions.spec.failsafes import Failsafe, Response
 from app.missions.spec.recovery import Recovery
 from app.missions.spec.search import DEFAULTS as SEARCH_DEFAULTS
 from app.missions.spec.search import SearchSpec, filled_in
+from app.missions.spec.site import SiteId
 from app.missions.spec.sonar import SwathSonarSpec
 from app.missions.spec.systematic_errors import SystematicErrors
 from app.missions.spec.targets import MOST_TARGETS, TargetSpec, Tracking
@@ -440,6 +441,12 @@ class MissionSpec(Model):
     systematic_errors: SystematicErrors = Field(
         default_factory=SystematicErrors, description="What is always wrong with sonars and water levels"
     )
+    site: SiteId | None = Field(
+        default=None, description="The site that it surveys, which keeps what it finds; null: none"
+    )
+    site_prior: bool = Field(
+        default=True, description="With a site: begin with the depths that its earlier surveys found"
+    )
     seed: int = Field(default=0, ge=0, lt=2**63, description="Seed of every random decision")
 
     @model_validator(mode="before")
@@ -519,6 +526,8 @@ class MissionSpec(Model):
             )
         if self.search is None:
             return self
+        if self.site is not None:
+            raise ValueError("site is given and kind is search: only surveys find depths, leave site out")
         site = Polygon(self.local_area())
         for name in ("goal", "entry"):
             lon, lat = getattr(self.search, name)

@@ -49,6 +49,7 @@ class ImportView(View):
     id: str
     filename: str
     source: str
+    site: str | None = Field(default=None, description="The site whose depths these are; null: they came as a file")
     sha256: str = Field(description="Of the file")
     created_at: datetime
     found: int = Field(description="Depths in the file")

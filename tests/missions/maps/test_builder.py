@@ -6,6 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 
+from app.mapping.swath.pings import Footprints, Pings
 from app.missions.maps.builder import CLAIM_MARGIN, MAX_LANDMARKS, UNSEEN_MARGIN, MapBuilder, make_grid
 from tests.support.missions.maps import AREA, built_of, soundings
 
@@ -22,6 +23,30 @@ def test_nothing_is_known_before_the_first_sounding() -> None:
     assert np.isnan(belief.depth_m).all()
     assert np.isinf(belief.sd_m).all()
     assert len(belief.xy_m) == 900
+
+
+def test_beams_that_all_fell_outside_of_the_area_make_no_map() -> None:
+    builder = MapBuilder(AREA, 1.0, 0.25)
+    zeros, angle, range_m = np.zeros(1), np.zeros((1, 1), np.float32), np.full((1, 1), 9.0, np.float32)
+    pings = Pings(zeros, zeros, zeros, zeros, zeros, zeros, zeros, zeros, angle, range_m)
+    off = Footprints(np.arange(1), np.array([-20.0]), np.array([5.0]), np.array([9.0]), zeros, np.array([9.0]))
+    builder.swath.place = lambda vehicle, pings: off
+    builder.swath.add("rover", pings)
+    assert builder.build() is None
+    assert builder.own_map() is None
+
+
+def test_a_map_of_its_own_soundings_knows_nothing_of_imported_ones() -> None:
+    builder, plain = built_of(soundings(40)), built_of(soundings(40))
+    builder.arrivals.replace_prior(soundings(300, seed=3) + np.array([0.0, 0.0, 2.0, 0.0]))
+    fused = builder.build()
+    own, expected = builder.own_map(), plain.own_map()
+    assert fused is not None
+    assert own is not None
+    assert expected is not None
+    np.testing.assert_array_equal(own.depth_m, expected.depth_m)
+    np.testing.assert_array_equal(own.sd_m, expected.sd_m)
+    assert np.abs(fused.map.depth_m - own.depth_m).max() > 0.03
 
 
 def test_the_same_soundings_give_the_same_digest() -> None:

@@ -1,6 +1,7 @@
 import type {
   ActionView,
   AlarmView,
+  ChangesView,
   CrossoversView,
   DoctorView,
   EventView,
@@ -12,6 +13,7 @@ import type {
   MissionSummary,
   MissionView,
   NewMission,
+  NewSite,
   PlannerView,
   PreflightView,
   Problem,
@@ -19,10 +21,12 @@ import type {
   QualityView,
   SearchGridView,
   SessionView,
+  SiteView,
   SoundingPage,
   SoundingState,
   SoundingView,
   StepView,
+  SurveyView,
   SystematicErrors,
   SystematicErrorsView,
   TelemetryView,
@@ -122,6 +126,8 @@ function post<T>(path: string, body?: unknown): Promise<T> {
 const missionPath = (id: string) => `/missions/${encodeURIComponent(id)}`;
 const vehiclePath = (id: string, name: string) => `${missionPath(id)}/vehicles/${encodeURIComponent(name)}`;
 
+const sitePath = (id: string, part: string) => `/sites/${encodeURIComponent(id)}/${part}`;
+
 export const api = {
   session: () => request<SessionView>("/session"),
   signIn: (token: string) =>
@@ -186,6 +192,11 @@ export const api = {
     request<unknown>(`${missionPath(id)}/systematic-errors`, { method: "DELETE" }),
   holidays: (id: string) => request<Holidays>(`${missionPath(id)}/holidays`),
   products: (id: string) => request<ProductView[]>(`${missionPath(id)}/products`),
+  sites: () => request<SiteView[]>("/sites"),
+  createSite: (site: NewSite) => post<SiteView>("/sites", site),
+  surveys: (site: string) => request<SurveyView[]>(sitePath(site, "surveys")),
+  changes: (site: string) => request<ChangesView>(sitePath(site, "changes")),
+  siteFile: (site: string, name: string) => file(`${BASE}${sitePath(site, name)}`),
   quality: (id: string) => request<QualityView>(`${missionPath(id)}/quality`),
   file,
 };

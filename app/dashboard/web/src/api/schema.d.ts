@@ -374,6 +374,183 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/sites": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * List the sites
+         * @description Return every site, newest first.
+         */
+        get: operations["listSites"];
+        put?: never;
+        /**
+         * Describe a site
+         * @description Store a place that is surveyed again and again. Missions belong to it by their field `site`.
+         */
+        post: operations["createSite"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/sites/{site_id}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * See a site
+         * @description Return a site with the number of its missions and surveys.
+         */
+        get: operations["getSite"];
+        put?: never;
+        post?: never;
+        /**
+         * Delete a site without surveys
+         * @description Remove a site that has neither missions nor surveys. Any other one is refused: what was measured is kept.
+         */
+        delete: operations["deleteSite"];
+        options?: never;
+        head?: never;
+        /**
+         * Change a site
+         * @description Change name, area, cell or `yearly_change_m`; its map is made anew of its surveys, which stay as they are.
+         */
+        patch: operations["changeSite"];
+        trace?: never;
+    };
+    "/api/v1/sites/{site_id}/surveys": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * List a site's surveys
+         * @description Return its missions with dates, share and accuracy, oldest first; those that have not ended come last.
+         */
+        get: operations["listSurveys"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/sites/{site_id}/map": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * See a site's map
+         * @description Return depth, deviation, newest survey and number of surveys of every cell, as of now.
+         *
+         *     Each survey's own soundings count by their uncertainty, which grows by `yearly_change_m` with their age; where a
+         *     survey found the floor changed, those before it count no more. What nobody measured is null.
+         */
+        get: operations["getSiteMap"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/sites/{site_id}/changes": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * See what changed between two surveys
+         * @description Return volumes gained and lost with their deviations, and the share of significant cells.
+         *
+         *     A difference is significant by |d| / sqrt(sd1^2 + sd2^2), each survey by its own soundings alone.
+         */
+        get: operations["getChanges"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/sites/{site_id}/map.{format}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Download a site's map
+         * @description Return the site's map as a file.
+         */
+        get: operations["getSiteMapFile"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/sites/{site_id}/changes.{format}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Download what changed between two surveys
+         * @description Return difference, deviation and significance of each cell as a file.
+         */
+        get: operations["getChangesFile"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/missions/{mission_id}/site": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        /**
+         * Put a mission into a site
+         * @description Let a mission that is not at sea belong to a site, also afterwards: what it found goes with it.
+         */
+        put: operations["setSite"];
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/missions/{mission_id}/forecast": {
         parameters: {
             query?: never;
@@ -1933,6 +2110,77 @@ export interface components {
          */
         Cause: "sound" | "switched_off" | "port_in_use" | "no_interface" | "no_vehicle" | "not_heard" | "no_announce" | "no_service" | "announces_ceased" | "no_traffic" | "unreachable" | "blocked_port" | "stale_port" | "foreign_address" | "wrong_version" | "same_id_twice" | "our_id_taken" | "clock_off" | "clock_rate" | "silent" | "radio_gaps" | "restarted" | "packets_dropped" | "low_rate" | "no_entities" | "no_soundings" | "soundings_refused" | "no_way_home" | "foreign_control" | "not_ready" | "send_errors" | "bad_packets" | "refused" | "unknown_messages" | "crowded";
         /**
+         * ChangesView
+         * @description What changed at a site between two of its surveys, over the ground that both know.
+         */
+        ChangesView: {
+            /** Site Id */
+            site_id: string;
+            earlier: components["schemas"]["SurveyName"];
+            later: components["schemas"]["SurveyName"];
+            /**
+             * Confidence
+             * @description A share of so much of unchanged ground is not called changed
+             */
+            confidence: number;
+            /** Compared M2 */
+            compared_m2: number;
+            /**
+             * Significant Pct
+             * @description Of the compared cells, those that changed significantly
+             */
+            significant_pct: number;
+            /**
+             * Expected Pct
+             * @description What chance makes of unchanged ground where deviations are right
+             */
+            expected_pct: number;
+            /**
+             * Deeper Pct
+             * @description Of the compared cells, those that are significantly deeper now
+             */
+            deeper_pct: number;
+            /** Shoaler Pct */
+            shoaler_pct: number;
+            /** @description What went where it is significantly deeper */
+            lost: components["schemas"]["VolumeView"];
+            /** @description What came where it is significantly shoaler */
+            gained: components["schemas"]["VolumeView"];
+            /** @description What came less what went, over all compared cells */
+            net: components["schemas"]["VolumeView"];
+            /**
+             * Mean M
+             * @description Later depth less earlier depth: positive where it is deeper now
+             */
+            mean_m: number | null;
+            /** Rms M */
+            rms_m: number | null;
+            /**
+             * Median Sd M
+             * @description Standard deviation of a difference
+             */
+            median_sd_m: number | null;
+            /** Least M */
+            least_m: number | null;
+            /** Largest M */
+            largest_m: number | null;
+            /**
+             * Corners
+             * @description Of changes.png, as those of a map
+             */
+            corners: [
+                number,
+                number
+            ][];
+            /** Vertical Datum */
+            vertical_datum: string;
+            /**
+             * Notes
+             * @description What has to be known to read it, in words
+             */
+            notes: string[];
+        };
+        /**
          * CheckStatus
          * @description How a line of the checklist stands.
          * @enum {string}
@@ -2669,6 +2917,11 @@ export interface components {
             /** Source */
             source: string;
             /**
+             * Site
+             * @description The site whose depths these are; null: they came as a file
+             */
+            site: string | null;
+            /**
              * Sha256
              * @description Of the file
              */
@@ -3283,6 +3536,17 @@ export interface components {
             /** @description What is always wrong with sonars and water levels */
             systematic_errors?: components["schemas"]["SystematicErrors"];
             /**
+             * Site
+             * @description The site that it surveys, which keeps what it finds; null: none
+             */
+            site?: string | null;
+            /**
+             * Site Prior
+             * @description With a site: begin with the depths that its earlier surveys found
+             * @default true
+             */
+            site_prior: boolean;
+            /**
              * Seed
              * @description Seed of every random decision
              * @default 0
@@ -3465,6 +3729,17 @@ export interface components {
                 sound_speed?: components["schemas"]["SoundSpeed"] | null;
                 /** @description What is always wrong with sonars and water levels */
                 systematic_errors?: components["schemas"]["SystematicErrors"];
+                /**
+                 * Site
+                 * @description The site that it surveys, which keeps what it finds; null: none
+                 */
+                site?: string | null;
+                /**
+                 * Site Prior
+                 * @description With a site: begin with the depths that its earlier surveys found
+                 * @default true
+                 */
+                site_prior: boolean;
                 /**
                  * Seed
                  * @description Seed of every random decision
@@ -4566,6 +4841,176 @@ export interface components {
             speed_mps: number;
         };
         /**
+         * SiteChanges
+         * @description What may be changed of a site; what is left out stays.
+         */
+        SiteChanges: {
+            /** Name */
+            name?: string | null;
+            area?: components["schemas"]["PolygonGeometry"] | null;
+            /** Cell M */
+            cell_m?: number | null;
+            /** Yearly Change M */
+            yearly_change_m?: number | null;
+        };
+        /**
+         * SiteChoice
+         * @description Which site a mission belongs to.
+         * @example {}
+         */
+        SiteChoice: {
+            /**
+             * Site
+             * @description The site; null: none
+             */
+            site: string | null;
+        };
+        /**
+         * SiteMapView
+         * @description A site's depths from all its surveys, as of a time. Rows go from south to north; null: nobody surveyed there.
+         */
+        SiteMapView: {
+            /** Site Id */
+            site_id: string;
+            /**
+             * At
+             * Format: date-time
+             * @description As of when: what was known before is less certain by then
+             */
+            at: string;
+            /**
+             * West M
+             * @description Western edge of the grid in the site's local frame
+             */
+            west_m: number;
+            /** South M */
+            south_m: number;
+            /** Cell M */
+            cell_m: number;
+            /** Rows */
+            rows: number;
+            /** Cols */
+            cols: number;
+            /**
+             * Corners
+             * @description North-west, north-east, south-east and south-west corner, [longitude, latitude]
+             */
+            corners: [
+                number,
+                number
+            ][];
+            /** Vertical Datum */
+            vertical_datum: string;
+            /**
+             * Known Pct
+             * @description Of the site's cells, those that a survey knows
+             */
+            known_pct: number;
+            /** Min Depth M */
+            min_depth_m: number | null;
+            /** Max Depth M */
+            max_depth_m: number | null;
+            /**
+             * Surveys
+             * @description What `survey` counts in, oldest first
+             */
+            surveys: components["schemas"]["SurveyName"][];
+            /** Depth M */
+            depth_m: (number | null)[][];
+            /**
+             * Sd M
+             * @description Standard deviation of the depths, grown with their age
+             */
+            sd_m: (number | null)[][];
+            /**
+             * Survey
+             * @description Number in `surveys` of the newest one that counts in the cell
+             */
+            survey: (number | null)[][];
+            /**
+             * Count
+             * @description Surveys that count in the cell: those since it was found changed
+             */
+            count: number[][];
+            /**
+             * Sounded
+             * @description Whether one of them sounded it; else its soundings support the depth
+             */
+            sounded: boolean[][];
+        };
+        /**
+         * SiteSpec
+         * @description A site as an operator describes it.
+         */
+        SiteSpec: {
+            /**
+             * Name
+             * @description Shown to people; need not be unique
+             * @example Leixoes, harbour mouth
+             */
+            name: string;
+            /** @description What belongs to the site */
+            area: components["schemas"]["PolygonGeometry"];
+            /**
+             * Cell M
+             * @description Cell of the site's grid, metres
+             * @default 1
+             */
+            cell_m: number;
+            /**
+             * Yearly Change M
+             * @description By how much the floor may change in a year, standard deviation in metres: what was known grows as uncertain, after four years by twice as much. 0: surveys count the same however old
+             * @default 0
+             */
+            yearly_change_m: number;
+        };
+        /**
+         * SiteView
+         * @description A site that is surveyed again and again.
+         */
+        SiteView: {
+            /** Id */
+            id: string;
+            /** Name */
+            name: string;
+            area: components["schemas"]["PolygonGeometry"];
+            /**
+             * Cell M
+             * @description Cell of the site's grid
+             */
+            cell_m: number;
+            /**
+             * Yearly Change M
+             * @description By how much the floor may change in a year, standard deviation
+             */
+            yearly_change_m: number;
+            /**
+             * Created At
+             * Format: date-time
+             */
+            created_at: string;
+            /**
+             * Updated At
+             * Format: date-time
+             */
+            updated_at: string;
+            /**
+             * Missions
+             * @description Missions of the site, whatever their state
+             */
+            missions: number;
+            /**
+             * Surveys
+             * @description Missions that ended, whose depths the site keeps
+             */
+            surveys: number;
+            /**
+             * Last Survey At
+             * @description When the newest survey made its last sounding
+             */
+            last_survey_at: string | null;
+        };
+        /**
          * SnapshotMessage
          * @description First message on the live socket: everything needed to draw the picture.
          */
@@ -4902,6 +5347,85 @@ export interface components {
              * @description It stays at the surface until its position is known this well; null: a third of the limit
              */
             good_position_sd_m?: number | null;
+        };
+        /**
+         * SurveyName
+         * @description A survey in short.
+         */
+        SurveyName: {
+            /** Mission Id */
+            mission_id: string;
+            /** Name */
+            name: string;
+            /**
+             * At
+             * Format: date-time
+             * @description Its last sounding
+             */
+            at: string;
+        };
+        /**
+         * SurveyView
+         * @description What a mission has to do with its site: a survey once it has ended.
+         */
+        SurveyView: {
+            /** Mission Id */
+            mission_id: string;
+            /** Name */
+            name: string;
+            /**
+             * State
+             * @description Of the mission; null: it was removed, its depths are kept
+             */
+            state: string | null;
+            /**
+             * Surveyed
+             * @description Whether the site has its depths: false until it ends, and while its map is made
+             */
+            surveyed: boolean;
+            /**
+             * Left Out
+             * @description Why its depths are not in the site's model; empty where they are
+             */
+            left_out: string;
+            /**
+             * Began At
+             * @description First sounding
+             */
+            began_at: string | null;
+            /**
+             * Ended At
+             * @description Last sounding
+             */
+            ended_at: string | null;
+            /**
+             * Soundings
+             * @description Accepted ones, without beams of swath sonars
+             */
+            soundings: number;
+            /** Beams */
+            beams: number;
+            /**
+             * Share Pct
+             * @description Of the site's cells, those that it knows
+             */
+            share_pct: number;
+            /**
+             * Median Sd M
+             * @description Standard deviation of its depths
+             */
+            median_sd_m: number | null;
+            /** Min Depth M */
+            min_depth_m: number | null;
+            /** Max Depth M */
+            max_depth_m: number | null;
+            /**
+             * Changed Pct
+             * @description Of its cells that were known before, those where it differs from what was foretold by more than 1.96 deviations: about 5 where nothing changed. null: none was known
+             */
+            changed_pct: number | null;
+            /** Vertical Datum */
+            vertical_datum: string;
         };
         /**
          * SwathSonarSpec
@@ -6031,6 +6555,16 @@ export interface components {
          * @enum {string}
          */
         Verdict: "accepted" | "rejected" | "duplicate";
+        /**
+         * VolumeView
+         * @description A volume with its standard deviation, cubic metres.
+         */
+        VolumeView: {
+            /** M3 */
+            m3: number;
+            /** Sd M3 */
+            sd_m3: number;
+        };
         /**
          * WaypointStatus
          * @description The life of one waypoint. A vehicle's route is drawn from ``ACKNOWLEDGED`` on, not before.
@@ -7956,6 +8490,926 @@ export interface operations {
             };
             /** @description Too many requests */
             429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    listSites: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["SiteView"][];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too many requests */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    createSite: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["SiteSpec"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            201: {
+                headers: {
+                    /** @description Path of the site */
+                    Location?: string;
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["SiteView"];
+                };
+            };
+            /** @description The body cannot be read */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The request took too long to arrive */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body is too large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body's media type is not supported */
+            415: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too much is sent at once; too many requests */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too much is under way */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    getSite: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description The site's id */
+                site_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["SiteView"];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such site */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too many requests */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    deleteSite: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description The site's id */
+                site_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            204: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such site */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description It contradicts the present state */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too many requests */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    changeSite: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description The site's id */
+                site_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["SiteChanges"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["SiteView"];
+                };
+            };
+            /** @description The body cannot be read */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such site */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The request took too long to arrive */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body is too large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body's media type is not supported */
+            415: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too much is sent at once; too many requests */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too much is under way */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    listSurveys: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description The site's id */
+                site_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["SurveyView"][];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such site */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too many requests */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    getSiteMap: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description The site's id */
+                site_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["SiteMapView"];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such site; there is no map yet */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too many requests */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    getChanges: {
+        parameters: {
+            query?: {
+                /** @description Mission of the earlier survey; default: the one before the other */
+                from?: string;
+                /** @description Mission of the later survey; default: the newest */
+                to?: string;
+                /** @description Of unchanged ground this share is not called changed */
+                confidence?: number;
+            };
+            header?: never;
+            path: {
+                /** @description The site's id */
+                site_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ChangesView"];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such site; there is no map yet */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description It contradicts the present state */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too many requests */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    getSiteMapFile: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description The site's id */
+                site_id: string;
+                /** @description One of tif, png, xyz */
+                format: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description `.tif`: GeoTIFF with depth, deviation, age and survey of each cell; `.png`: the site's map as a picture; `.xyz`: text: position, depth, deviation, surveys, sounded */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "image/tiff": string;
+                    "image/png": string;
+                    "text/plain": string;
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such format */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too many requests */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    getChangesFile: {
+        parameters: {
+            query?: {
+                /** @description Mission of the earlier survey; default: the one before the other */
+                from?: string;
+                /** @description Mission of the later survey; default: the newest */
+                to?: string;
+                /** @description Of unchanged ground this share is not called changed */
+                confidence?: number;
+            };
+            header?: never;
+            path: {
+                /** @description The site's id */
+                site_id: string;
+                /** @description One of tif, csv, png */
+                format: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description `.tif`: GeoTIFF with difference, deviation, significance; `.csv`: a row for each cell that both surveys know; `.png`: a picture to lay over a web map; pale where the change is not significant */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "image/tiff": string;
+                    "text/csv": string;
+                    "image/png": string;
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such format */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description It contradicts the present state */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too many requests */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    setSite: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description The mission's id */
+                mission_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["SiteChoice"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["MissionView"];
+                };
+            };
+            /** @description The body cannot be read */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such mission */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The request took too long to arrive */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description It contradicts the present state */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body is too large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body's media type is not supported */
+            415: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too much is sent at once; too many requests */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too much is under way */
+            503: {
                 headers: {
                     [name: string]: unknown;
                 };

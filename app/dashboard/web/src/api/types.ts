@@ -43,6 +43,10 @@ export type CheckStatus = Schemas["CheckStatus"];
 export type SoundingView = Complete<Schemas["SoundingView"]>;
 export type SoundingPage = Complete<Schemas["SoundingPage"]>;
 export type SoundingState = Schemas["SoundingState"];
+export type SiteView = Complete<Schemas["SiteView"]>;
+export type SurveyView = Complete<Schemas["SurveyView"]>;
+export type ChangesView = Complete<Schemas["ChangesView"]>;
+export type NewSite = Pick<Schemas["SiteSpec"], "name" | "area" | "cell_m">;
 export type LayerView = Complete<Schemas["LayerView"]>;
 export type ProductView = Complete<Schemas["ProductView"]>;
 export type QualityView = Complete<Schemas["QualityView"]>;
@@ -79,6 +83,8 @@ export type PlannerOptions = Partial<Schemas["PlannerOptions"]>;
 /** What the form sends. */
 export type NewMission = Pick<Schemas["MissionSpec"], "name" | "area" | "keep_out" | "cell_m"> & {
   kind?: Schemas["MissionKind"];
+  site?: string | null;
+  site_prior?: boolean;
   vehicles: VehicleSpec[];
   budget?: Schemas["Budget"];
   speed_mps?: number;

@@ -317,3 +317,15 @@ describe("recovery", () => {
     );
   });
 });
+
+describe("a site", () => {
+  it("goes with a survey and its copy, and with no search", () => {
+    const draft = { ...emptyDraft([-8.7, 41.2]), name: "Quay", site: "s-1" };
+    const mission = toMission(draft);
+    expect(mission.site).toBe("s-1");
+    const copy = copyOf({ name: "Quay", spec: { tide: {}, ...mission } as unknown as MissionView["spec"] });
+    expect(copy.site).toBe("s-1");
+    expect(toMission({ ...copy, site: "" })).not.toHaveProperty("site");
+    expect(fieldOf("site")).toBe("site");
+  });
+});

@@ -38,6 +38,8 @@ export type Own = Partial<Record<VehicleField | "recovery_point", string>> & { s
 export interface Draft extends Texts {
   name: string;
   kind: MissionKind;
+  /** Id of the site that a survey belongs to; empty: to none. */
+  site: string;
   length: LengthUnit;
   /** As "latitude, longitude". */
   goal: string;
@@ -99,6 +101,7 @@ export function emptyDraft(middle: LngLat): Draft {
     ...SUGGESTED,
     name: "",
     kind: "survey",
+    site: "",
     length: "steps",
     goal: "",
     entry: "",
@@ -138,6 +141,7 @@ export function copyOf({ spec, name }: Pick<MissionView, "spec" | "name">): Draf
     ...places,
     name: `${name} (copy)`,
     kind: spec.kind,
+    site: spec.site ?? "",
     length: Object.keys(spec.budget)[0] as LengthUnit,
     source: "drawn",
     ring,
@@ -332,7 +336,7 @@ export function cornersOf(draft: Draft): LngLat[] {
 export function toMission(draft: Draft): NewMission {
   const area = areaOf(draft);
   if (!area) throw new Error("the draft has faults");
-  const { search, budget: _, recovery: before, ...base } = draft.base;
+  const { search, budget: _, recovery: before, site: _site, ...base } = draft.base;
   const point = placeOf(draft.recovery);
   const simulated = simulatedNames(draft).map(
     (name): VehicleSpec => ({ name, kind: "sim", sensor: draft.sensor }),
@@ -346,6 +350,7 @@ export function toMission(draft: Draft): NewMission {
     area,
     keep_out: draft.keepOut.map(polygonOf),
     vehicles,
+    ...(draft.kind === "survey" && draft.site ? { site: draft.site } : {}),
     ...(draft.tide_m.trim()
       ? { tide: { source: draft.tide_source.trim() || "stated by the operator" } }
       : {}),
@@ -422,6 +427,7 @@ const OTHERS: [path: string, field: keyof Draft][] = [
   ["keep_out", "keepOut"],
   ["area", "ring"],
   ["name", "name"],
+  ["site", "site"],
 ];
 
 /** Which of the form's fields a field of the service's refusal stands for. */

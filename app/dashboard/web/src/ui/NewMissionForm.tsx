@@ -31,6 +31,7 @@ import { Button, Choice, FileButton, same, useEscape } from "./Controls";
 import { Fault, Form, type FormState, Part, PlaceField, Text, useForm } from "./Fields";
 import { Forecast } from "./Forecast";
 import { SearchFields } from "./SearchFields";
+import { SiteFields } from "./SiteFields";
 import { VehicleFields } from "./VehicleFields";
 
 export function NewMissionForm() {
@@ -113,6 +114,7 @@ export function NewMissionForm() {
         <Text field="name" label="Name" placeholder="Leixões quay" />
         <Kind />
         <AreaFields />
+        {draft.value.kind === "survey" ? <SiteFields /> : null}
         <VehicleFields />
         <RecoveryFields />
         {draft.value.kind === "search" ? (

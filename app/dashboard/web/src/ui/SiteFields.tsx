@@ -1,0 +1,148 @@
+import "./SiteFields.css";
+import { useSignal } from "@preact/signals";
+import { useEffect } from "preact/hooks";
+import { api, ServiceError } from "../api/client";
+import type { ChangesView, SiteView, SurveyView } from "../api/types";
+import { areaOf } from "../state/draft";
+import { said } from "../state/session";
+import { Button, Choice } from "./Controls";
+import { Fault, useForm } from "./Fields";
+
+const DAY = new Intl.DateTimeFormat("en-GB", { dateStyle: "medium", timeZone: "UTC" });
+
+/** Which site a survey belongs to, and what is known of it: its surveys, and what changed between the last two. */
+export function SiteFields() {
+  const { draft, set } = useForm();
+  const sites = useSignal<readonly SiteView[]>([]);
+  const note = useSignal("");
+  useEffect(() => {
+    api.sites().then(
+      (list) => {
+        sites.value = list;
+      },
+      (error: unknown) => {
+        note.value = said(error);
+      },
+    );
+  }, []);
+  const describe = async () => {
+    const area = areaOf(draft);
+    if (!area || !draft.name.trim()) {
+      note.value = "Give the mission a name and an area first: the site gets both";
+      return;
+    }
+    try {
+      const made = await api.createSite({ name: draft.name.trim(), area, cell_m: Number(draft.cell_m) });
+      sites.value = [made, ...sites.value];
+      note.value = "";
+      set({ site: made.id });
+    } catch (error) {
+      note.value = said(error);
+    }
+  };
+  const options = [["", "None"] as const, ...sites.value.map(({ id, name }) => [id, name] as const)];
+  return (
+    <details class="site" open={draft.site !== ""}>
+      <summary>Site that is surveyed again</summary>
+      <div class="pair">
+        <label class="field">
+          Site
+          <Choice
+            id="site"
+            value={draft.site}
+            options={options}
+            onChoose={(site: string) => set({ site })}
+            label="Site"
+          />
+        </label>
+        <Button kind="tool" id="make-site" onClick={() => void describe()}>
+          Make a site of this area
+        </Button>
+      </div>
+      {note.value ? (
+        <p class="hint" role="status">
+          {note.value}
+        </p>
+      ) : null}
+      <Fault field="site" />
+      {draft.site ? <Known key={draft.site} site={draft.site} /> : null}
+    </details>
+  );
+}
+
+/** The surveys of a site, and what changed between the last two. */
+function Known({ site }: { site: string }) {
+  const surveys = useSignal<readonly SurveyView[] | null>(null);
+  const changes = useSignal<ChangesView | null>(null);
+  const note = useSignal("");
+  useEffect(() => {
+    const failed = (error: unknown) => {
+      // One survey has nothing to be compared with.
+      if (!(error instanceof ServiceError && error.status === 404)) note.value = said(error);
+    };
+    api.surveys(site).then((list) => {
+      surveys.value = list;
+    }, failed);
+    api.changes(site).then((found) => {
+      changes.value = found;
+    }, failed);
+  }, [site]);
+  const download = async (name: string) => {
+    try {
+      const file = await api.siteFile(site, name);
+      const link = document.createElement("a");
+      link.href = URL.createObjectURL(file.content);
+      link.download = file.name;
+      link.click();
+      URL.revokeObjectURL(link.href);
+    } catch (error) {
+      note.value = said(error);
+    }
+  };
+  const known = surveys.value?.filter((survey) => survey.surveyed) ?? [];
+  return (
+    <>
+      {surveys.value && known.length === 0 ? <p class="hint">No survey of it has ended yet.</p> : null}
+      <ul class="surveys" data-testid="surveys">
+        {known.map((survey) => (
+          <li key={survey.mission_id}>
+            <b>{survey.name}</b> {survey.ended_at ? DAY.format(new Date(survey.ended_at)) : ""},{" "}
+            {survey.share_pct.toFixed(0)} % of the site
+            {survey.median_sd_m === null ? "" : `, ± ${survey.median_sd_m.toFixed(2)} m`}
+            {survey.left_out ? <small> left out: {survey.left_out}</small> : null}
+          </li>
+        ))}
+      </ul>
+      {known.length > 0 ? <p class="hint">The mission begins with these depths.</p> : null}
+      {changes.value ? <Changes found={changes.value} /> : null}
+      {known.length > 0 ? (
+        <div class="row">
+          <Button kind="tool small" onClick={() => void download("map.tif")}>
+            Map as GeoTIFF
+          </Button>
+          {changes.value ? (
+            <Button kind="tool small" id="changes-file" onClick={() => void download("changes.tif")}>
+              Changes as GeoTIFF
+            </Button>
+          ) : null}
+        </div>
+      ) : null}
+      {note.value ? (
+        <p class="hint" role="status">
+          {note.value}
+        </p>
+      ) : null}
+    </>
+  );
+}
+
+/** What changed between the last two surveys, in words. */
+function Changes({ found }: { found: ChangesView }) {
+  const volume = ({ m3, sd_m3 }: ChangesView["lost"]) => `${m3.toFixed(0)} ± ${sd_m3.toFixed(0)} m³`;
+  return (
+    <p class="changes" data-testid="changes">
+      From {found.earlier.name} to {found.later.name}: {found.significant_pct.toFixed(1)} % changed (
+      {found.expected_pct.toFixed(0)} % is chance); {volume(found.lost)} went, {volume(found.gained)} came.
+    </p>
+  );
+}

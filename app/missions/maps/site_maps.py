@@ -1,0 +1,302 @@
+"""A site's model and its changes as they leave the service: as JSON and as files."""
+
+import csv
+import io
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from typing import Any
+
+import numpy as np
+
+from app.arrays import BoolArray, FloatArray
+from app.mapping.georeference import LocalFrame
+from app.mapping.layers import Fit, Layer
+from app.mapping.products.geotiff import geotiff
+from app.mapping.products.overlay import overlay_corners, overlay_png
+from app.mapping.products.picture import picture_png
+from app.mapping.products.text import map_xyz
+from app.mapping.sites import Change, SiteModel, Survey, Volume
+from app.mapping.types import BathymetricMap, Grid
+from app.mapping.vertical import INSTANTANEOUS_WATER_LEVEL, VerticalDatum
+from app.missions.errors import MapNotReadyError
+from app.missions.maps.products import CSV, Product, slug
+from app.missions.views.sites import ChangesView, SiteMapView, SurveyName, VolumeView
+from imc_bridge.printable import printable
+
+DAY_S = 86_400.0
+
+
+@dataclass(frozen=True)
+class SiteFacts:
+    """What every product of a site states; ``inside`` (rows, cols) are the cells that belong to it."""
+
+    id: str
+    name: str
+    frame: LocalFrame
+    grid: Grid
+    inside: BoolArray
+
+
+@dataclass(frozen=True)
+class Surveyed:
+    """A survey of a site: by which mission, and until when, Unix seconds."""
+
+    mission_id: str
+    name: str
+    last_time_s: float
+    vertical_datum: VerticalDatum
+
+    @property
+    def view(self) -> SurveyName:
+        """Return it in short."""
+        return SurveyName(mission_id=self.mission_id, name=self.name, at=moment(self.last_time_s))
+
+
+@dataclass(frozen=True)
+class SiteMap:
+    """A site's model; ``surveys`` are what ``model.newest`` counts in."""
+
+    facts: SiteFacts
+    model: SiteModel
+    surveys: Sequence[Surveyed]
+
+    @property
+    def datum(self) -> VerticalDatum:
+        """Return what depths are counted from."""
+        return self.surveys[-1].vertical_datum
+
+    @property
+    def known_pct(self) -> float:
+        """Return the share of the site's cells that are known."""
+        return 100.0 * float(self.model.known[self.facts.inside].mean())
+
+    @property
+    def age_days(self) -> FloatArray:
+        """Return how old the newest survey of each cell is, (rows, cols); NaN without one."""
+        times = np.array([survey.last_time_s for survey in self.surveys])
+        known = self.model.known
+        age = (self.model.at_s - times[np.where(known, self.model.newest, 0)]) / DAY_S
+        return np.where(known, age, np.nan)
+
+    @property
+    def bathymetry(self) -> BathymetricMap:
+        """Return it as a map; ``count`` are surveys."""
+        model = self.model
+        return BathymetricMap(
+            grid=model.grid,
+            depth_m=model.depth_m,
+            sd_m=model.sd_m,
+            count=model.surveys,
+            sounded=model.sounded,
+            roughness=np.where(self.facts.inside, 1.0, np.nan),
+            correlation_length_m=0.0,
+            model=f"surveys: {len(self.surveys)}, each cell from the last time that it changed",
+        )
+
+    def view(self) -> SiteMapView:
+        """Return it as JSON shows it."""
+        model, grid = self.model, self.model.grid
+        known = model.known
+        newest = model.newest.astype(object)
+        newest[~known] = None
+        return SiteMapView.model_construct(
+            site_id=self.facts.id,
+            at=moment(model.at_s),
+            west_m=grid.west_m,
+            south_m=grid.south_m,
+            cell_m=grid.cell_m,
+            rows=grid.rows,
+            cols=grid.cols,
+            corners=overlay_corners(grid, self.facts.frame),
+            vertical_datum=self.datum.statement,
+            known_pct=round(self.known_pct, 2),
+            min_depth_m=_rounded(np.min, model.depth_m[known]),
+            max_depth_m=_rounded(np.max, model.depth_m[known]),
+            surveys=[survey.view for survey in self.surveys],
+            depth_m=_nullable(model.depth_m),
+            sd_m=_nullable(model.sd_m),
+            survey=newest.tolist(),
+            count=model.surveys.tolist(),
+            sounded=model.sounded.tolist(),
+        )
+
+    def layers(self) -> list[Layer]:
+        """Return what a raster has of it."""
+        model = self.model
+        number = np.where(model.known, model.newest + 1.0, np.nan)
+        names = "; ".join(f"{i}: {one.mission_id}" for i, one in enumerate(self.surveys, start=1))
+        return [
+            Layer("depth", "depth from all surveys, positive down", "metre", model.depth_m),
+            Layer("sd", "standard deviation of the depth, grown with its age", "metre", model.sd_m),
+            Layer("age", "since the newest survey that counts", "day", self.age_days),
+            Layer("survey", f"number of the newest survey that counts: {names}", "1", number),
+            Layer("surveys", "surveys that count", "1", np.where(model.known, model.surveys, np.nan)),
+        ]
+
+
+@dataclass(frozen=True)
+class SiteChange:
+    """What changed at a site between two surveys."""
+
+    facts: SiteFacts
+    change: Change
+    earlier: Survey
+    later: Survey
+    surveys: tuple[Surveyed, Surveyed]
+
+    def view(self) -> ChangesView:
+        """Return it as JSON shows it."""
+        change = self.change
+        difference = change.difference_m[change.compared]
+        cells = max(len(difference), 1)
+        share = {sign: 100.0 * float((change.significant & (sign * change.difference_m > 0)).sum()) for sign in (1, -1)}
+        return ChangesView(
+            site_id=self.facts.id,
+            earlier=self.surveys[0].view,
+            later=self.surveys[1].view,
+            confidence=change.confidence,
+            compared_m2=len(difference) * change.grid.cell_m**2,
+            significant_pct=round(change.significant_pct, 2),
+            expected_pct=round(100.0 * (1.0 - change.confidence), 4),
+            deeper_pct=round(share[1] / cells, 2),
+            shoaler_pct=round(share[-1] / cells, 2),
+            lost=_volume(change.lost),
+            gained=_volume(change.gained),
+            net=_volume(change.net),
+            mean_m=_rounded(np.mean, difference),
+            rms_m=_rounded(lambda values: np.sqrt(np.mean(values**2)), difference),
+            median_sd_m=_rounded(np.median, change.sd_m[change.compared]),
+            least_m=_rounded(np.min, difference),
+            largest_m=_rounded(np.max, difference),
+            corners=overlay_corners(change.grid, self.facts.frame),
+            vertical_datum=self.surveys[1].vertical_datum.statement,
+            notes=self._notes(),
+        )
+
+    def _notes(self) -> list[str]:
+        notes = []
+        if INSTANTANEOUS_WATER_LEVEL in (survey.vertical_datum.epsg for survey in self.surveys):
+            notes.append("the water level is not corrected: where it differed, every difference holds that as well")
+        if not self.change.compared.any():
+            notes.append("the two surveys have no ground in common")
+        return notes
+
+    def layers(self) -> list[Layer]:
+        """Return what a raster has of it."""
+        change = self.change
+        significant = np.where(change.compared, change.significant, np.nan)
+        return [
+            Layer("difference", "later depth less earlier depth, positive: deeper now", "metre", change.difference_m),
+            Layer("sd", "standard deviation of the difference", "metre", change.sd_m),
+            Layer("significance", "|difference| over its standard deviation", "1", change.significance),
+            Layer("significant", f"1: changed, at {change.confidence:g}; 0: not told from chance", "1", significant),
+        ]
+
+
+def site_map_file(kind: str, site: SiteMap) -> Product:
+    """Return a site's map as a file, a key of ``MAP_FILES``."""
+    media_type, _, make = MAP_FILES[kind]
+    return Product(f"{slug(site.facts.name)}.{kind}", media_type, make(site))
+
+
+def changes_file(kind: str, change: SiteChange) -> Product:
+    """Return what changed as a file, a key of ``CHANGE_FILES``."""
+    media_type, _, make = CHANGE_FILES[kind]
+    return Product(f"{slug(change.facts.name)}-changes.{kind}", media_type, make(change))
+
+
+def _map_tif(site: SiteMap) -> bytes:
+    return geotiff(site.bathymetry, site.layers(), site.facts.frame, vertical_datum=site.datum)
+
+
+def _map_png(site: SiteMap) -> bytes:
+    if not site.model.known.any():
+        raise MapNotReadyError("no survey of the site knows a depth within its area", "see its surveys")
+    title = printable(site.facts.name).strip()
+    return picture_png(site.bathymetry, vertical_datum=site.datum.statement, title=title)
+
+
+def _map_xyz(site: SiteMap) -> bytes:
+    return map_xyz(site.bathymetry, site.facts.frame, vertical_datum=site.datum.statement)
+
+
+def _changes_tif(change: SiteChange) -> bytes:
+    shape = change.change.difference_m.shape
+    names = [f"{one.mission_id} ({moment(one.last_time_s).date()})" for one in change.surveys]
+    described = BathymetricMap(
+        grid=change.change.grid,
+        depth_m=change.later.depth_m,
+        sd_m=change.later.sd_m,
+        count=np.zeros(shape, dtype=np.int64),
+        sounded=change.later.sounded,
+        roughness=np.ones(shape),
+        correlation_length_m=0.0,
+        model=f"{names[1]} less {names[0]}",
+    )
+    datum = change.surveys[1].vertical_datum
+    return geotiff(described, change.layers(), change.facts.frame, vertical_datum=datum)
+
+
+def _changes_png(change: SiteChange) -> bytes:
+    found = change.change
+    compared = np.abs(found.difference_m[found.compared])
+    most = max(float(np.quantile(compared, 0.99)) if compared.size else 0.0, 0.01)
+    return overlay_png(found.difference_m, found.significant, (-most, most), Fit.ABOUT_ZERO)
+
+
+def _changes_csv(change: SiteChange) -> bytes:
+    found, grid = change.change, change.change.grid
+    rows, cols = np.nonzero(found.compared)
+    lat, lon = change.facts.frame.to_geographic(grid.east_m[cols], grid.north_m[rows])
+    columns: dict[str, Any] = {
+        "lat_deg": np.round(lat, 8),
+        "lon_deg": np.round(lon, 8),
+        "east_m": np.round(grid.east_m[cols], 3),
+        "north_m": np.round(grid.north_m[rows], 3),
+        "earlier_depth_m": np.round(change.earlier.depth_m[rows, cols], 4),
+        "later_depth_m": np.round(change.later.depth_m[rows, cols], 4),
+        "difference_m": np.round(found.difference_m[rows, cols], 4),
+        "sd_m": np.round(found.sd_m[rows, cols], 4),
+        "significance": np.round(found.significance[rows, cols], 3),
+        "significant": found.significant[rows, cols].astype(int),
+    }
+    stream = io.StringIO()
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow(columns)
+    writer.writerows(zip(*(values.tolist() for values in columns.values()), strict=True))
+    return stream.getvalue().encode()
+
+
+Maker = Callable[[Any], bytes]
+
+MAP_FILES: dict[str, tuple[str, str, Maker]] = {
+    "tif": ("image/tiff", "GeoTIFF with depth, deviation, age and survey of each cell", _map_tif),
+    "png": ("image/png", "the site's map as a picture", _map_png),
+    "xyz": ("text/plain; charset=utf-8", "text: position, depth, deviation, surveys, sounded", _map_xyz),
+}
+CHANGE_FILES: dict[str, tuple[str, str, Maker]] = {
+    "tif": ("image/tiff", "GeoTIFF with difference, deviation, significance", _changes_tif),
+    "csv": (CSV, "a row for each cell that both surveys know", _changes_csv),
+    "png": ("image/png", "a picture to lay over a web map; pale where the change is not significant", _changes_png),
+}
+"""Kinds of files by their ending: media type, title and what makes them."""
+
+
+def moment(time_s: float) -> datetime:
+    """Return Unix seconds as a time."""
+    return datetime.fromtimestamp(time_s, UTC)
+
+
+def _volume(volume: Volume) -> VolumeView:
+    return VolumeView(m3=round(volume.m3, 3), sd_m3=round(volume.sd_m3, 3))
+
+
+def _rounded(figure: Callable[[FloatArray], Any], values: FloatArray) -> float | None:
+    return round(float(figure(values)), 3) if values.size else None
+
+
+def _nullable(layer: FloatArray) -> list[list[float | None]]:
+    rounded = np.round(layer, 3).astype(object)
+    rounded[~np.isfinite(layer)] = None
+    return rounded.tolist()  # type: ignore[no-any-return]
