@@ -146,8 +146,8 @@ class AisSettings(Section):
         default=5.0,
         ge=0,
         le=100,
-        description="Vehicles that are deeper are out of ships' way; under a ship whose draught is known, 2 m below that "
-        "if this is deeper",
+        description="Vehicles that are deeper are out of ships' way; of a ship that tells its draught, 2 m more than "
+        "that where it is deeper",
     )
     hold_s: float = Field(
         default=900.0,

@@ -102,9 +102,12 @@ class Withdrawals:
             await self._begin(member, withdrawal)
         if withdrawal.response is Response.STOP:
             await self._end(member, withdrawal, f"{member.name} is stopped")
-        elif not member.present or withdrawal.response is Response.HOLD or await self._waits_below(member, withdrawal):
-            return
-        elif member.ordered:
+        elif (
+            not member.present
+            or withdrawal.response is Response.HOLD
+            or await self._waits_below(member, withdrawal)
+            or member.ordered
+        ):
             return
         elif member.ahead:
             await self._dispatch.begin()

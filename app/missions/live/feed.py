@@ -32,8 +32,8 @@ class LiveFeed:
     Parameters
     ----------
     vehicles, targets, search, ships
-        Return how these are now. ``targets``: None for a mission without; ``search`` returns None in a survey, ``ships``
-        where nothing listens for any.
+        Return how these are now. ``targets``: None for a mission without; ``search`` returns None in a survey,
+        ``ships`` where nothing listens for any.
     """
 
     def __init__(

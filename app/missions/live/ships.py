@@ -85,7 +85,7 @@ class ShipsAbout:
             if member.report is None:
                 continue
             distance, in_s = self._approaches(member, ships, SHOWN_S)
-            soon, soon_s = self._approaches(member, ships, limits.cpa_s)
+            soon, _ = self._approaches(member, ships, limits.cpa_s)
             for ship, far_m, later_s, near_m in zip(ships, distance, in_s, soon, strict=True):
                 before = best.get(ship.position.mmsi)
                 if math.isfinite(far_m) and (before is None or far_m < before.distance_m):

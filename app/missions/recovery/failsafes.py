@@ -89,8 +89,8 @@ TABLE: Mapping[Failsafe, Rule] = {
         after_s=LINK_LOST_S,
     ),
     Failsafe.TRAFFIC: Rule(
-        "a ship (AIS) comes closer than ais.cpa_m within ais.cpa_s to a vehicle that is at or near the surface, or will "
-        "be",
+        "a ship (AIS) comes closer than ais.cpa_m within ais.cpa_s to a vehicle that is at or near the surface, or "
+        "will be",
         Response.WARN,
         "alarm: which ship, how close, how soon; with `hold` it waits below, no longer than ais.hold_s",
         after_s=3.0,

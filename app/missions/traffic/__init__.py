@@ -1,1 +1,1 @@
-"""Ships about, by AIS: ``watch.Traffic`` hears them and knows which are near, ``approach`` reckons how close they come."""
+"""Ships about, by AIS: ``watch.Traffic`` hears them, ``approach`` reckons how close they come to vehicles."""

@@ -29,7 +29,7 @@ class SentenceError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class ShipPosition:
-    """Where a ship is. ``sog_mps``, ``cog_deg`` (over ground), ``heading_deg`` (of the bow), ``status``: None: not told."""
+    """Where a ship is, its speed and course over ground, where its bow points and what it does; None: not told."""
 
     mmsi: int
     own: bool

@@ -82,7 +82,8 @@ class Source(ABC):
             try:
                 await self._listen()
             except OSError as error:
-                self._fail(error.strerror or type(error).__name__)
+                # Words of our own libraries name addresses, and differ.
+                self._fail(os.strerror(error.errno) if error.errno and error.errno > 0 else str(error) or "no answer")
             except Exception as error:
                 log.exception("a source of AIS broke off", source=self.name)
                 self._fail(type(error).__name__)
