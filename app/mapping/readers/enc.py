@@ -4,7 +4,6 @@ Depths of a chart are chosen to be safe: soundings are true, contours are drawn 
 depths and measure none, so they are no soundings.
 """
 
-import io
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,11 +17,10 @@ from shapely.geometry.base import BaseGeometry
 
 from app.arrays import FloatArray
 from app.mapping.georeference import LocalFrame
-from app.mapping.readers.types import MAX_SOUNDINGS, MapExtent, Points, ReadError
+from app.mapping.readers.types import MAX_CORNERS, MAX_SOUNDINGS, MAX_ZONES, MapExtent, Points, ReadError
 from app.mapping.s44 import NORMAL_95
 
 MAX_FEATURES = 100_000
-MAX_ZONES, MAX_CORNERS = 100, 20_000
 DETAIL_M = 1.0
 """Corners of coasts are told apart from this distance on."""
 
@@ -38,14 +36,8 @@ Appendix A, chapter 2 (CATZOC). D and U state none."""
 NO_ZONE_POSITION_M = 500.0
 """Where nothing states how well positions are known, they may be as wrong as in zone C."""
 
-HAZARDS = {
-    "LNDARE": "land",
-    "OBSTRN": "obstruction",
-    "WRECKS": "wreck",
-    "UWTROC": "rock",
-    "RESARE": "restricted area",
-}
-"""Objects that vehicles should keep out of, and what people call them."""
+HAZARDS = ("LNDARE", "OBSTRN", "WRECKS", "UWTROC", "RESARE")
+"""Objects that vehicles should keep out of: land, dangers under water, and restricted areas."""
 
 
 @dataclass(frozen=True)
@@ -55,7 +47,7 @@ class Zone:
     Attributes
     ----------
     kind
-        A key of :data:`HAZARDS`.
+        One of :data:`HAZARDS`.
     name
         What the chart calls it; it may be empty.
     depth_m
@@ -226,11 +218,9 @@ def _check(content: bytes) -> None:
     if len(content) < 24 or content[5:6] not in (b"1", b"2", b"3") or content[6:7] != b"L":
         raise _unreadable()
     try:
-        names = {str(name) for name, _ in pyogrio.list_layers(io.BytesIO(content))}
+        pyogrio.raw.read(content, layer="DSID", read_geometry=False, UPDATES="IGNORE")
     except (pyogrio.errors.DataSourceError, pyogrio.errors.DataLayerError, ValueError, RuntimeError):
         raise _unreadable() from None
-    if "DSID" not in names:
-        raise _unreadable()
 
 
 def _layer(content: bytes, name: str) -> _Table | None:
@@ -238,11 +228,11 @@ def _layer(content: bytes, name: str) -> _Table | None:
     options = {"SPLIT_MULTIPOINT": "ON"} if name == "SOUNDG" else {}
     try:
         about, _, shapes, columns = pyogrio.raw.read(
-            io.BytesIO(content), layer=name, max_features=MAX_FEATURES + 1, UPDATES="IGNORE", **options
+            content, layer=name, max_features=MAX_FEATURES + 1, UPDATES="IGNORE", **options
         )
     except (pyogrio.errors.DataSourceError, pyogrio.errors.DataLayerError):
         return None
-    except (pyogrio.errors.GeometryError, pyogrio.errors.FeatureError, ValueError, RuntimeError):
+    except (ValueError, RuntimeError):
         raise _unreadable() from None
     if len(shapes) > MAX_FEATURES:
         raise ReadError("file", f"it has more than {MAX_FEATURES} objects of a class", "send a smaller cell")
