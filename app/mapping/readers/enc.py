@@ -4,6 +4,7 @@ Depths of a chart are chosen to be safe: soundings are true, contours are drawn 
 depths and measure none, so they are no soundings.
 """
 
+import warnings
 from dataclasses import dataclass
 from typing import Any
 
@@ -218,7 +219,7 @@ def _check(content: bytes) -> None:
     if len(content) < 24 or content[5:6] not in (b"1", b"2", b"3") or content[6:7] != b"L":
         raise _unreadable()
     try:
-        pyogrio.raw.read(content, layer="DSID", read_geometry=False, UPDATES="IGNORE")
+        _read(content, layer="DSID", read_geometry=False)
     except (pyogrio.errors.DataSourceError, pyogrio.errors.DataLayerError, ValueError, RuntimeError):
         raise _unreadable() from None
 
@@ -227,9 +228,7 @@ def _layer(content: bytes, name: str) -> _Table | None:
     """Return the objects of a class; None where the cell has none."""
     options = {"SPLIT_MULTIPOINT": "ON"} if name == "SOUNDG" else {}
     try:
-        about, _, shapes, columns = pyogrio.raw.read(
-            content, layer=name, max_features=MAX_FEATURES + 1, UPDATES="IGNORE", **options
-        )
+        about, _, shapes, columns = _read(content, layer=name, max_features=MAX_FEATURES + 1, **options)
     except (pyogrio.errors.DataSourceError, pyogrio.errors.DataLayerError):
         return None
     except (ValueError, RuntimeError):
@@ -241,6 +240,14 @@ def _layer(content: bytes, name: str) -> _Table | None:
     return _Table(
         shapely.from_wkb(shapes[kept], on_invalid="ignore"), {key: values[kept] for key, values in told.items()}
     )
+
+
+def _read(content: bytes, **options: Any) -> Any:
+    """Read a class of a cell; updates that may lie beside it are not looked for."""
+    with warnings.catch_warnings():
+        # What GDAL finds odd about a cell, it tells word by word.
+        warnings.simplefilter("ignore", RuntimeWarning)
+        return pyogrio.raw.read(content, UPDATES="IGNORE", **options)
 
 
 def _unreadable() -> ReadError:
