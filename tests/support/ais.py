@@ -23,7 +23,7 @@ RECORDED = (
 
 def sentence(*, channel: str = "A", part: int = 0, seq_id: int = 0, **message: Any) -> bytes:
     """Return a sentence that says this; ``part``: which one, where it takes several."""
-    return encode_dict(message, radio_channel=channel, talker_id="AI", seq_id=seq_id)[part].encode()
+    return encode_dict(message, radio_channel=channel, talker_id="AI", sentence_type="VDM", seq_id=seq_id)[part].encode()
 
 
 def position(mmsi: int, lat_deg: float, lon_deg: float, knots: float = 0.0, course_deg: float = 0.0) -> bytes:

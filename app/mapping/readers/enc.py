@@ -116,6 +116,7 @@ def read_zones(content: bytes, place: MapExtent, margin_m: float) -> tuple[list[
         grid.west_m + grid.cols * grid.cell_m + place.margin_m,
         grid.south_m + grid.rows * grid.cell_m + place.margin_m,
     )
+    around = _around(frame, box.buffer(NO_ZONE_POSITION_M + margin_m))
     found: list[tuple[float, Zone]] = []
     for kind in HAZARDS:
         table = _layer(content, kind)
@@ -125,10 +126,11 @@ def read_zones(content: bytes, place: MapExtent, margin_m: float) -> tuple[list[
         for number, shape in enumerate(table.shapes):
             if shape is None or shape.is_empty:
                 continue
-            local = shapely.transform(shape, lambda lonlat: _local(frame, lonlat))
-            if not local.is_valid:
-                local = shapely.make_valid(local)
-            middle = shapely.get_coordinates(shape.representative_point())
+            near = (shape if shape.is_valid else shapely.make_valid(shape)).intersection(around)
+            if near.is_empty:
+                continue
+            local = shapely.transform(near, lambda lonlat: _local(frame, lonlat))
+            middle = shapely.get_coordinates(near.representative_point())
             [position_m] = quality.at(*middle.T)[2]
             # Limits that somebody drew are where they are drawn, and coasts are not surveyed from the water.
             position_m = 0.0 if kind in ("RESARE", "LNDARE") else float(position_m)
@@ -259,6 +261,13 @@ def _unreadable() -> ReadError:
 def _local(frame: LocalFrame, lonlat: FloatArray) -> FloatArray:
     east, north = frame.to_local(lonlat[:, 1], lonlat[:, 0])
     return np.column_stack([east, north])
+
+
+def _around(frame: LocalFrame, box: BaseGeometry) -> BaseGeometry:
+    """Return degrees that hold a part of the frame: what lies elsewhere cannot be placed in it, and need not be."""
+    west, south, east, north = box.bounds
+    lat, lon = frame.to_geographic(np.array([west, west, east, east]), np.array([south, north, south, north]))
+    return shapely.box(lon.min(), lat.min(), lon.max(), lat.max())
 
 
 def _polygons(geometry: BaseGeometry) -> list[Polygon]:

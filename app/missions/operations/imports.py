@@ -38,6 +38,7 @@ from app.storage import stored_maps
 from app.storage.models import ImportRow, ReferenceRow
 from app.storage.uncancellable import to_the_end
 
+METRES_PER_DEGREE = 111_200.0
 MAX_SIDE_M = 50_000.0
 """Of an area that a chart is asked for."""
 
@@ -254,16 +255,18 @@ def _extent_of(options: ZoneOptions) -> MapExtent:
         raise InvalidRequestError(
             "area", "it ends before it begins", "give west_deg < east_deg and south_deg < north_deg"
         )
+    high_m = METRES_PER_DEGREE * (options.north_deg - options.south_deg)
+    wide_m = METRES_PER_DEGREE * (options.east_deg - options.west_deg) * math.cos(math.radians(middle[0]))
+    if max(wide_m, high_m) > MAX_SIDE_M:
+        raise InvalidRequestError(
+            "area", f"it is {max(wide_m, high_m) / 1000:.0f} km wide", f"ask for at most {MAX_SIDE_M / 1000:g} km"
+        )
     frame = LocalFrame(*middle)
     east, north = frame.to_local(
         [options.south_deg, options.south_deg, options.north_deg, options.north_deg],
         [options.west_deg, options.east_deg, options.east_deg, options.west_deg],
     )
     wide, high = float(np.ptp(east)), float(np.ptp(north))
-    if max(wide, high) > MAX_SIDE_M:
-        raise InvalidRequestError(
-            "area", f"it is {max(wide, high) / 1000:.0f} km wide", f"ask for at most {MAX_SIDE_M / 1000:g} km"
-        )
     rows, cols = max(math.ceil(high), 1), max(math.ceil(wide), 1)
     return MapExtent(frame, Grid(float(east.min()), float(north.min()), 1.0, rows, cols), 0.0)
 
