@@ -660,6 +660,29 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/chart-zones": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Propose keep-out zones from a chart
+         * @description Return what an ENC cell (S-57, its .000 file) shows in an area to keep out of.
+         *
+         *     Land, obstructions, wrecks, rocks and restricted areas. Nothing is stored and no mission changes: who creates one
+         *     looks at them and takes those that apply into `keep_out`.
+         */
+        post: operations["proposeZones"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/missions/{mission_id}/map": {
         parameters: {
             query?: never;
@@ -4098,6 +4121,52 @@ export interface components {
             eta_s: number | null;
             /** @description In missions of kind search: how it stands */
             search: components["schemas"]["SearchProgress"] | null;
+        };
+        /**
+         * ProposedZoneView
+         * @description What a chart shows to keep out of. It is a proposal: nothing keeps out of it before a mission has it.
+         */
+        ProposedZoneView: {
+            /**
+             * Object
+             * @description The chart's class: LNDARE, OBSTRN, WRECKS, UWTROC or RESARE
+             */
+            object: string;
+            /**
+             * Reason
+             * @description What it is, in words
+             */
+            reason: string;
+            /**
+             * Name
+             * @description What the chart calls it; it may be empty
+             */
+            name: string;
+            /**
+             * Depth M
+             * @description Least depth over it, as charted; null: not known
+             */
+            depth_m: number | null;
+            /**
+             * Position M
+             * @description How far off it may be; its outline is enlarged by that
+             */
+            position_m: number;
+            /** @description For a mission's `keep_out` */
+            zone: components["schemas"]["PolygonGeometry"];
+        };
+        /**
+         * ProposedZonesView
+         * @description What a chart shows to keep out of, the nearest to the middle of the area first.
+         */
+        ProposedZonesView: {
+            /** Zones */
+            zones: components["schemas"]["ProposedZoneView"][];
+            /**
+             * Notes
+             * @description What was assumed or left out, in words
+             */
+            notes: string[];
         };
         /**
          * QualityView
@@ -9372,7 +9441,7 @@ export interface operations {
     importSoundings: {
         parameters: {
             query: {
-                /** @description Its name; the ending says what it is: .xyz, .csv, .txt (also with .gz), .asc, .tif, .nc or .bag */
+                /** @description Its name; the ending says what it is: .xyz, .csv, .txt (also with .gz), .asc, .tif, .nc, .bag, .h5 (S-102) or .000 (ENC cell) */
                 filename: string;
                 /** @description Where it comes from, kept with the mission */
                 source?: string;
@@ -9650,7 +9719,7 @@ export interface operations {
     setReference: {
         parameters: {
             query: {
-                /** @description Its name; the ending says what it is: .xyz, .csv, .txt (also with .gz), .asc, .tif, .nc or .bag */
+                /** @description Its name; the ending says what it is: .xyz, .csv, .txt (also with .gz), .asc, .tif, .nc, .bag, .h5 (S-102) or .000 (ENC cell) */
                 filename: string;
                 /** @description Where it comes from, kept with the mission */
                 source?: string;
@@ -9837,6 +9906,114 @@ export interface operations {
             };
             /** @description Too many requests */
             429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    proposeZones: {
+        parameters: {
+            query: {
+                /** @description Western end of the area */
+                west_deg: number;
+                /** @description Southern end of the area */
+                south_deg: number;
+                /** @description Eastern end of the area */
+                east_deg: number;
+                /** @description Northern end of the area */
+                north_deg: number;
+                /** @description How much all of it is enlarged, beside how well its place is known */
+                margin_m?: number;
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /** @description The file as it is, whatever its media type */
+        requestBody: {
+            content: {
+                "application/octet-stream": string;
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ProposedZonesView"];
+                };
+            };
+            /** @description The body cannot be read */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The request took too long to arrive */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body is too large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too much is sent at once; too many requests */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No file can be read now; too much is under way */
+            503: {
                 headers: {
                     [name: string]: unknown;
                 };
