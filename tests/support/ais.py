@@ -21,9 +21,10 @@ RECORDED = (
 )
 
 
-def sentence(*, channel: str = "A", part: int = 0, seq_id: int = 0, **message: Any) -> bytes:
+def sentence(channel: str = "A", part: int = 0, seq_id: int = 0, **message: Any) -> bytes:
     """Return a sentence that says this; ``part``: which one, where it takes several."""
-    return encode_dict(message, radio_channel=channel, talker_id="AI", sentence_type="VDM", seq_id=seq_id)[part].encode()
+    made = encode_dict(message, radio_channel=channel, talker_id="AI", sentence_type="VDM", seq_id=seq_id)
+    return made[part].encode()
 
 
 def position(mmsi: int, lat_deg: float, lon_deg: float, knots: float = 0.0, course_deg: float = 0.0) -> bytes:
@@ -33,6 +34,6 @@ def position(mmsi: int, lat_deg: float, lon_deg: float, knots: float = 0.0, cour
 
 def named(mmsi: int, name: str) -> list[bytes]:
     """Return the sentences that name a ship of 30 m by 8 m, with a draught of 3 m."""
-    told = {"msg_type": 5, "mmsi": mmsi, "shipname": name, "ship_type": 70, "draught": 3.0}
-    sides = {"to_bow": 20, "to_stern": 10, "to_port": 4, "to_starboard": 4}
-    return [sentence(part=part, seq_id=1, **told, **sides) for part in (0, 1)]
+    told: dict[str, Any] = {"msg_type": 5, "mmsi": mmsi, "shipname": name, "ship_type": 70, "draught": 3.0}
+    sides: dict[str, Any] = {"to_bow": 20, "to_stern": 10, "to_port": 4, "to_starboard": 4}
+    return [sentence("A", part, 1, **told, **sides) for part in (0, 1)]

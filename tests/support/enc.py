@@ -1,6 +1,7 @@
 """Small ENC cells, written by GDAL's S-57 writer, which pyogrio's library has; pyogrio itself writes one layer only."""
 
 import ctypes
+from collections.abc import Sequence
 from pathlib import Path
 
 import pyogrio
@@ -47,7 +48,7 @@ class Cell:
         self._lib.CPLSetConfigOption(b"GDAL_DATA", str(here / "gdal_data").encode())
         self._lib.GDALAllRegister()
         self._last = {ISOLATED: 0, CONNECTED: 0, EDGE: 0, 0: 0}
-        self._made: list[tuple[str, dict[str, object], bytes]] = []
+        self._made: list[tuple[str, dict[str, object]]] = []
         self._primitives: list[tuple[int, int, list[tuple[float, ...]], list[int]]] = []
 
     def point(self, kind: str, place: Place, **attributes: object) -> None:
@@ -76,12 +77,12 @@ class Cell:
                 fields |= {f"NAME_RCNM_{i}": CONNECTED, f"NAME_RCID_{i}": end, f"ORNT_{i}": 255, f"USAG_{i}": 255}
                 fields |= {f"TOPI_{i}": i + 1, f"MASK_{i}": 255}
             self._feature(data, _PRIMITIVES[kind], fields, self._geometry(kind, places))
-        for name, fields, _ in self._made:
-            self._feature(data, name.encode(), fields, None)
+        for name, attributes in self._made:
+            self._feature(data, name.encode(), attributes, None)
         lib.GDALClose(data)
         return file.read_bytes()
 
-    def _node(self, kind: int, places: list[tuple[float, ...]] | list[Place]) -> int:
+    def _node(self, kind: int, places: Sequence[tuple[float, ...]]) -> int:
         self._last[kind] += 1
         self._primitives.append((kind, self._last[kind], [tuple(place) for place in places], []))
         return self._last[kind]
@@ -90,7 +91,7 @@ class Cell:
         first = self._node(CONNECTED, [places[0]])
         last = first if places[0] == places[-1] else self._node(CONNECTED, [places[-1]])
         self._last[EDGE] += 1
-        inner = [tuple(place) for place in places[1:-1]]
+        inner: list[tuple[float, ...]] = list(places[1:-1])
         self._primitives.append((EDGE, self._last[EDGE], inner, [first, last]))
         return self._last[EDGE]
 
@@ -100,7 +101,7 @@ class Cell:
         fields: dict[str, object] = {"RCID": number, "PRIM": shape, "GRUP": 2, "RVER": 1, "AGEN": 1, "FIDN": number}
         fields |= {"FIDS": 1, "NAME_RCNM": [node for node, _ in of], "NAME_RCID": [one for _, one in of]}
         fields |= {"ORNT": [1 if shape == AREA else 255], "USAG": [1 if shape == AREA else 255], "MASK": [255]}
-        self._made.append((kind, fields | attributes, b""))
+        self._made.append((kind, fields | attributes))
 
     def _geometry(self, kind: int, places: list[tuple[float, ...]]) -> int:
         lib = self._lib

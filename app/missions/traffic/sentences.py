@@ -171,19 +171,26 @@ def _position(message: Any, mmsi: int, own: bool, *, long_range: bool) -> ShipPo
 
 
 def _particulars(message: Any, mmsi: int, own: bool) -> ShipParticulars:
-    sides = [getattr(message, f"to_{side}", 0) or 0 for side in ("bow", "stern", "port", "starboard")]
+    bow, stern, port, starboard = (_metres(message, side) for side in ("bow", "stern", "port", "starboard"))
     # Zero and zero is what ships send that never entered it.
-    length, width = sides[:2] if sum(sides[:2]) else [None, None], sides[2:] if sum(sides[2:]) else [None, None]
+    long, wide = bow + stern > 0.0, port + starboard > 0.0
     kind, draught = getattr(message, "ship_type", None), getattr(message, "draught", None)
     return ShipParticulars(
         mmsi,
         own,
-        _text(getattr(message, "shipname", "")),
-        _text(getattr(message, "callsign", "")),
-        _words(kind.name) if kind is not None and int(kind) and hasattr(kind, "name") else "",
-        *(None if side is None else float(side) for side in (*length, *width)),
-        float(draught) if draught else None,
+        name=_text(getattr(message, "shipname", "")),
+        call_sign=_text(getattr(message, "callsign", "")),
+        type=_words(kind.name) if kind is not None and int(kind) and hasattr(kind, "name") else "",
+        to_bow_m=bow if long else None,
+        to_stern_m=stern if long else None,
+        to_port_m=port if wide else None,
+        to_starboard_m=starboard if wide else None,
+        draught_m=float(draught) if draught else None,
     )
+
+
+def _metres(message: Any, side: str) -> float:
+    return float(getattr(message, f"to_{side}", 0) or 0)
 
 
 def _text(said: Any) -> str:

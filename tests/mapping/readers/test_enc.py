@@ -137,7 +137,7 @@ def test_what_is_no_cell_is_refused(content: bytes, tmp_path: Path) -> None:
         read_file(opened, ".000")
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(st.lists(st.tuples(st.integers(24, 4700), st.integers(0, 255)), min_size=1, max_size=6), st.integers(100, 4749))
 def test_a_damaged_cell_is_read_or_refused(changes: list[tuple[int, int]], length: int) -> None:
     content = bytearray(SMALL_CELL.read_bytes())
