@@ -135,7 +135,7 @@ def read_zones(content: bytes, place: MapExtent, margin_m: float) -> tuple[list[
             # Limits that somebody drew are where they are drawn, and coasts are not surveyed from the water.
             position_m = 0.0 if kind in ("RESARE", "LNDARE") else float(position_m)
             for part in _polygons(local.buffer(position_m + margin_m, quad_segs=4).intersection(box)):
-                ring = np.asarray(part.simplify(DETAIL_M).exterior.coords)[:-1]
+                ring = shapely.get_coordinates(Polygon(part.exterior).simplify(DETAIL_M))[:-1]
                 lat, lon = frame.to_geographic(ring[:, 0], ring[:, 1])
                 depth = float(depths[number])
                 told = Zone(
@@ -267,7 +267,7 @@ def _around(frame: LocalFrame, box: BaseGeometry) -> BaseGeometry:
     """Return degrees that hold a part of the frame: what lies elsewhere cannot be placed in it, and need not be."""
     west, south, east, north = box.bounds
     lat, lon = frame.to_geographic(np.array([west, west, east, east]), np.array([south, north, south, north]))
-    return shapely.box(lon.min(), lat.min(), lon.max(), lat.max())
+    return Polygon(shapely.get_coordinates(shapely.box(lon.min(), lat.min(), lon.max(), lat.max())))
 
 
 def _polygons(geometry: BaseGeometry) -> list[Polygon]:
