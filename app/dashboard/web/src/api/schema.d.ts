@@ -1319,6 +1319,28 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/traffic": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * List the ships about
+         * @description Return the ships that were heard by AIS lately, each with the vehicle near the surface that it comes closest to.
+         *
+         *     Each process hears for itself: this is what the one hears that is asked.
+         */
+        get: operations["listShips"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/planners": {
         parameters: {
             query?: never;
@@ -1826,6 +1848,31 @@ export interface components {
             sd_m: number | null;
             /** Within Pct */
             within_pct: number;
+        };
+        /**
+         * ApproachView
+         * @description The closest point of approach of a ship and the vehicle that it comes closest to.
+         */
+        ApproachView: {
+            /** Mission Id */
+            mission_id: string;
+            /** Vehicle */
+            vehicle: string;
+            /**
+             * Distance M
+             * @description Between the ship's hull, as far as it is known, and the vehicle
+             */
+            distance_m: number;
+            /**
+             * In S
+             * @description From now; 0: it is farther every moment
+             */
+            in_s: number;
+            /**
+             * Alarm
+             * @description Closer than ais.cpa_m within ais.cpa_s
+             */
+            alarm: boolean;
         };
         /**
          * AuditEntry
@@ -2368,6 +2415,12 @@ export interface components {
             own: components["schemas"]["Finding"][];
             /** Vehicles */
             vehicles: components["schemas"]["VehicleDiagnosis"][];
+            /**
+             * Traffic
+             * @description Of AIS; empty where it is not set up
+             * @default []
+             */
+            traffic: components["schemas"]["TrafficFinding"][];
         };
         /**
          * EllipseView
@@ -2455,7 +2508,7 @@ export interface components {
          * @description What may go wrong with a vehicle, or with all of them.
          * @enum {string}
          */
-        Failsafe: "leak" | "critical_energy" | "too_deep" | "position_lost" | "low_energy" | "link_lost" | "geofence_left" | "separation_lost" | "vehicle_error" | "other_console" | "all_links_lost" | "service_restarted";
+        Failsafe: "leak" | "critical_energy" | "too_deep" | "position_lost" | "low_energy" | "link_lost" | "traffic" | "geofence_left" | "separation_lost" | "vehicle_error" | "other_console" | "all_links_lost" | "service_restarted";
         /**
          * FailsafeView
          * @description A failsafe in force for a vehicle.
@@ -2991,7 +3044,7 @@ export interface components {
          * @enum {string}
          */
         LinkState: "unknown" | "lost" | "expected_offline" | "heard" | "ready" | "engaged";
-        LiveMessage: components["schemas"]["SnapshotMessage"] | components["schemas"]["VehiclesMessage"] | components["schemas"]["TargetsMessage"] | components["schemas"]["SearchMessage"] | components["schemas"]["WaypointsMessage"] | components["schemas"]["StateMessage"] | components["schemas"]["MapMessage"] | components["schemas"]["EventMessage"] | components["schemas"]["AlarmMessage"];
+        LiveMessage: components["schemas"]["SnapshotMessage"] | components["schemas"]["VehiclesMessage"] | components["schemas"]["TargetsMessage"] | components["schemas"]["SearchMessage"] | components["schemas"]["WaypointsMessage"] | components["schemas"]["StateMessage"] | components["schemas"]["TrafficMessage"] | components["schemas"]["MapMessage"] | components["schemas"]["EventMessage"] | components["schemas"]["AlarmMessage"];
         /**
          * Liveness
          * @description The process answers.
@@ -4594,6 +4647,56 @@ export interface components {
             horizontal_m: number;
         };
         /**
+         * ShipView
+         * @description A ship as it was heard last. What it does not tell is null, or an empty text.
+         */
+        ShipView: {
+            /** Mmsi */
+            mmsi: number;
+            /** Name */
+            name: string;
+            /** Call Sign */
+            call_sign: string;
+            /** Type */
+            type: string;
+            /** Status */
+            status: string;
+            /**
+             * Own
+             * @description Belongs to the operation: no cause for an alarm
+             */
+            own: boolean;
+            /** Lat Deg */
+            lat_deg: number;
+            /** Lon Deg */
+            lon_deg: number;
+            /**
+             * Sog Mps
+             * @description Speed over ground
+             */
+            sog_mps: number | null;
+            /**
+             * Cog Deg
+             * @description Course over ground
+             */
+            cog_deg: number | null;
+            /** Heading Deg */
+            heading_deg: number | null;
+            /** Length M */
+            length_m: number | null;
+            /** Width M */
+            width_m: number | null;
+            /** Draught M */
+            draught_m: number | null;
+            /**
+             * Age S
+             * @description Since it was heard
+             */
+            age_s: number;
+            /** @description To vehicles that are at or near the surface, or will be; null: to none within half an hour */
+            closest: components["schemas"]["ApproachView"] | null;
+        };
+        /**
          * SimulatedTarget
          * @description A target that moves about in the service's own simulation; vehicles of kind ``sim`` range to it.
          */
@@ -5634,6 +5737,100 @@ export interface components {
              * @default 10
              */
             standoff_m: number;
+        };
+        /**
+         * TrafficFinding
+         * @description What the doctor says of AIS, and what to do about it.
+         */
+        TrafficFinding: {
+            severity: components["schemas"]["Severity"];
+            /** Text */
+            text: string;
+            /**
+             * Remedy
+             * @default
+             */
+            remedy: string;
+        };
+        /**
+         * TrafficMessage
+         * @description The ships near the mission, about once a second where AIS is set up.
+         */
+        TrafficMessage: {
+            /**
+             * Type
+             * @default traffic
+             * @constant
+             */
+            type: "traffic";
+            /**
+             * Time
+             * Format: date-time
+             */
+            time: string;
+            /** Ships */
+            ships: components["schemas"]["ShipView"][];
+        };
+        /**
+         * TrafficSourceView
+         * @description Where sentences come from.
+         */
+        TrafficSourceView: {
+            /** Name */
+            name: string;
+            /** Open */
+            open: boolean;
+            /**
+             * Reason
+             * @description Why nothing can be heard; empty while it is open
+             */
+            reason: string;
+            /**
+             * Sentences
+             * @description Of AIS, that could be read
+             */
+            sentences: number;
+            /**
+             * Silent S
+             * @description Since the last of them; null: none came yet
+             */
+            silent_s: number | null;
+        };
+        /**
+         * TrafficView
+         * @description The ships about and how they are heard.
+         */
+        TrafficView: {
+            /**
+             * Ships
+             * @description The nearest to a mission first
+             */
+            ships: components["schemas"]["ShipView"][];
+            /**
+             * Sources
+             * @description Empty: AIS is not set up, see the settings ais.*
+             */
+            sources: components["schemas"]["TrafficSourceView"][];
+            /**
+             * Malformed
+             * @description Sentences that could not be read
+             */
+            malformed: number;
+            /**
+             * Dropped
+             * @description Sentences that came faster than they can be read
+             */
+            dropped: number;
+            /**
+             * Turned Away
+             * @description Positions of ships there was no room for; near ones come before others
+             */
+            turned_away: number;
+            /**
+             * Jumps
+             * @description Positions too far from where the ship had just been
+             */
+            jumps: number;
         };
         /**
          * Training
@@ -12538,6 +12735,53 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["DoctorView"];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too many requests */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    listShips: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["TrafficView"];
                 };
             };
             /** @description An access token is needed */
