@@ -320,7 +320,7 @@ def doctor(
     raise typer.Exit(0 if diagnosis.healthy else FAILURE)
 
 
-def _show_diagnosis(diagnosis: "Diagnosis", ships: Sequence["TrafficFinding"]) -> None:
+def _show_diagnosis(diagnosis: "Diagnosis", ships: Sequence["TrafficFinding"] = ()) -> None:
     from rich.console import Console
     from rich.table import Table
     from rich.text import Text
