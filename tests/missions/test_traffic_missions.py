@@ -14,8 +14,8 @@ from app.missions.service import MissionService
 from app.missions.spec.mission import MissionSpec
 from app.missions.states import MissionState
 from app.missions.traffic.sources import UdpSource
-from app.missions.views.messages import TrafficMessage
 from app.missions.views.mission import Level, MissionView
+from app.missions.views.traffic import TrafficMessage
 from tests.support.ais import named, position
 from tests.support.missions.harbour import Harbour, act, sim_spec, until_state, until_step, view_of
 from tests.support.missions.specs import FRAME, lon_lat
@@ -127,6 +127,7 @@ async def test_vehicles_wait_below_for_a_ship_over_their_home(harbour_closed: Ha
     assert vehicle.depth_m is not None
     assert vehicle.depth_m < 1.5, "it has come up"
     assert vehicle.lat_deg is not None
+    assert vehicle.lon_deg is not None
     east, north = FRAME.to_local(vehicle.lat_deg, vehicle.lon_deg)
     home_east, home_north = FRAME.to_local(HOME[1], HOME[0])
     assert abs(east - home_east) < 25.0
