@@ -3,6 +3,7 @@
 import asyncio
 import json
 import sys
+from collections.abc import Sequence
 from datetime import UTC, datetime
 from enum import StrEnum
 from pathlib import Path
@@ -23,6 +24,7 @@ from app.commands.sites import sites_app
 from app.commands.train import train
 
 if TYPE_CHECKING:
+    from app.missions.views.traffic import TrafficFinding
     from imc_bridge.doctor.doctor import Diagnosis
 
 app = typer.Typer(
@@ -269,17 +271,30 @@ def doctor(
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
-    """Listen for IMC vehicles and say what is missing. Nothing is commanded. Exit code 1 when something is wrong."""
+    """Listen for IMC vehicles, and ships by AIS, and say what is missing. Nothing is commanded.
+
+    Exit code 1 when something is wrong.
+    """
     settings = command_settings()
     from app.missions.fleet.links.imc import bridge_settings
+    from app.missions.traffic.watch import Traffic
     from app.missions.views.doctor import doctor_view
+    from app.missions.views.traffic import traffic_findings
     from imc_bridge.doctor.doctor import Diagnosis, diagnose, diagnose_recording
     from imc_bridge.doctor.replay import RecordingError
 
     bridge = bridge_settings(settings.imc, settings.time_scale)
+    ships: list[TrafficFinding] = []
 
     async def run() -> Diagnosis:
-        return await diagnose(bridge, seconds)
+        traffic = Traffic(settings.ais)
+        await traffic.start()
+        try:
+            diagnosis = await diagnose(bridge, seconds)
+            ships.extend(traffic_findings(traffic))
+            return diagnosis
+        finally:
+            await traffic.close()
 
     try:
         if replay is not None:
@@ -301,13 +316,13 @@ def doctor(
             "Stop the service first, or ask it: GET /api/v1/doctor",
         ) from None
     if as_json:
-        typer.echo(doctor_view(diagnosis).model_dump_json(indent=2))
+        typer.echo(doctor_view(diagnosis, ships).model_dump_json(indent=2))
     else:
-        _show_diagnosis(diagnosis)
+        _show_diagnosis(diagnosis, ships)
     raise typer.Exit(0 if diagnosis.healthy else FAILURE)
 
 
-def _show_diagnosis(diagnosis: "Diagnosis") -> None:
+def _show_diagnosis(diagnosis: "Diagnosis", ships: Sequence["TrafficFinding"] = ()) -> None:
     from rich.console import Console
     from rich.table import Table
     from rich.text import Text
@@ -329,6 +344,9 @@ def _show_diagnosis(diagnosis: "Diagnosis") -> None:
             words, style = marks[finding.severity]
             table.add_row("" if index else plain(name), Text(words, style), plain(finding.text), plain(finding.remedy))
         table.add_section()
+    for index, ship in enumerate(ships):
+        words, style = marks[ship.severity]
+        table.add_row("" if index else "ships", Text(words, style), plain(ship.text), plain(ship.remedy))
     Console().print(table)
     for node in diagnosis.nodes:
         if len(node.history) > 1:

@@ -172,6 +172,7 @@ def create_app(settings: Settings | None = None, *, port: int | None = None) -> 
         measurements.router,
         corrections.router,
         imports.router,
+        imports.charts_router,
         maps.router,
         maps.layers_router,
         tiles.router,

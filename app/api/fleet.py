@@ -11,6 +11,7 @@ from app.api.state import Service, State
 from app.missions.running.mission_views import planner_views
 from app.missions.views.doctor import DoctorView
 from app.missions.views.mission import PlannerView, VehicleView
+from app.missions.views.traffic import TrafficView
 
 _views = TypeAdapter(list[VehicleView])
 
@@ -31,6 +32,15 @@ async def list_vehicles(request: Request, state: State, service: Service, reader
 async def examine_links(service: Service, reader: Reader) -> DoctorView:
     """Return what keeps IMC vehicles from working with this service, each finding with its cause and what to do."""
     return service.doctor()
+
+
+@router.get("/traffic", operation_id="listShips", summary="List the ships about", tags=["vehicles"])
+async def list_ships(service: Service, reader: Reader) -> TrafficView:
+    """Return the ships that were heard by AIS lately, each with the vehicle near the surface that it comes closest to.
+
+    Each process hears for itself: this is what the one hears that is asked.
+    """
+    return service.ships()
 
 
 @router.get("/planners", operation_id="listPlanners", summary="List the planners", tags=["planners"])

@@ -15,11 +15,13 @@ from app.api.state import EdgeState, Service, State
 from app.missions.live.mission import LiveMission
 from app.missions.operations.imports import imports_of, kind_of, reference_of
 from app.missions.operations.uploads import Upload
-from app.missions.views.imports import ImportOptions, ImportView, ReferenceView
+from app.missions.views.imports import ImportOptions, ImportView, ProposedZonesView, ReferenceView, ZoneOptions
 
 router = APIRouter(
     prefix=f"{API}/missions/{{mission_id}}", tags=["imports"], responses=problems("unauthenticated", "forbidden")
 )
+
+charts_router = APIRouter(prefix=API, tags=["imports"], responses=problems("unauthenticated", "forbidden"))
 
 _FILE: dict[str, Any] = {
     "requestBody": {
@@ -78,6 +80,28 @@ async def import_soundings(
     if view.replayed:
         response.status_code = 200
     return view
+
+
+@charts_router.post(
+    "/chart-zones",
+    operation_id="proposeZones",
+    summary="Propose keep-out zones from a chart",
+    openapi_extra=_FILE,
+    responses=problems("malformed-body", "body-too-large", "invalid-request", "import-unavailable"),
+)
+async def propose_zones(
+    options: Annotated[ZoneOptions, Query()], request: Request, state: State, operator: Operator
+) -> ProposedZonesView:
+    """Return what an ENC cell (S-57, its .000 file) shows in an area to keep out of.
+
+    Land, obstructions, wrecks, rocks and restricted areas. Nothing is stored and no mission changes: who creates one
+    looks at them and takes those that apply into `keep_out`.
+    """
+    try:
+        async with state.service.uploads.receive(request.stream(), state.settings.max_import_bytes) as upload:
+            return await state.service.imports.propose_zones(upload, options)
+    except ClientDisconnect:
+        raise ProblemError("malformed-body", "the connection ended before the file did") from None
 
 
 @router.get(

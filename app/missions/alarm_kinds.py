@@ -30,6 +30,7 @@ class AlarmKind(StrEnum):
     POSITION_LOST = "position_lost"
     LOW_ENERGY = "low_energy"
     LINK_LOST = "link_lost"
+    TRAFFIC = "traffic"
     GEOFENCE_LEFT = "geofence_left"
     VEHICLE_ERROR = "vehicle_error"
     OTHER_CONSOLE = "other_console"
@@ -90,6 +91,9 @@ ALARMS: Mapping[AlarmKind, AlarmRule] = {
     ),
     AlarmKind.LOW_ENERGY: AlarmRule(_MAJOR, "a vehicle turns back for its energy", "be at the recovery point in time"),
     AlarmKind.LINK_LOST: AlarmRule(_CRITICAL, "a vehicle was silent for too long", "look for it along its way home"),
+    AlarmKind.TRAFFIC: AlarmRule(
+        _CRITICAL, "a ship comes close to a vehicle at the surface", "call the ship; hold the vehicle below"
+    ),
     AlarmKind.GEOFENCE_LEFT: AlarmRule(
         _CRITICAL, "a vehicle stays in a keep-out zone or outside the area", "abort it, or recover it"
     ),

@@ -29,6 +29,7 @@ from app.missions.operations.reading import Reader
 from app.missions.operations.recorrection import check_level_is_known
 from app.missions.operations.reports import Reports
 from app.missions.operations.sites import Sites
+from app.missions.operations.traffic import places_of, traffic_view
 from app.missions.operations.uploads import Uploads
 from app.missions.operations.web_tiles import WebTiles
 from app.missions.running.admission import check_spec
@@ -44,8 +45,10 @@ from app.missions.running.team_changes import TeamChanges, vehicle_row
 from app.missions.settings import ServiceSettings
 from app.missions.spec.mission import MissionSpec
 from app.missions.states import ENDED, Action, MissionState
+from app.missions.traffic.watch import Traffic
 from app.missions.views.doctor import DoctorView, Examine, doctor_view, switched_off
 from app.missions.views.mission import ActionView, Level, MissionSummary, MissionView, VehicleView
+from app.missions.views.traffic import TrafficView, traffic_findings
 from app.storage import missions as mission_queries
 from app.storage.database import Database
 from app.storage.fast_read import AtOnce
@@ -119,8 +122,10 @@ class MissionService:
         self.team_changes = TeamChanges(self.hub, self._claims, self._supervisor)
         """Vehicles that join missions and leave them."""
         self._ping_files = PingFiles.beside(settings.database_url, settings.pings_url)
+        self.traffic = Traffic(settings.ais, lambda: places_of(self._registry))
+        """Ships about."""
         self._registry = MissionRegistry(
-            database, self.hub, self._executor, self.maps, self._ping_files, settings.time_scale
+            database, self.hub, self._executor, self.maps, self._ping_files, settings.time_scale, self.traffic
         )
         self.process = Ownership(database, url, certificate)
         """This process among those that share the database."""
@@ -146,6 +151,7 @@ class MissionService:
         self._compilation.begin()
         await finish_removing(self._database, self._ping_files)
         await self.hub.start()
+        await self.traffic.start()
         self._registry.share(self.process, self._failover.may_take_up, self._taken_up)
         await self._failover.begin()
         self.alarms.start()
@@ -161,6 +167,7 @@ class MissionService:
         await self.alarms.close()
         await asyncio.gather(*(self._supervisor.halt(live) for live in self._registry if live.id in self._runs))
         await self.maps.close()
+        await self.traffic.close()
         await self.hub.close()
         await self._supervisor.close()
         await self._registry.close()
@@ -307,7 +314,11 @@ class MissionService:
 
     def doctor(self) -> DoctorView:
         """Return what keeps IMC vehicles from working with us, as far as listening tells."""
-        return doctor_view(self._examine())
+        return doctor_view(self._examine(), traffic_findings(self.traffic))
+
+    def ships(self) -> TrafficView:
+        """Return the ships about, each with the vehicle that it comes closest to."""
+        return traffic_view(self.traffic, self._registry)
 
     async def vehicles(self) -> list[VehicleView]:
         """Return every vehicle that is known, whether it takes part in a mission or not."""

@@ -1,9 +1,10 @@
 """Settings of the mission service. ``app.settings`` composes them with those of the HTTP edge."""
 
+import ipaddress
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
 from app.missions.alarm_settings import AlarmSettings
 from imc_bridge.settings import ConsoleSettings
@@ -115,6 +116,56 @@ class SimulationSettings(Section):
     )
 
 
+class AisSettings(Section):
+    """Ships about, by AIS. Without udp_port, tcp_host and file nothing is listened for."""
+
+    udp_address: str = Field(
+        default="0.0.0.0",  # noqa: S104 - receivers on the ship's network send there
+        description="Address on which sentences are taken; a group's address (as in IEC 61162-450) is joined",
+    )
+    udp_port: int | None = Field(
+        default=None, ge=0, le=65535, description="UDP port that a receiver sends NMEA sentences to, often 10110"
+    )
+    tcp_host: str = Field(default="", max_length=253, description="Server that sends NMEA sentences; empty: none")
+    tcp_port: int = Field(default=10110, ge=1, le=65535, description="Its TCP port")
+    file: Path | None = Field(
+        default=None,
+        description="File that a receiver's program adds NMEA sentences to, or a serial device that is set up",
+    )
+    max_age_s: float = Field(
+        default=600.0, ge=10, le=86_400, description="A ship that is silent for so long is forgotten"
+    )
+    own_mmsi: tuple[int, ...] = Field(
+        default=(), max_length=100, description="Ships of the operation itself: shown, and no cause for an alarm"
+    )
+    cpa_m: float = Field(
+        default=200.0, gt=0, le=20_000, description="Alarm where a ship's hull comes closer to a vehicle than this"
+    )
+    cpa_s: float = Field(default=300.0, gt=0, le=7200, description="Alarm so long before it does")
+    near_surface_m: float = Field(
+        default=5.0,
+        ge=0,
+        le=100,
+        description="Vehicles that are deeper are out of ships' way; of a ship that tells its draught, 2 m more than "
+        "that where it is deeper",
+    )
+    hold_s: float = Field(
+        default=900.0,
+        gt=0,
+        le=86_400,
+        description="Where missions hold vehicles below because of ships: no longer than this, vehicles' time",
+    )
+
+    @field_validator("udp_address")
+    @classmethod
+    def _is_an_address(cls, address: str) -> str:
+        try:
+            ipaddress.ip_address(address)
+        except ValueError:
+            raise ValueError(f"{address!r} is no IP address, such as 0.0.0.0 or 239.192.0.4") from None
+        return address
+
+
 class ProviderSettings(Section):
     """Who hands soundings in as crowdsourced bathymetry (IHO B-12)."""
 
@@ -163,6 +214,7 @@ class ServiceSettings(Section):
     )
     imc: ImcSettings = Field(default=ImcSettings(), description="The link to IMC vehicles")
     neptus: NeptusSettings = Field(default=NeptusSettings(), description="The gateway for Neptus' ConvCAO panel")
+    ais: AisSettings = Field(default=AisSettings(), description="Ships about, by AIS")
     simulation: SimulationSettings = Field(
         default=SimulationSettings(), description="The world of vehicles of kind sim"
     )

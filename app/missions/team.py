@@ -67,6 +67,8 @@ class Withdrawal:
         Whether it was sent on its way in this run.
     asked
         Whether a person wanted it: then only a person ends it.
+    below
+        Whether it waits below for ships to pass: it would come up where it is.
     """
 
     response: Response
@@ -74,6 +76,7 @@ class Withdrawal:
     over: bool = False
     led: bool = False
     asked: bool = False
+    below: bool = False
 
     def remember(self) -> dict[str, Any]:
         """Return what is stored, so that a restart goes on with it."""

@@ -47,6 +47,7 @@ BEYOND_THE_SCHEMA = {
     "getTile",
     "getTileJson",
     "importSoundings",
+    "proposeZones",
     "setReference",
     "setTide",
     "setSoundSpeed",

@@ -62,7 +62,8 @@ async def test_live_messages_are_in_the_document_for_generated_clients(document:
     assert {"$ref": "#/components/schemas/TargetsMessage"} in branches
     assert {"$ref": "#/components/schemas/SearchMessage"} in branches
     assert {"$ref": "#/components/schemas/AlarmMessage"} in branches
-    assert len(branches) == 9
+    assert {"$ref": "#/components/schemas/TrafficMessage"} in branches
+    assert len(branches) == 10
 
 
 async def test_what_is_always_sent_is_required_in_the_document(document: dict[str, Any]) -> None:

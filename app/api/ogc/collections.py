@@ -9,6 +9,8 @@ _TEXT: dict[str, Any] = {"type": "string"}
 _TIME: dict[str, Any] = {"type": "string", "format": "date-time"}
 _NUMBER: dict[str, Any] = {"type": "number"}
 _COUNT: dict[str, Any] = {"type": "integer"}
+_TRUTH: dict[str, Any] = {"type": "boolean"}
+_OPEN_TEXT: dict[str, Any] = {"type": "string", "nullable": True}
 _OPEN_TIME: dict[str, Any] = {"type": "string", "format": "date-time", "nullable": True}
 _OPEN_NUMBER: dict[str, Any] = {"type": "number", "nullable": True}
 
@@ -97,7 +99,7 @@ COLLECTIONS = {
                 "mission": _TEXT,
                 "vehicle": _TEXT,
                 "datetime": _TIME,
-                "active": {"type": "boolean"},
+                "active": _TRUTH,
                 "phase": _TEXT,
                 "link": _TEXT,
                 "age_s": _OPEN_NUMBER,
@@ -109,6 +111,34 @@ COLLECTIONS = {
                 "position_sd_m": _OPEN_NUMBER,
             },
             ("mission", "vehicle"),
+        ),
+        Collection(
+            Kind.TRAFFIC,
+            "Ships",
+            "Ships near missions that have not ended, by AIS, each with the vehicle near the surface that it comes "
+            "closest to. Time: when it was heard.",
+            "Point",
+            {
+                "mission": _TEXT,
+                "datetime": _TIME,
+                "mmsi": _COUNT,
+                "name": _TEXT,
+                "call_sign": _TEXT,
+                "type": _TEXT,
+                "status": _TEXT,
+                "own": _TRUTH,
+                "sog_mps": _OPEN_NUMBER,
+                "cog_deg": _OPEN_NUMBER,
+                "heading_deg": _OPEN_NUMBER,
+                "length_m": _OPEN_NUMBER,
+                "width_m": _OPEN_NUMBER,
+                "draught_m": _OPEN_NUMBER,
+                "age_s": _NUMBER,
+                "closest_vehicle": _OPEN_TEXT,
+                "closest_m": _OPEN_NUMBER,
+                "closest_in_s": _OPEN_NUMBER,
+                "alarm": _TRUTH,
+            },
         ),
     )
 }

@@ -21,11 +21,12 @@ from app.api.ogc.collections import COLLECTIONS, Collection
 from app.api.ogc.crs import CRS84, offered, transformed
 from app.api.ogc.document import GEOJSON, JSON, OPENAPI, SCHEMA, document
 from app.api.ogc.parameters import check_names, crs_of, items_query
-from app.api.ogc.sources import extent, extent_of_ways, feature, page
+from app.api.ogc.sources import enlarged, extent, extent_of_ways, feature, page
 from app.api.problems import ProblemError
 from app.api.state import State
 from app.missions.errors import MissionNotFoundError
 from app.missions.operations.features import Feature, Kind, period_of
+from app.missions.traffic.roster import NEAR_M
 from app.storage.models import MissionRow
 
 OGC = "/ogc"
@@ -90,7 +91,7 @@ async def get_landing_page(request: Request, data: Data) -> Response:
     return _answer(
         {
             "title": f"bathyfleet: {data.title}",
-            "description": "Areas, tracks, soundings, contours, holidays and vehicles, as they are now",
+            "description": "Areas, tracks, soundings, contours, holidays, vehicles and ships, as they are now",
             "links": [
                 _link("self", data.root, JSON, "This page"),
                 _link("service-desc", f"{data.root}/api", OPENAPI, "Description (OpenAPI 3.0)"),
@@ -232,6 +233,8 @@ def _described(data: Dataset, collection: Collection, crs: Sequence[str] = ("#/c
     if data.rows:
         of_maps = collection.kind in (Kind.AREAS, Kind.CONTOURS, Kind.HOLIDAYS)
         ends = extent(data.rows) if of_maps else extent_of_ways(data.rows)
+        if collection.kind is Kind.TRAFFIC:
+            ends = enlarged(ends, NEAR_M)
         described["extent"] = {"spatial": {"bbox": [ends], "crs": CRS84}}
         if of_maps:
             periods = [period_of(row) for row in data.rows]

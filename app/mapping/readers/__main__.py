@@ -19,6 +19,8 @@ def main(layers: tuple[str, ...] = LAYERS) -> int:
     """Do what the arguments say, with these layers of confinement."""
     task, result = json.loads(sys.argv[1]), int(sys.argv[2])
     limit(LIMITS)
+    # pyogrio would load it, and it starts threads.
+    sys.modules["pyarrow"] = None  # type: ignore[assignment]
     # Everything is imported and used once before the file is looked at: afterwards nothing more can be loaded.
     from app.mapping.readers.reading import place_file
     from app.mapping.readers.warming import data_folders, warm_up

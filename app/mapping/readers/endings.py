@@ -9,8 +9,11 @@ NETCDF = (".nc",)
 DRIVERS = {".tif": "GTiff", ".tiff": "GTiff", ".asc": "AAIGrid", ".bag": "BAG"}
 """Which of GDAL's drivers reads which ending; whatever else a file pretends to be is refused."""
 
+ENC = (".000",)
+S102 = (".h5",)
+
 PACKED = ".gz"
-ENDINGS = (*TEXT, *NETCDF, *DRIVERS)
+ENDINGS = (*TEXT, *NETCDF, *DRIVERS, *ENC, *S102)
 
 
 def ending(filename: str) -> str:

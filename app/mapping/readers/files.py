@@ -2,7 +2,7 @@
 
 from typing import BinaryIO
 
-from app.mapping.readers.endings import NETCDF, PACKED, TEXT
+from app.mapping.readers.endings import ENC, NETCDF, PACKED, S102, TEXT
 from app.mapping.readers.text import read_text
 from app.mapping.readers.types import Points, Raster
 
@@ -29,6 +29,14 @@ def read_file(file: BinaryIO, kind: str) -> Points | Raster:
         from app.mapping.readers.netcdf import read_netcdf
 
         return read_netcdf(content)
+    if kind in ENC:
+        from app.mapping.readers.enc import read_enc
+
+        return read_enc(content)
+    if kind in S102:
+        from app.mapping.readers.s102 import read_s102
+
+        return read_s102(content)
     from app.mapping.readers.raster import read_raster
 
     return read_raster(content, kind)

@@ -20,7 +20,7 @@ def place_file(file: BinaryIO, task: dict[str, Any], out: BinaryIO) -> dict[str,
 
     Returns
     -------
-    ``shape``, ``notes`` and, of soundings, how many were ``found``.
+    ``shape``, ``notes`` and, of soundings, how many were ``found``; of zones to keep out of also ``zones``.
 
     Raises
     ------
@@ -28,6 +28,8 @@ def place_file(file: BinaryIO, task: dict[str, Any], out: BinaryIO) -> dict[str,
         When the file cannot be used.
     """
     place = MapExtent(LocalFrame(*task["origin"]), Grid(**task["grid"]), task["margin_m"])
+    if task["what"] == "zones":
+        return _zones(file, place, float(task["around_m"]), out)
     options = ReadOptions(**task["options"])
     content = read_file(file, task["kind"])
     if task["what"] == "reference":
@@ -39,6 +41,19 @@ def place_file(file: BinaryIO, task: dict[str, Any], out: BinaryIO) -> dict[str,
     for column in (found.east_m, found.north_m, found.depth_m, found.sd_m):
         _write(out, column)
     return {"shape": (4, len(found)), "notes": placed.notes, "found": placed.found}
+
+
+def _zones(file: BinaryIO, place: MapExtent, around_m: float, out: BinaryIO) -> dict[str, Any]:
+    """Write the corners of what to keep out of: which zone, longitude and latitude, one column after the other."""
+    from app.mapping.readers.enc import read_zones  # GDAL's vector part is loaded for what it is for
+
+    zones, notes = read_zones(file.read(), place, around_m)
+    number = np.concatenate([np.full(len(zone.ring), i, np.float64) for i, zone in enumerate(zones)] or [np.empty(0)])
+    corners = np.concatenate([zone.ring for zone in zones] or [np.empty((0, 2))])
+    for column in (number, *corners.T):
+        _write(out, column)
+    told = [{name: getattr(zone, name) for name in ("kind", "name", "depth_m", "position_m")} for zone in zones]
+    return {"shape": (3, len(number)), "notes": notes, "found": len(zones), "zones": told}
 
 
 def _write(out: BinaryIO, values: FloatArray) -> None:

@@ -14,6 +14,8 @@ from app.mapping.types import Grid
 
 MAX_SOUNDINGS = 2_000_000
 MAX_RASTER_CELLS = 30_000_000
+MAX_ZONES, MAX_CORNERS = 100, 20_000
+"""Of what a chart shows to keep out of: as many zones as a mission takes."""
 
 LOCAL: Literal["local"] = "local"
 """Stands for the mission's own frame where a coordinate reference system is asked for."""

@@ -2,9 +2,11 @@
 
 import contextlib
 import io
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 import pyproj
 import rasterio
@@ -12,11 +14,16 @@ from affine import Affine
 from netCDF4 import Dataset
 
 from app.mapping.georeference import LocalFrame
-from app.mapping.readers.endings import NETCDF, PACKED, TEXT
+from app.mapping.readers.endings import ENC, NETCDF, PACKED, S102, TEXT
 from app.mapping.readers.files import read_file
 from app.mapping.readers.placing import place_reference, place_soundings
+from app.mapping.readers.s102 import INSTANCE, VALUES
 from app.mapping.readers.types import MapExtent, ReadError, ReadOptions
 from app.mapping.types import Grid
+
+SMALL_CELL = Path(__file__).with_name("small.000")
+"""A cell with one object of each class that is read."""
+SMALL_CELL_AT = (41.1800, -8.7000)
 
 _ROWS = 8
 _GRID = Grid(-_ROWS, -_ROWS, 2.0, _ROWS, _ROWS)
@@ -27,7 +34,8 @@ def data_folders() -> list[Path]:
     """Return where PROJ and GDAL keep tables, which they look things up in while they work."""
     named = [*pyproj.datadir.get_data_dir().split(":")]
     beside = Path(rasterio.__file__).parent
-    folders = [*map(Path, named), beside / "proj_data", beside / "gdal_data"]
+    vector = Path(found.origin).parent if (found := find_spec("pyogrio")) and found.origin else beside
+    folders = [*map(Path, named), *(one / data for one in (beside, vector) for data in ("proj_data", "gdal_data"))]
     return [folder for folder in dict.fromkeys(folders) if folder.is_dir()]
 
 
@@ -39,6 +47,14 @@ def warm_up(task: dict[str, Any]) -> None:
         content = _text(frame)
     elif kind in NETCDF:
         content = _netcdf(frame)
+    elif kind in ENC:
+        from app.mapping.readers.enc import read_zones
+
+        content = SMALL_CELL.read_bytes()
+        frame = LocalFrame(*SMALL_CELL_AT)
+        read_zones(content, MapExtent(frame, _GRID, 1000.0), 10.0)
+    elif kind in S102:
+        content = _s102(frame)
     else:
         # BAG is HDF5, and the other grids go through GDAL as this one does.
         read_file(io.BytesIO(_netcdf(frame)), NETCDF[0])
@@ -47,7 +63,7 @@ def warm_up(task: dict[str, Any]) -> None:
     found = read_file(io.BytesIO(content), kind)
     place_reference(found, _OPTIONS, place)
     place_soundings(found, _OPTIONS, place)
-    for content in (b"", b"x,y,z\na,b,c\n", b"\x89HDF\r\n\x1a\n"):
+    for content in (b"", b"x,y,z\na,b,c\n", b"\x89HDF\r\n\x1a\n", b"000263LE1 0900201   " + 40 * b"0"):
         with contextlib.suppress(ReadError):
             read_file(io.BytesIO(content), kind)
 
@@ -63,6 +79,20 @@ def _netcdf(frame: LocalFrame) -> bytes:
         file.createVariable(name, "f8", (name,))[:] = middle + 1e-5 * (np.arange(_ROWS) - 0.5 * _ROWS)
     file.createVariable("depth", "f4", ("lat", "lon"), zlib=True)[:] = 5.0
     return bytes(file.close())
+
+
+def _s102(frame: LocalFrame) -> bytes:
+    """Return the least that is read of an S-102 file."""
+    content = io.BytesIO()
+    with h5py.File(content, "w") as file:
+        file.attrs["horizontalCRS"] = 4326
+        cells = np.full((_ROWS, _ROWS), 5.0, [("depth", "<f4"), ("uncertainty", "<f4")])
+        instance = file.create_group(INSTANCE)
+        file.create_dataset(VALUES, data=cells, compression="gzip")
+        for axis, middle in (("Longitude", frame.origin_lon_deg), ("Latitude", frame.origin_lat_deg)):
+            instance.attrs[f"gridOrigin{axis}"] = middle - 5e-5
+            instance.attrs[f"gridSpacing{axis.removesuffix('e')}inal"] = 1e-5
+    return content.getvalue()
 
 
 def _geotiff(frame: LocalFrame) -> bytes:

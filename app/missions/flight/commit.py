@@ -188,8 +188,24 @@ class LegCommit:
         centre_m = self._room(member, inside, inside)
         if centre_m is None:
             return None
-        place = self._position(centre_m[0], centre_m[1], member.order.position.depth_m)
+        depth_m = member.order.position.depth_m
+        if member.withdrawal is not None and member.withdrawal.below:
+            depth_m = self._depth_below_m(member, depth_m)
+        place = self._position(centre_m[0], centre_m[1], depth_m)
         return replace(member.order, step=NO_LEG, position=place, lead=None, circle=None)
+
+    def waiting_below(self, member: Member) -> WaypointOrder | None:
+        """Return an order that keeps a vehicle where it is, as deep as it is; None where it has no order to change."""
+        if member.report is None or member.order is None:
+            return None
+        east_m, north_m = member.place_m(self._live.frame)
+        place = self._position(east_m, north_m, self._depth_below_m(member, 0.0))
+        return replace(member.order, step=NO_LEG, position=place, lead=None, circle=None)
+
+    def _depth_below_m(self, member: Member, depth_m: float) -> float:
+        """Return a depth that is not shallower than where a vehicle is now."""
+        here_m = depth_m if member.report is None else member.report.position.depth_m
+        return max(depth_m, min(here_m, self._live.spec.limits.max_depth_m))
 
     def _circle(self, member: Member, start: FloatArray, target: FloatArray) -> Position | None:
         """Return where a vehicle that is led by legs may circle down, apart from the others' ways and circles."""

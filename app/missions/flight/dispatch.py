@@ -7,7 +7,7 @@ import numpy as np
 import structlog
 
 from app.missions.fleet.hub import FleetHub
-from app.missions.fleet.interface import VehicleRefusedError, WaypointReport, WaypointStatus
+from app.missions.fleet.interface import VehicleRefusedError, WaypointOrder, WaypointReport, WaypointStatus
 from app.missions.flight.commit import LegCommit
 from app.missions.live.mission import LiveMission
 from app.missions.spec.mission import Guidance
@@ -111,8 +111,11 @@ class Dispatch:
         That is no leg: what the vehicle tells of it is of no interest.
         """
         order = self._committing.holding(member)
-        if order is None:
-            return
+        if order is not None:
+            await self.stay(member, order)
+
+    async def stay(self, member: Member, order: WaypointOrder) -> None:
+        """Send a vehicle where it is to stay; that is no leg."""
         try:
             await self._hub.order(member.key, order)
         except VehicleRefusedError as error:

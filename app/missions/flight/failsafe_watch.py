@@ -21,6 +21,7 @@ from app.missions.recovery.failsafes import (
     LAST_S,
     LOW_PCT,
     POSITION_LOST_M,
+    STRENGTH,
     Active,
     FailsafeJudge,
     with_reserve_s,
@@ -53,6 +54,10 @@ class FailsafeWatch:
         self._time_scale = time_scale
         self._judges: dict[str, FailsafeJudge] = {}
         self._told: dict[str, list[Active]] = {}
+        self._ships: dict[str, set[int]] = {}
+        """By vehicle: the ships (MMSI) that came too close a moment ago."""
+        self._below_since_s: dict[str, float] = {}
+        """Since when vehicles have waited below for ships."""
         self._been_apart: set[frozenset[str]] = set()
         """Vehicles are launched side by side: who has not been apart yet is not too close."""
 
@@ -75,7 +80,9 @@ class FailsafeWatch:
             member.return_needs_s = self._range.needs_s(member)
             over = member.withdrawal is not None and member.withdrawal.over
             detected = {} if over else self._detected(member) | too_close.get(member.name, {})
-            found = self._judge(member, now_s, detected)
+            # Who waits at the surface to be taken out of the water is in ships' way, too.
+            detected |= await self._ships_of(member)
+            found = await self._waiting_below(member, now_s, self._judge(member, now_s, detected))
             member.failsafes = found
             await self._tell(member.name, found)
             self._act(member, found)
@@ -97,10 +104,47 @@ class FailsafeWatch:
         withdrawal = member.withdrawal
         held = withdrawal is not None and withdrawal.response is Response.HOLD and not withdrawal.asked
         if strongest is not None and strongest.response is not Response.WARN:
-            self._live.withdraw(member, strongest.response, strongest.message)
+            withdrawn = self._live.withdraw(member, strongest.response, strongest.message)
+            if withdrawn and member.withdrawal is not None:
+                member.withdrawal.below = strongest.failsafe is Failsafe.TRAFFIC
         elif held:
             member.withdrawal = None
             self._live.changed.set()
+
+    async def _ships_of(self, member: Member) -> dict[Failsafe, str]:
+        """Return which ship comes too close to a vehicle; of those that join it is told one by one."""
+        begun = self._ships.get(member.name, set())
+        found = self._live.ships.encounters(member, begun)
+        self._ships[member.name] = now = {one.ship.position.mmsi for one in found}
+        if begun:
+            for one in found:
+                if one.ship.position.mmsi in now - begun:
+                    words = f"{member.name}: {one.words}, too"
+                    await self._live.journal.alarm(
+                        AlarmKind.TRAFFIC, words, failsafe=Failsafe.TRAFFIC, vehicle=member.name
+                    )
+        return {Failsafe.TRAFFIC: found[0].words} if found else {}
+
+    async def _waiting_below(self, member: Member, now_s: float, found: list[Active]) -> list[Active]:
+        """Return what is in force; who is up already, or has waited long for ships, is not kept from going on."""
+        held = any(one.failsafe is Failsafe.TRAFFIC and one.response is not Response.WARN for one in found)
+        if not held:
+            self._below_since_s.pop(member.name, None)
+            return found
+        traffic = self._live.ships.traffic
+        most_s = math.inf if traffic is None else traffic.settings.hold_s
+        withdrawal = member.withdrawal
+        if withdrawal is not None and withdrawal.below:
+            since_s = self._below_since_s.setdefault(member.name, now_s)
+            if since_s > -math.inf and now_s - since_s > most_s:
+                self._below_since_s[member.name] = -math.inf
+                words = f"{member.name} waited {most_s:.0f} s for ships to pass, and comes up"
+                await self._live.journal.alarm(AlarmKind.TRAFFIC, words, vehicle=member.name)
+        waited = self._below_since_s.get(member.name) == -math.inf
+        if not waited and not self._live.ships.is_up(member):
+            return found
+        warned = [replace(one, response=Response.WARN) if one.failsafe is Failsafe.TRAFFIC else one for one in found]
+        return sorted(warned, key=lambda one: -STRENGTH[one.response])
 
     def _detected(self, member: Member) -> dict[Failsafe, str]:
         """Return what is wrong with a vehicle now, in words for the operator."""

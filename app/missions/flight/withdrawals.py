@@ -16,7 +16,7 @@ from app.missions.flight.waiting import until_next_look
 from app.missions.live.mission import LiveMission, phase_of
 from app.missions.live.vehicles import energy_left_pct
 from app.missions.recovery.failsafes import LINK_LOST_S
-from app.missions.spec.failsafes import Response
+from app.missions.spec.failsafes import Failsafe, Response
 from app.missions.team import Member, Withdrawal
 from app.missions.views.mission import Level
 from app.storage import missions as mission_queries
@@ -102,7 +102,12 @@ class Withdrawals:
             await self._begin(member, withdrawal)
         if withdrawal.response is Response.STOP:
             await self._end(member, withdrawal, f"{member.name} is stopped")
-        elif not member.present or member.ordered or withdrawal.response is Response.HOLD:
+        elif (
+            not member.present
+            or withdrawal.response is Response.HOLD
+            or await self._waits_below(member, withdrawal)
+            or member.ordered
+        ):
             return
         elif member.ahead:
             await self._dispatch.begin()
@@ -110,6 +115,28 @@ class Withdrawals:
             await self._surface(member, withdrawal)
         else:
             await self._go_home(member, withdrawal)
+
+    async def _waits_below(self, member: Member, withdrawal: Withdrawal) -> bool:
+        """Whether a vehicle on its way home stays below for ships to pass where it would come up now."""
+        held = any(one.failsafe is Failsafe.TRAFFIC and one.response is not Response.WARN for one in member.failsafes)
+        if not held or withdrawal.response is not Response.RETURN or self._at_surface(member):
+            withdrawal.below = False
+            return False
+        if withdrawal.below:
+            return True
+        rises = member.ordered and member.order is not None and member.order.position.depth_m <= DEEP_M
+        will_rise = not member.ordered and bool(member.ahead) and member.ahead[0].position.depth_m <= DEEP_M
+        if not rises and not will_rise:
+            return False
+        withdrawal.below = True
+        order = self._committing.waiting_below(member)
+        if rises:
+            self._dispatch.settle(member, WaypointStatus.MISSED, "ships are about")
+        if order is not None:
+            await self._dispatch.stay(member, order)
+        words = f"{member.name} waits below for ships to pass"
+        await self._live.journal.log(Level.INFO, "recovery", words, vehicle=member.name)
+        return True
 
     async def _begin(self, member: Member, withdrawal: Withdrawal) -> None:
         """Write a withdrawal down and give up the vehicle's legs."""

@@ -13,12 +13,15 @@ from app.missions.views.messages import MapMessage, TargetsMessage, VehiclesMess
 from app.missions.views.mission import VehicleView
 from app.missions.views.search import SearchMessage, SearchProgress
 from app.missions.views.targets import TargetView
+from app.missions.views.traffic import ShipView, TrafficMessage
 
 LIVE_PERIOD_S = 0.2
 CROWD, MOST_PERIODS = 20, 5
 """For so many viewers more the period grows by itself once, so many times at most."""
 LIVE_MAP_S = 0.3
 """Least time between two times that what was just sounded is told of."""
+SHIPS_S = 1.0
+"""Time between two pictures of the ships about."""
 CROWD_MAP_S = 4.0
 """Least time between two maps that a crowd is told of."""
 
@@ -28,8 +31,9 @@ class LiveFeed:
 
     Parameters
     ----------
-    vehicles, targets, search
-        Return how these are now. ``targets``: None for a mission without; ``search`` returns None in a survey.
+    vehicles, targets, search, ships
+        Return how these are now. ``targets``: None for a mission without; ``search`` returns None in a survey,
+        ``ships`` where nothing listens for any.
     """
 
     def __init__(
@@ -38,11 +42,14 @@ class LiveFeed:
         vehicles: Callable[[], list[VehicleView]],
         targets: Callable[[], list[TargetView]] | None,
         search: Callable[[], SearchProgress | None],
+        ships: Callable[[], list[ShipView] | None] = lambda: None,
     ) -> None:
         self._broadcaster = broadcaster
         self._vehicles = vehicles
         self._targets = targets
         self._search = search
+        self._ships = ships
+        self._ships_told_s = -np.inf
         self._ticker: asyncio.Task[None] | None = None
         self._map = MapMessage(version=0, step=0, min_depth_m=None, max_depth_m=None)
         self._map_is_news = self._soundings_are_news = False
@@ -89,6 +96,7 @@ class LiveFeed:
             if self._targets is not None:
                 self._broadcaster.publish(TargetsMessage(time=now(), targets=self._targets()))
             self._tell_of_search()
+            self._tell_of_ships()
             self._tell_of_map()
             await asyncio.sleep(live_period_s(self._broadcaster.viewers))
 
@@ -101,6 +109,14 @@ class LiveFeed:
             self._broadcaster.publish(self._map)
             self._map_is_news = self._soundings_are_news = False
             self._map_told_s = time.monotonic()
+
+    def _tell_of_ships(self) -> None:
+        """Publish the ships about; they are slow, so that this is seldom."""
+        if time.monotonic() - self._ships_told_s >= SHIPS_S:
+            self._ships_told_s = time.monotonic()
+            ships = self._ships()
+            if ships is not None:
+                self._broadcaster.publish(TrafficMessage(time=now(), ships=ships))
 
     def _tell_of_search(self) -> None:
         """Publish how a search stands when a scan changed that."""

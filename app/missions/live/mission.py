@@ -41,6 +41,7 @@ from app.missions.live.feed import LiveFeed
 from app.missions.live.journal import Counts, Journal
 from app.missions.live.range_journal import RangeJournal
 from app.missions.live.remaining import remaining
+from app.missions.live.ships import ShipsAbout
 from app.missions.live.sounding_store import SoundingStore
 from app.missions.live.swath_intake import SwathIntake
 from app.missions.live.trails import Trails
@@ -71,6 +72,7 @@ from app.missions.views.messages import StateMessage
 from app.missions.views.mission import Level, MissionSummary, Progress
 from app.missions.views.search import SearchProgress
 from app.missions.views.targets import TargetView
+from app.missions.views.traffic import ShipView
 from app.storage import events as event_queries
 from app.storage import soundings as sounding_queries
 from app.storage.database import Database
@@ -214,9 +216,11 @@ class LiveMission:
         self.boundaries = Boundaries(self.area, [spec.to_local(zone) for zone in spec.keep_out])
         self.vehicles = VehicleViews(row.id, spec, self.frame, hub, self.team, self.boundaries.breach, time_scale)
         targets = self.target_views if spec.targets else None
-        self.telling = LiveFeed(self.broadcaster, self.vehicles.all, targets, self.search_progress)
         self.measured_late: Callable[[], None] = _nothing
         """Called when what was measured changes after the mission has ended."""
+        self.ships = ShipsAbout(row.id, lambda: self.spec, self.frame, self.team, time_scale)
+        """Ships near the mission."""
+        self.telling = LiveFeed(self.broadcaster, self.vehicles.all, targets, self.search_progress, self.ship_views)
         self._time_scale = time_scale
         self._executor = executor
         self._parts: dict[Callable[[LiveMission], Any], Any] = {}
@@ -641,6 +645,10 @@ class LiveMission:
         """Return the moving targets, foretold for now."""
         pursuers = {member.pursuing: member.name for member in self.team if member.pursuing is not None}
         return target_views(self.ranges.tracking, self.frame, self.area, self.ranges.times.now_s(), pursuers)
+
+    def ship_views(self) -> list[ShipView] | None:
+        """Return the ships near the mission; None where nothing listens for any."""
+        return self.ships.views() if self.ships.listens else None
 
     def abandon(self, why: str = "another process has the mission now") -> None:
         """Write nothing any more, and let everyone who watches ask again."""

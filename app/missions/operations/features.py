@@ -12,6 +12,7 @@ from shapely.geometry.base import BaseGeometry
 
 from app.mapping.products.contours import find_contours, usual_interval_m
 from app.mapping.products.tracks import utc_text
+from app.missions.clock import now
 from app.missions.errors import ConflictError, MapNotReadyError
 from app.missions.live.mission import LiveMission
 from app.missions.maps.products import snapshot_holidays
@@ -38,6 +39,7 @@ class Kind(StrEnum):
     CONTOURS = "contours"
     HOLIDAYS = "holidays"
     VEHICLES = "vehicles"
+    TRAFFIC = "traffic"
 
 
 @dataclass(frozen=True)
@@ -140,6 +142,8 @@ async def features_of(live: LiveMission, maps: FinalMaps, kind: Kind, row: Missi
         return await _tracks(live)
     if kind is Kind.VEHICLES:
         return _vehicles(live)
+    if kind is Kind.TRAFFIC:
+        return _traffic(live)
     try:
         snapshot = await newest_map(live, maps, patient=False)
     except MapNotReadyError:
@@ -188,6 +192,28 @@ _VEHICLE_FIELDS = (
     *("active", "phase", "link", "age_s", "depth_m", "altitude_m", "heading_deg", "speed_mps", "battery_pct"),
     "position_sd_m",
 )
+
+
+def _traffic(live: LiveMission) -> list[Feature]:
+    if live.header.state in ENDED:
+        return []
+    found, now_s = [], now().timestamp()
+    for view in sorted(live.ships.views(), key=lambda view: str(view.mmsi)):
+        shown = view.model_dump(mode="json", exclude={"lat_deg", "lon_deg", "closest", "age_s"})
+        at_s, closest = now_s - view.age_s, view.closest
+        properties = {
+            "mission": live.id,
+            "datetime": utc_text(at_s),
+            **shown,
+            "age_s": view.age_s,
+            "closest_vehicle": None if closest is None else closest.vehicle,
+            "closest_m": None if closest is None else closest.distance_m,
+            "closest_in_s": None if closest is None else closest.in_s,
+            "alarm": closest is not None and closest.alarm,
+        }
+        place = {"type": "Point", "coordinates": [view.lon_deg, view.lat_deg]}
+        found.append(Feature(f"{live.id}.{view.mmsi}", place, properties, at_s, at_s))
+    return found
 
 
 class _MapFeatures:

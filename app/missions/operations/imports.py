@@ -2,6 +2,7 @@
 
 import asyncio
 import hashlib
+import math
 import uuid
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -14,23 +15,45 @@ from sqlalchemy import select
 from sqlalchemy.ext.asyncio import AsyncSession
 from sqlalchemy.orm import defer
 
+from app.mapping.georeference import LocalFrame
 from app.mapping.readers.endings import ending
 from app.mapping.readers.types import MapExtent, ReadError, ReadOptions
 from app.mapping.supersoundings import merge_soundings
-from app.mapping.types import SoundingRows, Soundings
+from app.mapping.types import Grid, SoundingRows, Soundings
 from app.missions.clock import now
 from app.missions.errors import ConflictError, ImportNotFoundError, InvalidRequestError
 from app.missions.live.mission import LiveMission
-from app.missions.operations.reading import Reader
+from app.missions.operations.reading import ChartedZone, Reader
 from app.missions.operations.uploads import Upload
 from app.missions.running.final_maps import FinalMaps
+from app.missions.spec.base import PolygonGeometry
 from app.missions.states import ENDED, NOT_STARTED
-from app.missions.views.imports import ImportOptions, ImportView, ReferenceView
+from app.missions.views.imports import (
+    ImportOptions,
+    ImportView,
+    ProposedZonesView,
+    ProposedZoneView,
+    ReferenceView,
+    ZoneOptions,
+)
 from app.missions.views.mission import Level
 from app.storage import soundings as sounding_queries
 from app.storage import stored_maps
 from app.storage.models import ImportRow, ReferenceRow
 from app.storage.uncancellable import to_the_end
+
+METRES_PER_DEGREE = 111_200.0
+MAX_SIDE_M = 50_000.0
+"""Of an area that a chart is asked for."""
+
+REASONS = {
+    "LNDARE": "land",
+    "OBSTRN": "obstruction",
+    "WRECKS": "wreck",
+    "UWTROC": "rock",
+    "RESARE": "restricted area",
+}
+"""What objects of charts are, in words."""
 
 MAX_PRIOR = 100_000
 """Imported soundings per file that the map takes one by one; where there are more they are merged per cell."""
@@ -206,6 +229,22 @@ class Imports:
                 live.builder.arrivals.replace_prior(prior)
         return filename
 
+    async def propose_zones(self, upload: Upload, options: ZoneOptions) -> ProposedZonesView:
+        """Return what an ENC cell shows in an area to keep out of. Nothing is stored, and no mission changes.
+
+        Raises
+        ------
+        InvalidRequestError, ImportUnavailableError
+            When area or file cannot be used, or nothing can be read now.
+        """
+        place = _extent_of(options)
+        if not upload.size_bytes:
+            raise InvalidRequestError("file", "it is empty", "send the file's content as the body")
+        async with self._reader.turn():
+            zones, notes = await self._reader.read_zones(upload, place, options.margin_m)
+        shown = [_proposed(zone) for zone in zones]
+        return ProposedZonesView(zones=[zone for zone in shown if zone is not None], notes=notes)
+
     async def set_reference(
         self, live: LiveMission, upload: Upload, options: ImportOptions, actor: str
     ) -> ReferenceView:
@@ -287,6 +326,44 @@ def _row_of_site(
             "median_sd_m": float(np.median(kept[:, 3])),
         },
         soundings=content,
+    )
+
+
+def _extent_of(options: ZoneOptions) -> MapExtent:
+    """Return an area given by its ends. Raises InvalidRequestError."""
+    middle = 0.5 * (options.south_deg + options.north_deg), 0.5 * (options.west_deg + options.east_deg)
+    if options.south_deg >= options.north_deg or options.west_deg >= options.east_deg:
+        raise InvalidRequestError(
+            "area", "it ends before it begins", "give west_deg < east_deg and south_deg < north_deg"
+        )
+    high_m = METRES_PER_DEGREE * (options.north_deg - options.south_deg)
+    wide_m = METRES_PER_DEGREE * (options.east_deg - options.west_deg) * math.cos(math.radians(middle[0]))
+    if max(wide_m, high_m) > MAX_SIDE_M:
+        raise InvalidRequestError(
+            "area", f"it is {max(wide_m, high_m) / 1000:.0f} km wide", f"ask for at most {MAX_SIDE_M / 1000:g} km"
+        )
+    frame = LocalFrame(*middle)
+    east, north = frame.to_local(
+        [options.south_deg, options.south_deg, options.north_deg, options.north_deg],
+        [options.west_deg, options.east_deg, options.east_deg, options.west_deg],
+    )
+    wide, high = float(np.ptp(east)), float(np.ptp(north))
+    rows, cols = max(math.ceil(high), 1), max(math.ceil(wide), 1)
+    return MapExtent(frame, Grid(float(east.min()), float(north.min()), 1.0, rows, cols), 0.0)
+
+
+def _proposed(zone: ChartedZone) -> ProposedZoneView | None:
+    try:
+        geometry = PolygonGeometry(coordinates=[zone.ring])
+    except ValueError:
+        return None  # a sliver that rounding made touch itself
+    return ProposedZoneView(
+        object=zone.kind,
+        reason=REASONS[zone.kind],
+        name=zone.name,
+        depth_m=zone.depth_m,
+        position_m=zone.position_m,
+        zone=geometry,
     )
 
 

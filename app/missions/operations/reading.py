@@ -9,7 +9,7 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from dataclasses import asdict
 from pathlib import Path
-from typing import IO, Annotated, Literal
+from typing import IO, Annotated, Any, Literal
 
 import numpy as np
 import structlog
@@ -18,9 +18,11 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 import app
 from app.mapping.readers.types import (
+    MAX_CORNERS,
     MAX_DEPTH_M,
     MAX_SD_M,
     MAX_SOUNDINGS,
+    MAX_ZONES,
     MIN_DEPTH_M,
     UNCONFINED,
     UNUSABLE,
@@ -41,11 +43,23 @@ WAITING_TIMEOUT_S = 60.0
 AT_ONCE = 1
 """Each takes a core and memory, which vehicles' decisions need."""
 MAX_ANSWER_BYTES = 1 << 16
+FEWEST_CORNERS = 3
 
 _ENVIRONMENT = ("LD_LIBRARY_PATH", "PROJ_DATA", "GDAL_DATA", "TMPDIR", "TZDIR")
 """What the reading process gets of ours: where libraries and their tables lie, and nothing that is secret."""
 
 Text = Annotated[str, Field(max_length=500)]
+
+
+class _Zone(BaseModel):
+    """What the reading process says of something to keep out of."""
+
+    model_config = ConfigDict(extra="forbid", strict=True)
+
+    kind: Literal["LNDARE", "OBSTRN", "WRECKS", "UWTROC", "RESARE"]
+    name: Annotated[str, Field(max_length=60)]
+    depth_m: Annotated[float, Field(ge=MIN_DEPTH_M, le=MAX_DEPTH_M)] | None
+    position_m: Annotated[float, Field(ge=0, le=1000)]
 
 
 class _Answer(BaseModel):
@@ -57,9 +71,22 @@ class _Answer(BaseModel):
     shape: list[int] = Field(default=[], max_length=2)
     notes: list[Text] = Field(default=[], max_length=20)
     found: int = Field(default=0, ge=0)
+    zones: list[_Zone] = Field(default=[], max_length=MAX_ZONES)
     field: Text = "file"
     message: Text = ""
     remedy: Text = ""
+
+
+class ChartedZone(BaseModel):
+    """Something on a chart to keep out of; ``ring`` is longitude and latitude, and ends where it began."""
+
+    model_config = ConfigDict(frozen=True)
+
+    kind: str
+    name: str
+    depth_m: float | None
+    position_m: float
+    ring: list[tuple[float, float]]
 
 
 class Found(BaseModel):
@@ -125,32 +152,60 @@ class Reader:
         ImportUnavailableError
             When nothing here keeps the process that reads it from other files.
         """
+        task = self._task(kind, what, place) | {"options": asdict(options)}
+        with await asyncio.to_thread(unnamed_file) as result:
+            answer = await self._ask(upload, task, result)
+            expected = None if what == "soundings" else (place.grid.rows, place.grid.cols)
+            values = await to_the_end(asyncio.to_thread(_values, result, tuple(answer.shape), expected))
+            return Found(values=values, notes=answer.notes, found=answer.found)
+
+    async def read_zones(
+        self, upload: Upload, place: MapExtent, around_m: float
+    ) -> tuple[list[ChartedZone], list[str]]:
+        """Return what an ENC cell shows near a place to keep out of, enlarged, and notes; within a :meth:`turn`.
+
+        Raises
+        ------
+        InvalidRequestError, ImportUnavailableError
+            As ``read`` does.
+        """
+        task = self._task(".000", "zones", place) | {"around_m": around_m}
+        with await asyncio.to_thread(unnamed_file) as result:
+            answer = await self._ask(upload, task, result)
+            corners = await to_the_end(asyncio.to_thread(_corners, result, tuple(answer.shape), len(answer.zones)))
+        zones = []
+        for number, zone in enumerate(answer.zones):
+            ring = corners[corners[:, 0] == number, 1:]
+            closed = [(float(lon), float(lat)) for lon, lat in np.vstack([ring, ring[:1]])]
+            zones.append(ChartedZone(**zone.model_dump(), ring=closed))
+        return zones, answer.notes
+
+    def _task(self, kind: str, what: str, place: MapExtent) -> dict[str, Any]:
         grid = place.grid
-        task = {
+        return {
             "kind": kind,
             "what": what,
             "origin": (place.frame.origin_lat_deg, place.frame.origin_lon_deg),
             "grid": {name: getattr(grid, name) for name in ("west_m", "south_m", "cell_m", "rows", "cols")},
             "margin_m": place.margin_m,
-            "options": asdict(options),
             "unconfined": self._unconfined,
         }
-        with await asyncio.to_thread(unnamed_file) as result:
-            code, said = await _run(upload.file, json.dumps(task), result)
-            answer = _answer(said) if code in (0, UNUSABLE, UNCONFINED) else None
-            if answer is None:
-                raise _broken_off()
-            self._note(answer.confined)
-            if code == UNCONFINED:
-                raise ImportUnavailableError(
-                    "this system has neither Landlock nor seccomp, so nothing would keep a file from reading others",
-                    "use a kernel that has them, or set unconfined_imports",
-                )
-            if code == UNUSABLE:
-                raise InvalidRequestError(answer.field, answer.message, answer.remedy)
-            expected = None if what == "soundings" else (grid.rows, grid.cols)
-            values = await to_the_end(asyncio.to_thread(_values, result, tuple(answer.shape), expected))
-            return Found(values=values, notes=answer.notes, found=answer.found)
+
+    async def _ask(self, upload: Upload, task: dict[str, Any], result: IO[bytes]) -> _Answer:
+        """Return what the reading process says when it is done. Raises InvalidRequestError, ImportUnavailableError."""
+        code, said = await _run(upload.file, json.dumps(task), result)
+        answer = _answer(said) if code in (0, UNUSABLE, UNCONFINED) else None
+        if answer is None:
+            raise _broken_off()
+        self._note(answer.confined)
+        if code == UNCONFINED:
+            raise ImportUnavailableError(
+                "this system has neither Landlock nor seccomp, so nothing would keep a file from reading others",
+                "use a kernel that has them, or set unconfined_imports",
+            )
+        if code == UNUSABLE:
+            raise InvalidRequestError(answer.field, answer.message, answer.remedy)
+        return answer
 
     def _note(self, confined: dict[str, str]) -> None:
         """Log once what this system lacks to lock readers in."""
@@ -191,6 +246,20 @@ def _values(result: IO[bytes], shape: tuple[int, ...], expected: tuple[int, int]
     if not sound:
         raise _broken_off()
     return values.T.copy() if expected is None else values
+
+
+def _corners(result: IO[bytes], shape: tuple[int, ...], zones: int) -> NDArray[np.float64]:
+    """Return corners (n, 3), each with its zone's number, when they can be what was asked for."""
+    result.seek(0, os.SEEK_END)
+    if len(shape) != 2 or shape[0] != 3 or not 0 <= shape[1] <= MAX_CORNERS or result.tell() != 24 * shape[1]:
+        raise _broken_off()
+    result.seek(0)
+    table = np.fromfile(result, "<f8").reshape(shape).T.copy()
+    number, lon, lat = table.T
+    sound = bool(np.isfinite(table).all()) and bool((np.abs(lon) <= 180.0).all() and (np.abs(lat) <= 90.0).all())
+    if not sound or any(np.count_nonzero(number == one) < FEWEST_CORNERS for one in range(zones)):
+        raise _broken_off()
+    return table
 
 
 async def _run(file: IO[bytes], task: str, result: IO[bytes]) -> tuple[int, bytes]:

@@ -88,6 +88,14 @@ TABLE: Mapping[Failsafe, Rule] = {
         "alarm: link lost; it is sent home as soon as it is heard",
         after_s=LINK_LOST_S,
     ),
+    Failsafe.TRAFFIC: Rule(
+        "a ship (AIS) comes closer than ais.cpa_m within ais.cpa_s to a vehicle that is at or near the surface, or "
+        "will be",
+        Response.WARN,
+        "alarm: which ship, how close, how soon; with `hold` it waits below, no longer than ais.hold_s",
+        after_s=3.0,
+        over_s=30.0,
+    ),
     Failsafe.GEOFENCE_LEFT: Rule(
         "in a keep-out zone, or outside the area while it surveys",
         Response.WARN,

@@ -16,6 +16,7 @@ from app.missions.running.final_maps import FinalMaps
 from app.missions.running.ownership import Ownership
 from app.missions.spec.mission import MissionSpec
 from app.missions.states import AT_SEA, ENDED
+from app.missions.traffic.watch import Traffic
 from app.missions.views.mission import MissionSummary
 from app.storage import sites as site_queries
 from app.storage.database import Database
@@ -41,6 +42,7 @@ class MissionRegistry:
         maps: FinalMaps,
         ping_files: PingFiles,
         time_scale: float,
+        traffic: Traffic | None = None,
     ) -> None:
         self._database = database
         self._hub = hub
@@ -48,6 +50,7 @@ class MissionRegistry:
         self._maps = maps
         self._ping_files = ping_files
         self._time_scale = time_scale
+        self._traffic = traffic
         self._ownership: Ownership | None = None
         self._may_take_up: Callable[[MissionRow], Awaitable[bool]] = _always
         self._taken_up: Callable[[LiveMission], Awaitable[None]] = _nothing
@@ -119,6 +122,7 @@ class MissionRegistry:
                 async with database.reading() as session:
                     row = await session.get_one(MissionRow, mission_id)
             live = await take_up(database, self._hub, self._executor, row, self._ping_files, self._time_scale)
+            live.ships.traffic = self._traffic
             if self._ownership is not None:
                 await live.pings.tidy()
             await self._make_room()

@@ -12,6 +12,7 @@ class Failsafe(StrEnum):
     POSITION_LOST = "position_lost"
     LOW_ENERGY = "low_energy"
     LINK_LOST = "link_lost"
+    TRAFFIC = "traffic"
     GEOFENCE_LEFT = "geofence_left"
     SEPARATION_LOST = "separation_lost"
     VEHICLE_ERROR = "vehicle_error"

@@ -454,6 +454,17 @@ class MissionSpec(Model):
     def _a_search_has_its_own_defaults(cls, data: Any) -> Any:
         return filled_in(data)
 
+    @field_validator("failsafes")
+    @classmethod
+    def _nobody_comes_up_under_ships(cls, failsafes: dict[Failsafe, Response]) -> dict[Failsafe, Response]:
+        response = failsafes.get(Failsafe.TRAFFIC, Response.WARN)
+        if response not in (Response.WARN, Response.HOLD):
+            raise ValueError(
+                f"traffic is {response.value!r}, which brings vehicles up where ships are: say 'warn', or 'hold' to "
+                "keep them below"
+            )
+        return failsafes
+
     @field_validator("vehicles")
     @classmethod
     def _names_are_unique(cls, vehicles: list[VehicleSpec]) -> list[VehicleSpec]:

@@ -1,11 +1,12 @@
 """What the doctor found, as REST and the dashboard show it."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
 
 from pydantic import Field
 
 from app.missions.views.base import View
+from app.missions.views.traffic import TrafficFinding
 from imc_bridge.doctor.diagnosis import Cause, Diagnosis, NodeDiagnosis, Severity, problem
 from imc_bridge.doctor.diagnosis import Finding as BridgeFinding
 from imc_bridge.events import NodeState
@@ -51,9 +52,10 @@ class DoctorView(View):
     causes: list[Cause]
     own: list[Finding] = Field(description="On this machine's side")
     vehicles: list[VehicleDiagnosis]
+    traffic: list[TrafficFinding] = Field(default=[], description="Of AIS; empty where it is not set up")
 
 
-def doctor_view(diagnosis: Diagnosis) -> DoctorView:
+def doctor_view(diagnosis: Diagnosis, traffic: Sequence[TrafficFinding] = ()) -> DoctorView:
     """Put a diagnosis into the form that goes out."""
     return DoctorView(
         healthy=diagnosis.healthy,
@@ -61,6 +63,7 @@ def doctor_view(diagnosis: Diagnosis) -> DoctorView:
         causes=list(diagnosis.causes),
         own=[_finding(finding) for finding in diagnosis.own],
         vehicles=[_vehicle(node) for node in diagnosis.nodes],
+        traffic=list(traffic),
     )
 
 

@@ -6,6 +6,7 @@ from typing import Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from app.mapping.s44 import Order
+from app.missions.spec.base import PolygonGeometry
 from app.missions.views.base import View
 
 
@@ -18,7 +19,8 @@ class ImportOptions(BaseModel):
         min_length=1,
         max_length=200,
         pattern=r"^[^/\\\x00-\x1f\x7f]+$",
-        description="Its name; the ending says what it is: .xyz, .csv, .txt (also with .gz), .asc, .tif, .nc or .bag",
+        description="Its name; the ending says what it is: .xyz, .csv, .txt (also with .gz), .asc, .tif, .nc, .bag, "
+        ".h5 (S-102) or .000 (ENC cell)",
         examples=["harbour_2019.xyz"],
     )
     source: str = Field(default="", max_length=500, description="Where it comes from, kept with the mission")
@@ -41,6 +43,38 @@ class ImportOptions(BaseModel):
     datum_offset_m: float = Field(
         default=0.0, ge=-200, le=200, description="Added to every depth to bring it to the mission's datum"
     )
+
+
+class ZoneOptions(BaseModel):
+    """Where what a chart shows is asked for."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+    west_deg: float = Field(ge=-180, le=180, description="Western end of the area")
+    south_deg: float = Field(ge=-90, le=90, description="Southern end of the area")
+    east_deg: float = Field(ge=-180, le=180, description="Eastern end of the area")
+    north_deg: float = Field(ge=-90, le=90, description="Northern end of the area")
+    margin_m: float = Field(
+        default=10.0, ge=0, le=1000, description="How much all of it is enlarged, beside how well its place is known"
+    )
+
+
+class ProposedZoneView(View):
+    """What a chart shows to keep out of. It is a proposal: nothing keeps out of it before a mission has it."""
+
+    object: str = Field(description="The chart's class: LNDARE, OBSTRN, WRECKS, UWTROC or RESARE")
+    reason: str = Field(description="What it is, in words")
+    name: str = Field(description="What the chart calls it; it may be empty")
+    depth_m: float | None = Field(description="Least depth over it, as charted; null: not known")
+    position_m: float = Field(description="How far off it may be; its outline is enlarged by that")
+    zone: PolygonGeometry = Field(description="For a mission's `keep_out`")
+
+
+class ProposedZonesView(View):
+    """What a chart shows to keep out of, the nearest to the middle of the area first."""
+
+    zones: list[ProposedZoneView]
+    notes: list[str] = Field(description="What was assumed or left out, in words")
 
 
 class ImportView(View):

@@ -10,6 +10,7 @@ from app.missions.views.base import View
 from app.missions.views.mission import EventView, MissionSummary, MissionView, VehicleView, WaypointView
 from app.missions.views.search import SearchMessage
 from app.missions.views.targets import TargetView
+from app.missions.views.traffic import TrafficMessage
 
 
 class SnapshotMessage(View):
@@ -87,6 +88,7 @@ LiveMessage = (
     | SearchMessage
     | WaypointsMessage
     | StateMessage
+    | TrafficMessage
     | MapMessage
     | EventMessage
     | AlarmMessage

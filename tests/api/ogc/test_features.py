@@ -11,7 +11,7 @@ import shapely
 from tests.api.ogc.conftest import SOUNDINGS, START_S, Gis
 from tests.support.missions.specs import FRAME
 
-COLLECTIONS = ("areas", "tracks", "soundings", "contours", "holidays", "vehicles")
+COLLECTIONS = ("areas", "tracks", "soundings", "contours", "holidays", "vehicles", "traffic")
 CRS84 = "http://www.opengis.net/def/crs/OGC/1.3/CRS84"
 EPSG = "http://www.opengis.net/def/crs/EPSG/0/"
 UTM29 = f"{EPSG}32629"

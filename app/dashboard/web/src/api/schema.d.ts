@@ -837,6 +837,29 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/chart-zones": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Propose keep-out zones from a chart
+         * @description Return what an ENC cell (S-57, its .000 file) shows in an area to keep out of.
+         *
+         *     Land, obstructions, wrecks, rocks and restricted areas. Nothing is stored and no mission changes: who creates one
+         *     looks at them and takes those that apply into `keep_out`.
+         */
+        post: operations["proposeZones"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/missions/{mission_id}/map": {
         parameters: {
             query?: never;
@@ -1473,6 +1496,28 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/traffic": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * List the ships about
+         * @description Return the ships that were heard by AIS lately, each with the vehicle near the surface that it comes closest to.
+         *
+         *     Each process hears for itself: this is what the one hears that is asked.
+         */
+        get: operations["listShips"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/planners": {
         parameters: {
             query?: never;
@@ -1980,6 +2025,31 @@ export interface components {
             sd_m: number | null;
             /** Within Pct */
             within_pct: number;
+        };
+        /**
+         * ApproachView
+         * @description The closest point of approach of a ship and the vehicle that it comes closest to.
+         */
+        ApproachView: {
+            /** Mission Id */
+            mission_id: string;
+            /** Vehicle */
+            vehicle: string;
+            /**
+             * Distance M
+             * @description Between the ship's hull, as far as it is known, and the vehicle
+             */
+            distance_m: number;
+            /**
+             * In S
+             * @description From now; 0: it is farther every moment
+             */
+            in_s: number;
+            /**
+             * Alarm
+             * @description Closer than ais.cpa_m within ais.cpa_s
+             */
+            alarm: boolean;
         };
         /**
          * AuditEntry
@@ -2593,6 +2663,12 @@ export interface components {
             own: components["schemas"]["Finding"][];
             /** Vehicles */
             vehicles: components["schemas"]["VehicleDiagnosis"][];
+            /**
+             * Traffic
+             * @description Of AIS; empty where it is not set up
+             * @default []
+             */
+            traffic: components["schemas"]["TrafficFinding"][];
         };
         /**
          * EllipseView
@@ -2680,7 +2756,7 @@ export interface components {
          * @description What may go wrong with a vehicle, or with all of them.
          * @enum {string}
          */
-        Failsafe: "leak" | "critical_energy" | "too_deep" | "position_lost" | "low_energy" | "link_lost" | "geofence_left" | "separation_lost" | "vehicle_error" | "other_console" | "all_links_lost" | "service_restarted";
+        Failsafe: "leak" | "critical_energy" | "too_deep" | "position_lost" | "low_energy" | "link_lost" | "traffic" | "geofence_left" | "separation_lost" | "vehicle_error" | "other_console" | "all_links_lost" | "service_restarted";
         /**
          * FailsafeView
          * @description A failsafe in force for a vehicle.
@@ -3221,7 +3297,7 @@ export interface components {
          * @enum {string}
          */
         LinkState: "unknown" | "lost" | "expected_offline" | "heard" | "ready" | "engaged";
-        LiveMessage: components["schemas"]["SnapshotMessage"] | components["schemas"]["VehiclesMessage"] | components["schemas"]["TargetsMessage"] | components["schemas"]["SearchMessage"] | components["schemas"]["WaypointsMessage"] | components["schemas"]["StateMessage"] | components["schemas"]["MapMessage"] | components["schemas"]["EventMessage"] | components["schemas"]["AlarmMessage"];
+        LiveMessage: components["schemas"]["SnapshotMessage"] | components["schemas"]["VehiclesMessage"] | components["schemas"]["TargetsMessage"] | components["schemas"]["SearchMessage"] | components["schemas"]["WaypointsMessage"] | components["schemas"]["StateMessage"] | components["schemas"]["TrafficMessage"] | components["schemas"]["MapMessage"] | components["schemas"]["EventMessage"] | components["schemas"]["AlarmMessage"];
         /**
          * Liveness
          * @description The process answers.
@@ -4386,6 +4462,52 @@ export interface components {
             search: components["schemas"]["SearchProgress"] | null;
         };
         /**
+         * ProposedZoneView
+         * @description What a chart shows to keep out of. It is a proposal: nothing keeps out of it before a mission has it.
+         */
+        ProposedZoneView: {
+            /**
+             * Object
+             * @description The chart's class: LNDARE, OBSTRN, WRECKS, UWTROC or RESARE
+             */
+            object: string;
+            /**
+             * Reason
+             * @description What it is, in words
+             */
+            reason: string;
+            /**
+             * Name
+             * @description What the chart calls it; it may be empty
+             */
+            name: string;
+            /**
+             * Depth M
+             * @description Least depth over it, as charted; null: not known
+             */
+            depth_m: number | null;
+            /**
+             * Position M
+             * @description How far off it may be; its outline is enlarged by that
+             */
+            position_m: number;
+            /** @description For a mission's `keep_out` */
+            zone: components["schemas"]["PolygonGeometry"];
+        };
+        /**
+         * ProposedZonesView
+         * @description What a chart shows to keep out of, the nearest to the middle of the area first.
+         */
+        ProposedZonesView: {
+            /** Zones */
+            zones: components["schemas"]["ProposedZoneView"][];
+            /**
+             * Notes
+             * @description What was assumed or left out, in words
+             */
+            notes: string[];
+        };
+        /**
          * QualityView
          * @description How good the map is, as far as it can be told.
          */
@@ -4809,6 +4931,56 @@ export interface components {
              * @description Of the place, east and north together
              */
             horizontal_m: number;
+        };
+        /**
+         * ShipView
+         * @description A ship as it was heard last. What it does not tell is null, or an empty text.
+         */
+        ShipView: {
+            /** Mmsi */
+            mmsi: number;
+            /** Name */
+            name: string;
+            /** Call Sign */
+            call_sign: string;
+            /** Type */
+            type: string;
+            /** Status */
+            status: string;
+            /**
+             * Own
+             * @description Belongs to the operation: no cause for an alarm
+             */
+            own: boolean;
+            /** Lat Deg */
+            lat_deg: number;
+            /** Lon Deg */
+            lon_deg: number;
+            /**
+             * Sog Mps
+             * @description Speed over ground
+             */
+            sog_mps: number | null;
+            /**
+             * Cog Deg
+             * @description Course over ground
+             */
+            cog_deg: number | null;
+            /** Heading Deg */
+            heading_deg: number | null;
+            /** Length M */
+            length_m: number | null;
+            /** Width M */
+            width_m: number | null;
+            /** Draught M */
+            draught_m: number | null;
+            /**
+             * Age S
+             * @description Since it was heard
+             */
+            age_s: number;
+            /** @description To vehicles that are at or near the surface, or will be; null: to none within half an hour */
+            closest: components["schemas"]["ApproachView"] | null;
         };
         /**
          * SimulatedTarget
@@ -6100,6 +6272,100 @@ export interface components {
              * @default 10
              */
             standoff_m: number;
+        };
+        /**
+         * TrafficFinding
+         * @description What the doctor says of AIS, and what to do about it.
+         */
+        TrafficFinding: {
+            severity: components["schemas"]["Severity"];
+            /** Text */
+            text: string;
+            /**
+             * Remedy
+             * @default
+             */
+            remedy: string;
+        };
+        /**
+         * TrafficMessage
+         * @description The ships near the mission, about once a second where AIS is set up.
+         */
+        TrafficMessage: {
+            /**
+             * Type
+             * @default traffic
+             * @constant
+             */
+            type: "traffic";
+            /**
+             * Time
+             * Format: date-time
+             */
+            time: string;
+            /** Ships */
+            ships: components["schemas"]["ShipView"][];
+        };
+        /**
+         * TrafficSourceView
+         * @description Where sentences come from.
+         */
+        TrafficSourceView: {
+            /** Name */
+            name: string;
+            /** Open */
+            open: boolean;
+            /**
+             * Reason
+             * @description Why nothing can be heard; empty while it is open
+             */
+            reason: string;
+            /**
+             * Sentences
+             * @description Of AIS, that could be read
+             */
+            sentences: number;
+            /**
+             * Silent S
+             * @description Since the last of them; null: none came yet
+             */
+            silent_s: number | null;
+        };
+        /**
+         * TrafficView
+         * @description The ships about and how they are heard.
+         */
+        TrafficView: {
+            /**
+             * Ships
+             * @description The nearest to a mission first
+             */
+            ships: components["schemas"]["ShipView"][];
+            /**
+             * Sources
+             * @description Empty: AIS is not set up, see the settings ais.*
+             */
+            sources: components["schemas"]["TrafficSourceView"][];
+            /**
+             * Malformed
+             * @description Sentences that could not be read
+             */
+            malformed: number;
+            /**
+             * Dropped
+             * @description Sentences that came faster than they can be read
+             */
+            dropped: number;
+            /**
+             * Turned Away
+             * @description Positions of ships there was no room for; near ones come before others
+             */
+            turned_away: number;
+            /**
+             * Jumps
+             * @description Positions too far from where the ship had just been
+             */
+            jumps: number;
         };
         /**
          * Training
@@ -10837,7 +11103,7 @@ export interface operations {
     importSoundings: {
         parameters: {
             query: {
-                /** @description Its name; the ending says what it is: .xyz, .csv, .txt (also with .gz), .asc, .tif, .nc or .bag */
+                /** @description Its name; the ending says what it is: .xyz, .csv, .txt (also with .gz), .asc, .tif, .nc, .bag, .h5 (S-102) or .000 (ENC cell) */
                 filename: string;
                 /** @description Where it comes from, kept with the mission */
                 source?: string;
@@ -11115,7 +11381,7 @@ export interface operations {
     setReference: {
         parameters: {
             query: {
-                /** @description Its name; the ending says what it is: .xyz, .csv, .txt (also with .gz), .asc, .tif, .nc or .bag */
+                /** @description Its name; the ending says what it is: .xyz, .csv, .txt (also with .gz), .asc, .tif, .nc, .bag, .h5 (S-102) or .000 (ENC cell) */
                 filename: string;
                 /** @description Where it comes from, kept with the mission */
                 source?: string;
@@ -11302,6 +11568,114 @@ export interface operations {
             };
             /** @description Too many requests */
             429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    proposeZones: {
+        parameters: {
+            query: {
+                /** @description Western end of the area */
+                west_deg: number;
+                /** @description Southern end of the area */
+                south_deg: number;
+                /** @description Eastern end of the area */
+                east_deg: number;
+                /** @description Northern end of the area */
+                north_deg: number;
+                /** @description How much all of it is enlarged, beside how well its place is known */
+                margin_m?: number;
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /** @description The file as it is, whatever its media type */
+        requestBody: {
+            content: {
+                "application/octet-stream": string;
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ProposedZonesView"];
+                };
+            };
+            /** @description The body cannot be read */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The request took too long to arrive */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body is too large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too much is sent at once; too many requests */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No file can be read now; too much is under way */
+            503: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -13826,6 +14200,53 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["DoctorView"];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too many requests */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    listShips: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["TrafficView"];
                 };
             };
             /** @description An access token is needed */

@@ -27,6 +27,7 @@ export type VehicleView = Complete<Schemas["VehicleView"]>;
 export type PositionQuality = Schemas["PositionQuality"];
 export type TargetState = Schemas["TargetState"];
 export type TargetView = Complete<Schemas["TargetView"]>;
+export type ShipView = Complete<Schemas["ShipView"]>;
 export type SearchProgress = Complete<Schemas["SearchProgress"]>;
 export type SearchGridView = Complete<Schemas["SearchGridView"]>;
 export type WaypointView = Complete<Schemas["WaypointView"]>;

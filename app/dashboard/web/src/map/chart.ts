@@ -13,6 +13,7 @@ import type { PlaceMark, Route, Spot, Track } from "./marks";
 import { type Look, PAPER } from "./paper";
 import type { PictureResult } from "./picture.worker";
 import { Sheets } from "./sheets";
+import type { ShipMark } from "./ships";
 import { type Site, sitePicture } from "./site";
 import { imageOf, paintStill, type StillContent } from "./still";
 import type { SwathLine } from "./swath";
@@ -273,6 +274,15 @@ export class Chart {
   /** Where moving targets are thought to be. */
   setTargets(targets: readonly TargetMark[]): void {
     this.#show({ targets });
+  }
+
+  setShips(ships: readonly ShipMark[]): void {
+    this.#show({ ships });
+  }
+
+  /** Where the pointer is. */
+  setPointed(pointed: LngLat | null): void {
+    this.#show({ pointed });
   }
 
   setSpots(spots: readonly Spot[]): void {

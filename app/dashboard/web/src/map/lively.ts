@@ -6,6 +6,7 @@ import type { PlaceMark, Route, Spot, Track } from "./marks";
 import type { Paper } from "./paper";
 import { dot, line, stroke, trace, way } from "./pen";
 import type { Projection } from "./projection";
+import type { ShipMark } from "./ships";
 import type { SwathLine } from "./swath";
 import type { TargetMark } from "./targets";
 
@@ -24,6 +25,9 @@ export interface LivelyContent {
   swaths: readonly SwathLine[];
   routes: readonly Route[];
   targets: readonly TargetMark[];
+  ships: readonly ShipMark[];
+  /** What the pointer is at: of a ship there its words are shown. */
+  pointed: LngLat | null;
   marks: readonly PlaceMark[];
   spots: readonly Spot[];
   measure: readonly LngLat[];
@@ -37,6 +41,8 @@ export const NOTHING: LivelyContent = {
   swaths: [],
   routes: [],
   targets: [],
+  ships: [],
+  pointed: null,
   marks: [],
   spots: [],
   measure: [],
@@ -51,7 +57,8 @@ export function paintLively(
   content: LivelyContent,
   paper: Paper,
 ): void {
-  const { draft, ranges, tails, swaths, routes, targets, marks, spots, measure, sketch } = content;
+  const { draft, ranges, tails, swaths, routes, targets, ships, pointed, marks, spots, measure, sketch } =
+    content;
   context.lineJoin = context.lineCap = "round";
   for (const ring of draft.area?.coordinates ?? []) {
     line(context, at, ring as LngLat[], { colour: paper.area, width: 2.5, dash: [5, 5] });
@@ -76,6 +83,7 @@ export function paintLively(
     line(context, at, points, acknowledged ? { colour, width: 2.5 } : { colour, width: 2, dash: [3, 4] });
   }
   for (const target of targets) paintTarget(context, at, target, paper);
+  for (const ship of ships) paintShip(context, at, ship, pointed, paper);
   for (const { at: place, state, chosen } of spots) {
     const edge = { colour: "#10181d", width: chosen ? 3 : 1.5 };
     dot(context, at, place, chosen ? 9 : 5.5, SPOT_COLOURS[state] ?? "#e0452f", edge);
@@ -100,6 +108,45 @@ function paintTarget(
   dot(context, at, place, 6, accurate ? paper.ink : paper.casing, { colour: paper.ink, width: 2 });
   label(context, at, place, name, paper);
 }
+
+const NEAR_PX = 16;
+
+function paintShip(
+  context: CanvasRenderingContext2D,
+  at: Projection,
+  { at: place, ahead, bow_deg, alarm, words }: ShipMark,
+  pointed: LngLat | null,
+  paper: Paper,
+): void {
+  const colour = alarm ? paper.keepOut : paper.ink;
+  line(context, at, [place, ahead], { colour, width: alarm ? 2.5 : 1.5 });
+  const [x, y] = [at.x(place[0]), at.y(place[1])];
+  if (bow_deg === null) {
+    dot(context, at, place, 5, paper.casing, { colour, width: 2 });
+  } else {
+    const turn = (bow_deg * Math.PI) / 180;
+    const [sin, cos] = [Math.sin(turn), Math.cos(turn)];
+    context.beginPath();
+    SHIP.forEach(([across, along], i) => {
+      const [px, py] = [x + across * cos + along * sin, y + across * sin - along * cos];
+      if (i === 0) context.moveTo(px, py);
+      else context.lineTo(px, py);
+    });
+    context.closePath();
+    context.fillStyle = alarm ? paper.keepOut : paper.casing;
+    context.fill();
+    stroke(context, { colour, width: 2 });
+  }
+  const near = pointed !== null && Math.hypot(at.x(pointed[0]) - x, at.y(pointed[1]) - y) < NEAR_PX;
+  if (alarm || near) label(context, at, place, words, paper);
+}
+
+/** A ship's outline: to starboard and ahead, pixels. */
+const SHIP = [
+  [0, 11],
+  [6, -8],
+  [-6, -8],
+] as const;
 
 function label(
   context: CanvasRenderingContext2D,

@@ -6,6 +6,7 @@ import type {
   LiveMessage,
   MissionView,
   Place,
+  ShipView,
   VehicleView,
   WaypointView,
 } from "../api/types";
@@ -36,6 +37,8 @@ export interface LiveView {
   /** Alarms that nobody has acknowledged, oldest first, and the one that was last. */
   alarms: readonly AlarmView[];
   taken: AlarmView | null;
+  /** Ships near the mission; null: nothing listens for any. */
+  ships: readonly ShipView[] | null;
   mapVersion: number;
   /** Grows with what was sounded since that map. */
   liveVersion: number;
@@ -54,6 +57,7 @@ export const EMPTY_VIEW: LiveView = {
   events: [],
   alarms: [],
   taken: null,
+  ships: null,
   mapVersion: 0,
   liveVersion: 0,
   lastEventId: 0,
@@ -82,6 +86,7 @@ export function reduce(view: LiveView, message: LiveMessage, at: number): LiveVi
         events: view.mission?.id === message.mission.id ? view.events : [],
         alarms: message.alarms,
         taken: view.mission?.id === message.mission.id ? view.taken : null,
+        ships: view.mission?.id === message.mission.id ? view.ships : null,
         mapVersion: message.map_version,
         liveVersion: 0,
         lastEventId: message.last_event_id,
@@ -101,6 +106,8 @@ export function reduce(view: LiveView, message: LiveMessage, at: number): LiveVi
       };
     case "targets":
       return view.mission ? { ...view, mission: { ...view.mission, targets: message.targets } } : view;
+    case "traffic":
+      return view.mission ? { ...view, ships: message.ships } : view;
     case "search":
       if (!view.mission) return view;
       return {

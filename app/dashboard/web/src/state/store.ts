@@ -157,6 +157,9 @@ export const showSite = kept("site", true);
 export const showHolidays = kept("holidays", true);
 export const showCrossings = kept("crossings", true);
 export const showTargets = kept("targets", true);
+export const showShips = kept("ships", true);
+/** Ships near the mission; null where nothing listens for any. */
+export const ships = computed(() => view.value.ships);
 /** Ranges that the operator fixed, for each layer; a layer without one takes a fitting range. */
 export const fixedRanges = kept<Partial<Record<string, Range>>>("ranges", {});
 export const shownRange = computed(() => rangeOf(layer.value));

@@ -10,9 +10,11 @@ import {
   measured,
   mission,
   seaFloor,
+  ships,
   showCrossings,
   showHolidays,
   showRanges,
+  showShips,
   showSite,
   showTargets,
   showTracks,
@@ -49,6 +51,11 @@ export function MapTools({ onFit }: { onFit: () => void }) {
         {mission.value?.targets.length ? (
           <Shown what="Targets" signal={showTargets} id="show-targets">
             <path d="M10,2 v4 M10,14 v4 M2,10 h4 M14,10 h4 M10,6 a4,4 0 1 1 -0.01,0" />
+          </Shown>
+        ) : null}
+        {ships.value ? (
+          <Shown what="Ships" signal={showShips} id="show-ships">
+            <path d="M10,2 L15,17 H5 Z" />
           </Shown>
         ) : null}
         {mission.value?.progress.holidays != null ? (

@@ -14,6 +14,7 @@ import { lookupTable } from "../map/palette";
 import type { Look } from "../map/paper";
 import { recoveryMarks } from "../map/recovery";
 import type { SeaFloor } from "../map/seafloor";
+import { shipMarks } from "../map/ships";
 import { searchMarks } from "../map/site";
 import { ringsOf, type SwathLine, swathEnds, swathOpacity } from "../map/swath";
 import { targetMarks } from "../map/targets";
@@ -22,6 +23,7 @@ import {
   chosenSounding,
   colourOf,
   crossovers,
+  cursor,
   depthPalette,
   destination,
   draftShapes,
@@ -36,6 +38,7 @@ import {
   replayStep,
   reviewed,
   seaFloor,
+  ships,
   showContours,
   showCrossings,
   showHatching,
@@ -43,6 +46,7 @@ import {
   shownLayer,
   shownRange,
   showRanges,
+  showShips,
   showSite,
   showTargets,
   showTracks,
@@ -106,6 +110,12 @@ export function follow(chart: Chart): () => void {
         showTargets.value && replayStep.value === null ? targetMarks(mission.value?.targets ?? []) : [],
       ),
     ),
+    effect(() =>
+      chart.setShips(showShips.value && replayStep.value === null ? shipMarks(ships.value ?? []) : []),
+    ),
+    effect(() => {
+      if (showShips.value && ships.value?.length) chart.setPointed(cursor.value);
+    }),
     effect(() => chart.setSwaths(replayStep.value === null ? swaths() : [])),
     effect(() => {
       const shown = showHolidays.value && replayStep.value === null ? holidays.value : null;

@@ -1,0 +1,50 @@
+/** Ships on the map: a triangle that points ahead, and where each will be in six minutes. Pure. */
+
+import type { LngLat, ShipView } from "../api/types";
+import { metresPerDegree } from "./geo";
+
+const AHEAD_S = 360;
+const RAD = Math.PI / 180;
+
+export interface ShipMark {
+  at: LngLat;
+  /** Where it will be, if it keeps course and speed. */
+  ahead: LngLat;
+  /** Which way its bow points, degrees from north; null: it does not say. */
+  bow_deg: number | null;
+  alarm: boolean;
+  words: string;
+}
+
+export function shipMarks(ships: readonly ShipView[]): ShipMark[] {
+  return ships.map((ship) => {
+    const at: LngLat = [ship.lon_deg, ship.lat_deg];
+    const scale = metresPerDegree(ship.lat_deg);
+    const way_m = ship.cog_deg === null ? 0 : (ship.sog_mps ?? 0) * AHEAD_S;
+    const course = (ship.cog_deg ?? 0) * RAD;
+    return {
+      at,
+      ahead: [
+        at[0] + (way_m * Math.sin(course)) / scale.east,
+        at[1] + (way_m * Math.cos(course)) / scale.north,
+      ],
+      bow_deg: ship.heading_deg ?? ship.cog_deg,
+      alarm: ship.closest?.alarm ?? false,
+      words: shipWords(ship),
+    };
+  });
+}
+
+export function shipWords({ name, mmsi, type, sog_mps, own, closest }: ShipView): string {
+  const who = `${name || `MMSI ${mmsi}`}${own ? " (own)" : type ? ` (${type})` : ""}`;
+  const speed = sog_mps === null ? "" : `, ${((sog_mps * 3600) / 1852).toFixed(1)} kn`;
+  if (!closest) return who + speed;
+  const away = `${closest.distance_m.toFixed(0)} m from ${closest.vehicle}`;
+  const when = closest.in_s < 1 ? "now" : `in ${minutes(closest.in_s)}`;
+  return `${who}${speed}, CPA ${away} ${when}`;
+}
+
+function minutes(seconds: number): string {
+  const whole = Math.round(seconds);
+  return whole < 60 ? `${whole} s` : `${Math.floor(whole / 60)} min ${whole % 60} s`;
+}

@@ -1,0 +1,1 @@
+"""Ships about, by AIS: ``watch.Traffic`` hears them, ``approach`` reckons how close they come to vehicles."""

@@ -1,0 +1,158 @@
+"""Hears AIS and keeps the ships that are about, at a pace that no flood of sentences can change."""
+
+import asyncio
+from collections import deque
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import structlog
+
+from app.missions.settings import AisSettings
+from app.missions.traffic.roster import NEAR_M, Roster, Ship, distance_m
+from app.missions.traffic.sentences import SentenceError, SentenceReader, ShipPosition
+from app.missions.traffic.sources import FileSource, Source, TcpSource, UdpSource
+
+TICK_S, MOST_PER_TICK = 0.05, 50
+"""So many sentences are decoded so often: 1000 a second, ten times what both channels of AIS carry."""
+MOST_WAITING = 2000
+FORGET_S = 1.0
+SILENCE_S = 60.0
+"""Who heard nothing for so long hears nothing."""
+
+log = structlog.get_logger(__name__)
+
+
+@dataclass(frozen=True, slots=True)
+class SourceState:
+    """How a source is; ``trouble`` empty: open. ``silent_s``: since its last sentence, None: none came yet."""
+
+    name: str
+    trouble: str
+    sentences: int
+    silent_s: float | None
+
+
+class Traffic:
+    """The ships about, as they are heard.
+
+    Parameters
+    ----------
+    places
+        Returns where missions are, latitude and longitude: ships near them come before others.
+
+    Attributes
+    ----------
+    settings
+        See :class:`AisSettings`; without a source nothing is heard.
+    malformed, dropped
+        Sentences that could not be read, and those that came faster than they can be.
+    """
+
+    def __init__(self, settings: AisSettings, places: Callable[[], Sequence[tuple[float, float]]] = tuple) -> None:
+        self.settings = settings
+        self.roster = Roster(settings.max_age_s)
+        self.malformed = 0
+        self.dropped = 0
+        self._places = places
+        self._reader = SentenceReader()
+        self._waiting: deque[tuple[bytes, Source]] = deque()
+        self._task: asyncio.Task[None] | None = None
+        self._began_s: float | None = None
+        self.sources: list[Source] = []
+        if settings.udp_port is not None:
+            self.sources.append(UdpSource(settings.udp_address, settings.udp_port, self._put))
+        if settings.tcp_host:
+            self.sources.append(TcpSource(settings.tcp_host, settings.tcp_port, self._put))
+        if settings.file is not None:
+            self.sources.append(FileSource(settings.file, self._put))
+
+    @property
+    def listens(self) -> bool:
+        """Whether there is anything to hear ships by."""
+        return bool(self.sources)
+
+    @property
+    def now_s(self) -> float:
+        """The clock that ships' ``heard_s`` is by."""
+        return asyncio.get_running_loop().time()
+
+    async def start(self) -> None:
+        """Begin to listen; what cannot be opened is tried again."""
+        if not self.listens:
+            return
+        self._began_s = self.now_s
+        for source in self.sources:
+            source.open()
+        self._task = asyncio.create_task(self._keep())
+
+    async def close(self) -> None:
+        """Listen no more."""
+        for source in self.sources:
+            await source.close()
+        if self._task is not None:
+            self._task.cancel()
+            await asyncio.gather(self._task, return_exceptions=True)
+
+    def ships(self) -> list[Ship]:
+        """Return the ships that were heard lately, the nearest to a mission first."""
+        return sorted(self.roster, key=lambda ship: (ship.distance_m, ship.position.mmsi))
+
+    def near(self, lat_deg: float, lon_deg: float, within_m: float = NEAR_M) -> list[Ship]:
+        """Return the ships within so far of a place."""
+        return [
+            ship
+            for ship in self.ships()
+            if distance_m(lat_deg, lon_deg, ship.position.lat_deg, ship.position.lon_deg) <= within_m
+        ]
+
+    def states(self) -> list[SourceState]:
+        """Return how each source is."""
+        return [
+            SourceState(
+                source.name,
+                source.trouble,
+                source.sentences,
+                None if source.heard_s is None else self.now_s - source.heard_s,
+            )
+            for source in self.sources
+        ]
+
+    @property
+    def listened_s(self) -> float:
+        """For how long it has listened."""
+        return 0.0 if self._began_s is None else self.now_s - self._began_s
+
+    def _put(self, line: bytes, source: Source) -> None:
+        if len(self._waiting) >= MOST_WAITING:
+            self.dropped += 1
+        else:
+            self._waiting.append((line, source))
+
+    async def _keep(self) -> None:
+        looked_s = self.now_s
+        while True:
+            await asyncio.sleep(TICK_S)
+            try:
+                self._take_some()
+                if self.now_s - looked_s >= FORGET_S:
+                    looked_s = self.now_s
+                    self.roster.forget_silent(looked_s)
+                    self.roster.watch_over(self._places())
+            except Exception:
+                log.exception("ships could not be told apart")
+
+    def _take_some(self) -> None:
+        for _ in range(min(len(self._waiting), MOST_PER_TICK)):
+            line, source = self._waiting.popleft()
+            try:
+                told = self._reader.read(line, source.name, self.now_s)
+            except SentenceError:
+                self.malformed += 1
+                continue
+            source.sentences += 1
+            source.heard_s = self.now_s
+            for one in told:
+                if isinstance(one, ShipPosition):
+                    self.roster.place(one, self.now_s)
+                else:
+                    self.roster.describe(one)

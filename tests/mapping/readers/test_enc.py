@@ -1,0 +1,154 @@
+"""ENC cells: depths with the chart's quality, and what to keep out of."""
+
+import contextlib
+from pathlib import Path
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from app.mapping.georeference import LocalFrame
+from app.mapping.readers.enc import NO_ZONE_POSITION_M, ZONES_OF_CONFIDENCE, Zone, read_enc, read_zones
+from app.mapping.readers.files import read_file
+from app.mapping.readers.placing import place_soundings
+from app.mapping.readers.types import MapExtent, ReadError, ReadOptions
+from app.mapping.readers.warming import SMALL_CELL, SMALL_CELL_AT
+from app.mapping.s44 import NORMAL_95
+from app.mapping.types import Grid
+from tests.support.enc import Cell
+
+LAT, LON = 41.18, -8.70
+FRAME = LocalFrame(LAT, LON)
+PLACE = MapExtent(FRAME, Grid(-500.0, -500.0, 1.0, 1000, 1000), 0.0)
+
+
+def at(east_m: float, north_m: float) -> tuple[float, float]:
+    lat, lon = FRAME.to_geographic(east_m, north_m)
+    return round(float(lon), 7), round(float(lat), 7)
+
+
+def square(east_m: float, north_m: float, side_m: float) -> list[tuple[float, float]]:
+    return [at(east_m + e * side_m, north_m + n * side_m) for e, n in ((0, 0), (1, 0), (1, 1), (0, 1))]
+
+
+def deep(*places: tuple[float, float, float]) -> list[tuple[float, float, float]]:
+    return [(*at(east, north), depth) for east, north, depth in places]
+
+
+def local(zone: Zone) -> shapely.Polygon:
+    east, north = FRAME.to_local(zone.ring[:, 1], zone.ring[:, 0])
+    return shapely.Polygon(np.column_stack([east, north]))
+
+
+def test_soundings_and_contours_have_the_accuracy_of_their_zone(tmp_path: Path) -> None:
+    cell = Cell()
+    cell.area("M_QUAL", square(-500, -500, 500), CATZOC=1)
+    cell.area("M_QUAL", square(0, -500, 500), CATZOC=4)
+    cell.soundings(deep((-100, -100, 10.0), (100, -100, 20.0)))
+    cell.line("DEPCNT", [at(-200, -200), at(-150, -200)], VALDCO=5.0)
+    found = read_enc(cell.write(tmp_path / "cell.000"))
+    assert found.positive == "down"
+    by_depth = {float(depth): float(sd) for depth, sd in zip(found.z, found.sd_m, strict=True)}
+    assert by_depth == pytest.approx(
+        {
+            10.0: (0.5 + 0.01 * 10) / NORMAL_95,
+            20.0: (2.0 + 0.05 * 20) / NORMAL_95,
+            5.0: (0.5 + 0.01 * 5) / NORMAL_95,
+        }
+    )
+    assert len(found.z) == 4
+    east, north = FRAME.to_local(found.y, found.x)
+    assert sorted(zip(np.round(east), np.round(north), strict=True))[0] == (-200.0, -200.0)
+
+
+@pytest.mark.parametrize("quality", [{}, {"CATZOC": 5}, {"CATZOC": 6}])
+def test_what_nobody_stated_has_to_be_said(tmp_path: Path, quality: dict[str, int]) -> None:
+    cell = Cell()
+    if quality:
+        cell.area("M_QUAL", square(-500, -500, 1000), **quality)
+    cell.soundings(deep((0, 0, 10.0)))
+    found = read_enc(cell.write(tmp_path / "cell.000"))
+    assert np.isnan(found.sd_m).all()
+    with pytest.raises(ReadError, match="state no uncertainty"):
+        place_soundings(found, ReadOptions(), PLACE)
+    assert place_soundings(found, ReadOptions(sd_m=1.5), PLACE).soundings.sd_m == pytest.approx([1.5])
+
+
+def test_depth_areas_are_no_soundings(tmp_path: Path) -> None:
+    cell = Cell()
+    cell.area("DEPARE", square(-100, -100, 200), DRVAL1=5.0, DRVAL2=10.0)
+    with pytest.raises(ReadError, match="neither soundings"):
+        read_enc(cell.write(tmp_path / "cell.000"))
+
+
+def test_dangers_are_proposed_as_large_as_their_place_is_uncertain(tmp_path: Path) -> None:
+    cell = Cell()
+    cell.area("M_QUAL", square(-500, -500, 1000), CATZOC=2)
+    cell.point("WRECKS", at(100, 50), VALSOU=3.5, OBJNAM="Old Tom")
+    cell.area("LNDARE", square(-300, -300, 100), OBJNAM="Rock island")
+    cell.area("RESARE", square(200, 200, 100), OBJNAM="Cable")
+    cell.point("UWTROC", at(3000, 0))
+    zones, notes = read_zones(cell.write(tmp_path / "cell.000"), PLACE, 10.0)
+    assert notes == []
+    named = {zone.kind: zone for zone in zones}
+    assert set(named) == {"WRECKS", "LNDARE", "RESARE"}, "the rock lies elsewhere"
+    wreck = named["WRECKS"]
+    assert (wreck.name, wreck.depth_m, wreck.position_m) == ("Old Tom", 3.5, 20.0)
+    shape = local(wreck)
+    assert shape.centroid.distance(shapely.Point(100, 50)) < 1.0
+    assert shape.area == pytest.approx(np.pi * 30.0**2, rel=0.08)
+    land = local(named["LNDARE"])
+    assert land.bounds == pytest.approx((-310, -310, -190, -190), abs=1.5)
+    assert named["LNDARE"].depth_m is None
+    assert local(named["RESARE"]).bounds == pytest.approx((190, 190, 310, 310), abs=1.5)
+    assert zones[0].kind == "WRECKS", "the nearest first"
+
+
+def test_a_chart_that_states_no_quality_says_so(tmp_path: Path) -> None:
+    cell = Cell()
+    cell.point("OBSTRN", at(0, 0))
+    [zone], notes = read_zones(cell.write(tmp_path / "cell.000"), PLACE, 0.0)
+    assert zone.position_m == NO_ZONE_POSITION_M
+    assert "nothing states the chart's quality" in notes[0]
+
+
+def test_zones_end_where_the_area_does(tmp_path: Path) -> None:
+    cell = Cell()
+    cell.area("LNDARE", square(400, -2000, 4000))
+    [zone], _ = read_zones(cell.write(tmp_path / "cell.000"), PLACE, 0.0)
+    assert local(zone).bounds == pytest.approx((400, -500, 500, 500), abs=1.5)
+
+
+def test_the_small_cell_has_all_that_is_read() -> None:
+    content = SMALL_CELL.read_bytes()
+    place = MapExtent(LocalFrame(*SMALL_CELL_AT), PLACE.grid, 2000.0)
+    zones, _ = read_zones(content, place, 0.0)
+    assert {zone.kind for zone in zones} == {"LNDARE", "RESARE", "WRECKS", "UWTROC", "OBSTRN"}
+    assert np.isfinite(read_enc(content).sd_m).all()
+
+
+@pytest.mark.parametrize("content", [b"", b"000263LE1 0900201   " + b"0" * 60, b"\x89HDF\r\n\x1a\n" * 10])
+def test_what_is_no_cell_is_refused(content: bytes, tmp_path: Path) -> None:
+    file = tmp_path / "a.000"
+    file.write_bytes(content)
+    with file.open("rb") as opened, pytest.raises(ReadError, match="ENC cell"):
+        read_file(opened, ".000")
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.lists(st.tuples(st.integers(24, 4700), st.integers(0, 255)), min_size=1, max_size=6), st.integers(100, 4749))
+def test_a_damaged_cell_is_read_or_refused(changes: list[tuple[int, int]], length: int) -> None:
+    content = bytearray(SMALL_CELL.read_bytes())
+    for place, value in changes:
+        content[place] = value
+    for damaged in (bytes(content), bytes(content[:length])):
+        for read in (read_enc, lambda cell: read_zones(cell, PLACE, 1.0)):
+            with contextlib.suppress(ReadError):
+                read(damaged)
+
+
+def test_zones_of_confidence_grow_worse() -> None:
+    table = np.array(list(ZONES_OF_CONFIDENCE.values()))
+    assert (np.diff(table, axis=0) >= 0).all()
