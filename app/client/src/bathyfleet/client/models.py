@@ -15,6 +15,15 @@ from bathyfleet.client.model import Model, Open
 Action: TypeAlias = Annotated[Literal["start", "pause", "resume", "abort", "finish"], Open]
 """What operators and consoles may ask of a mission."""
 
+AlarmKind: TypeAlias = Annotated[Literal["leak", "critical_energy", "too_deep", "position_lost", "low_energy", "link_lost", "traffic", "geofence_left", "vehicle_error", "other_console", "all_links_lost", "zone_entered", "area_left", "vehicle_lost", "vehicle_restarted", "vehicle_refuses", "stop_not_acknowledged", "not_come_home", "no_way_home", "no_vehicle", "no_waypoint", "no_scan", "search_late", "search_stuck", "no_water_level", "database_unwritable", "mission_failed", "test"], Open]
+"""What is raised as an alarm. Those of failsafes have the failsafes' names."""
+
+AlarmSeverity: TypeAlias = Annotated[Literal["minor", "major", "critical"], Open]
+"""How grave an alarm is, least to most, in the words of ITU-T X.733."""
+
+AlarmState: TypeAlias = Annotated[Literal["open", "acknowledged"], Open]
+"""Whether somebody has taken an alarm."""
+
 BatteryState: TypeAlias = Annotated[Literal["ok", "low", "critical"], Open]
 """What a battery's level is worth."""
 
@@ -24,10 +33,13 @@ Cause: TypeAlias = Annotated[Literal["sound", "switched_off", "port_in_use", "no
 CheckStatus: TypeAlias = Annotated[Literal["ok", "note", "warning", "problem"], Open]
 """How a line of the checklist stands."""
 
+DeliveryState: TypeAlias = Annotated[Literal["waiting", "delivered", "failed", "superseded"], Open]
+"""How far the telling has come."""
+
 ErrorKind: TypeAlias = Annotated[Literal["depth", "water_level", "roll_offset", "sound_speed"], Open]
 """What may be wrong."""
 
-Failsafe: TypeAlias = Annotated[Literal["leak", "critical_energy", "too_deep", "position_lost", "low_energy", "link_lost", "geofence_left", "separation_lost", "vehicle_error", "other_console", "all_links_lost", "service_restarted"], Open]
+Failsafe: TypeAlias = Annotated[Literal["leak", "critical_energy", "too_deep", "position_lost", "low_energy", "link_lost", "traffic", "geofence_left", "separation_lost", "vehicle_error", "other_console", "all_links_lost", "service_restarted"], Open]
 """What may go wrong with a vehicle, or with all of them."""
 
 Fit: TypeAlias = Annotated[Literal["data", "from_zero", "about_zero"], Open]
@@ -62,6 +74,9 @@ MissionState: TypeAlias = Annotated[Literal["draft", "ready", "running", "paused
 
 NodeState: TypeAlias = Annotated[Literal["heard", "announced", "active", "ready", "in_plan", "lost", "expected_offline"], Open]
 """How far the acquaintance with a node has come."""
+
+Notice: TypeAlias = Annotated[Literal["raised", "escalated", "acknowledged"], Open]
+"""Why somebody is told of an alarm."""
 
 Order: TypeAlias = Annotated[Literal["exclusive", "special", "1a", "1b", "2"], Open]
 """An order of survey."""
@@ -170,6 +185,57 @@ class AgreementView(Model):
     """Share that is not larger than the order's largest TVU"""
 
 
+class AlarmMessage(Model):
+    """An alarm was raised or acknowledged; by its id the page knows whether it has it already."""
+
+    type: Literal["alarm"]
+    alarm: AlarmView
+
+
+class AlarmReport(Model):
+    """An alarm with everything that was told of it."""
+
+    id: str
+    mission_id: str | None
+    """null: it concerns no mission"""
+    kind: AlarmKind
+    severity: AlarmSeverity
+    vehicle: str | None
+    message: str
+    raised_at: datetime
+    state: AlarmState
+    acknowledged_at: datetime | None
+    acknowledged_by: str | None
+    """The name of the token, or of the user, that acknowledged it"""
+    deliveries: list[DeliveryView]
+
+
+class AlarmTrial(Model):
+    """Whom to try to reach."""
+
+    severity: AlarmSeverity = "minor"
+    """As grave as this: routes go by it"""
+    to: str | None = None
+    """Only this recipient of the settings; null: whom the routes say"""
+
+
+class AlarmView(Model):
+    """An alarm: who has it, or that nobody has."""
+
+    id: str
+    mission_id: str | None
+    """null: it concerns no mission"""
+    kind: AlarmKind
+    severity: AlarmSeverity
+    vehicle: str | None
+    message: str
+    raised_at: datetime
+    state: AlarmState
+    acknowledged_at: datetime | None
+    acknowledged_by: str | None
+    """The name of the token, or of the user, that acknowledged it"""
+
+
 class AllowedView(Model):
     """What an order of IHO S-44 allows at the depth, 95 %."""
 
@@ -188,6 +254,19 @@ class AngleAgreementView(Model):
     mean_m: float
     sd_m: float | None
     within_pct: float
+
+
+class ApproachView(Model):
+    """The closest point of approach of a ship and the vehicle that it comes closest to."""
+
+    mission_id: str
+    vehicle: str
+    distance_m: float
+    """Between the ship's hull, as far as it is known, and the vehicle"""
+    in_s: float
+    """From now; 0: it is farther every moment"""
+    alarm: bool
+    """Closer than ais.cpa_m within ais.cpa_s"""
 
 
 class AuditEntry(Model):
@@ -243,6 +322,42 @@ class Budget(Model):
     """Kilometres that each vehicle flies"""
     steps: int | None = None
     """Legs that each vehicle flies"""
+
+
+class ChangesView(Model):
+    """What changed at a site between two of its surveys, over the ground that both know."""
+
+    site_id: str
+    earlier: SurveyName
+    later: SurveyName
+    confidence: float
+    """A share of so much of unchanged ground is not called changed"""
+    compared_m2: float
+    significant_pct: float
+    """Of the compared cells, those that changed significantly"""
+    expected_pct: float
+    """What chance makes of unchanged ground where deviations are right"""
+    deeper_pct: float
+    """Of the compared cells, those that are significantly deeper now"""
+    shoaler_pct: float
+    lost: VolumeView
+    """What went where it is significantly deeper"""
+    gained: VolumeView
+    """What came where it is significantly shoaler"""
+    net: VolumeView
+    """What came less what went, over all compared cells"""
+    mean_m: float | None
+    """Later depth less earlier depth: positive where it is deeper now"""
+    rms_m: float | None
+    median_sd_m: float | None
+    """Standard deviation of a difference"""
+    least_m: float | None
+    largest_m: float | None
+    corners: list[tuple[float, float]]
+    """Of changes.png, as those of a map"""
+    vertical_datum: str
+    notes: list[str]
+    """What has to be known to read it, in words"""
 
 
 class CheckView(Model):
@@ -406,6 +521,24 @@ class CrossoversView(Model):
     features: CrossingFeaturesView
 
 
+class DeliveryView(Model):
+    """What one recipient is told, and what came of it."""
+
+    id: str
+    """What the recipient sees as the message's id; the same at every attempt"""
+    recipient: str
+    """The recipient's name in the settings"""
+    notice: Notice
+    state: DeliveryState
+    attempts: int
+    created_at: datetime
+    next_try_at: datetime | None
+    """null: it is not tried again"""
+    done_at: datetime | None
+    error: str
+    """Why the last attempt failed; empty when none did"""
+
+
 class DifferenceView(Model):
     """Map minus reference grid over the cells that both know."""
 
@@ -430,6 +563,8 @@ class DoctorView(Model):
     own: list[Finding]
     """On this machine's side"""
     vehicles: list[VehicleDiagnosis]
+    traffic: list[TrafficFinding]
+    """Of AIS; empty where it is not set up"""
 
 
 class EllipseView(Model):
@@ -584,6 +719,8 @@ class ImportView(Model):
     id: str
     filename: str
     source: str
+    site: str | None
+    """The site whose depths these are; null: they came as a file"""
     sha256: str
     """Of the file"""
     created_at: datetime
@@ -855,6 +992,10 @@ class MissionSpec(Model):
     """Sound speed correction; null: the sonars' own ranges are taken"""
     systematic_errors: SystematicErrors | None = None
     """What is always wrong with sonars and water levels"""
+    site: str | None = None
+    """The site that it surveys, which keeps what it finds; null: none"""
+    site_prior: bool = True
+    """With a site: begin with the depths that its earlier surveys found"""
     seed: int = 0
     """Seed of every random decision"""
 
@@ -1134,6 +1275,31 @@ class Progress(Model):
     """In missions of kind search: how it stands"""
 
 
+class ProposedZoneView(Model):
+    """What a chart shows to keep out of. It is a proposal: nothing keeps out of it before a mission has it."""
+
+    object: str
+    """The chart's class: LNDARE, OBSTRN, WRECKS, UWTROC or RESARE"""
+    reason: str
+    """What it is, in words"""
+    name: str
+    """What the chart calls it; it may be empty"""
+    depth_m: float | None
+    """Least depth over it, as charted; null: not known"""
+    position_m: float
+    """How far off it may be; its outline is enlarged by that"""
+    zone: PolygonGeometry
+    """For a mission's `keep_out`"""
+
+
+class ProposedZonesView(Model):
+    """What a chart shows to keep out of, the nearest to the middle of the area first."""
+
+    zones: list[ProposedZoneView]
+    notes: list[str]
+    """What was assumed or left out, in words"""
+
+
 class QualityView(Model):
     """How good the map is, as far as it can be told."""
 
@@ -1306,6 +1472,32 @@ class ShareView(Model):
     """Of the place, east and north together"""
 
 
+class ShipView(Model):
+    """A ship as it was heard last. What it does not tell is null, or an empty text."""
+
+    mmsi: int
+    name: str
+    call_sign: str
+    type: str
+    status: str
+    own: bool
+    """Belongs to the operation: no cause for an alarm"""
+    lat_deg: float
+    lon_deg: float
+    sog_mps: float | None
+    """Speed over ground"""
+    cog_deg: float | None
+    """Course over ground"""
+    heading_deg: float | None
+    length_m: float | None
+    width_m: float | None
+    draught_m: float | None
+    age_s: float
+    """Since it was heard"""
+    closest: ApproachView | None
+    """To vehicles that are at or near the surface, or will be; null: to none within half an hour"""
+
+
 class SimulatedTarget(Model):
     """A target that moves about in the service's own simulation; vehicles of kind ``sim`` range to it."""
 
@@ -1317,6 +1509,89 @@ class SimulatedTarget(Model):
     speed_mps: float = 0.3
 
 
+class SiteChanges(Model):
+    """What may be changed of a site; what is left out stays."""
+
+    name: str | None = None
+    area: PolygonGeometry | None = None
+    cell_m: float | None = None
+    yearly_change_m: float | None = None
+
+
+class SiteChoice(Model):
+    """Which site a mission belongs to."""
+
+    site: str | None
+    """The site; null: none"""
+
+
+class SiteMapView(Model):
+    """A site's depths from all its surveys, as of a time. Rows go from south to north; null: nobody surveyed there."""
+
+    site_id: str
+    at: datetime
+    """As of when: what was known before is less certain by then"""
+    west_m: float
+    """Western edge of the grid in the site's local frame"""
+    south_m: float
+    cell_m: float
+    rows: int
+    cols: int
+    corners: list[tuple[float, float]]
+    """North-west, north-east, south-east and south-west corner, [longitude, latitude]"""
+    vertical_datum: str
+    known_pct: float
+    """Of the site's cells, those that a survey knows"""
+    min_depth_m: float | None
+    max_depth_m: float | None
+    surveys: list[SurveyName]
+    """What `survey` counts in, oldest first"""
+    depth_m: list[list[float | None]]
+    sd_m: list[list[float | None]]
+    """Standard deviation of the depths, grown with their age"""
+    survey: list[list[int | None]]
+    """Number in `surveys` of the newest one that counts in the cell"""
+    count: list[list[int]]
+    """Surveys that count in the cell: those since it was found changed"""
+    sounded: list[list[bool]]
+    """Whether one of them sounded it; else its soundings support the depth"""
+
+
+class SiteSpec(Model):
+    """A site as an operator describes it."""
+
+    name: str
+    """Shown to people; need not be unique"""
+    area: PolygonGeometry
+    """What belongs to the site"""
+    cell_m: float = 1.0
+    """Cell of the site's grid, metres"""
+    yearly_change_m: float = 0.0
+    """By how much the floor may change in a year, standard deviation in metres: what was known grows as uncertain,
+    after four years by twice as much. 0: surveys count the same however old
+    """
+
+
+class SiteView(Model):
+    """A site that is surveyed again and again."""
+
+    id: str
+    name: str
+    area: PolygonGeometry
+    cell_m: float
+    """Cell of the site's grid"""
+    yearly_change_m: float
+    """By how much the floor may change in a year, standard deviation"""
+    created_at: datetime
+    updated_at: datetime
+    missions: int
+    """Missions of the site, whatever their state"""
+    surveys: int
+    """Missions that ended, whose depths the site keeps"""
+    last_survey_at: datetime | None
+    """When the newest survey made its last sounding"""
+
+
 class SnapshotMessage(Model):
     """First message on the live socket: everything needed to draw the picture."""
 
@@ -1326,6 +1601,8 @@ class SnapshotMessage(Model):
     """Per vehicle its track so far as [longitude, latitude, depth], to within 0.2 m"""
     map_version: int
     last_event_id: int
+    alarms: list[AlarmView]
+    """Those of the mission that nobody has acknowledged, oldest first"""
 
 
 class SoundSpeed(Model):
@@ -1454,6 +1731,46 @@ class SurfacePolicy(Model):
     """How long a vehicle stays up that comes up by the clock"""
     good_position_sd_m: float | None = None
     """It stays at the surface until its position is known this well; null: a third of the limit"""
+
+
+class SurveyName(Model):
+    """A survey in short."""
+
+    mission_id: str
+    name: str
+    at: datetime
+    """Its last sounding"""
+
+
+class SurveyView(Model):
+    """What a mission has to do with its site: a survey once it has ended."""
+
+    mission_id: str
+    name: str
+    state: str | None
+    """Of the mission; null: it was removed, its depths are kept"""
+    surveyed: bool
+    """Whether the site has its depths: false until it ends, and while its map is made"""
+    left_out: str
+    """Why its depths are not in the site's model; empty where they are"""
+    began_at: datetime | None
+    """First sounding"""
+    ended_at: datetime | None
+    """Last sounding"""
+    soundings: int
+    """Accepted ones, without beams of swath sonars"""
+    beams: int
+    share_pct: float
+    """Of the site's cells, those that it knows"""
+    median_sd_m: float | None
+    """Standard deviation of its depths"""
+    min_depth_m: float | None
+    max_depth_m: float | None
+    changed_pct: float | None
+    """Of its cells that were known before, those where it differs from what was foretold by more than 1.96
+    deviations: about 5 where nothing changed. null: none was known
+    """
+    vertical_datum: str
 
 
 class SwathSonarSpec(Model):
@@ -1780,6 +2097,52 @@ class Tracking(Model):
     """A vehicle that goes for a target comes no closer to any"""
 
 
+class TrafficFinding(Model):
+    """What the doctor says of AIS, and what to do about it."""
+
+    severity: Severity
+    text: str
+    remedy: str
+
+
+class TrafficMessage(Model):
+    """The ships near the mission, about once a second where AIS is set up."""
+
+    type: Literal["traffic"]
+    time: datetime
+    ships: list[ShipView]
+
+
+class TrafficSourceView(Model):
+    """Where sentences come from."""
+
+    name: str
+    open: bool
+    reason: str
+    """Why nothing can be heard; empty while it is open"""
+    sentences: int
+    """Of AIS, that could be read"""
+    silent_s: float | None
+    """Since the last of them; null: none came yet"""
+
+
+class TrafficView(Model):
+    """The ships about and how they are heard."""
+
+    ships: list[ShipView]
+    """The nearest to a mission first"""
+    sources: list[TrafficSourceView]
+    """Empty: AIS is not set up, see the settings ais.*"""
+    malformed: int
+    """Sentences that could not be read"""
+    dropped: int
+    """Sentences that came faster than they can be read"""
+    turned_away: int
+    """Positions of ships there was no room for; near ones come before others"""
+    jumps: int
+    """Positions too far from where the ship had just been"""
+
+
 class Training(Model):
     """How the controller came about."""
 
@@ -1986,6 +2349,13 @@ class VehiclesMessage(Model):
     vehicles: list[VehicleView]
 
 
+class VolumeView(Model):
+    """A volume with its standard deviation, cubic metres."""
+
+    m3: float
+    sd_m3: float
+
+
 class WaypointView(Model):
     """One waypoint of one vehicle."""
 
@@ -2014,4 +2384,4 @@ class WaypointsMessage(Model):
     waypoints: list[WaypointView]
 
 
-LiveMessage: TypeAlias = SnapshotMessage | VehiclesMessage | TargetsMessage | SearchMessage | WaypointsMessage | StateMessage | MapMessage | EventMessage
+LiveMessage: TypeAlias = SnapshotMessage | VehiclesMessage | TargetsMessage | SearchMessage | WaypointsMessage | StateMessage | TrafficMessage | MapMessage | EventMessage | AlarmMessage

@@ -201,6 +201,84 @@ class Operations(ABC):
             models.MissionView,
         ))
 
+    def list_sites(self) -> list[models.SiteView]:
+        """List the sites: ``GET /sites``."""
+        return self._call(Call[list[models.SiteView]]("GET", "/sites", list[models.SiteView]))
+
+    def create_site(self, body: models.SiteSpec | Mapping[str, Any]) -> models.SiteView:
+        """Describe a site: ``POST /sites``."""
+        return self._call(Call[models.SiteView]("POST", "/sites", models.SiteView, body=body))
+
+    def get_site(self, site_id: str) -> models.SiteView:
+        """See a site: ``GET /sites/{site_id}``."""
+        return self._call(Call[models.SiteView]("GET", f"/sites/{part(site_id)}", models.SiteView))
+
+    def change_site(self, site_id: str, body: models.SiteChanges | Mapping[str, Any]) -> models.SiteView:
+        """Change a site: ``PATCH /sites/{site_id}``."""
+        return self._call(Call[models.SiteView]("PATCH", f"/sites/{part(site_id)}", models.SiteView, body=body))
+
+    def delete_site(self, site_id: str) -> None:
+        """Delete a site without surveys: ``DELETE /sites/{site_id}``."""
+        return self._call(Call[None]("DELETE", f"/sites/{part(site_id)}", None))
+
+    def list_surveys(self, site_id: str) -> list[models.SurveyView]:
+        """List a site's surveys: ``GET /sites/{site_id}/surveys``."""
+        return self._call(Call[list[models.SurveyView]](
+            "GET",
+            f"/sites/{part(site_id)}/surveys",
+            list[models.SurveyView],
+        ))
+
+    def get_site_map(self, site_id: str) -> models.SiteMapView:
+        """See a site's map: ``GET /sites/{site_id}/map``."""
+        return self._call(Call[models.SiteMapView]("GET", f"/sites/{part(site_id)}/map", models.SiteMapView))
+
+    def get_changes(
+        self,
+        site_id: str,
+        *,
+        from_: str | None = None,
+        to: str | None = None,
+        confidence: float | None = None,
+    ) -> models.ChangesView:
+        """See what changed between two surveys: ``GET /sites/{site_id}/changes``."""
+        return self._call(Call[models.ChangesView](
+            "GET",
+            f"/sites/{part(site_id)}/changes",
+            models.ChangesView,
+            query={"from": from_, "to": to, "confidence": confidence},
+        ))
+
+    def get_site_map_file(self, site_id: str, format: str) -> bytes:
+        """Download a site's map: ``GET /sites/{site_id}/map.{format}``."""
+        return self._call(Call[bytes]("GET", f"/sites/{part(site_id)}/map.{part(format)}", bytes))
+
+    def get_changes_file(
+        self,
+        site_id: str,
+        format: str,
+        *,
+        from_: str | None = None,
+        to: str | None = None,
+        confidence: float | None = None,
+    ) -> bytes:
+        """Download what changed between two surveys: ``GET /sites/{site_id}/changes.{format}``."""
+        return self._call(Call[bytes](
+            "GET",
+            f"/sites/{part(site_id)}/changes.{part(format)}",
+            bytes,
+            query={"from": from_, "to": to, "confidence": confidence},
+        ))
+
+    def set_site(self, mission_id: str, body: models.SiteChoice | Mapping[str, Any]) -> models.MissionView:
+        """Put a mission into a site: ``PUT /missions/{mission_id}/site``."""
+        return self._call(Call[models.MissionView](
+            "PUT",
+            f"/missions/{part(mission_id)}/site",
+            models.MissionView,
+            body=body,
+        ))
+
     def forecast_mission(self, mission_id: str, *, floor_depth_m: float | None = None) -> models.ForecastView:
         """Foretell a mission: ``POST /missions/{mission_id}/forecast``."""
         return self._call(Call[models.ForecastView](
@@ -416,6 +494,25 @@ class Operations(ABC):
     def delete_reference(self, mission_id: str) -> None:
         """Compare the map with nothing: ``DELETE /missions/{mission_id}/reference``."""
         return self._call(Call[None]("DELETE", f"/missions/{part(mission_id)}/reference", None))
+
+    def propose_zones(
+        self,
+        content: bytes,
+        *,
+        west_deg: float,
+        south_deg: float,
+        east_deg: float,
+        north_deg: float,
+        margin_m: float | None = None,
+    ) -> models.ProposedZonesView:
+        """Propose keep-out zones from a chart: ``POST /chart-zones``."""
+        return self._call(Call[models.ProposedZonesView](
+            "POST",
+            "/chart-zones",
+            models.ProposedZonesView,
+            content=content,
+            query={"west_deg": west_deg, "south_deg": south_deg, "east_deg": east_deg, "north_deg": north_deg, "margin_m": margin_m},
+        ))
 
     def get_map(
         self,
@@ -758,9 +855,40 @@ class Operations(ABC):
         """Say what is missing: ``GET /doctor``."""
         return self._call(Call[models.DoctorView]("GET", "/doctor", models.DoctorView))
 
+    def list_ships(self) -> models.TrafficView:
+        """List the ships about: ``GET /traffic``."""
+        return self._call(Call[models.TrafficView]("GET", "/traffic", models.TrafficView))
+
     def list_planners(self) -> list[models.PlannerView]:
         """List the planners: ``GET /planners``."""
         return self._call(Call[list[models.PlannerView]]("GET", "/planners", list[models.PlannerView]))
+
+    def list_alarms(
+        self,
+        *,
+        state: models.AlarmState | None = None,
+        mission: str | None = None,
+        limit: int | None = None,
+    ) -> list[models.AlarmReport]:
+        """List alarms: ``GET /alarms``."""
+        return self._call(Call[list[models.AlarmReport]](
+            "GET",
+            "/alarms",
+            list[models.AlarmReport],
+            query={"state": state, "mission": mission, "limit": limit},
+        ))
+
+    def test_alarm(self, body: models.AlarmTrial | Mapping[str, Any] | None = None) -> models.AlarmReport:
+        """Try who is told: ``POST /alarms/test``."""
+        return self._call(Call[models.AlarmReport]("POST", "/alarms/test", models.AlarmReport, body=body))
+
+    def get_alarm(self, alarm_id: str) -> models.AlarmReport:
+        """See an alarm: ``GET /alarms/{alarm_id}``."""
+        return self._call(Call[models.AlarmReport]("GET", f"/alarms/{part(alarm_id)}", models.AlarmReport))
+
+    def acknowledge_alarm(self, alarm_id: str) -> models.AlarmReport:
+        """Take an alarm: ``POST /alarms/{alarm_id}/acknowledge``."""
+        return self._call(Call[models.AlarmReport]("POST", f"/alarms/{part(alarm_id)}/acknowledge", models.AlarmReport))
 
     def list_audit(
         self,
@@ -994,6 +1122,84 @@ class AsyncOperations(ABC):
             models.MissionView,
         ))
 
+    async def list_sites(self) -> list[models.SiteView]:
+        """List the sites: ``GET /sites``."""
+        return await self._call(Call[list[models.SiteView]]("GET", "/sites", list[models.SiteView]))
+
+    async def create_site(self, body: models.SiteSpec | Mapping[str, Any]) -> models.SiteView:
+        """Describe a site: ``POST /sites``."""
+        return await self._call(Call[models.SiteView]("POST", "/sites", models.SiteView, body=body))
+
+    async def get_site(self, site_id: str) -> models.SiteView:
+        """See a site: ``GET /sites/{site_id}``."""
+        return await self._call(Call[models.SiteView]("GET", f"/sites/{part(site_id)}", models.SiteView))
+
+    async def change_site(self, site_id: str, body: models.SiteChanges | Mapping[str, Any]) -> models.SiteView:
+        """Change a site: ``PATCH /sites/{site_id}``."""
+        return await self._call(Call[models.SiteView]("PATCH", f"/sites/{part(site_id)}", models.SiteView, body=body))
+
+    async def delete_site(self, site_id: str) -> None:
+        """Delete a site without surveys: ``DELETE /sites/{site_id}``."""
+        return await self._call(Call[None]("DELETE", f"/sites/{part(site_id)}", None))
+
+    async def list_surveys(self, site_id: str) -> list[models.SurveyView]:
+        """List a site's surveys: ``GET /sites/{site_id}/surveys``."""
+        return await self._call(Call[list[models.SurveyView]](
+            "GET",
+            f"/sites/{part(site_id)}/surveys",
+            list[models.SurveyView],
+        ))
+
+    async def get_site_map(self, site_id: str) -> models.SiteMapView:
+        """See a site's map: ``GET /sites/{site_id}/map``."""
+        return await self._call(Call[models.SiteMapView]("GET", f"/sites/{part(site_id)}/map", models.SiteMapView))
+
+    async def get_changes(
+        self,
+        site_id: str,
+        *,
+        from_: str | None = None,
+        to: str | None = None,
+        confidence: float | None = None,
+    ) -> models.ChangesView:
+        """See what changed between two surveys: ``GET /sites/{site_id}/changes``."""
+        return await self._call(Call[models.ChangesView](
+            "GET",
+            f"/sites/{part(site_id)}/changes",
+            models.ChangesView,
+            query={"from": from_, "to": to, "confidence": confidence},
+        ))
+
+    async def get_site_map_file(self, site_id: str, format: str) -> bytes:
+        """Download a site's map: ``GET /sites/{site_id}/map.{format}``."""
+        return await self._call(Call[bytes]("GET", f"/sites/{part(site_id)}/map.{part(format)}", bytes))
+
+    async def get_changes_file(
+        self,
+        site_id: str,
+        format: str,
+        *,
+        from_: str | None = None,
+        to: str | None = None,
+        confidence: float | None = None,
+    ) -> bytes:
+        """Download what changed between two surveys: ``GET /sites/{site_id}/changes.{format}``."""
+        return await self._call(Call[bytes](
+            "GET",
+            f"/sites/{part(site_id)}/changes.{part(format)}",
+            bytes,
+            query={"from": from_, "to": to, "confidence": confidence},
+        ))
+
+    async def set_site(self, mission_id: str, body: models.SiteChoice | Mapping[str, Any]) -> models.MissionView:
+        """Put a mission into a site: ``PUT /missions/{mission_id}/site``."""
+        return await self._call(Call[models.MissionView](
+            "PUT",
+            f"/missions/{part(mission_id)}/site",
+            models.MissionView,
+            body=body,
+        ))
+
     async def forecast_mission(self, mission_id: str, *, floor_depth_m: float | None = None) -> models.ForecastView:
         """Foretell a mission: ``POST /missions/{mission_id}/forecast``."""
         return await self._call(Call[models.ForecastView](
@@ -1217,6 +1423,25 @@ class AsyncOperations(ABC):
     async def delete_reference(self, mission_id: str) -> None:
         """Compare the map with nothing: ``DELETE /missions/{mission_id}/reference``."""
         return await self._call(Call[None]("DELETE", f"/missions/{part(mission_id)}/reference", None))
+
+    async def propose_zones(
+        self,
+        content: bytes,
+        *,
+        west_deg: float,
+        south_deg: float,
+        east_deg: float,
+        north_deg: float,
+        margin_m: float | None = None,
+    ) -> models.ProposedZonesView:
+        """Propose keep-out zones from a chart: ``POST /chart-zones``."""
+        return await self._call(Call[models.ProposedZonesView](
+            "POST",
+            "/chart-zones",
+            models.ProposedZonesView,
+            content=content,
+            query={"west_deg": west_deg, "south_deg": south_deg, "east_deg": east_deg, "north_deg": north_deg, "margin_m": margin_m},
+        ))
 
     async def get_map(
         self,
@@ -1572,9 +1797,44 @@ class AsyncOperations(ABC):
         """Say what is missing: ``GET /doctor``."""
         return await self._call(Call[models.DoctorView]("GET", "/doctor", models.DoctorView))
 
+    async def list_ships(self) -> models.TrafficView:
+        """List the ships about: ``GET /traffic``."""
+        return await self._call(Call[models.TrafficView]("GET", "/traffic", models.TrafficView))
+
     async def list_planners(self) -> list[models.PlannerView]:
         """List the planners: ``GET /planners``."""
         return await self._call(Call[list[models.PlannerView]]("GET", "/planners", list[models.PlannerView]))
+
+    async def list_alarms(
+        self,
+        *,
+        state: models.AlarmState | None = None,
+        mission: str | None = None,
+        limit: int | None = None,
+    ) -> list[models.AlarmReport]:
+        """List alarms: ``GET /alarms``."""
+        return await self._call(Call[list[models.AlarmReport]](
+            "GET",
+            "/alarms",
+            list[models.AlarmReport],
+            query={"state": state, "mission": mission, "limit": limit},
+        ))
+
+    async def test_alarm(self, body: models.AlarmTrial | Mapping[str, Any] | None = None) -> models.AlarmReport:
+        """Try who is told: ``POST /alarms/test``."""
+        return await self._call(Call[models.AlarmReport]("POST", "/alarms/test", models.AlarmReport, body=body))
+
+    async def get_alarm(self, alarm_id: str) -> models.AlarmReport:
+        """See an alarm: ``GET /alarms/{alarm_id}``."""
+        return await self._call(Call[models.AlarmReport]("GET", f"/alarms/{part(alarm_id)}", models.AlarmReport))
+
+    async def acknowledge_alarm(self, alarm_id: str) -> models.AlarmReport:
+        """Take an alarm: ``POST /alarms/{alarm_id}/acknowledge``."""
+        return await self._call(Call[models.AlarmReport](
+            "POST",
+            f"/alarms/{part(alarm_id)}/acknowledge",
+            models.AlarmReport,
+        ))
 
     async def list_audit(
         self,
