@@ -121,7 +121,7 @@ class FailsafeWatch:
                 if one.ship.position.mmsi in now - begun:
                     words = f"{member.name}: {one.words}, too"
                     await self._live.journal.alarm(
-                        AlarmKind.TRAFFIC, words, failsafe=Failsafe.TRAFFIC, vehicle=member.name
+                        AlarmKind(Failsafe.TRAFFIC), words, failsafe=Failsafe.TRAFFIC, vehicle=member.name
                     )
         return {Failsafe.TRAFFIC: found[0].words} if found else {}
 
@@ -139,7 +139,7 @@ class FailsafeWatch:
             if since_s > -math.inf and now_s - since_s > most_s:
                 self._below_since_s[member.name] = -math.inf
                 words = f"{member.name} waited {most_s:.0f} s for ships to pass, and comes up"
-                await self._live.journal.alarm(AlarmKind.TRAFFIC, words, vehicle=member.name)
+                await self._live.journal.alarm(AlarmKind(Failsafe.TRAFFIC), words, vehicle=member.name)
         waited = self._below_since_s.get(member.name) == -math.inf
         if not waited and not self._live.ships.is_up(member):
             return found
