@@ -13,7 +13,7 @@ import numpy as np
 from numba import njit
 
 from app.arrays import FloatArray, IntArray
-from app.exploration.core.routes import Turns, Vehicles, turn_m
+from app.exploration.core.routes import Turns, Vehicles, fly
 
 BUCKETS_PER_SIDE = 12
 
@@ -144,27 +144,13 @@ def lower_to_route(
     count: int,
 ) -> float:
     """Lower ``d2`` to what it is after flying a route from ``start`` (2,), in place; return the metres left."""
-    x, y, course, before, leg = start[0], start[1], 0.5 * np.pi - heading, 0.0, np.inf
-    for k in range(count):
-        dx = route[k, 0] - x
-        dy = route[k, 1] - y
-        d = np.hypot(dx, dy)
-        if d < 1e-6:
-            continue
-        towards = np.arctan2(dy, dx)
-        if not np.isnan(course):
-            turn = (towards - course + np.pi) % (2.0 * np.pi) - np.pi
-            left_m -= turn_m(turn, before, leg, objective.turns)
-            before = turn
-        if left_m <= 0.0:
-            return 0.0
-        f = min(1.0, left_m / d)
-        lower_to_segment(d2, nodes, x, y, x + f * dx, y + f * dy, objective.reach_m)
-        left_m -= d
-        if left_m <= 0.0:
-            return 0.0
-        x, y, course, leg = route[k, 0], route[k, 1], towards, d
-    return left_m
+    ends = np.empty((count, 2))
+    legs, flown = fly(start[0], start[1], heading, left_m, route[:count], objective.turns, ends)
+    x, y = start
+    for k in range(legs):
+        lower_to_segment(d2, nodes, x, y, ends[k, 0], ends[k, 1], objective.reach_m)
+        x, y = ends[k]
+    return max(0.0, left_m - flown)
 
 
 @njit(cache=True, nogil=True, inline="always")
