@@ -125,42 +125,49 @@ def turn_m(turn: float, before: float, leg_m: float, turns: Turns) -> float:
     return float(extra + turns.corner_m if angle > SHARP_RAD else extra)
 
 
-@njit(cache=True, nogil=True)
-def fly(
-    x: float, y: float, heading: float, left_m: float, route: FloatArray, turns: Turns, ends: FloatArray
-) -> tuple[int, float]:
-    """Fly a route (k, 2) from (x, y) for at most ``left_m``, turns included; NaN heading: unknown.
+class Underway(NamedTuple):
+    """A vehicle on its route: where it is, its course (mathematical, NaN unknown), and how far it has flown.
 
-    ``ends`` (k, 2) is overwritten with where the legs end that are flown. Returns how many legs and metres these are.
+    ``turn`` is the turn at the start of its last leg, ``leg_m`` the length of that.
     """
-    flown, course, before, leg, legs = 0.0, 0.5 * np.pi - heading, 0.0, np.inf, 0
-    for k in range(len(route)):
-        dx = route[k, 0] - x
-        dy = route[k, 1] - y
-        d = np.hypot(dx, dy)
-        if d < 1e-6:
-            continue
-        towards = np.arctan2(dy, dx)
-        if not np.isnan(course):
-            turn = (towards - course + np.pi) % (2.0 * np.pi) - np.pi
-            flown += turn_m(turn, before, leg, turns)
-            before = turn
-        if flown >= left_m:
-            return legs, left_m
-        f = min(1.0, (left_m - flown) / d)
-        ends[legs, 0] = x + f * dx
-        ends[legs, 1] = y + f * dy
-        legs += 1
-        flown += d
-        if flown >= left_m:
-            return legs, left_m
-        x, y, course, leg = route[k, 0], route[k, 1], towards, d
-    return legs, flown
+
+    x: float
+    y: float
+    course: float
+    turn: float
+    leg_m: float
+    flown_m: float
 
 
+@njit(cache=True, nogil=True)
+def set_out(x: float, y: float, heading: float) -> Underway:
+    """Return a vehicle that begins its route at (x, y); NaN heading: unknown."""
+    return Underway(x, y, 0.5 * np.pi - heading, 0.0, np.inf, 0.0)
+
+
+@njit(cache=True, nogil=True)
+def after_leg(at: Underway, to_x: float, to_y: float, most_m: float, turns: Turns) -> tuple[Underway, float]:
+    """Return a vehicle after its next leg, and which part of that it flies before it has flown ``most_m`` in all."""
+    dx = to_x - at.x
+    dy = to_y - at.y
+    d = np.hypot(dx, dy)
+    if d < 1e-6:
+        return at, 0.0
+    course, turn, flown = np.arctan2(dy, dx), at.turn, at.flown_m
+    if not np.isnan(at.course):
+        turn = (course - at.course + np.pi) % (2.0 * np.pi) - np.pi
+        flown += turn_m(turn, at.turn, at.leg_m, turns)
+    part = max(0.0, min(1.0, (most_m - flown) / d))
+    return Underway(to_x, to_y, course, turn, d, min(flown + d, most_m)), part
+
+
+@njit(cache=True, nogil=True)
 def flown_m(x: float, y: float, heading: float, route: FloatArray, turns: Turns) -> float:
     """Return how far a vehicle flies from (x, y) along a route (k, 2), turns included; NaN heading: unknown."""
-    return float(fly(x, y, heading, np.inf, route, turns, np.empty((len(route), 2)))[1])
+    at = set_out(x, y, heading)
+    for k in range(len(route)):
+        at, _ = after_leg(at, route[k, 0], route[k, 1], np.inf, turns)
+    return at.flown_m
 
 
 def metres_left(team: Situation) -> FloatArray:

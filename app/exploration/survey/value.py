@@ -13,7 +13,7 @@ import numpy as np
 from numba import njit
 
 from app.arrays import FloatArray, IntArray
-from app.exploration.core.routes import Turns, Vehicles, fly
+from app.exploration.core.routes import Turns, Underway, Vehicles, after_leg, set_out
 
 BUCKETS_PER_SIDE = 12
 
@@ -133,6 +133,21 @@ def lower_to_segment(d2: FloatArray, nodes: Nodes, ax: float, ay: float, bx: flo
 
 
 @njit(cache=True, nogil=True)
+def lower_to_leg(
+    d2: FloatArray, nodes: Nodes, objective: SurveyObjective, at: Underway, to_x: float, to_y: float, most_m: float
+) -> Underway:
+    """Lower ``d2`` to what it is after a vehicle's next leg, in place; return the vehicle after it.
+
+    It ends where the vehicle has flown ``most_m`` in all.
+    """
+    after, part = after_leg(at, to_x, to_y, most_m, objective.turns)
+    if part > 0.0:
+        x, y = at.x + part * (to_x - at.x), at.y + part * (to_y - at.y)
+        lower_to_segment(d2, nodes, at.x, at.y, x, y, objective.reach_m)
+    return after
+
+
+@njit(cache=True, nogil=True)
 def lower_to_route(
     d2: FloatArray,
     nodes: Nodes,
@@ -144,13 +159,12 @@ def lower_to_route(
     count: int,
 ) -> float:
     """Lower ``d2`` to what it is after flying a route from ``start`` (2,), in place; return the metres left."""
-    ends = np.empty((count, 2))
-    legs, flown = fly(start[0], start[1], heading, left_m, route[:count], objective.turns, ends)
-    x, y = start
-    for k in range(legs):
-        lower_to_segment(d2, nodes, x, y, ends[k, 0], ends[k, 1], objective.reach_m)
-        x, y = ends[k]
-    return max(0.0, left_m - flown)
+    at = set_out(start[0], start[1], heading)
+    for k in range(count):
+        if at.flown_m >= left_m:
+            break
+        at = lower_to_leg(d2, nodes, objective, at, route[k, 0], route[k, 1], left_m)
+    return max(0.0, left_m - at.flown_m)
 
 
 @njit(cache=True, nogil=True, inline="always")
