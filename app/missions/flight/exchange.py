@@ -71,7 +71,11 @@ class LegExchange:
         if not self._may_be_flown(decisions, old, anew):
             planner.restore(memory)
             return False
-        await self._exchange(decisions[-1], old, anew)
+        try:
+            await self._exchange(decisions[-1], old, anew)
+        except BaseException:
+            planner.restore(memory)
+            raise
         return True
 
     def _open_legs(self, member: Member) -> list[CommittedLeg]:

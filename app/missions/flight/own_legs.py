@@ -143,7 +143,8 @@ class OwnLegs:
     async def _decide(self, getting: list[Member]) -> None:
         """Decide the next leg of some vehicles, and commit it."""
         live = self._live
-        if not self._watched and all(member.ordered for member in getting):
+        unhurried_s = 2.0 * DECISIONS_AHEAD * self._decider.takes_s
+        if not self._watched and all(self._lasts_s(member) > unhurried_s for member in getting):
             await self._exchange.look()
         names = {member.name for member in getting}
         numbers = {member.name: self._next_number(member) for member in getting}
