@@ -4,11 +4,11 @@
         [--only NAME,...] [--jobs 1] [--write]
 
 Every run is what ``bathyfleet evaluate survey --dynamics`` does: 2 vehicles with turning circles, each 600 m at
-1.3 m/s, legs of 10 m ahead, decisions that take half a second, noise of 1 % of the range. ``demo`` is the harbour with the seed
-of the run, ``floors`` those of the study (:mod:`.survey_study`), ``unseen`` generated ones of every family whose seeds
-nothing was chosen on. *ratio* is our RMSE over that of the best of three patterns; each of these has the better of two
-maps, and choosing the best of three afterwards has luck in it. *lasting* is our mean over the mean of the pattern that
-is best on average.
+1.3 m/s, legs of 10 m ahead, decisions that take half a second, noise of 1 % of the range. ``demo`` is the harbour with
+the seed of the run, ``floors`` those of the study (:mod:`.survey_study`), ``unseen`` generated ones of every family
+whose seeds nothing was chosen on. *ratio* is our RMSE over that of the best of three patterns; each of these has the
+better of two maps, and choosing the best of three afterwards has luck in it. *lasting* is our mean over the mean of the
+pattern that is best on average.
 """
 
 from collections.abc import Iterator, Sequence
